@@ -11,7 +11,7 @@ namespace {
 
 // Returns the active pairs of all contacts at q, with the velocities v of all degrees of freedom. Entries that
 // pairs of fewer vertices do not have are -1 and zero.
-py::dict touching_pairs(Model& model, const VectorXd& q, const VectorXd& v) {
+py::dict contact_pair_stiffness(Model& model, const VectorXd& q, const VectorXd& v) {
     std::vector<BodyContactTerm::ActiveContact> all;
     std::vector<FrictionLaw> laws;
     {
@@ -89,7 +89,7 @@ void register_body_contact(py::module_& module) {
         "at rest, if "
         "that is nearer than twice its reach and minimal distance: how far [m], and their faces in words.");
     module.def(
-        "touching_pairs", &touching_pairs, py::arg("model"), py::arg("q"), py::arg("v"),
+        "touching_pairs", &contact_pair_stiffness, py::arg("model"), py::arg("q"), py::arg("v"),
         "Pairs of bodies in contact: contacts (n,), pairs (n, 4), distances (n,) [m], normal_forces (n,) "
         "[N], "
         "forces (n, 4, 3) [N], weights (n, 4) of the difference of the closest points, normals (n, 3) on the "

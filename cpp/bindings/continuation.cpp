@@ -9,10 +9,10 @@
 namespace magshell::bindings {
 namespace {
 
-PathResult follow(Model& model, const VectorXd& start, const Model::Turns& turns, const Controls& from,
-                  const Controls& to, const PathOptions& options, const std::vector<Index>& entries,
-                  const py::object& until, const py::object& progress) {
-    const Varying varying(model.registry(), entries);
+PathResult follow(Model& model, const VectorXd& start, const Model::AngleBranches& turns,
+                  const Controls& from, const Controls& to, const PathOptions& options,
+                  const std::vector<Index>& entries, const py::object& until, const py::object& progress) {
+    const TimeVaryingParameters varying(model.registry(), entries);
     check_controls(model, varying, from, to);
     const Watch watch(progress);
     Until ends;
@@ -44,7 +44,7 @@ void register_continuation(py::module_& module) {
     py::class_<PathPoint>(module, "PathPoint")
         .def_readonly("state", &PathPoint::state)
         .def_readonly("parameter", &PathPoint::parameter)
-        .def_readonly("turns", &PathPoint::turns)
+        .def_readonly("turns", &PathPoint::angle_branches)
         .def_readonly("unstable_directions", &PathPoint::unstable_directions);
 
     py::enum_<CriticalKind>(module, "CriticalKind")

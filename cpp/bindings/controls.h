@@ -10,7 +10,7 @@ namespace magshell::bindings {
 
 /// Throws InvalidInput unless both ends of a load path have as many numbers as the model's load parameters and
 /// varying parameters.
-inline void check_controls(const Model& model, const Varying& varying, const Controls& from,
+inline void check_controls(const Model& model, const TimeVaryingParameters& varying, const Controls& from,
                            const Controls& to) {
     const Index width = model.registry().controls.size() + varying.size();
     if (from.size() != width || to.size() != width)

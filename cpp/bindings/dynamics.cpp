@@ -24,7 +24,8 @@ Tableau tableau_of(const std::string& name) {
 // Converts load parameters with one row per time point.
 using Knots = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-std::vector<Controls> controls_of(const Model& model, const Varying& varying, const Array& rows) {
+std::vector<Controls> controls_of(const Model& model, const TimeVaryingParameters& varying,
+                                  const Array& rows) {
     const Index width = model.registry().controls.size() + varying.size();
     if (rows.ndim() != 2 || rows.shape(1) != width)
         throw InvalidInput("controls must have one row per time point, of " + std::to_string(width) +
@@ -70,7 +71,7 @@ MotionInput input_of(Model& model, const py::dict& given) {
     MotionInput input;
     input.start.q = to_vector(array("state"));
     input.start.v = to_vector(array("velocity"));
-    input.start.turns = given["turns"].cast<Model::Turns>();
+    input.start.angle_branches = given["turns"].cast<Model::AngleBranches>();
     input.inertia = {model.bodies().vertex_weights(to_vector(array("mass"))),
                      model.bodies().vertex_weights(to_vector(array("damping")))};
     input.start.e = strains_of(model, given["maxwell_strains"].cast<Array>());
@@ -86,7 +87,7 @@ MotionInput input_of(Model& model, const py::dict& given) {
     input.tableau = tableau_of(given["integrator"].cast<std::string>());
     input.time_step = given["time_step"].cast<double>();
     input.steps = given["steps"].cast<Index>();
-    input.varying = Varying(model.registry(), given["varying"].cast<std::vector<Index>>());
+    input.varying = TimeVaryingParameters(model.registry(), given["varying"].cast<std::vector<Index>>());
     input.controls = controls_of(model, input.varying, array("controls"));
     input.newton = given["newton"].cast<NewtonOptions>();
     if (const py::object projective = given["projective"]; !projective.is_none()) {
@@ -134,10 +135,10 @@ Array directions_of(const MotionResult& motion, const Model& model) {
 
 // Returns the motor forces of the recorded states, (n, m); NaN in states that no step led to.
 Knots driving_of(const MotionResult& motion) {
-    const Eigen::Index n = static_cast<Eigen::Index>(motion.recorded.size()), m = motion.last.driving.size();
+    const Eigen::Index n = static_cast<Eigen::Index>(motion.recorded.size()), m = motion.last.motor_forces.size();
     Knots rows = Knots::Constant(n, m, std::numeric_limits<double>::quiet_NaN());
     for (Eigen::Index k = 0; k < n; ++k)
-        if (motion.recorded[k].driving.size() == m) rows.row(k) = motion.recorded[k].driving.transpose();
+        if (motion.recorded[k].motor_forces.size() == m) rows.row(k) = motion.recorded[k].motor_forces.transpose();
     return rows;
 }
 
@@ -145,7 +146,7 @@ Knots driving_of(const MotionResult& motion) {
 // which they were given; NaN in states that no step led to.
 Array held_forces_of(const MotionResult& motion, const Model& model) {
     const py::ssize_t n = static_cast<py::ssize_t>(motion.recorded.size());
-    const VectorXd none = model.reduction().held(VectorXd::Zero(model.size()));
+    const VectorXd none = model.dof_map().along_supports(VectorXd::Zero(model.size()));
     const py::ssize_t size = none.size();
     Array rows({n, size / 3, py::ssize_t{3}});
     for (py::ssize_t k = 0; k < n; ++k) {
@@ -172,7 +173,7 @@ py::list largest_strains(const MotionResult& motion, const Model& model, const V
     return rows;
 }
 
-MotionResult run(Model& model, const MotionInput& input, bool gradients, std::size_t budget, Keep keep,
+MotionResult run(Model& model, const MotionInput& input, bool gradients, std::size_t budget, AdjointStorage keep,
                  const py::object& progress) {
     const Watch watch(progress);
     const py::gil_scoped_release unlocked;
@@ -195,14 +196,14 @@ py::dict back(Model& model, const MotionInput& input, const MotionResult& motion
         const VectorXd rotations = Eigen::Map<const VectorXd>(by_edge_rotations.data() + k * n_e, n_e);
         by.q.push_back(model.bodies().gradient_by_state(rows(by_positions), rotations));
         by.v.push_back(model.bodies().gradient_by_state(rows(by_velocities), no_rotations));
-        if (by_driving.size() > 0) by.driving.push_back(by_driving.row(k).transpose());
+        if (by_driving.size() > 0) by.motor_forces.push_back(by_driving.row(k).transpose());
     }
     MotionGradient gradient;
     {
         const py::gil_scoped_release unlocked;
         const std::lock_guard lock(model.in_use());
         gradient =
-            pull_back(model, input, motion, by, [&](double at, double residual) { watch(at, residual); });
+            motion_vjp(model, input, motion, by, [&](double at, double residual) { watch(at, residual); });
     }
     py::dict result;
     result["values"] = values_to_user(model, gradient.values);
@@ -227,11 +228,11 @@ void register_dynamics(py::module_& module) {
     py::class_<MotionInput>(module, "MotionInput")
         .def(py::init(&input_of), py::arg("model"), py::arg("given"));
 
-    py::enum_<Keep>(module, "Keep")
-        .value("nothing", Keep::nothing)
-        .value("checkpoints", Keep::checkpoints)
-        .value("stages", Keep::stages)
-        .value("factors", Keep::factors);
+    py::enum_<AdjointStorage>(module, "Keep")
+        .value("nothing", AdjointStorage::nothing)
+        .value("checkpoints", AdjointStorage::checkpoints)
+        .value("stages", AdjointStorage::stages)
+        .value("factors", AdjointStorage::factors);
 
     py::class_<MotionResult>(module, "MotionResult")
         .def_readonly("outcome", &MotionResult::outcome)
@@ -247,13 +248,13 @@ void register_dynamics(py::module_& module) {
              [](const MotionResult& r, const Model& m) { return numbers_of(m, r.last.rates.elastic.d); })
         .def("last_maxwell_strain_rates",
              [](const MotionResult& r, const Model& m) { return numbers_of(m, r.last.rates.elastic.e); })
-        .def_property_readonly("last_turns", [](const MotionResult& r) { return r.last.turns; })
+        .def_property_readonly("last_turns", [](const MotionResult& r) { return r.last.angle_branches; })
         .def_readonly("kinetic_energy", &MotionResult::kinetic_energy)
         .def_readonly("energies", &MotionResult::energies)
         .def_property_readonly("halved",
                                [](const MotionResult& r) {
                                    std::map<Index, std::vector<std::tuple<double, double, bool>>> all;
-                                   for (const auto& [step, substeps] : r.halved)
+                                   for (const auto& [step, substeps] : r.substeps)
                                        for (const Substep& each : substeps)
                                            all[step].emplace_back(each.begin, each.end, each.dissipative);
                                    return all;

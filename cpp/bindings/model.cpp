@@ -10,7 +10,7 @@
 #include "bindings/scene_input.h"
 #include "bindings/strains.h"
 #include "magshell/core/errors.h"
-#include "magshell/solve/small_deflection.h"
+#include "magshell/solve/linear_response.h"
 
 namespace magshell::bindings {
 namespace {
@@ -45,12 +45,12 @@ py::dict energies(const Model& model, const VectorXd& q, const Controls& control
 }
 
 // Returns [(name, J)] for each term; terms of the same name, of several bodies, are consecutive.
-py::list term_energies(Model& model, const VectorXd& q, const Model::Turns& turns, const Controls& controls) {
+py::list term_energies(Model& model, const VectorXd& q, const Model::AngleBranches& turns, const Controls& controls) {
     std::vector<std::pair<std::string_view, double>> of_terms;
     {
         const py::gil_scoped_release unlocked;
         const std::lock_guard lock(model.in_use());
-        model.set_turns(turns);
+        model.set_angle_branches(turns);
         of_terms = model.energies(q, controls);
     }
     py::list energies;
@@ -72,8 +72,8 @@ py::tuple hessian(Model& model, const VectorXd& q, const Controls& controls, boo
         model.require_symmetric();
         if (reduced) {
             model.reduce_matrix(values);
-            model.reduction().add_curvature(model.residual().gradient, values);
-            pattern = *model.reduction().pattern();
+            model.dof_map().add_curvature(model.residual().gradient, values);
+            pattern = *model.dof_map().pattern();
         } else {
             merge(model.matrix(), model.contact_matrix(), pattern.column_starts, pattern.rows, values);
         }
@@ -86,10 +86,10 @@ py::tuple hessian(Model& model, const VectorXd& q, const Controls& controls, boo
 std::vector<Index> recut_faces(const Model& model) {
     std::vector<Index> faces;
     Index first = 0;  // first face of a body in the numbering of all
-    for (Index body = 0; body < static_cast<Index>(model.bodies().sheets().size()); ++body) {
-        const Sheet& sheet = *model.bodies().sheets()[body];
+    for (Index body = 0; body < static_cast<Index>(model.bodies().shells().size()); ++body) {
+        const Shell& sheet = *model.bodies().shells()[body];
         for (Index f = 0; f < sheet.n_faces(); ++f)
-            if (model.membrane_faces(body).shares(f)[1].part > 0.0)
+            if (model.membrane_faces(body).parts(f)[1].part > 0.0)
                 faces.push_back(first + sheet.faces.user[f]);
         first += sheet.n_faces();
     }
@@ -152,21 +152,21 @@ void register_model(py::module_& module) {
                 return rows;
             },
             "Where each free unknown is at rest (n, 3) [m]: its vertex, or the middle of its edge.")
-        .def_property_readonly("free_size", [](const Model& m) { return m.reduction().size(); })
+        .def_property_readonly("free_size", [](const Model& m) { return m.dof_map().size(); })
         .def_property_readonly("bytes", &Model::bytes)
         .def_property_readonly("n_strains", [](const Model& m) { return m.elastic().size(); })
         .def("rest_state", [](const Model& m) { return m.bodies().rest_state(); })
         .def("state",
              [](const Model& m, const Array& x, const Array& r) {
                  VectorXd q = m.bodies().state(to_rows3(x), to_vector(r));
-                 m.reduction().settle(q, nullptr);
+                 m.dof_map().project_state(q, nullptr);
                  return q;
              })
         .def(
             "settled_velocity",
             [](const Model& m, const VectorXd& q, VectorXd v) {
                 VectorXd at = q;
-                m.reduction().settle(at, &v);
+                m.dof_map().project_state(at, &v);
                 return v;
             },
             "Velocities of all unknowns, with those of rigid parts as their vertices say.")
@@ -181,19 +181,19 @@ void register_model(py::module_& module) {
         .def("edge_rotations", [](const Model& m, const VectorXd& q) { return m.bodies().edge_rotations(q); })
         .def("principal_strains", &strains_at, py::arg("q"), py::arg("thickness"))
         .def("largest_strains", &largest_at, py::arg("q"), py::arg("thickness"))
-        .def("expand", [](const Model& m, const VectorXd& reduced) { return m.reduction().expand(reduced); })
-        .def("reduce", [](const Model& m, const VectorXd& full) { return m.reduction().vector(full); })
+        .def("expand", [](const Model& m, const VectorXd& reduced) { return m.dof_map().expand(reduced); })
+        .def("reduce", [](const Model& m, const VectorXd& full) { return m.dof_map().vector(full); })
         .def(
             "free_weights",
             [](const Model& m, const Array& of_vertices) {
-                return m.reduction().weights(m.bodies().vertex_weights(to_vector(of_vertices)));
+                return m.dof_map().weights(m.bodies().vertex_weights(to_vector(of_vertices)));
             },
             "Masses, say, of the caller's vertices (n_v,) among the free unknowns; zero elsewhere.")
         .def(
             "free_weight_values",
             [](const Model& m, const Array& of_points) {
-                LargeVector<double> values(m.reduction().pattern()->rows.size(), 0.0);
-                m.reduction().add_weights(m.bodies().vertex_weights(to_vector(of_points)), values);
+                LargeVector<double> values(m.dof_map().pattern()->rows.size(), 0.0);
+                m.dof_map().add_weights(m.bodies().vertex_weights(to_vector(of_points)), values);
                 return py::array_t<double>(values.size(), values.data());
             },
             "The same as a matrix, in the places of hessian(): with rigid parts it is no diagonal. At the "
@@ -202,7 +202,7 @@ void register_model(py::module_& module) {
         .def(
             "driven_increment",
             [](const Model& m, const VectorXd& q, const Controls& controls) {
-                return m.reduction().prescribed_increment(q, controls);
+                return m.dof_map().prescribed_increment(q, controls);
             },
             py::arg("q"), py::arg("controls"),
             "How far from a state what motors and supports prescribe at these controls is, of all unknowns, "
@@ -210,7 +210,7 @@ void register_model(py::module_& module) {
             "elsewhere.")
         .def(
             "prescribed_rate",
-            [](const Model& m, const Controls& controls) { return m.reduction().prescribed_rate(controls); },
+            [](const Model& m, const Controls& controls) { return m.dof_map().prescribed_rate(controls); },
             "d(all unknowns)/d(progress) of what moving supports hold; zero elsewhere.")
         .def("energy", &Model::energy, py::call_guard<py::gil_scoped_release>())
         .def_property_readonly("term_names",
@@ -223,7 +223,8 @@ void register_model(py::module_& module) {
         .def("energies", &energies)
         .def("term_energies", &term_energies, "[(name, J)] of each term, at a state with these turns.",
              py::arg("q"), py::arg("turns"), py::arg("controls"))
-        .def("refusal", &Model::refusal, "What is wrong with a state, in words; empty where nothing is.",
+        .def("refusal", &Model::invalid_state_reason,
+             "What is wrong with a state, in words; empty where nothing is.",
              py::call_guard<py::gil_scoped_release>())
         .def(
             "gradient",
@@ -235,22 +236,22 @@ void register_model(py::module_& module) {
             py::call_guard<py::gil_scoped_release>())
         .def(
             "driving",
-            [](Model& model, const VectorXd& q, const Controls& controls, const Model::Turns& turns) {
+            [](Model& model, const VectorXd& q, const Controls& controls, const Model::AngleBranches& turns) {
                 const std::lock_guard lock(model.in_use());
-                model.set_turns(turns);
+                model.set_angle_branches(turns);
                 model.evaluate(q, controls);
-                return model.reduction().driving(model.residual().gradient);
+                return model.dof_map().motor_forces(model.residual().gradient);
             },
             py::arg("q"), py::arg("controls"), py::arg("turns"),
             "What the motors of joints do in an equilibrium q, N and N m, one after another.",
             py::call_guard<py::gil_scoped_release>())
         .def(
             "held_forces",
-            [](Model& model, const VectorXd& q, const Model::Turns& turns, const Controls& controls) {
+            [](Model& model, const VectorXd& q, const Model::AngleBranches& turns, const Controls& controls) {
                 const std::lock_guard lock(model.in_use());
-                model.set_turns(turns);
+                model.set_angle_branches(turns);
                 model.evaluate(q, controls);
-                return model.reduction().held(model.residual().gradient);
+                return model.dof_map().along_supports(model.residual().gradient);
             },
             "(3 m,) [N], with which supports pull at the held nodes of a scene at rest.", py::arg("q"),
             py::arg("turns"), py::arg("controls"), py::call_guard<py::gil_scoped_release>())
@@ -269,7 +270,7 @@ void register_model(py::module_& module) {
                 const std::lock_guard lock(model.in_use());
                 const LowRank& rest = model.low_rank();
                 return py::make_tuple(
-                    reduced ? rest.reduced(model.reduction(), model.size()) : rest.columns(model.size()),
+                    reduced ? rest.reduced(model.dof_map(), model.size()) : rest.columns(model.size()),
                     rest.stiffness());
             },
             py::arg("reduced") = true,

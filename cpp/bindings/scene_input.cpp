@@ -16,8 +16,8 @@ std::vector<DirectedEdge> directed_edges(const IndexArray& pairs) {
     return edges;
 }
 
-std::vector<HeldNode> held_nodes(const IndexArray& nodes, const Array& frames) {
-    std::vector<HeldNode> held;
+std::vector<PrescribedNode> held_nodes(const IndexArray& nodes, const Array& frames) {
+    std::vector<PrescribedNode> held;
     for (py::ssize_t k = 0; k < nodes.shape(0); ++k) {
         Mat3 frame;
         for (int r = 0; r < 3; ++r)
@@ -73,10 +73,10 @@ GrowthForm growth_of(const py::handle& sheet) {
     return {form("growth"), form("rest_curvature")};
 }
 
-std::vector<SheetInput> sheets_of(const py::list& given) {
-    std::vector<SheetInput> sheets;
+std::vector<ShellInput> sheets_of(const py::list& given) {
+    std::vector<ShellInput> sheets;
     for (const py::handle each : given) {
-        SheetInput& sheet = sheets.emplace_back();
+        ShellInput& sheet = sheets.emplace_back();
         sheet.owner = each["owner"].cast<std::string>();
         sheet.mesh = each["mesh"].cast<std::shared_ptr<TriangleMesh>>();
         sheet.vertices = each["vertices"].cast<std::vector<Index>>();
@@ -89,10 +89,10 @@ std::vector<SheetInput> sheets_of(const py::list& given) {
     return sheets;
 }
 
-std::vector<SixNodeSheetInput> six_node_sheets_of(const py::list& given) {
-    std::vector<SixNodeSheetInput> sheets;
+std::vector<SixNodeShellInput> six_node_sheets_of(const py::list& given) {
+    std::vector<SixNodeShellInput> sheets;
     for (const py::handle each : given) {
-        SixNodeSheetInput& sheet = sheets.emplace_back();
+        SixNodeShellInput& sheet = sheets.emplace_back();
         sheet.owner = each["owner"].cast<std::string>();
         sheet.mesh.rest_positions = to_rows3(each["rest_positions"].cast<Array>());
         const IndexArray faces = each["faces"].cast<IndexArray>();
@@ -175,8 +175,8 @@ SceneInput scene_input(const py::kwargs& given) {
     SceneInput input;
     input.n_vertices = given["n_vertices"].cast<Index>();
     input.original = given["original"].cast<std::vector<Index>>();
-    input.sheets = sheets_of(given["sheets"]);
-    input.six_node_sheets = six_node_sheets_of(given["six_node_sheets"]);
+    input.shells = sheets_of(given["sheets"]);
+    input.six_node_shells = six_node_sheets_of(given["six_node_sheets"]);
     input.solids = solids_of(given["solids"]);
     input.skins = skins_of(given["skins"]);
     input.muscles = muscles_of(given["muscles"]);

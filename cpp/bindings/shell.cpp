@@ -1,6 +1,6 @@
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
-#include "magshell/scene/sheet_stresses.h"
+#include "magshell/scene/shell_stresses.h"
 
 namespace magshell::bindings {
 namespace {
@@ -9,7 +9,7 @@ py::tuple stresses_of(const Model& model, Index sheet, const VectorXd& q) {
     std::vector<FaceStress> faces;
     {
         const py::gil_scoped_release unlocked;
-        faces = sheet_stresses(model, sheet, q);
+        faces = shell_stresses(model, sheet, q);
     }
     const auto tensors = [&](Mat3 FaceStress::* which) {
         std::vector<Mat3> rows;
@@ -24,7 +24,7 @@ py::tuple stresses_of(const Model& model, Index sheet, const VectorXd& q) {
 
 void register_sheet(py::module_& module) {
     module.def(
-        "sheet_stresses", &stresses_of, py::arg("model"), py::arg("sheet"), py::arg("q"),
+        "shell_stresses", &stresses_of, py::arg("model"), py::arg("sheet"), py::arg("q"),
         "(Green's strain, change of curvature [1/m], membrane force [N/m], bending moment [N]) of a sheet's "
         "faces at rest, in world axes: (n_f, 3, 3) each.");
 }

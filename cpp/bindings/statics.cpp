@@ -4,17 +4,17 @@
 #include "bindings/arrays.h"
 #include "bindings/controls.h"
 #include "bindings/watch.h"
+#include "magshell/solve/linear_response.h"
 #include "magshell/solve/modes.h"
-#include "magshell/solve/response.h"
 
 namespace magshell::bindings {
 namespace {
 
-StaticsResult solve(Model& model, const VectorXd& start, const Model::Turns& turns, const Controls& from,
-                    const Controls& to, const StaticsOptions& options, const py::object& progress,
-                    const std::vector<Index>& entries) {
+StaticsResult solve(Model& model, const VectorXd& start, const Model::AngleBranches& turns,
+                    const Controls& from, const Controls& to, const StaticsOptions& options,
+                    const py::object& progress, const std::vector<Index>& entries) {
     const Watch watch(progress);
-    const Varying varying(model.registry(), entries);
+    const TimeVaryingParameters varying(model.registry(), entries);
     check_controls(model, varying, from, to);
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());
@@ -31,7 +31,7 @@ VectorXd change(Model& model, const StaticsResult& equilibrium, const Controls& 
 
 // Returns the lowest eigenmodes of all degrees of freedom about an equilibrium, their eigenvalues [N/m3], and
 // the number of negative ones.
-py::tuple lowest_modes(Model& model, const VectorXd& state, const Model::Turns& turns,
+py::tuple lowest_modes(Model& model, const VectorXd& state, const Model::AngleBranches& turns,
                        const Controls& controls, int count, const py::object& progress) {
     const Watch watch(progress);
     std::vector<Mode> modes;
@@ -39,7 +39,7 @@ py::tuple lowest_modes(Model& model, const VectorXd& state, const Model::Turns& 
     {
         const py::gil_scoped_release unlocked;
         const std::lock_guard lock(model.in_use());
-        model.set_turns(turns);
+        model.set_angle_branches(turns);
         Newton newton(model, {}, [&](double residual) { watch(1.0, residual); });
         const FactorReport report = newton.factorize_at(state, controls);
         negative = report.negative_pivots;
@@ -60,9 +60,9 @@ VectorXd moved(Model& model, const VectorXd& state, const VectorXd& step) {
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());
     model.linearize(state);
-    const double share = model.has_body_contact() ? 0.9 * model.largest_share(state, step) : 1.0;
+    const double share = model.has_body_contact() ? 0.9 * model.max_step_length(state, step) : 1.0;
     VectorXd there = state;
-    model.reduction().advance(there, share * step);
+    model.dof_map().retract(there, share * step);
     return there;
 }
 
@@ -97,13 +97,13 @@ void register_statics(py::module_& module) {
         .def_readonly("state", &FailedAttempt::state)
         .def_readonly("controls", &FailedAttempt::controls)
         .def_readonly("shortest_step", &FailedAttempt::shortest_step)
-        .def_readonly("last_move", &FailedAttempt::last_move)
-        .def_readonly("falling", &FailedAttempt::falling);
+        .def_readonly("last_move", &FailedAttempt::last_displacement)
+        .def_readonly("falling", &FailedAttempt::descent_direction);
 
     py::class_<StaticsResult>(module, "StaticsResult")
         .def_readonly("outcome", &StaticsResult::outcome)
         .def_readonly("state", &StaticsResult::state)
-        .def_readonly("turns", &StaticsResult::turns)
+        .def_readonly("turns", &StaticsResult::angle_branches)
         .def_readonly("controls", &StaticsResult::controls)
         .def_readonly("progress", &StaticsResult::progress)
         .def_readonly("reason", &StaticsResult::reason)
@@ -113,7 +113,7 @@ void register_statics(py::module_& module) {
         .def_readonly("failed_factorizations", &StaticsResult::failed_factorizations)
         .def_readonly("load_steps", &StaticsResult::load_steps)
         .def_readonly("relaxation_steps", &StaticsResult::relaxation_steps)
-        .def_readonly("saddles_left", &StaticsResult::saddles_left)
+        .def_readonly("saddles_left", &StaticsResult::saddles_escaped)
         .def_readonly("residual", &StaticsResult::residual)
         .def_readonly("at_roundoff", &StaticsResult::at_roundoff)
         .def_readonly("stable", &StaticsResult::stable)

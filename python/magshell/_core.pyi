@@ -65,7 +65,7 @@ __all__: list[str] = [
     "pull_back_motion",
     "sample_fields",
     "set_num_threads",
-    "sheet_stresses",
+    "shell_stresses",
     "simulate",
     "solid_point_states",
     "touching_pairs",
@@ -1141,7 +1141,7 @@ def sample_fields(
     """
 
 def set_num_threads(count: typing.SupportsInt | typing.SupportsIndex) -> None: ...
-def sheet_stresses(
+def shell_stresses(
     model: Model,
     sheet: typing.SupportsInt | typing.SupportsIndex,
     q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],

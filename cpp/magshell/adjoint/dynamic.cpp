@@ -2,16 +2,16 @@
 
 #include <algorithm>
 
-#include "magshell/adjoint/stretches.h"
+#include "magshell/adjoint/checkpointed_reverse.h"
 #include "magshell/adjoint/viscous.h"
 #include "magshell/core/errors.h"
-#include "magshell/solve/driven_end.h"
-#include "magshell/solve/rotations.h"
+#include "magshell/solve/edge_rotations.h"
+#include "magshell/solve/motor_reactions.h"
 
 namespace magshell {
 namespace {
 
-// What is viscous, stage by stage: elastic terms, and dampers in joints.
+// The adjoints of the viscous parts of a step: of elastic terms, and of joint dampers.
 struct Viscous {
     ViscousAdjoint strains, joints;
 };
@@ -33,10 +33,10 @@ class Backward {
     }
 
     MotionGradient run() {
-        take_in(motion_.steps_done);
+        add_state_gradient(motion_.steps_done);
         Index end = motion_.steps_done;
         for (std::size_t k = motion_.steps.size(); k-- > 0;) back(--end, motion_.steps[k]);
-        const Stretches stretches(
+        const CheckpointedReverse stretches(
             motion_.leaf, [this](Index begin, Index end, MotionState& state) { forward(begin, end, state); },
             [this](Index begin, Index end, const MotionState& state) { leaf(begin, end, state); });
         Index free = motion_.slots - static_cast<Index>(motion_.checkpoints.size()) + 1;
@@ -45,7 +45,8 @@ class Backward {
             end = std::min(end, at->first);
         }
         back_to_start();
-        model_.reduction().settle_vjp(motion_.start.q, motion_.start.v, g_.positions, g_.velocities, scene_);
+        model_.dof_map().project_state_vjp(motion_.start.q, motion_.start.v, g_.positions, g_.velocities,
+                                           scene_);
         g_.values = std::move(scene_.values);
         g_.factorizations = newton_.factorizations();
         return std::move(g_);
@@ -56,39 +57,40 @@ class Backward {
   private:
     void forward(Index begin, Index end, MotionState& state) {
         for (Index step = begin; step < end; ++step)
-            repeat_step(stepper_, input_, step, substeps_of(motion_.halved, step), state, nullptr);
+            repeat_step(stepper_, input_, step, substeps_of(motion_.substeps, step), state, nullptr);
     }
 
     void leaf(Index begin, Index end, MotionState state) {
         std::vector<std::vector<SubstepRecord>> steps(end - begin);
         for (Index step = begin; step < end; ++step)
-            repeat_step(stepper_, input_, step, substeps_of(motion_.halved, step), state,
+            repeat_step(stepper_, input_, step, substeps_of(motion_.substeps, step), state,
                         &steps[step - begin]);
         for (Index step = end - 1; step >= begin; --step) back(step, steps[step - begin]);
     }
 
     void back(Index step, const std::vector<SubstepRecord>& records) {
         progress_ = 1.0 - static_cast<double>(step + 1) / static_cast<double>(motion_.steps_done);
-        const Substeps substeps = substeps_of(motion_.halved, step);
+        const Substeps substeps = substeps_of(motion_.substeps, step);
         for (std::size_t k = substeps.size(); k-- > 0;)
-            back(step, substeps[k], records[k], k + 1 == substeps.size() ? by_driving(step + 1) : VectorXd());
-        take_in(step);
+            back(step, substeps[k], records[k],
+                 k + 1 == substeps.size() ? by_motor_forces(step + 1) : VectorXd());
+        add_state_gradient(step);
     }
 
-    // What the loss says of the motors' forces in the state that so many steps led to; empty where it says nothing.
-    VectorXd by_driving(Index steps) const {
-        if (by_.driving.empty() || steps % input_.record_every != 0) return {};
-        const VectorXd& by = by_.driving[steps / input_.record_every];
+    // Returns the gradient by the motor forces in the state after this number of steps; empty if the loss does not depend on them.
+    VectorXd by_motor_forces(Index steps) const {
+        if (by_.motor_forces.empty() || steps % input_.record_every != 0) return {};
+        const VectorXd& by = by_.motor_forces[steps / input_.record_every];
         return by.isZero(0.0) ? VectorXd() : by;
     }
 
-    // By what a stage, or the state beside it where motors are looked at, started from.
+    // The gradient by the start of a stage, or of the nearby state at which motor forces are evaluated.
     struct BeforeStage {
         VectorXd x_hat, v_hat;
         double dt = 0.0;
     };
 
-    // What lambda says, at a state with these rates, of inertia, of forces, and of where the stage started from.
+    // Adds the contribution of lambda, at a state with these rates, to the gradients by inertia, by forces, and by the start of the stage.
     void through_rates(const StepAlgebra& algebra, const VectorXd& lambda,
                        const KinematicsGradient& by_forces, const VectorXd& v, const VectorXd& w,
                        BeforeStage& by) {
@@ -97,7 +99,7 @@ class Backward {
         const VectorXd accelerated = lambda.cwiseProduct(w), moved = lambda.cwiseProduct(v);
         g_.mass += accelerated;
         g_.damping += moved;
-        // d/dt of M (x - x^ - a dt v^)/(a dt)^2 + Gamma (x - x^)/(a dt), with x^ and v^ fixed
+        // The derivative by dt of M (x - x^ - a dt v^)/(a dt)^2 + Gamma (x - x^)/(a dt) at constant x^ and v^.
         by.dt -= (mass.dot(accelerated + moved / adt) + damping.dot(moved)) / dt;
         by.x_hat -= algebra.weights().cwiseProduct(lambda);
         by.v_hat -= mass.cwiseProduct(lambda) / adt;
@@ -109,10 +111,11 @@ class Backward {
         g_.positions -= by_forces.begin;
     }
 
-    void back(Index step, const Substep& substep, const SubstepRecord& record, const VectorXd& by_driving) {
-        const double share = substep.share();
+    void back(Index step, const Substep& substep, const SubstepRecord& record,
+              const VectorXd& by_motor_forces) {
+        const double fraction = substep.fraction();
         const StepAlgebra algebra = stepper_.algebra(
-            share * input_.time_step, stepper_.tableau_from(record.begin, substep.dissipative));
+            fraction * input_.time_step, stepper_.tableau_from(record.begin, substep.dissipative));
         const Tableau& tableau = algebra.tableau();
         const int n = tableau.stages, first = tableau.begins_explicitly ? 1 : 0;
         const double dt = algebra.dt(), adt = algebra.stage_time();
@@ -124,7 +127,7 @@ class Backward {
         by_v.back() = std::move(g_.velocities);
         if (by_w_.size() > 0) by_w.back() = std::move(by_w_);
         g_.positions = g_.velocities = VectorXd::Zero(model_.size());
-        const std::vector<Controls> controls = controls_of(input_, tableau, step, substep);
+        const std::vector<Controls> controls = stage_controls(input_, tableau, step, substep);
         Viscous viscous{
             {model_, model_.elastic(), input_.viscosity, &StageRates::elastic, algebra, record, controls,
              by_strains_},
@@ -133,8 +136,8 @@ class Backward {
         const VectorXd by_earlier = std::move(by_v_before_);
         by_v_before_ = VectorXd();
         BeforeStage by_end{VectorXd::Zero(model_.size()), VectorXd::Zero(model_.size())};
-        if (by_driving.size() > 0)
-            back_through_motors(algebra, at, record, step, substep, by_driving, viscous, by_v.back(),
+        if (by_motor_forces.size() > 0)
+            back_through_motors(algebra, at, record, step, substep, by_motor_forces, viscous, by_v.back(),
                                 by_w.back(), by_end);
         for (int i = n - 1; i >= 0; --i) {
             const VectorXd &v = at.all[first + i].v, &w = at.all[first + i].w;
@@ -167,13 +170,13 @@ class Backward {
             by_w_ = std::move(by_w.front());
         }
         if (input_.viscosity.any()) {
-            model_.take(controls.front());
+            model_.set_time_varying(controls.front());
             model_.evaluate(record.begin.q, model_.no_controls());
             ViscousAdjoint& strains = viscous.strains;
             g_.positions += model_.elastic().forces(strains.by_d_begin, model_.size());
             scene_.controls.setZero();
             model_.elastic().strains_vjp(strains.by_d_begin, scene_);
-            model_.varying().move_gradient(scene_);
+            model_.time_varying().move_gradient(scene_);
             add_by_controls(step, substep.begin, scene_.controls);
             by_strains_ = std::move(strains.by_begin);
             by_dt += strains.by_dt;
@@ -189,88 +192,91 @@ class Backward {
                 model_.damper_rates_vjp(record.begin.q, record.begin.v, viscous.joints.by_begin.d_rate,
                                         g_.positions, g_.velocities, scene_);
         }
-        g_.time_step += share * by_dt;
+        g_.time_step += fraction * by_dt;
         if (by_earlier.size() > 0) g_.velocities += by_earlier;
     }
 
-    // With the Hessian at a state, which was evaluated last: by a factorization from nearby if there is one.
-    VectorXd solve(const VectorXd& q, const Factor* nearby, const Controls& controls, const Anchor& anchor,
-                   const VectorXd& rhs) {
+    // Solves with the transposed Hessian at a state, evaluated last: by GMRES with a nearby factorization if there is one.
+    VectorXd solve(const VectorXd& q, const Factor* nearby, const Controls& controls,
+                   const ProximalTerm& proximal, const VectorXd& rhs) {
         newton_.watch(0.0);
         VectorXd solution = rhs;
-        if (nearby && newton_.solve_nearby(q, controls, anchor, *nearby, solution).converged) return solution;
+        if (nearby && newton_.solve_gmres_adjoint(q, controls, proximal, *nearby, solution).converged)
+            return solution;
         Eigen::MatrixXd no_moves(q.size(), 0);
-        const FactorReport factor = newton_.factorize(q, controls, false, anchor, no_moves);
-        if (!factor.succeeded) throw InvalidInput("the adjoint of a step: " + factor.reason);
+        const FactorReport factor = newton_.factorize(q, controls, false, proximal, no_moves);
+        if (!factor.succeeded)
+            throw InvalidInput("the gradient of a time step cannot be computed: " + factor.reason);
         return newton_.solve_transposed(rhs);
     }
 
-    // As a stage was solved for.
+    // Sets the model to the conditions under which a stage was solved.
     void set_stage(const SubstepRecord& record, int i, Index step, const Substep& substep,
                    const Controls& controls, const Viscous& viscous) {
-        model_.take(controls);
-        model_.set_turns(record.stages[i].turns);
+        model_.set_time_varying(controls);
+        model_.set_angle_branches(record.stages[i].angle_branches);
         model_.begin_step(record.begin.q, input_.controls_at(step, substep.begin));
         viscous.strains.set_history(i);
         viscous.joints.set_history(i);
     }
 
-    // lambda of a stage, and what its forces say of how it moved; adds what it says of the scene and of the controls.
+    // Returns lambda of a stage and the gradient by the kinematics of its forces. Adds the gradients by the scene and the load parameters.
     std::pair<VectorXd, KinematicsGradient> back_through(const StepAlgebra& algebra, const StepRates& at,
                                                          int i, const SubstepRecord& record, Index step,
                                                          const Substep& substep, VectorXd& by_x,
                                                          Viscous& viscous) {
         const StageState& stage = record.stages[i];
-        const ElasticAfterwards elastic_afterwards(model_);
-        const double share = substep.begin + algebra.tableau().time(i) * substep.share();
-        const Controls controls = input_.controls_at(step, share);
+        const ScopedStrainHistory elastic_afterwards(model_);
+        const double fraction = substep.begin + algebra.tableau().time(i) * substep.fraction();
+        const Controls controls = input_.controls_at(step, fraction);
         const VectorXd target = algebra.target(at.x_hat[i], at.v_hat[i]);
         const StageMotion motion{&at.x_hat[i], &at.v_hat[i], algebra.stage_time()};
         set_stage(record, i, step, substep, controls, viscous);
-        const Anchor anchor{&algebra.weights(), &target, &motion};
-        newton_.evaluate(stage.q, controls, anchor);
+        const ProximalTerm proximal{&algebra.weights(), &target, &motion};
+        newton_.evaluate(stage.q, controls, proximal);
         viscous.strains.before_solve(i, by_x, scene_);
         viscous.joints.before_solve(i, by_x, scene_);
-        const VectorXd lambda = solve(stage.q, stage.factor.get(), controls, anchor, -by_x);
+        const VectorXd lambda = solve(stage.q, stage.factor.get(), controls, proximal, -by_x);
         viscous.strains.after_solve(i, lambda);
         viscous.joints.after_solve(i, lambda);
-        return {lambda, by_scene(stage.q, controls, anchor, step, substep, share, lambda, {}, by_x)};
+        return {lambda, by_scene(stage.q, controls, proximal, step, substep, fraction, lambda, {}, by_x)};
     }
 
-    // What the forces of motors at the end of a substep say: of the scene and the controls, of the state that they are
-    // looked up at, which is next to the last stage, and of the velocities behind its acceleration (solve/driven_end.h).
+    // Adds the gradients through the motor forces at the end of a substep: by the scene and the load parameters, by the state next to the
+    // last stage at which they are evaluated, and by the velocities that enter its acceleration (solve/motor_reactions.h).
     void back_through_motors(const StepAlgebra& algebra, const StepRates& at, const SubstepRecord& record,
-                             Index step, const Substep& substep, const VectorXd& by_driving, Viscous& viscous,
-                             VectorXd& by_v_last, VectorXd& by_w_last, BeforeStage& by) {
+                             Index step, const Substep& substep, const VectorXd& by_motor_forces,
+                             Viscous& viscous, VectorXd& by_v_last, VectorXd& by_w_last, BeforeStage& by) {
         const int i = algebra.tableau().stages - 1;
         const StageState& stage = record.stages[i];
-        const ElasticAfterwards elastic_afterwards(model_);
+        const ScopedStrainHistory elastic_afterwards(model_);
         const Controls controls = input_.controls_at(step, substep.end);
         const VectorXd target = algebra.target(at.x_hat[i], at.v_hat[i]);
         const StageMotion motion{&at.x_hat[i], &at.v_hat[i], algebra.stage_time()};
         set_stage(record, i, step, substep, controls, viscous);
-        const Anchor there{&algebra.weights(), &target, &motion};
-        const DrivenEnd end(newton_, input_.inertia, record.begin, algebra.dt(), stage.q, controls, there,
-                            at.all.back());
-        if (!end.found())
-            throw InvalidInput("what a motor does has no gradient where it was not found (NaN)");
-        const Anchor anchor = end.anchor();
+        const ProximalTerm there{&algebra.weights(), &target, &motion};
+        const MotorReactions end(newton_, input_.inertia, record.begin, algebra.dt(), stage.q, controls,
+                                 there, at.all.back());
+        if (!end.converged())
+            throw InvalidInput(
+                "the motor forces have no gradient in a step in which they could not be computed (NaN)");
+        const ProximalTerm proximal = end.proximal();
         const VectorXd& q = end.q();
-        newton_.evaluate(q, controls, anchor);
+        newton_.evaluate(q, controls, proximal);
         model_.assemble(q, controls, false);
         if (model_.has_forces()) model_.assemble_forces(controls);
-        const VectorXd motors = model_.reduction().driving_motion(by_driving);
+        const VectorXd motors = model_.dof_map().motor_motion(by_motor_forces);
         const VectorXd by_q = product(motors, algebra.weights());
         VectorXd by_free = by_q;
-        model_.reduction().add_driving_change(newton_.gradient(q, anchor), by_driving, by_free);
+        model_.dof_map().add_motor_force_change(newton_.gradient(q, proximal), by_motor_forces, by_free);
         const std::shared_ptr<Factor> nearby = newton_.factor();
-        const bool serves = nearby && nearby->pattern() == model_.reduction().pattern();
-        const VectorXd lambda = solve(q, serves ? nearby.get() : nullptr, controls, anchor, -by_free),
+        const bool serves = nearby && nearby->pattern() == model_.dof_map().pattern();
+        const VectorXd lambda = solve(q, serves ? nearby.get() : nullptr, controls, proximal, -by_free),
                        all = lambda + motors;
-        viscous.strains.beside(i, q, all);
-        viscous.joints.beside(i, q, all);
+        viscous.strains.at_nearby_state(i, q, all);
+        viscous.joints.at_nearby_state(i, q, all);
         const KinematicsGradient by_forces =
-            by_scene(q, controls, anchor, step, substep, substep.end, lambda, by_driving, by_q);
+            by_scene(q, controls, proximal, step, substep, substep.end, lambda, by_motor_forces, by_q);
         VectorXd v = VectorXd::Zero(model_.size());
         v.head(model_.n_coordinates()) =
             (q - at.x_hat[i]).head(model_.n_coordinates()) / algebra.stage_time();
@@ -279,80 +285,80 @@ class Backward {
         const VectorXd pull = input_.inertia.mass.cwiseProduct(all);
         g_.mass += all.cwiseProduct(end.acceleration_change());
         by_w_last -= pull;
-        by_v_last += end.share_last() * pull;
-        g_.velocities += end.share_begin() * pull;
-        by_v_before_ = end.share_before() * pull;
-        // Both substeps are shares of the time step: their ratio stays.
+        by_v_last += end.weight_last() * pull;
+        g_.velocities += end.weight_begin() * pull;
+        by_v_before_ = end.weight_before() * pull;
+        // Both substeps are fractions of the time step, so their ratio does not depend on it.
         by.dt -= pull.dot(end.acceleration_change() + at.all.back().w) / algebra.dt();
     }
 
-    // (K + W)^T along a motion of all unknowns, as assembled last.
+    // Returns (K + W)^T times a motion of all dofs, with the matrix assembled last.
     VectorXd product(const VectorXd& along, const VectorXd& weights) const {
         VectorXd forces(model_.size());
         model_.multiply(along, forces);
-        model_.remainder().add_product(along, true, forces);
+        model_.nonsymmetric_tangent().add_product(along, true, forces);
         return forces + weights.cwiseProduct(along);
     }
 
-    // Adds what an adjoint at the evaluated state says of the scene and of the controls, with the motion along what motors
-    // drive where the loss feels them; what it says of how the state moved.
-    KinematicsGradient by_scene(const VectorXd& q, const Controls& controls, const Anchor& anchor, Index step,
-                                const Substep& substep, double share, const VectorXd& lambda,
-                                const VectorXd& by_driving, const VectorXd& by_q) {
-        const Reduction& reduction = model_.reduction();
+    // Adds the gradients by the scene and the load parameters for an adjoint at the evaluated state, plus the motion along the motors if the
+    // loss depends on their forces. Returns the gradient by the kinematics.
+    KinematicsGradient by_scene(const VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
+                                Index step, const Substep& substep, double fraction, const VectorXd& lambda,
+                                const VectorXd& by_motor_forces, const VectorXd& by_q) {
+        const DofMap& dof_map = model_.dof_map();
         const VectorXd all =
-            by_driving.size() > 0 ? VectorXd(lambda + reduction.driving_motion(by_driving)) : lambda;
+            by_motor_forces.size() > 0 ? VectorXd(lambda + dof_map.motor_motion(by_motor_forces)) : lambda;
         scene_.controls.setZero();
         model_.vjp(q, controls, all, scene_);
         KinematicsGradient by_forces;
         if (model_.has_forces()) by_forces = model_.forces_vjp(controls, all, scene_);
-        if (reduction.has_values()) {
-            // Once more: the factorization has turned the blocks of framed nodes.
+        if (dof_map.has_values()) {
+            // Assembles again, because the factorization has rotated the blocks of rotated nodes.
             model_.assemble(q, controls, false);
             if (model_.has_forces()) model_.assemble_forces(controls);
-            const VectorXd reaction = product(lambda, *anchor.weights) + by_q;
-            reduction.vjp(reaction, lambda, newton_.gradient(q, anchor), controls, scene_, by_driving);
+            const VectorXd reaction = product(lambda, *proximal.weights) + by_q;
+            dof_map.vjp(reaction, lambda, newton_.gradient(q, proximal), controls, scene_, by_motor_forces);
         }
-        model_.varying().move_gradient(scene_);
-        add_by_controls(step, share, scene_.controls);
+        model_.time_varying().move_gradient(scene_);
+        add_by_controls(step, fraction, scene_.controls);
         if (model_.has_forces()) add_by_controls(step, substep.begin, by_forces.begin_controls);
         return by_forces;
     }
 
-    // What the controls at a share of a step do is that of the two knots that they lie between.
-    void add_by_controls(Index step, double share, const Controls& by) {
-        const auto [first, weight] = input_.between(step, share);
+    // Distributes a gradient by the load parameters at a fraction of a step to the two entries that they are interpolated from.
+    void add_by_controls(Index step, double fraction, const Controls& by) {
+        const auto [first, weight] = input_.between(step, fraction);
         g_.controls[first] += (1.0 - weight) * by;
         g_.controls[first + 1] += weight * by;
     }
 
-    // Rotations that were put to rest depend on everything else.
+    // Continues to the inputs of the start: edge rotations in equilibrium depend on all others.
     void back_to_start() {
         const VectorXd& q = motion_.start.q;
-        model_.take(input_.controls_at(0, 0.0));
+        model_.set_time_varying(input_.controls_at(0, 0.0));
         if (input_.viscosity.maxwell() && input_.start.e.empty()) {
             model_.evaluate(q, input_.controls_at(0, 0.0));
             g_.positions += model_.elastic().forces(by_strains_.e, model_.size());
             scene_.controls.setZero();
             model_.elastic().strains_vjp(by_strains_.e, scene_);
-            model_.varying().move_gradient(scene_);
+            model_.time_varying().move_gradient(scene_);
             g_.controls[0] += scene_.controls;
         }
         if (input_.rotations_given) return;
-        model_.set_turns(input_.start.turns);
+        model_.set_angle_branches(input_.start.angle_branches);
         const Controls controls = input_.controls_at(0, 0.0);
-        const VectorXd lambda = RotationsAtRest(model_, q, controls).adjoint(g_.positions);
+        const VectorXd lambda = EdgeRotationEquilibrium(model_, q, controls).adjoint(g_.positions);
         VectorXd reaction(model_.size());
         model_.multiply(lambda, reaction);
         g_.positions += reaction;
         scene_.controls.setZero();
         model_.vjp(q, controls, lambda, scene_);
-        model_.varying().move_gradient(scene_);
+        model_.time_varying().move_gradient(scene_);
         g_.controls[0] += scene_.controls;
     }
 
-    // Adds what the loss says of the state at the beginning of a step.
-    void take_in(Index step) {
+    // Adds the gradient of the loss by the state at the beginning of a step.
+    void add_state_gradient(Index step) {
         if (step % input_.record_every != 0) return;
         const std::size_t k = step / input_.record_every;
         g_.positions += by_.q[k];
@@ -366,22 +372,22 @@ class Backward {
     const MotionResult& motion_;
     const GradientsByStates& by_;
     Stepper stepper_;
-    Gradient scene_;  // by all values; by the controls of the stage at hand
-    // By the rates, and by the Maxwell branch, at the beginning of the last step taken back.
+    Gradient scene_;  // by all parameters, and by the load parameters of the current stage
+    // Gradients by the rates and by the Maxwell branch at the beginning of the last step processed.
     VectorXd by_w_;
     VectorXd
-        by_v_before_;  // by the velocity at the beginning of the step before that; empty where nothing asks
+        by_v_before_;  // by the velocity at the beginning of the step before that; empty if nothing depends on it
     ViscousGradient by_strains_;
     double progress_ = 0.0;
 };
 
 }  // namespace
 
-MotionGradient pull_back(Model& model, const MotionInput& input, const MotionResult& motion,
-                         const GradientsByStates& by, const MotionWatch& watch) {
-    if (motion.keep == Keep::nothing)
-        throw InvalidInput("the motion was computed without keeping its states");
-    const WhileVarying varying(model, input.varying);
+MotionGradient motion_vjp(Model& model, const MotionInput& input, const MotionResult& motion,
+                          const GradientsByStates& by, const MotionWatch& watch) {
+    if (motion.keep == AdjointStorage::nothing)
+        throw InvalidInput("the motion has no stored states: it was computed without gradients");
+    const ScopedTimeVarying varying(model, input.varying);
     const Backward* running = nullptr;
     Newton newton(model, input.newton, [&](double residual) {
         if (watch) watch(running ? running->progress() : 0.0, residual);

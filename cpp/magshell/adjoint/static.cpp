@@ -5,40 +5,41 @@
 
 namespace magshell {
 
-Gradient pull_back(Model& model, const StaticsResult& equilibrium, const VectorXd& by_state,
-                   const VectorXd& by_driving) {
+Gradient equilibrium_vjp(Model& model, const StaticsResult& equilibrium, const VectorXd& by_state,
+                         const VectorXd& by_motor_forces) {
     if (!equilibrium.factor)
-        throw InvalidInput("the equilibrium was found without keeping its factorization");
+        throw InvalidInput("the equilibrium has no factorization: it was solved without gradients");
     const VectorXd& q = equilibrium.state;
     const Controls& controls = equilibrium.controls;
-    const Reduction& reduction = model.reduction();
-    const bool drives = !by_driving.isZero(0.0);
+    const DofMap& dof_map = model.dof_map();
+    const bool has_motor_gradient = !by_motor_forces.isZero(0.0);
 
-    model.set_turns(equilibrium.turns);
+    model.set_angle_branches(equilibrium.angle_branches);
     model.evaluate(q, controls);
-    if (model.follows() || reduction.has_values()) model.assemble(q, controls, false);
+    if (model.has_follower_loads() || dof_map.has_values()) model.assemble(q, controls, false);
     const auto add_product = [&](const VectorXd& motion, VectorXd& forces) {
         VectorXd product(q.size());
         model.multiply(motion, product);
-        model.remainder().add_product(motion, true, product);
+        model.nonsymmetric_tangent().add_product(motion, true, product);
         forces += product;
     };
     VectorXd by_q = by_state, motors = VectorXd::Zero(q.size());
-    if (drives) {
-        motors = reduction.driving_motion(by_driving);
+    if (has_motor_gradient) {
+        motors = dof_map.motor_motion(by_motor_forces);
         add_product(motors, by_q);
     }
     VectorXd by_free = by_q;
-    if (drives) reduction.add_driving_change(model.residual().gradient, by_driving, by_free);
-    VectorXd reduced = -reduction.vector(by_free);
+    if (has_motor_gradient)
+        dof_map.add_motor_force_change(model.residual().gradient, by_motor_forces, by_free);
+    VectorXd reduced = -dof_map.vector(by_free);
     solve_at_equilibrium(model, *equilibrium.factor, true, reduced);
-    const VectorXd lambda = reduction.expand(reduced);
+    const VectorXd lambda = dof_map.expand(reduced);
     Gradient gradient(model.registry());
     model.vjp(q, controls, lambda + motors, gradient);
-    if (reduction.has_values()) {
+    if (dof_map.has_values()) {
         add_product(lambda, by_q);
-        reduction.vjp(by_q, lambda, model.residual().gradient, controls, gradient,
-                      drives ? by_driving : VectorXd());
+        dof_map.vjp(by_q, lambda, model.residual().gradient, controls, gradient,
+                    has_motor_gradient ? by_motor_forces : VectorXd());
     }
     return gradient;
 }

@@ -1,19 +1,19 @@
-// The adjoint of an equilibrium g(q, k) = 0, with q_f the free unknowns and q_h what supports hold.
+// The adjoint of an equilibrium g(q, k) = 0, with the free dofs q_f and the prescribed ones q_h:
 //
 //   H_ff lambda_f = - dF/dq_f,      dF/dk = lambda^T dg/dk + (dF/dq_h + H_hf lambda_f)^T dq_h/dk
 //
-// with H transposed where loads that follow make it unsymmetric. One back-substitution with the factorization that found the equilibrium stable serves all k.
-// What motors do is g . B z along the joints that they drive, with z the gradient by it: lambda + B z takes lambda's place.
+// H is transposed if follower loads make it nonsymmetric. One solve with the factorization that showed the equilibrium stable gives the
+// gradients by all k. Motor forces are g . B z along the prescribed joints; for a gradient z by them, lambda + B z replaces lambda.
 #pragma once
 
 #include "magshell/solve/statics.h"
 
 namespace magshell {
 
-/// dF/dk from dF/dq, a vector of all unknowns, and from the gradients by what motors do there, as
-/// Reduction::driving has it, or none; at an equilibrium whose factor was kept. The model must hold
-/// the values that the equilibrium was found with. Throws InvalidInput where no factor was kept.
-Gradient pull_back(Model& model, const StaticsResult& equilibrium, const VectorXd& by_state,
-                   const VectorXd& by_driving = {});
+/// Returns dF/dk from dF/dq, of all dofs, and from the gradient by the motor forces, in the order of DofMap::motor_forces, or none. The
+/// equilibrium must have a stored factorization, and the model the parameters that it was found with. Throws InvalidInput without a
+/// factorization.
+Gradient equilibrium_vjp(Model& model, const StaticsResult& equilibrium, const VectorXd& by_state,
+                         const VectorXd& by_motor_forces = {});
 
 }  // namespace magshell

@@ -7,16 +7,16 @@ ViscousAdjoint::ViscousAdjoint(Model& model, ViscousTerms& terms, const Viscosit
                                std::span<const Controls> controls, const ViscousGradient& by_end)
     : terms_(terms), unknowns_(model.size()), law_(law), kind_(kind), step_(step) {
     if (!law.any() || terms.empty()) return;
-    model.set_turns(substep.begin.turns);
-    model.take(controls.front());
+    model.set_angle_branches(substep.begin.angle_branches);
+    model.set_time_varying(controls.front());
     const StrainSet d_begin = terms.strains(substep.begin.q), zero = d_begin.times(0.0);
     rates_ = first_rates(model, step.tableau(), substep.begin);
     first_ = rates_.size();
     for (std::size_t i = 0; i < substep.stages.size(); ++i) {
         stages_.push_back(ViscousStage(law, step.stage_time(), step.dt(), step.tableau().a[i], rates_, kind,
                                        d_begin, substep.begin.e));
-        model.set_turns(substep.stages[i].turns);
-        model.take(controls[i + 1]);
+        model.set_angle_branches(substep.stages[i].angle_branches);
+        model.set_time_varying(controls[i + 1]);
         stages_.back().finish(law, step.stage_time(), terms.strains(substep.stages[i].q),
                               rates_.emplace_back().*kind);
     }
@@ -62,7 +62,7 @@ void ViscousAdjoint::before_solve(int i, VectorXd& by_q, Gradient& scene) {
 
 void ViscousAdjoint::after_solve(int i, const VectorXd& lambda) {
     if (idle()) return;
-    take_in(i, stages_[i].d, lambda);
+    add_stress_gradient(i, stages_[i].d, lambda);
     if (law_.maxwell()) {
         by_stage_time_[i] += by_ratio_[i] / law_.maxwell_time;
         by_law.maxwell_time -= by_ratio_[i] * law_.ratio(step_.stage_time()) / law_.maxwell_time;
@@ -71,15 +71,15 @@ void ViscousAdjoint::after_solve(int i, const VectorXd& lambda) {
     pass_on(i);
 }
 
-void ViscousAdjoint::beside(int i, const VectorXd& q, const VectorXd& lambda) {
-    if (!idle()) take_in(i, terms_.strains(q), lambda);
+void ViscousAdjoint::at_nearby_state(int i, const VectorXd& q, const VectorXd& lambda) {
+    if (!idle()) add_stress_gradient(i, terms_.strains(q), lambda);
 }
 
-// d: the strains at the evaluated state.
-void ViscousAdjoint::take_in(int i, const StrainSet& d, const VectorXd& lambda) {
+// Adds the gradients through the stress; d: the strains at the evaluated state.
+void ViscousAdjoint::add_stress_gradient(int i, const StrainSet& d, const VectorXd& lambda) {
     const ViscousStage& stage = stages_[i];
     const double T = step_.stage_time(), beta = law_.stiffness_damping;
-    // lambda . J^T C (scale d - shift)
+    // The gradient of lambda . J^T C (scale d - shift).
     const StrainSet along = terms_.stresses(terms_.rates(lambda));
     const double by_scale = along.dot(d), by_d_share = -along.dot(stage.d_hat);
     by_d_hat_[i].add(-beta / T, along);
@@ -94,7 +94,7 @@ void ViscousAdjoint::take_in(int i, const StrainSet& d, const VectorXd& lambda) 
     }
 }
 
-// d^_i = d + dt sum a_ij d'_j, and e^_i alike. What the step began with is passed on once all stages are done.
+// Distributes the gradients by d^_i = d + dt sum a_ij d'_j, and by e^_i. The part of the start of the step is complete after all stages.
 void ViscousAdjoint::pass_on(int i) {
     by_d_begin.add(1.0, by_d_hat_[i]);
     by_begin.e.add(1.0, by_e_hat_[i]);

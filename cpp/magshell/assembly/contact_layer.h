@@ -1,7 +1,7 @@
-// Blocks between nodes that touch: a matrix beside the scene's own, whose pattern follows what is near.
+// A second matrix for the blocks between nodes of bodies in contact; its pattern follows the pairs that are near.
 //
-// The scene's own keeps its places. What touches changes, so that this one couples more nodes than touch, and is made
-// anew only when some touch that it does not couple.
+// The pattern of the scene's own matrix stays fixed. Contacts change, so this one couples more nodes than are in contact, and is rebuilt
+// only if some pair is not coupled by it.
 #pragma once
 
 #include <array>
@@ -14,23 +14,23 @@ namespace magshell {
 
 class ContactLayer {
   public:
-    /// Nodes that a pair couples with each other; negative: fewer.
+    /// The nodes that a pair couples with each other; negative entries are absent.
     using Group = std::array<Index, 4>;
 
-    /// Of a scene with so many nodes and rotations.
+    /// Makes an empty layer for a scene with these numbers of nodes and edge rotations.
     ContactLayer(Index nodes, Index rotations) : matrix_(nodes, rotations, {}) {}
 
-    /// Whether all nodes of a group are coupled.
+    /// Returns true if all nodes of a group are coupled.
     bool couples(const Group& group) const;
-    /// Couples these groups from now on, and those that it couples already, as long as they are not too many more.
-    void couple(std::vector<Group> groups);
-    /// Whether the scene's matrix is to have it, from the next assembly on; at first not.
+    /// Couples these groups, and keeps those that it couples already as long as they are not too many.
+    void add_couplings(std::vector<Group> groups);
+    /// Sets whether the layer is added to the scene's matrix from the next assembly on; at first it is not.
     void use(bool used) { used_ = used; }
     bool used() const { return used_; }
-    /// How often its pattern has changed; at first it couples nothing.
+    /// Returns how often its pattern has changed; at first it couples nothing.
     std::int64_t version() const { return version_; }
 
-    /// Adds the lower blocks (i, j), i >= j, of a group that it couples: block(i, j) is a Mat3.
+    /// Adds the lower blocks (i, j), i >= j, of a group that it couples: block(i, j) returns a Mat3.
     template <class Block>
     void add(const Group& group, const Block& block) {
         for (int i = 0; i < 4 && group[i] >= 0; ++i) {
@@ -53,7 +53,7 @@ class ContactLayer {
     bool used_ = false;
 };
 
-/// The lower triangle of the sum of two matrices, of the first alone where there is no second.
+/// Computes the lower triangle of the sum of two matrices, or of the first alone if `layer` is null.
 void merge(const SystemMatrix& matrix, const SystemMatrix* layer, std::vector<Index>& column_starts,
            std::vector<Index>& rows, LargeVector<double>& values);
 

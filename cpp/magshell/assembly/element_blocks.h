@@ -1,5 +1,4 @@
-// The blocks of an element's Hessian, from those of all its nodes but the first, and the way round that the matrix
-// takes them.
+// The blocks of an element Hessian: all blocks follow from those of the nodes except the first, by translation invariance.
 #pragma once
 
 #include "magshell/assembly/lanes.h"
@@ -7,7 +6,7 @@
 
 namespace magshell {
 
-/// Puts in place, or adds, tangent.block(k, l) of a point of integration.
+/// Sets, or adds, the blocks tangent.block(k, l) of an integration point.
 template <int N, class Tangent>
 void add_blocks(const Tangent& tangent, bool first, Pack33 h[]) {
     for (int k = 1; k < N; ++k)
@@ -20,7 +19,7 @@ void add_blocks(const Tangent& tangent, bool first, Pack33 h[]) {
         }
 }
 
-/// Those of the first node: a translation changes nothing, so the blocks of a row add up to zero.
+/// Computes the blocks of the first node: a translation causes no force, so the blocks of each row sum to zero.
 template <int N>
 void complete_blocks(Pack33 h[]) {
     for (int k = 1; k < N; ++k) {
@@ -34,7 +33,7 @@ void complete_blocks(Pack33 h[]) {
     h[0] = -sum;
 }
 
-/// Transposes a block in these lanes, a bit each.
+/// Transposes a block in the lanes whose bit is set.
 inline void transpose_in(unsigned lanes, Pack33& block) {
     const auto chosen = lanes_with_bits(lanes);
     for (int r = 1; r < 3; ++r)

@@ -1,11 +1,10 @@
-// What every term on elements of N nodes shares: fetching the nodes of a pack of elements, and adding forces and
-// blocks to them.
+// Gathers the nodes of a pack of elements with N nodes, and scatters their forces and Hessian blocks.
 #pragma once
 
 #include <cstdint>
 
 #include "magshell/assembly/element_blocks.h"
-#include "magshell/assembly/schedule.h"
+#include "magshell/assembly/element_coloring.h"
 
 namespace magshell {
 
@@ -39,8 +38,8 @@ class ElementLoop {
             for (int k = 0; k < N; ++k) scatter_node(out, (*nodes_)[element(pack, lane)][k], g[k], lane);
     }
 
-    /// Adds the lower blocks (row, column), at lower_index(row, column). Those of them that go into the upper
-    /// triangle of the matrix come back transposed.
+    /// Adds the lower blocks (row, column), stored at lower_index(row, column). Blocks that belong to the upper triangle of the matrix
+    /// are transposed in place first.
     void scatter(Index pack, Pack33 h[N * (N + 1) / 2], SystemMatrix& out) const {
         for (int i = 1; i < N; ++i)
             for (int j = 0; j < i; ++j)
@@ -57,32 +56,32 @@ class ElementLoop {
                     const Pack33& block = h[lower_index(i, j)];
                     if (slot == same_node)
                         out.add_block_and_transpose(nodes[i], block, lane);
-                    else  // the length without a branch: whether a block is turned over is as good as random
+                    else  // length without a branch, because whether a block is transposed is unpredictable
                         out.add_lower_block(slot >> 1, length[j + (i - j) * (slot & 1)], block, lane);
                 }
             }
         }
     }
 
-    /// body(pack) for the packs of a chunk.
+    /// Calls body(pack) for the packs of a chunk.
     template <class Body>
     static void over_packs(const Chunk& chunk, const Body& body) {
         for (Index pack = chunk.first / Pack::width; pack < packs_for(chunk.last); ++pack) body(pack);
     }
 
-    /// body(pack) for all packs, in the schedule's order, where body scatters.
+    /// Calls body(pack) for all packs in the order of the element coloring, so that body may scatter.
     template <class Body>
     void scatter_packs(const Body& body) const {
         chunks_.scatter([&](const Chunk& chunk) { over_packs(chunk, body); });
     }
 
-    /// body(pack) for all packs, where body writes only what belongs to them.
+    /// Calls body(pack) for all packs in any order; body may write only what belongs to the pack.
     template <class Body>
     void each_pack(const Body& body) const {
         chunks_.each([&](const Chunk& chunk) { over_packs(chunk, body); });
     }
 
-    /// The sum of energy(pack) over the elements.
+    /// Returns the sum of energy(pack) over the elements [J].
     template <class Energy>
     double sum(const Energy& energy) const {
         return chunks_.sum([&](const Chunk& chunk) {
@@ -102,8 +101,16 @@ class ElementLoop {
     const std::vector<std::array<Index, N>>* nodes_;
     const ChunkLoop& chunks_;
     LargeVector<PairSlots<N>> slots_;
-    // Per pack and pair of nodes: the lanes, a bit each, whose block has its rows at the node with the lower number.
+    // Per pack and pair of nodes: a bit for each lane whose block has its rows at the node with the lower number.
     std::vector<std::array<std::uint8_t, N*(N - 1) / 2>> turned_;
+};
+
+/// The element loop over triangles.
+class FaceLoop : public ElementLoop<3> {
+  public:
+    using ElementLoop<3>::ElementLoop;
+
+    Index face(Index pack, int lane) const { return element(pack, lane); }
 };
 
 }  // namespace magshell

@@ -1,10 +1,10 @@
-// Filling packs from per-element data and emptying them again: lane l of pack k is element k * width + l.
+// Fills packs (SIMD vectors with one element per lane) from per-element data, and reads them: lane l of pack k is element k * width + l.
 #pragma once
 
 #include <utility>
 #include <vector>
 
-#include "magshell/assembly/residual.h"
+#include "magshell/assembly/out_of_balance.h"
 #include "magshell/assembly/system_matrix.h"
 #include "magshell/core/vector3.h"
 #include "magshell/energy/symmetric3.h"
@@ -15,13 +15,13 @@ constexpr Index packs_for(Index elements) {
     return (elements + Pack::width - 1) / Pack::width;
 }
 
-/// The element of a lane; lanes past the end repeat the last element and are never scattered.
+/// Returns the element of a lane. Lanes past the end repeat the last element and are never scattered.
 inline Index element_of(Index pack, int lane, Index elements) {
     const Index element = pack * Pack::width + lane;
     return element < elements ? element : elements - 1;
 }
 
-/// number(lane) in each lane, put together in registers: lanes written one by one would have to wait in memory for each
+/// Returns a pack with number(lane) in each lane. It is built in registers, because lanes written one by one to memory would wait for each
 /// other.
 template <class Number>
 inline Pack pack_of(const Number& number) {
@@ -30,7 +30,7 @@ inline Pack pack_of(const Number& number) {
     }(std::make_index_sequence<Pack::width>());
 }
 
-/// The vector that begins at from(lane), in each lane.
+/// Returns a pack of the vectors that begin at from(lane).
 template <class From>
 inline Pack3 vectors_of(const From& from) {
     const double* at[Pack::width];
@@ -76,11 +76,11 @@ inline void scatter_node(Residual& out, Index node, const Pack3& force, int lane
     out.add(3 * node + 2, force.z[lane]);
 }
 
-/// Where the blocks of N nodes go: one slot a pair, at lower_index(row - 1, column).
+/// Positions of the blocks of N nodes in the matrix: one slot per pair, at lower_index(row - 1, column).
 template <int N>
 using PairSlots = std::array<SystemMatrix::Slot, N*(N - 1) / 2>;
 
-/// The slot of two places of an element that one node takes: across two sides of a face, at a vertex of three.
+/// Marks a pair of places in an element that the same node takes, as across two edges of a face at a vertex with three faces.
 constexpr SystemMatrix::Slot same_node = -2;
 
 template <int N, class Nodes>
@@ -94,7 +94,7 @@ PairSlots<N> pair_slots(const SystemMatrix& matrix, const Nodes& nodes) {
     return slots;
 }
 
-/// Adds the lower blocks (row, column) at lower_index(row, column) of one lane; absent nodes are passed over.
+/// Adds the lower blocks (row, column), stored at lower_index(row, column), of one lane; absent nodes are skipped.
 template <int N, class Nodes>
 inline void scatter_blocks(SystemMatrix& matrix, const Nodes& nodes, const PairSlots<N>& slots,
                            const Pack33* blocks, int lane) {
@@ -114,6 +114,16 @@ inline void scatter_blocks(SystemMatrix& matrix, const Nodes& nodes, const PairS
 template <class T, class Allocator>
 std::size_t bytes_of(const std::vector<T, Allocator>& values) {
     return values.capacity() * sizeof(T);
+}
+
+/// Sets the first lane of a block with zero diagonal to the skew-symmetric [axis]x.
+inline void set_skew(Pack33& block, const Vec3& axis) {
+    block.at[1].set(0, -axis.z());
+    block.at[2].set(0, axis.y());
+    block.at[3].set(0, axis.z());
+    block.at[5].set(0, -axis.x());
+    block.at[6].set(0, -axis.y());
+    block.at[7].set(0, axis.x());
 }
 
 }  // namespace magshell

@@ -1,5 +1,5 @@
-// Entries of the full matrix whose rows are those of a carrier, gathered by links: what a column of them does to a link is
-// one wrench.
+// Entries of the system matrix in the rows of one rigid body or skeleton, grouped by links: the forces that a column exerts on a link
+// are summed to one wrench.
 #pragma once
 
 #include <map>
@@ -12,8 +12,8 @@ namespace magshell {
 
 class LinkCoupling {
   public:
-    /// An entry of the matrix at `from`, in this row of the carrier, of that link. at: its column, whatever the caller
-    /// counts; entries of one column and link are to come one after another.
+    /// Adds the matrix entry at `from`, in this row of the system, which belongs to this link. at: its column, in a numbering of the
+    /// caller. Entries of one column and link must be added one after another.
     void add(Index from, Index row, Index link, Index at, double factor = 1.0) {
         const Index end = static_cast<Index>(entries_.size());
         if (runs_.empty() || runs_.back().link != link || runs_.back().at != at ||
@@ -22,7 +22,7 @@ class LinkCoupling {
         entries_.push_back({from, row});
         ++runs_.back().end;
     }
-    /// The same, with the link that the column is of: runs add up to blocks.
+    /// Adds an entry whose column belongs to the link of_column, too: runs are summed to 6 x 6 blocks.
     void add(Index from, Index row, Index link, Index column, Index of_column, double factor) {
         add(from, row, link, column, factor);
         Run& run = runs_.back();
@@ -33,12 +33,12 @@ class LinkCoupling {
         run.block = found->second;
     }
 
-    /// Adds B^T K of columns that no link moves, for the first n coordinates, where `at` says.
+    /// Adds B^T K for columns that belong to no link, for the first n coordinates, to values + at.
     void add_columns(const double* entries, const LinkTwists& rows, Index n, double* values) const {
         each_run(entries, rows,
                  [&](const Run& run, const Vec6& a) { rows.add_wrench(run.link, a, n, values + run.at); });
     }
-    /// N^T K N by links.
+    /// Returns N^T K N by pairs of links, where N maps twists of links to velocities of nodes.
     std::vector<LinkTwists::Block> blocks(const double* entries, const LinkTwists& rows,
                                           const LinkTwists& columns) const {
         std::vector<LinkTwists::Block> sums = blocks_;

@@ -1,11 +1,11 @@
-// What of a Hessian couples everything with everything, but in a few directions only: sum_k s_k u_k u_k^T, of the volume of a
-// cavity or the length of a tendon. It never becomes a matrix: linalg/low_rank_factor.h.
+// The part of a Hessian that couples many nodes in a few directions only: sum_k s_k u_k u_k^T, for the volume of a cavity or the length
+// of a tendon. It is never assembled; linalg/low_rank_factor.h adds it to the factorization.
 #pragma once
 
 #include <utility>
 #include <vector>
 
-#include "magshell/assembly/reduction.h"
+#include "magshell/assembly/dof_map.h"
 
 namespace magshell {
 
@@ -14,12 +14,12 @@ class LowRank {
     void clear() { columns_.clear(); }
     bool empty() const { return columns_.empty(); }
 
-    /// Adds stiffness u u^T; u has these slopes at these nodes, each of which is there once.
+    /// Adds stiffness u u^T, where u has these slopes at these nodes, each given once.
     void add(std::vector<Index> nodes, std::vector<Vec3> slopes, double stiffness) {
         if (stiffness != 0.0) columns_.push_back({std::move(nodes), std::move(slopes), stiffness});
     }
 
-    /// y += A x, among all unknowns.
+    /// Adds A x to y, both of all dofs.
     void add_product(const VectorXd& x, VectorXd& y) const {
         for (const Column& each : columns_) {
             double along = 0.0;
@@ -36,7 +36,7 @@ class LowRank {
                 out.segment<3>(3 * each.nodes[k]) += each.stiffness * each.slopes[k].cwiseAbs2();
     }
 
-    /// u of all, a column each, among `size` unknowns.
+    /// Returns the vectors u as columns, with `size` rows.
     Eigen::MatrixXd columns(Index size) const {
         Eigen::MatrixXd all = Eigen::MatrixXd::Zero(size, static_cast<Index>(columns_.size()));
         for (std::size_t c = 0; c < columns_.size(); ++c)
@@ -44,8 +44,8 @@ class LowRank {
                 all.block<3, 1>(3 * columns_[c].nodes[k], static_cast<Index>(c)) = columns_[c].slopes[k];
         return all;
     }
-    /// The same among the free ones.
-    Eigen::MatrixXd reduced(const Reduction& reduction, Index size) const {
+    /// Returns the vectors u as columns, of the free dofs.
+    Eigen::MatrixXd reduced(const DofMap& reduction, Index size) const {
         const Eigen::MatrixXd all = columns(size);
         Eigen::MatrixXd free(reduction.size(), all.cols());
         for (Index c = 0; c < all.cols(); ++c) free.col(c) = reduction.vector(all.col(c));

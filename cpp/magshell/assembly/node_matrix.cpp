@@ -7,7 +7,7 @@ namespace magshell {
 
 void NodeMatrix::finish() {
     for (Index point = 0; point < points_; ++point) entries_.push_back({point, point, 0.0});
-    // Stable, so that sums do not depend on how sorting goes about it.
+    // A stable sort makes the sums independent of the sorting algorithm.
     std::stable_sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) {
         return std::tie(a.column, a.row) < std::tie(b.column, b.row);
     });

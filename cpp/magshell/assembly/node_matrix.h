@@ -1,7 +1,7 @@
-// A symmetric matrix of the nodes, the same along x, y and z: what Projective Dynamics has for stiffness.
+// A symmetric matrix between nodes, the same along x, y and z: the projective stiffness of Projective Dynamics.
 //
-// A scalar, an edge rotation, has a point beside the nodes. Of the three numbers of that point one is there: the part along
-// the normal of the sheet, wherever that points.
+// An edge rotation (a scalar) is represented by a point after the nodes. Of its three components only the one along the normal
+// of the shell is a dof.
 #pragma once
 
 #include <array>
@@ -11,40 +11,40 @@
 
 namespace magshell {
 
-/// Entries are added in any order, a pair of points any number of times; finish() makes columns of them.
+/// Entries may be added in any order and repeatedly; finish() compresses them to columns.
 class NodeMatrix {
   public:
     explicit NodeMatrix(Index nodes = 0, Index scalars = 0) : nodes_(nodes), points_(nodes + scalars) {}
 
     void add_diagonal(Index point, double value) { entries_.push_back({point, point, value}); }
-    /// Adds to (i, j) and to (j, i), which are the same place where one node takes two of an element.
+    /// Adds to (i, j) and (j, i). These coincide if one node takes two places of an element; the entry then counts twice.
     void add_pair(Index i, Index j, double value) {
         entries_.push_back({i < j ? i : j, i < j ? j : i, i == j ? 2.0 * value : value});
     }
     void finish();
 
     Index nodes() const { return nodes_; }
-    /// Nodes first, then scalars.
+    /// The nodes come first, then the scalars.
     Index points() const { return points_; }
     Index scalars() const { return points_ - nodes_; }
     Index point(Index scalar) const { return nodes_ + scalar; }
 
-    /// A face beside a scalar, by its corners: the scalar's normal is the mean of those of its faces.
-    struct Beside {
+    /// A face adjacent to a scalar, by its corners: the normal of the scalar is the mean of those of its faces.
+    struct AdjacentFace {
         Index scalar;
         std::array<Index, 3> corners;
     };
-    void add_beside(Index scalar, const std::array<Index, 3>& corners) {
-        beside_.push_back({scalar, corners});
+    void add_adjacent_face(Index scalar, const std::array<Index, 3>& corners) {
+        adjacent_faces_.push_back({scalar, corners});
     }
-    const std::vector<Beside>& beside() const { return beside_; }
+    const std::vector<AdjacentFace>& adjacent_faces() const { return adjacent_faces_; }
 
-    /// The lower triangle by columns, every diagonal entry among them, first in its column.
+    /// The lower triangle by columns; every diagonal entry is present and first in its column.
     const std::vector<Index>& column_starts() const { return column_starts_; }
     const std::vector<Index>& rows() const { return rows_; }
     const std::vector<double>& values() const { return values_; }
 
-    /// The product with x, three numbers a point.
+    /// Returns the product with x, three components per point.
     VectorXd times(const VectorXd& x) const;
 
   private:
@@ -54,17 +54,17 @@ class NodeMatrix {
     };
     Index nodes_, points_;
     std::vector<Entry> entries_;
-    std::vector<Beside> beside_;
+    std::vector<AdjacentFace> adjacent_faces_;
     std::vector<Index> column_starts_, rows_;
     std::vector<double> values_;
 };
 
-/// Sums of a few points' places, of which an element's stiffness C makes J^T C J.
+/// Linear combinations of the positions of a few points, as the rows J of an element: its stiffness C contributes J^T C J.
 class NodeRows {
   public:
     explicit NodeRows(std::size_t count) : rows_(count) {}
     void add(std::size_t row, Index point, double value) { rows_[row].push_back({point, value}); }
-    /// stiffness(r, s): C.
+    /// Adds J^T C J, where stiffness(r, s) returns C.
     template <class Stiffness>
     void add_to(NodeMatrix& out, const Stiffness& stiffness) const {
         for (std::size_t r = 0; r < rows_.size(); ++r)

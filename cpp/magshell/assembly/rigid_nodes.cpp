@@ -8,7 +8,7 @@
 namespace magshell {
 namespace {
 
-// The rotation that turns one set of points into another best, from sum of their products.
+// Returns the rotation that maps one point set onto another best, given the sum of their outer products (Kabsch).
 Mat3 nearest_rotation(const Mat3& products) {
     const Eigen::JacobiSVD<Mat3> svd(products, Eigen::ComputeFullU | Eigen::ComputeFullV);
     const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0 ? -1.0 : 1.0;
@@ -17,7 +17,7 @@ Mat3 nearest_rotation(const Mat3& products) {
 
 }  // namespace
 
-// Newton's iteration for the polar decomposition.
+// Newton's iteration for the polar decomposition; three iterations reach round-off.
 Mat3 orthonormal(Mat3 m) {
     for (int round = 0; round < 3; ++round) m = (0.5 * (m + m.inverse().transpose())).eval();
     return m;
@@ -57,7 +57,7 @@ RigidNodes::Pose RigidNodes::pose_of_vertices(const VectorXd& q) const {
     return {now - turn * rest, turn};
 }
 
-void RigidNodes::place(const Pose& pose, VectorXd& q) const {
+void RigidNodes::set_positions(const Pose& pose, VectorXd& q) const {
     for (Index k = 0; k < size(); ++k)
         q.segment<3>(3 * nodes_[k]) = pose.center + pose.rotation * offsets_[k];
 }

@@ -1,9 +1,9 @@
-// Nodes of one rigid body: where it is, from four of them, and where they are, from that.
+// The nodes of one rigid body: computes its pose from four of them, and their positions from the pose.
 //
 //   x_i = c + R rho_i
 //
-// The first four are the corners of a regular tetrahedron of its own, c their mean, l the half edge of the cube around
-// them: with sum rho_k rho_k^T = 4 l^2 I they tell the pose.
+// The first four nodes are the corners of a regular tetrahedron with center c; l is half the edge of the cube around it.
+// With sum rho_k rho_k^T = 4 l^2 I they determine the pose.
 #pragma once
 
 #include <vector>
@@ -19,36 +19,37 @@ class RigidNodes {
         Mat3 rotation;
     };
 
-    /// `own`: how many of the nodes, the four corners first, are no vertices of a body. rest: of all nodes of the scene.
+    /// own: how many of the nodes, the four corners first, are no vertices of a shell or solid. rest: of all nodes of the scene [m].
     RigidNodes(std::vector<Index> nodes, Index own, const std::vector<Vec3>& rest);
 
     const std::vector<Index>& nodes() const { return nodes_; }
     Index size() const { return static_cast<Index>(nodes_.size()); }
     Index own() const { return own_; }
     bool has_vertices() const { return size() > own_; }
-    /// l [m]
+    /// Returns l [m].
     double length() const { return length_; }
-    /// c at rest.
+    /// Returns c in the reference configuration.
     const Vec3& middle() const { return middle_; }
 
     Vec3 center(const VectorXd& q) const;
     Pose pose(const VectorXd& q) const;
-    /// The one that fits the vertices best.
+    /// Returns the pose that fits the vertices best, in the least-squares sense.
     Pose pose_of_vertices(const VectorXd& q) const;
-    void place(const Pose& pose, VectorXd& q) const;
+    void set_positions(const Pose& pose, VectorXd& q) const;
 
-    static constexpr Index corners = 4;
-    static constexpr Index points = 10;  // of its own, that tell where it starts; more are on its surface
+    static constexpr Index corners = 4;  // the nodes of the tetrahedron
+    static constexpr Index points =
+        10;  // nodes of its own that determine its start: corners and edge midpoints; more are on its surface
 
   private:
     std::vector<Index> nodes_;
     Index own_;
     Vec3 middle_;
-    std::vector<Vec3> offsets_;  // rho
+    std::vector<Vec3> offsets_;  // rho [m]
     double length_;
 };
 
-/// The rotation next to a matrix that is one but for rounding.
+/// Returns the rotation nearest to a matrix that is a rotation up to round-off.
 Mat3 orthonormal(Mat3 m);
 
 }  // namespace magshell

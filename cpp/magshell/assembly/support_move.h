@@ -1,7 +1,6 @@
-// A rigid move of what a support holds.
+// The rigid motion of the nodes of a support:
 //
-//   x -> center + R(t w)(x - center) + t u,   direction -> R(t w) direction           t = the progress, a
-//   control
+//   x -> center + R(t w)(x - center) + t u,   direction -> R(t w) direction           t: support factor, a load parameter
 #pragma once
 
 #include "magshell/core/types.h"
@@ -11,16 +10,17 @@ namespace magshell {
 struct SupportMove {
     Vec3 center = Vec3::Zero(), rotation_vector = Vec3::Zero(), translation = Vec3::Zero();
 
-    Vec3 point(const Vec3& rest, double progress) const;
-    Vec3 direction(const Vec3& rest, double progress) const;
+    /// Return the position of a point, and a direction, for a support factor.
+    Vec3 point(const Vec3& rest, double factor) const;
+    Vec3 direction(const Vec3& rest, double factor) const;
 
-    /// Their rates as the progress changes.
-    Vec3 point_rate(const Vec3& rest, double progress) const;
-    Vec3 direction_rate(const Vec3& rest, double progress) const;
+    /// Return their derivatives by the support factor.
+    Vec3 point_rate(const Vec3& rest, double factor) const;
+    Vec3 direction_rate(const Vec3& rest, double factor) const;
 
-    /// Adds the gradients by the move's own vectors of `by_place` . point(rest), and of `by_place` . direction(rest).
-    void point_vjp(const Vec3& rest, double progress, const Vec3& by_place, SupportMove& out) const;
-    void direction_vjp(const Vec3& rest, double progress, const Vec3& by_place, SupportMove& out) const;
+    /// Add the gradients of `by_position` . point(rest), and of `by_position` . direction(rest), by the vectors of the move.
+    void point_vjp(const Vec3& rest, double factor, const Vec3& by_position, SupportMove& out) const;
+    void direction_vjp(const Vec3& rest, double factor, const Vec3& by_position, SupportMove& out) const;
 };
 
 }  // namespace magshell

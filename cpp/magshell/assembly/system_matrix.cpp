@@ -8,7 +8,7 @@
 namespace magshell {
 namespace {
 
-// For every unknown of a kind, the stencils that hold it.
+// Returns the stencils that contain each dof of a kind.
 template <std::size_t N>
 std::vector<std::vector<Index>> holders(Index count, const std::vector<Stencil>& stencils,
                                         std::array<Index, N> Stencil::* members) {
@@ -19,7 +19,7 @@ std::vector<std::vector<Index>> holders(Index count, const std::vector<Stencil>&
     return of;
 }
 
-// Likewise, the cliques that hold it.
+// Returns the cliques that contain each dof of a kind.
 std::vector<std::vector<Index>> holders(Index count, const std::vector<Clique>& cliques,
                                         std::span<const Index> Clique::* members) {
     std::vector<std::vector<Index>> of(count);
@@ -29,7 +29,7 @@ std::vector<std::vector<Index>> holders(Index count, const std::vector<Clique>& 
     return of;
 }
 
-// Collects distinct numbers, cheaply emptied.
+// Collects distinct numbers; starting a new set costs nothing.
 class Marks {
   public:
     explicit Marks(Index count) : last_(count, -1) {}
@@ -132,7 +132,7 @@ void SystemMatrix::add_diagonal(VectorXd& out) const {
 }
 
 void SystemMatrix::add_product(const double* x, double* y) const {
-    // A node's three columns at once: their rows are the same.
+    // Processes the three columns of a node at once, because their rows are the same.
     for (Index j = 0; j < 3 * nodes_; j += 3) {
         const Index start = column_starts_[j], length = column_starts_[j + 1] - start;
         const double *a = values_.data() + start, *b = a + length - 1, *c = b + length - 2;

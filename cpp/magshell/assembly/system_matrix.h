@@ -1,9 +1,8 @@
-// The Hessian of a scene: lower triangle, compressed columns, in all unknowns before supports take any away.
+// The Hessian of a scene before supports remove dofs: lower triangle, compressed columns, in all dofs.
 //
-// Unknowns are numbered node by node (three each), then the edge rotations (one each). Where things go is
-// worked out once; evaluations add values in place. A place for a 3x3 block of nodes (i, j) is one number,
-// because the three columns of a node have the same rows and shrink by one from column to column: it stands
-// at p, p + L - 1 and p + 2 L - 3 in them, with L the length of the first.
+// The dofs are numbered node by node (three each), then the edge rotations (one each). Positions of entries are computed once, and
+// evaluations add values in place. The position of a 3 x 3 block of nodes (i, j) is one number, because the three columns of a node
+// have the same rows and each is shorter by one: the block stands at p, p + L - 1 and p + 2 L - 3, with L the length of the first column.
 #pragma once
 
 #include <algorithm>
@@ -20,11 +19,11 @@ namespace magshell {
 
 class SystemMatrix {
   public:
-    /// Where a block of two nodes goes: twice its position, plus one where it is to be transposed. Negative: nowhere.
+    /// The position of a block of two nodes: twice its index, plus one if the block is stored transposed. Negative: absent.
     using Slot = Index;
 
     SystemMatrix() = default;
-    /// `cliques`: what couples all with each other, beside the stencils.
+    /// cliques: dofs that are all coupled with each other, in addition to the stencils.
     SystemMatrix(Index nodes, Index rotations, const std::vector<Stencil>& stencils,
                  const std::vector<Clique>& cliques = {});
 
@@ -40,29 +39,28 @@ class SystemMatrix {
     }
     std::size_t bytes() const;
 
-    /// The slot of the block with rows at node i and columns at node j, two nodes that are coupled.
+    /// Returns the slot of the block with rows at node i and columns at node j, which must be coupled.
     Slot node_slot(Index i, Index j) const;
-    /// Whether two nodes are coupled.
+    /// Returns true if two nodes are coupled.
     bool couples(Index i, Index j) const;
-    /// The position of (rotation, first component of node).
+    /// Returns the position of the entry (rotation, first component of node).
     Index rotation_slot(Index rotation, Index node) const;
-    /// The position of (a, b), two rotations.
+    /// Returns the position of the entry (a, b) of two rotations.
     Index rotations_slot(Index a, Index b) const;
-    /// The length of the first of a node's three columns.
+    /// Returns the length of the first of a node's three columns.
     Index column_length(Index node) const { return column_starts_[3 * node + 1] - column_starts_[3 * node]; }
 
-    /// y = A x with the symmetric matrix.
+    /// Computes y = A x with the symmetric matrix.
     void multiply(const double* x, double* y) const {
         std::fill(y, y + size(), 0.0);
         add_product(x, y);
     }
-    /// y += A x.
+    /// Adds A x to y.
     void add_product(const double* x, double* y) const;
-    /// Adds its diagonal, of all unknowns.
+    /// Adds the diagonal of A, of all dofs.
     void add_diagonal(VectorXd& out) const;
 
-    /// Adds lane `lane` of block (i, j), i != j; `length` is the column length of the node whose columns the
-    /// slot is in.
+    /// Adds one lane of block (i, j), i != j; length: column length of the node whose columns the slot is in.
     void add_block(Slot slot, Index length, const Pack33& block, int lane) {
         const double* from = reinterpret_cast<const double*>(&block) + lane;
         const bool transposed = slot & 1;
@@ -78,7 +76,7 @@ class SystemMatrix {
         }
     }
 
-    /// Adds lane `lane` of a block that needs no transposing at its position, in columns of that length.
+    /// Adds one lane of a block that is stored untransposed, at its position, in columns of this length.
     void add_lower_block(Index position, Index length, const Pack33& block, int lane) {
         const double* from = reinterpret_cast<const double*>(&block) + lane;
         constexpr int w = Pack::width;
@@ -91,7 +89,7 @@ class SystemMatrix {
         }
     }
 
-    /// Adds lane `lane` of a symmetric block on the diagonal of a node.
+    /// Adds one lane of a symmetric diagonal block of a node.
     void add_diagonal_block(Index node, const Pack33& block, int lane) {
         const double* from = reinterpret_cast<const double*>(&block) + lane;
         constexpr int w = Pack::width;
@@ -106,7 +104,7 @@ class SystemMatrix {
         to[length - 1] += from[8 * w];
     }
 
-    /// Adds block (i, j), i != j; and a symmetric block on the diagonal of a node.
+    /// Adds a block (i, j), i != j, and a symmetric diagonal block of a node.
     void add_block(Slot slot, Index length, const Mat3& block) {
         const bool transposed = slot & 1;
         double* to = values_.data() + (slot >> 1);
@@ -125,14 +123,13 @@ class SystemMatrix {
         to[length - 1] += block(2, 2);
     }
 
-    /// Adds lane `lane` of the block (i, j) of two places i > j of an element that are both taken by one
-    /// node, and of its transpose, the block (j, i).
+    /// Adds one lane of the block (i, j) of two places i > j of an element that the same node takes, and of its transpose.
     void add_block_and_transpose(Index node, const Pack33& block, int lane) {
         const Pack33 sum = block + transpose(block);
         add_diagonal_block(node, sum, lane);
     }
 
-    /// Adds a row of three at a rotation_slot.
+    /// Adds one lane of a row of three entries at a rotation_slot.
     void add_rotation_row(Index slot, Index length, const Pack3& row, int lane) {
         double* to = values_.data() + slot;
         to[0] += row.x[lane];
@@ -151,8 +148,8 @@ class SystemMatrix {
     LargeVector<double> values_;
 };
 
-/// visit(row, place in the first, place in the other) for the entries of a column of the sum of two matrices; a place is
-/// negative where that one has none. There may be no other one.
+/// Calls visit(row, index in the first, index in the second) for the entries of a column of the sum of two matrices. An index is negative
+/// if that matrix has no such entry. `other` may be null.
 template <class Visit>
 void each_entry(const SystemMatrix& matrix, const SystemMatrix* other, Index column, const Visit& visit) {
     Index k = matrix.column_starts()[column], l = other ? other->column_starts()[column] : 0;

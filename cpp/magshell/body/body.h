@@ -1,4 +1,4 @@
-// What the assembly asks of a body: which unknowns its elements couple, and which folds come with them.
+// The interface of a body for assembly: the dofs that its elements couple, and the dihedral angles that belong to them.
 #pragma once
 
 #include <span>
@@ -12,14 +12,14 @@ class Body {
     virtual ~Body() = default;
 
     virtual Index n_elements() const = 0;
-    /// Nodes that an element couples; negative: none there.
+    /// Returns the nodes that an element couples; negative entries are absent.
     virtual std::span<const Index> nodes_of(Index element) const = 0;
-    /// Scalars likewise.
+    /// Returns the scalar dofs that an element couples; negative entries are absent.
     virtual std::span<const Index> scalars_of(Index /*element*/) const { return {}; }
 
-    virtual Index n_folds() const { return 0; }
-    /// The first of the elements that a fold belongs to; ascending.
-    virtual Index element_of_fold(Index /*fold*/) const { return 0; }
+    virtual Index n_dihedrals() const { return 0; }
+    /// Returns the first element that a dihedral angle belongs to; ascending with the angle.
+    virtual Index element_of_dihedral(Index /*dihedral*/) const { return 0; }
 };
 
 }  // namespace magshell

@@ -18,7 +18,8 @@ Fibres::Fibres(const Solid& solid_, const std::vector<Index>& given) : solid(sol
     std::sort(order.begin(), order.end(), [&](Index a, Index b) { return number(a) < number(b); });
     for (const Index k : order) {
         if (!of_solid.empty() && of_solid.back() == number(k))
-            throw InvalidInput("element " + std::to_string(given[k]) + " has its fibres twice");
+            throw InvalidInput("element " + std::to_string(given[k]) + " of " + solid.owner +
+                               " is given to one muscle twice");
         of_solid.push_back(number(k));
         if (solid.quadratic())
             quadratic_nodes.push_back(solid.quadratic_nodes[number(k)]);

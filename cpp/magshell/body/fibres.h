@@ -1,4 +1,4 @@
-// Fibres in some of a solid's elements, with chunks of their own: what is assembled by them comes on top of the solid.
+// The muscle fibres in some elements of a solid, with chunks of their own: their contributions are added to those of the solid.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@ namespace magshell {
 
 class Fibres final : public Body {
   public:
-    /// `elements`: of the solid, in the caller's numbers, each once. The solid has to outlive it.
+    /// elements: of the solid, in the numbering of the caller, each once. The solid must outlive this object.
     Fibres(const Solid& solid, const std::vector<Index>& elements);
     Fibres(const Fibres&) = delete;
     Fibres& operator=(const Fibres&) = delete;
@@ -22,8 +22,8 @@ class Fibres final : public Body {
     Vec3 rest(Index element, int k) const { return solid.rest(of_solid[element], k); }
 
     const Solid& solid;
-    Renumbering elements;                            // the caller's list of them <-> ours
-    std::vector<Index> of_solid;                     // of each, its number there, ascending
+    Renumbering elements;                            // the caller's list of elements <-> ours
+    std::vector<Index> of_solid;                     // per fibre element: its number in the solid, ascending
     std::vector<std::array<Index, 4>> linear_nodes;  // as those of the solid
     std::vector<std::array<Index, 10>> quadratic_nodes;
 };

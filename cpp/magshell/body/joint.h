@@ -1,4 +1,4 @@
-// What joins a link of a skeleton to the one before it.
+// The joint between a link of a skeleton and its parent.
 #pragma once
 
 #include "magshell/core/types.h"
@@ -6,27 +6,27 @@
 namespace magshell {
 
 enum class JointKind {
-    free,       // moves and turns as it likes
-    fixed,      // not at all
-    revolute,   // turns about the axis
-    prismatic,  // slides along it
-    ball        // turns about the origin
+    free,       // six degrees of freedom
+    fixed,      // none
+    revolute,   // rotates about the axis
+    prismatic,  // translates along the axis
+    ball        // rotates about the origin
 };
 
-/// Origin and axis as the world has them at rest; the axis is a unit vector, zero where there is none. A ball joint may have
-/// one: that of a cone.
+/// A joint. Origin and axis are in world coordinates of the reference configuration; the axis is a unit vector, zero without one. A ball
+/// joint may have an axis, that of a cone which limits its rotation.
 struct Joint {
     JointKind kind = JointKind::free;
-    Index parent = -1;  // a link of the same skeleton, before this one; negative: the world
+    Index parent = -1;  // index of an earlier link of the same skeleton; negative: the world
     Vec3 origin = Vec3::Zero(), axis = Vec3::Zero();
-    bool driven = false;   // a motor prescribes its coordinate, or its rotation
-    bool damped = false;   // a damper acts in it
-    bool twisted = false;  // a ball joint with a moment in it
-    bool served = false;   // a ball joint with a servo
-    bool coned = false;    // a ball joint whose axis has to stay in a cone
+    bool has_motor = false;  // a motor prescribes its coordinate or rotation
+    bool damped = false;     // a damper acts in it
+    bool twisted = false;    // a ball joint with an applied moment
+    bool served = false;     // a ball joint with a servo
+    bool coned = false;      // a ball joint whose axis is limited to a cone
 
     bool has_axis() const { return kind == JointKind::revolute || kind == JointKind::prismatic; }
-    /// How many coordinates it has.
+    /// Returns its number of degrees of freedom.
     Index freedom() const {
         switch (kind) {
             case JointKind::free:

@@ -1,9 +1,9 @@
-// The numbers of a scene, and the nodes of all its bodies: vertices, then directions.
+// The dofs of a scene, and the nodes of all its bodies: vertices first, then directors.
 //
-//   q = [ 3 a node | 1 a scalar ]        scalars: edge rotations
+//   q = [ 3 per node | 1 per scalar ]        scalars: edge rotations
 //
-// A direction is what clamped edges, symmetry planes and couples refer to: it has three components and
-// derivatives like a vertex, and is always prescribed.
+// A direction is a prescribed unit vector that clamped edges, symmetry planes and edge moments refer to. It is stored as a node, with three
+// components and derivatives like a vertex, and is always prescribed.
 #pragma once
 
 #include <string>
@@ -15,32 +15,32 @@ namespace magshell {
 
 struct Nodes {
     Renumbering vertices;    // of all bodies: the caller's <-> ours
-    std::vector<Vec3> rest;  // per node: rest position of a vertex, rest value of a direction
+    std::vector<Vec3> rest;  // per node: rest position of a vertex [m], or rest value of a direction
     Index scalars = 0;
 
-    /// Those that are welded count once.
+    /// Returns the number of vertices; welded ones count once.
     Index n_vertices() const { return vertices.size(); }
     Index n_user_vertices() const { return vertices.user_size(); }
     Index n_nodes() const { return static_cast<Index>(rest.size()); }
-    Index n_unknowns() const { return 3 * n_nodes() + scalars; }
-    /// Of the vertices: the first so many unknowns.
+    Index n_dofs() const { return 3 * n_nodes() + scalars; }
+    /// Returns the number of dofs that are coordinates of vertices; they come first.
     Index n_coordinates() const { return 3 * n_vertices(); }
-    /// The unknown that is the first scalar.
+    /// Returns the index of the first scalar dof.
     Index first_scalar() const { return 3 * n_nodes(); }
     Index direction_node(Index direction) const { return n_vertices() + direction; }
-    /// What the caller calls it.
+    /// Returns the caller's number of a vertex.
     Index user_vertex(Index node) const { return vertices.user[node]; }
 };
 
-/// Numbers vertices in the order in which bodies come to them.
+/// Numbers vertices in the order in which the bodies are added, so that neighbours have near numbers.
 class NodeNumbering {
   public:
     explicit NodeNumbering(Index n_vertices) { core_.assign(n_vertices, -1); }
 
-    /// Our number of the caller's vertex.
+    /// Returns our number of the caller's vertex, which it gets on the first call.
     Index number(Index user, const Vec3& rest_position);
-    /// Once all bodies are numbered; directions (n_d, 3). A vertex without a number is a copy, and
-    /// `original[vertex]` has one.
+    /// Finishes the numbering once all bodies are added; directions (n_d, 3). A vertex without a number is welded to the vertex
+    /// original[vertex], which has one.
     Nodes finish(const Rows3& directions, const std::vector<Index>& original);
 
   private:

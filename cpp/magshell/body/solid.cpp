@@ -61,7 +61,7 @@ void Solid::check_volumes() const {
     }
     if (first < n_elements())
         throw InvalidInput("tetrahedron " + std::to_string(first) +
-                           " is flat or inverted at rest: its volume at a point of integration is " +
+                           " is flat or inverted at rest: its volume at an integration point is " +
                            std::to_string(volume) + " m3");
 }
 

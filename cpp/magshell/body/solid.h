@@ -1,4 +1,4 @@
-// A solid as the core sees it: tetrahedra of four or of ten nodes, numbered along a curve, and the surface around them.
+// A solid of tetrahedra with four or ten nodes, numbered along a space-filling curve, and its surface.
 #pragma once
 
 #include <array>
@@ -11,17 +11,17 @@
 
 namespace magshell {
 
-/// The skin of a solid in a mesh of its own: of ten-node tetrahedra, four flat triangles a face.
+/// The surface of a solid as a mesh of its own; for ten-node tetrahedra, four flat triangles per face.
 struct SolidSurface {
     std::shared_ptr<const TriangleMesh> mesh;
-    std::vector<Index> vertices;  // the scene's vertex of each vertex of the mesh
+    std::vector<Index> vertices;  // the scene vertex of each vertex of the mesh
 };
 
 class Solid final : public Body {
   public:
-    /// elements (n_t, 4 or 10): rows of rest_positions (n, 3), middle nodes in the order of
-    /// strain/tetrahedron.h. `vertices`: the scene's vertex of each row. Throws InvalidInput, naming the
-    /// first offender, on elements whose volume at a point of integration is not positive.
+    /// elements (n_t, 4 or 10): rows of rest_positions (n, 3) [m], middle nodes in the order of strain/tetrahedron.h. vertices: the scene
+    /// vertex of each row. Throws InvalidInput, naming the first such element, if a volume at an integration point is not
+    /// positive.
     Solid(std::string owner, const Rows3& rest_positions, const std::vector<Index>& elements,
           int nodes_per_element, const std::vector<Index>& vertices, const SolidSurface& surface,
           NodeNumbering& numbering);
@@ -36,19 +36,19 @@ class Solid final : public Body {
 
     bool quadratic() const { return linear_nodes.empty(); }
     const Surface* surface() const { return surface_.get(); }
-    /// Of the bounding box at rest: its diagonal [m].
+    /// Returns the diagonal of the bounding box at rest [m].
     double extent() const;
-    /// The smallest height of an element at rest, between its corners [m].
+    /// Returns the smallest height of an element at rest, between its corners [m].
     double smallest_height() const;
-    /// Adds the volume of each element to its nodes, in equal shares, among all unknowns [m3].
+    /// Adds an equal part of the volume of each element to each of its nodes, among all dofs [m3].
     void add_volumes(VectorXd& metric) const;
     double volume() const;
-    /// The nodes of an element at rest [m].
+    /// Returns the rest position of a node of an element [m].
     Vec3 rest(Index element, int k) const { return rest_[element * width_ + k]; }
 
     const std::string owner;
     Renumbering elements;                            // the caller's <-> ours
-    std::vector<std::array<Index, 4>> linear_nodes;  // per element, our nodes; one of the two is empty
+    std::vector<std::array<Index, 4>> linear_nodes;  // per element: our nodes; one of the two is empty
     std::vector<std::array<Index, 10>> quadratic_nodes;
 
   private:

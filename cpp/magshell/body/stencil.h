@@ -1,4 +1,4 @@
-// Which unknowns an element couples.
+// The dofs that an element couples.
 #pragma once
 
 #include <array>
@@ -8,13 +8,13 @@
 
 namespace magshell {
 
-/// Nodes, and scalars. Negative: absent.
+/// A fixed number of nodes and scalar dofs. Negative entries are absent.
 struct Stencil {
     std::array<Index, 6> nodes{-1, -1, -1, -1, -1, -1};
     std::array<Index, 3> rotations{-1, -1, -1};
 };
 
-/// The same of any size, held elsewhere.
+/// Any number of nodes and scalar dofs, stored elsewhere.
 struct Clique {
     std::span<const Index> nodes, scalars = {};
 };

@@ -1,11 +1,12 @@
-// Triangles with the scene's nodes, numbered along a curve for locality: what magnetization, water, contact
-// and area loads act on.
+// Triangles on the nodes of a scene, numbered along a space-filling curve for locality. Magnetization, drag, contact and area loads act on
+// them.
 #pragma once
 
 #include <array>
 #include <string>
 #include <vector>
 
+#include "magshell/body/body.h"
 #include "magshell/body/nodes.h"
 #include "magshell/mesh/triangle_mesh.h"
 
@@ -13,30 +14,42 @@ namespace magshell {
 
 class Surface {
   public:
-    /// `vertices`: the scene's vertex of each vertex of the mesh, in the caller's numbers. `owner`: the body
-    /// under whose name its parameters stand.
+    /// vertices: the scene vertex of each vertex of the mesh, in the numbering of the caller. owner: name of the body under which its parameters
+    /// are registered.
     Surface(std::string owner, const TriangleMesh& mesh, const std::vector<Index>& vertices,
             NodeNumbering& numbering);
     Surface(const Surface&) = delete;
     Surface& operator=(const Surface&) = delete;
 
     Index n_faces() const { return faces.size(); }
-    /// The corners of a face at rest [m].
+    /// Returns the corners of a face at rest [m].
     const std::array<Vec3, 3>& rest_corners(Index face) const { return rest_corners_[face]; }
-    /// The largest coordinate at rest of the corners of a face [m]. A unit of its round-off is how exactly
-    /// they are known.
+    /// Returns the largest coordinate of the corners of a face at rest [m]; their round-off is relative to it.
     double largest_coordinate(Index face) const;
-    /// The smallest height of a face at rest [m].
+    /// Returns the smallest height of a face at rest [m].
     double smallest_height(Index face) const;
-    /// Of the bounding box at rest: its diagonal [m].
+    /// Returns the diagonal of the bounding box at rest [m].
     double extent() const;
 
     const std::string owner;
     Renumbering faces;                          // the caller's <-> ours
-    std::vector<std::array<Index, 3>> corners;  // per face, our nodes
+    std::vector<std::array<Index, 3>> corners;  // per face: our nodes
 
   private:
     std::vector<std::array<Vec3, 3>> rest_corners_;
+};
+
+/// A surface as a body with chunks of its own: what is assembled on its triangles is added to the body whose nodes they have.
+class SurfaceBody final : public Body {
+  public:
+    /// The surface must outlive this object.
+    explicit SurfaceBody(const Surface& surface) : surface_(surface) {}
+
+    Index n_elements() const override { return surface_.n_faces(); }
+    std::span<const Index> nodes_of(Index element) const override { return surface_.corners[element]; }
+
+  private:
+    const Surface& surface_;
 };
 
 }  // namespace magshell

@@ -1,4 +1,4 @@
-// What can go wrong, by what the caller should do about it. The bindings turn each into one Python exception.
+// Exceptions of the core, by what the caller should do. The bindings translate each into one Python exception.
 #pragma once
 
 #include <stdexcept>
@@ -6,12 +6,12 @@
 
 namespace magshell {
 
-/// The caller's input is wrong; raised before any work starts. ValueError in Python.
+/// The input is invalid; thrown before any work starts, except where only the work reveals it. ValueError in Python.
 struct InvalidInput : std::invalid_argument {
     using std::invalid_argument::invalid_argument;
 };
 
-/// Ctrl-C arrived while a solve was running. KeyboardInterrupt in Python.
+/// The user pressed Ctrl-C during a solve. KeyboardInterrupt in Python.
 struct Interrupted : std::runtime_error {
     Interrupted() : std::runtime_error("interrupted") {}
 };

@@ -8,10 +8,10 @@ namespace magshell {
 
 namespace {
 
-constexpr Nanoseconds between_ways = 50'000;  // to give way and to compare takes 1 us where nobody waits
+constexpr Nanoseconds yield_interval = 50'000;  // [ns] minimum interval between yields, which cost 1 us each
 
-void add(std::atomic<Nanoseconds>& told, Nanoseconds more) {
-    told.fetch_add(more, std::memory_order_relaxed);
+void add(std::atomic<Nanoseconds>& sum, Nanoseconds more) {
+    sum.fetch_add(more, std::memory_order_relaxed);
 }
 
 Nanoseconds processor_time() {
@@ -24,7 +24,7 @@ Nanoseconds processor_time() {
 
 Watch::Watch(Helper& helper) : helper_(helper), compared_(clock_now()), processor_(processor_time()) {}
 
-/// For how long since it was last asked, if that was more than a moment.
+/// Returns for how long the thread was suspended since the last call, 0 if that was less than `moment` [ns].
 Nanoseconds Watch::put_aside() {
     const Nanoseconds clock = compared_, processor = processor_;
     processor_ = processor_time();
@@ -43,15 +43,16 @@ void Watch::end_part() {
     add(helper_.put_aside_in_part, aside);
 }
 
-bool Watch::give_way() {
-    if (clock_now() - gave_way_ < between_ways) return false;
+bool Watch::yield_to_others() {
+    if (clock_now() - yielded_ < yield_interval) return false;
     std::this_thread::yield();
     const Nanoseconds time = put_aside();
-    gave_way_ = compared_;
+    yielded_ = compared_;
     return time > 0;
 }
 
-void Rest::settle(Nanoseconds now, Nanoseconds worked, Nanoseconds put_aside, Nanoseconds waited) {
+void HelperBackoff::record_loop(Nanoseconds now, Nanoseconds worked, Nanoseconds put_aside,
+                                Nanoseconds waited) {
     constexpr Nanoseconds of_waiting = 20, shortest = 2'000'000, longest = 250'000'000, forgiven = 4;
     const Nanoseconds cost = std::min(put_aside, waited);
     const bool of_no_use = put_aside > moment && put_aside > worked;

@@ -1,8 +1,8 @@
-// A thread that helps with loops, as long as it has a processor to itself, and when it was last no use.
+// A helper thread for parallel loops, which stays active as long as it has a processor to itself, and backs off when it has been of no use.
 //
-// A helper that the system puts aside in the middle of a part keeps the loop's caller waiting for as long as
-// the other program may run, some milliseconds, which is longer than a loop. So helpers give way to others
-// between parts, where nobody waits for them, and those that had to share their processor rest for a while.
+// If the system suspends a helper in the middle of a part of a loop, the caller waits for as long as the other program runs, some
+// milliseconds, which is longer than a loop. Helpers therefore yield to other programs between parts, where nobody waits for them, and those
+// that had to share their processor are not used for a while (exponential back-off).
 #pragma once
 
 #include <atomic>
@@ -20,38 +20,36 @@ inline Nanoseconds clock_now() {
         .count();
 }
 
-/// Less than this passes unnoticed: the system's own work takes a processor for some ten microseconds.
+/// Suspensions shorter than this are ignored [ns]: the work of the system takes some ten microseconds.
 inline constexpr Nanoseconds moment = 100'000;
 
-/// How long a helper is to be left alone. It begins with a multiple of what its last loop cost, so that
-/// waiting for helpers stays a small part of the time, and doubles from one cost to the next until it has
-/// been of use for a while.
-class Rest {
+/// The time for which a helper is not used. It begins with a multiple of the cost of its last loop, so that waiting for helpers remains
+/// a small part of the time, and doubles with each further cost until the helper has worked long enough.
+class HelperBackoff {
   public:
     bool over(Nanoseconds now) const { return now >= end_; }
 
-    /// The helper worked for so long, was put aside for so long, and kept the caller waiting for so long.
-    void settle(Nanoseconds now, Nanoseconds worked, Nanoseconds put_aside, Nanoseconds waited);
+    /// Records a loop: how long the helper worked, was suspended, and kept the caller waiting [ns].
+    void record_loop(Nanoseconds now, Nanoseconds worked, Nanoseconds put_aside, Nanoseconds waited);
 
   private:
     Nanoseconds end_ = 0, length_ = 0, worked_ = 0;
 };
 
-// What a helper and the caller of loops tell each other, apart from what others do.
+// The state that a helper and the caller of loops share, on a cache line of its own.
 struct alignas(64) Helper {
     std::thread thread;
-    Rest rest;  // the caller's
+    HelperBackoff backoff;  // used by the caller only
 
-    std::atomic<std::uint32_t> bell{0};  // rung by the caller; a sleeping helper waits for it to change
+    std::atomic<std::uint32_t> bell{0};  // changed by the caller; a sleeping helper waits for a change
     std::atomic<bool> asleep{false};
-    std::atomic<bool> resting{false};  // by the caller's word
+    std::atomic<bool> resting{false};  // set by the caller
 
-    std::atomic<Nanoseconds> worked{0}, put_aside{0};  // since the caller last asked
-    std::atomic<Nanoseconds> put_aside_in_part{0};     // of it, the most in one part
+    std::atomic<Nanoseconds> worked{0}, put_aside{0};  // [ns] since the caller last read them
+    std::atomic<Nanoseconds> put_aside_in_part{0};     // [ns] the largest suspension within one part
 };
 
-// How a helper finds out that it was put aside: by comparing the clock with its share of the processor, now
-// and then.
+// Detects that a helper was suspended, by comparing the clock with the processor time of its thread.
 class Watch {
   public:
     explicit Watch(Helper& helper);
@@ -59,16 +57,16 @@ class Watch {
     void begin_part() { part_began_ = clock_now(); }
     void end_part();
 
-    /// Lets another thread have this processor if one waits for it, now and then. True if one had it for more
-    /// than a moment, now or since.
-    bool give_way();
+    /// Yields the processor to another thread if one is waiting, at intervals. Returns true if another one ran for more than `moment`
+    /// since the last call.
+    bool yield_to_others();
 
   private:
     Nanoseconds put_aside();
 
     Helper& helper_;
-    Nanoseconds compared_, processor_;  // the clock, and this thread's share of it until then
-    Nanoseconds part_began_ = 0, gave_way_ = 0;
+    Nanoseconds compared_, processor_;  // the clock, and the processor time of this thread at that time
+    Nanoseconds part_began_ = 0, yielded_ = 0;
 };
 
 }  // namespace magshell

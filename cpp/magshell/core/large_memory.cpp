@@ -11,7 +11,7 @@ namespace magshell {
 namespace {
 
 constexpr std::size_t huge_page = std::size_t{1} << 21;
-#ifdef __SANITIZE_ADDRESS__  // which watches only what comes from new
+#ifdef __SANITIZE_ADDRESS__  // the sanitizer observes only what `new` allocates
 constexpr std::size_t large = std::numeric_limits<std::size_t>::max();
 #else
 constexpr std::size_t large = 2 * huge_page;
@@ -31,14 +31,14 @@ void* take_memory(std::size_t bytes) {
     if (mapped < bytes) throw std::bad_alloc();
     void* const from = mmap(nullptr, mapped, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (from == MAP_FAILED) throw std::bad_alloc();
-    // What lies before the first border of a huge page, and behind what is wanted, goes back.
+    // Returns the parts before the first boundary of a huge page, and behind what was requested, to the system.
     char* const begin = static_cast<char*>(from);
     const std::size_t before = -reinterpret_cast<std::uintptr_t>(begin) % huge_page;
     char* const memory = begin + before;
     if (before > 0) munmap(begin, before);
     if (before < huge_page) munmap(memory + wanted, huge_page - before);
 #ifdef MADV_HUGEPAGE
-    madvise(memory, wanted, MADV_HUGEPAGE);  // where it is refused, small pages do
+    madvise(memory, wanted, MADV_HUGEPAGE);  // if the system refuses, small pages are used
 #endif
     return memory;
 }

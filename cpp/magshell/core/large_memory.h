@@ -1,5 +1,5 @@
-// Memory for large arrays, in huge pages where the system gives them: fresh memory costs a fault a page, and
-// a factorization walks over more small pages than the processor keeps the addresses of.
+// An allocator for large arrays, in huge pages if the system provides them. Fresh memory costs a page fault per page, and a factorization
+// accesses more small pages than the processor caches addresses for.
 #pragma once
 
 #include <cstddef>
@@ -7,11 +7,11 @@
 
 namespace magshell {
 
-/// Aligned to 64 bytes, not initialised. Throws std::bad_alloc.
+/// Returns memory aligned to 64 bytes, not initialised. Throws std::bad_alloc.
 void* take_memory(std::size_t bytes);
 void give_back_memory(void* memory, std::size_t bytes) noexcept;
 
-/// For arrays that may become large.
+/// An allocator for arrays that may become large.
 template <class T>
 struct LargeAllocator {
     using value_type = T;

@@ -1,7 +1,7 @@
-// A pack of doubles, one a lane: the scalar of every element kernel, so that one instruction serves several elements.
+// A pack, i.e. a SIMD vector of doubles. Each component (lane) belongs to one element, so one instruction of a kernel processes several elements.
 //
-// Lanes never meet: each holds one element's numbers, so an element's result does not depend on its
-// neighbours in the pack. Written with the compilers' vector extension; -march decides what it becomes.
+// No operation combines lanes, so the result of an element does not depend on its neighbours in the pack. The implementation uses the vector
+// extension of the compilers; -march selects the instructions.
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// More functions of packs, for kernels that need them: logarithm, exponential, root, choices lane by lane.
+// Elementary functions of packs, for kernels that need them: logarithm, exponential, cube root, and choices by lane.
 #pragma once
 
 #include <cmath>
@@ -11,20 +11,20 @@ namespace magshell {
 
 typedef unsigned long long LaneBits __attribute__((vector_size(sizeof(Pack::Lanes))));
 
-/// A mask of the lanes whose bit is set.
+/// Returns a mask of the lanes whose bit is set.
 inline auto lanes_with_bits(unsigned bits) {
     return [&]<std::size_t... lane>(std::index_sequence<lane...>) {
         return ((LaneBits{} + bits) & LaneBits{1ull << lane...}) != LaneBits{};
     }(std::make_index_sequence<Pack::width>());
 }
 
-/// In every lane what std::log says of its number, to 1 ulp; a lane's result does not depend on its neighbours.
+/// Returns the natural logarithm in every lane, to 1 ulp and with the special values of std::log; lanes are independent of each other.
 ///
 ///   a = 2^k m,  m in [1/sqrt 2, sqrt 2):   ln a = k ln 2 + ln(1 + f),  f = m - 1
 ///   ln(1 + f) = 2 atanh(s) = f - f^2/2 + s (f^2/2 + r),   s = f/(2 + f),  r = 2 sum_n s^2n/(2n + 1)
 ///
-/// The series is Taylor's: |s| < 0.172, so that ten of its terms reach 1e-18 of the sum. ln 2 comes in two pieces, the
-/// first with zeros at its end for k to multiply.
+/// The series is the Taylor series: with |s| < 0.172, ten terms reach 1e-18 of the sum. ln 2 is split into two parts, the first with trailing
+/// zeros so that its product with k is exact.
 inline Pack log(const Pack& a) {
     using Lanes = Pack::Lanes;
     const auto all = [](double number) { return Lanes{} + number; };
@@ -32,7 +32,7 @@ inline Pack log(const Pack& a) {
                                  root_half = 0x3fe6a09e667f3bcdull, exponent_zero = 0x4330000000000000ull;
     const auto denormal = a.lanes < all(0x1p-1022);
     const Lanes number = denormal ? a.lanes * all(0x1p54) : a.lanes;
-    // The exponent steps where the mantissa passes 1/sqrt 2, not 1.
+    // Rounds the exponent so that the mantissa lies in [1/sqrt 2, sqrt 2) instead of [1, 2).
     const LaneBits bits = LaneBits(number) + (one - root_half);
     const LaneBits exponent_bits = (bits >> 52) | exponent_zero, m_bits = (bits & mantissa) + root_half;
     const Lanes k = Lanes(exponent_bits) - (denormal ? all(0x1p52 + 1077) : all(0x1p52 + 1023)),
@@ -65,7 +65,7 @@ inline Pack max(const Pack& a, const Pack& b) {
     return Pack(a.lanes > b.lanes ? a.lanes : b.lanes);
 }
 
-/// a where `number` is negative, else b.
+/// Returns a in lanes in which `number` is negative, else b.
 inline Pack where_negative(const Pack& number, const Pack& a, const Pack& b) {
     return Pack(number.lanes < Pack(0.0).lanes ? a.lanes : b.lanes);
 }

@@ -12,14 +12,13 @@ namespace {
 
 std::atomic<int> thread_count{1};
 
-// Never destroyed at exit: after a fork, or while Python ends, its threads cannot be joined.
+// Never destroyed at exit: after a fork, or while Python shuts down, its threads cannot be joined.
 Pool* pool = nullptr;
 pid_t pool_owner = 0;
-std::atomic<pid_t> pool_user{0};  // the process whose loop it runs
+std::atomic<pid_t> pool_user{0};  // the process whose loop the pool runs
 
-// The pool for one loop, if no other has it. Not a mutex: the thread that has it may ask again, from within
-// its loop, which a mutex leaves undefined. A process that was forked in the middle of another thread's loop
-// finds its parent's name there, and that loop is none of its own.
+// RAII claim of the pool for one loop. It is not a mutex, since the owning thread may claim it again within its loop, which is undefined for a
+// mutex. A process that was forked during another thread's loop finds the number of its parent here, and may claim the pool.
 class Claim {
   public:
     explicit Claim(pid_t process) {
@@ -59,7 +58,7 @@ void parallel_for(int count, const std::function<void(int)>& body, PartTime& par
     const Claim claim(process);
     if (!claim.granted()) return run_serially(count, body);
 
-    if (pool_owner != process) pool = nullptr;  // its threads stayed in the parent
+    if (pool_owner != process) pool = nullptr;  // its threads exist in the parent process only
     if (pool && pool->helpers() != wanted) {
         delete pool;
         pool = nullptr;

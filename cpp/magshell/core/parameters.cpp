@@ -20,7 +20,7 @@ Slot Parameters::add(const std::string& owner, const std::string& name, const st
     return slot;
 }
 
-// move(place in the caller's order, place in ours, width, whether an earlier row is there too) for all rows.
+// Calls move(position in the caller's order, position in ours, width, whether an earlier row has that position) for all rows.
 template <class Move>
 void Parameters::each_row(const Move& move) const {
     for (const Entry& entry : entries_) {

@@ -1,6 +1,6 @@
-// The numbers of a scene that a solve may change and differentiate by. Each is registered once, by who reads
-// it, and has a place in one flat vector of values and in one of their gradient. Names serve the way in and
-// out only.
+// The registered parameters of a scene: the numbers that a solve may change and differentiate by. Each is registered once, by the object that
+// reads it, and has a position in one flat vector of values and in the vector of gradients. Names are used only to translate from and to
+// the caller.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@
 
 namespace magshell {
 
-/// Where a parameter stands in the flat vectors: `rows` rows of `width` numbers.
+/// The position of a parameter in the flat vectors: `rows` rows of `width` numbers.
 struct Slot {
     Index entry = -1, first = 0, rows = 0, width = 1;
 
@@ -19,25 +19,25 @@ struct Slot {
     Index at(Index row) const { return first + row * width; }
 };
 
-/// The list of what is registered.
+/// The list of registered parameters.
 class Parameters {
   public:
     struct Entry {
         std::string owner, name, unit;
         Slot slot;
-        const Renumbering* order;  // of its rows; nullptr: the caller's own
+        const Renumbering* order;  // of its rows; nullptr: the order of the caller
     };
 
-    /// A new place, or the one that this parameter of this owner already has: several may read it. The order
-    /// of its rows has to outlive the list. Where several rows of the caller are one of ours, that one is their
-    /// sum, and our last rows are empty. Throws std::logic_error where the shapes differ.
+    /// Registers a parameter, or returns its slot if its owner has registered it already: several objects may read it. `order` must outlive the
+    /// list. If several rows of the caller are one of ours, ours is their sum, and our last rows are empty. Throws std::logic_error
+    /// if the shapes differ.
     Slot add(const std::string& owner, const std::string& name, const std::string& unit, Index rows,
              Index width, const Renumbering* order = nullptr);
 
     const std::vector<Entry>& entries() const { return entries_; }
     Index size() const { return size_; }
 
-    /// The one door between the caller's order of rows and ours.
+    /// Convert all values between the row order of the caller and that of the core.
     VectorXd to_core(const VectorXd& in_user_order) const;
     VectorXd to_user(const VectorXd& in_core_order) const;
 
@@ -49,7 +49,7 @@ class Parameters {
     Index size_ = 0;
 };
 
-/// All values, and which parameters differ from what they were before.
+/// The values of all parameters, with marks of those that the last change affected.
 class Values {
   public:
     const double* operator[](const Slot& slot) const { return numbers_.data() + slot.first; }
@@ -62,7 +62,7 @@ class Values {
     }
     const VectorXd& numbers() const { return numbers_; }
 
-    /// All of them, in our order; at first everything has changed.
+    /// Sets all values, in the order of the core, and marks those that differ from before; the first time all are marked.
     void set(const Parameters& parameters, VectorXd numbers);
 
   private:
@@ -70,21 +70,26 @@ class Values {
     std::vector<char> changed_;
 };
 
-/// What may change while a scene is solved, everything that a path parameter interpolates: one flat vector,
-/// with a list of its own.
+/// The load parameters of a state: load factors, uniform field, amplitude of supports, and values that vary during the solve. A path or a
+/// motion interpolates them. They form one flat vector with a list of their own.
 using Controls = VectorXd;
 
-/// The controls at `parameter` on the straight line from `from` (0) to `to` (1).
+/// Returns the load parameters at `parameter` on the straight line from `from` (0) to `to` (1).
 inline Controls interpolate(const Controls& from, const Controls& to, double parameter) {
     return (1.0 - parameter) * from + parameter * to;
 }
 
-/// What a scene's terms read.
+/// The name and unit of a parameter with one number per face of a surface.
+struct FaceInput {
+    const char *name, *unit;
+};
+
+/// The parameters and load parameters that the terms of a scene read.
 struct Registry {
     Parameters values, controls;
 };
 
-/// The gradient of a number by all values and all controls, in our order. Whoever has a share adds it.
+/// The gradient of a function by all values and all load parameters, in the order of the core. Each object adds its part.
 struct Gradient {
     VectorXd values, controls;
 

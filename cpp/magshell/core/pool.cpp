@@ -6,11 +6,11 @@
 namespace magshell {
 namespace {
 
-// To wake a sleeping thread takes 10 us of the caller's time and 30 until it comes, so a loop must be worth
-// it. Loops follow each other closely: helpers look for the next one for a while before they sleep.
+// Waking a sleeping thread costs the caller 10 us, and it starts after another 30 us, so a loop must be long enough. Loops follow each other
+// closely, so helpers look for the next one for a while before they sleep.
 constexpr Nanoseconds worth_waking = 100'000, worth_a_helper = 50'000;
-constexpr Nanoseconds patience = 200'000;    // of a helper, for the next loop
-constexpr Nanoseconds short_wait = 100'000;  // of the caller, awake
+constexpr Nanoseconds patience = 200'000;    // [ns] for which a helper looks for the next loop
+constexpr Nanoseconds short_wait = 100'000;  // [ns] for which the caller waits actively
 
 void pause() {
     for (int k = 0; k < 8; ++k) {
@@ -22,7 +22,7 @@ void pause() {
     }
 }
 
-// Parts look long when the system takes the processor from the caller, too. That alone is to wake nobody.
+// Limits the measured time of a part, which is too long if the system suspended the caller: that alone should wake nobody.
 Nanoseconds believable(Nanoseconds part_time, Nanoseconds before) {
     return before > 0 ? std::min(part_time, 4 * before) : part_time;
 }
@@ -46,12 +46,12 @@ void Pool::run(int count, const std::function<void(int)>& body, PartTime& part_t
     finished_.store(0, std::memory_order_relaxed);
     left_.store(count, std::memory_order_release);
     const int own = work(count, body, part_time);
-    settle(wait_for(count - own));
+    record_helpers(wait_for(count - own));
     if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
 }
 
-/// The caller's share of the loop, and how many parts it was. Helpers who sleep are woken at once where the
-/// same loop was long enough before, and else when it turns out to be.
+/// Processes parts of the loop in the caller and returns their number. Sleeping helpers are woken at once if the same loop was long enough
+/// in its last run, otherwise when it turns out to be.
 int Pool::work(int count, const std::function<void(int)>& body, PartTime& part_time) {
     const Nanoseconds begin = clock_now(), before = part_time.load(std::memory_order_relaxed);
     bool woken = wake_for(count - 1, before);
@@ -73,14 +73,14 @@ bool Pool::wake_for(int parts, Nanoseconds part_time) {
     return true;
 }
 
-/// One of the parts that are left, counted from the end.
+/// Takes one of the parts that are left, counted from the end. Returns false if there is none.
 bool Pool::take(int& left) {
     if (left_.load(std::memory_order_relaxed) <= 0) return false;
     left = left_.fetch_sub(1, std::memory_order_acquire);
     return left > 0;
 }
 
-/// Does a part, and returns how many are done with: all that are left, too, after an exception.
+/// Processes a part and returns how many parts this completes: after an exception, all that are left.
 int Pool::done(int part, const std::function<void(int)>& body) {
     try {
         body(part);
@@ -100,7 +100,7 @@ void Pool::wake(int wanted) {
         if (k == started_) {
             if (!start(helper)) return;
         } else {
-            if (!helper.rest.over(now)) continue;
+            if (!helper.backoff.over(now)) continue;
             helper.resting.store(false, std::memory_order_relaxed);
             if (helper.asleep.exchange(false, std::memory_order_relaxed)) {
                 helper.bell.fetch_add(1);
@@ -115,7 +115,7 @@ bool Pool::start(Helper& helper) {
     if (no_more_threads_) return false;
     try {
         helper.thread = std::thread([this, &helper] { serve(helper); });
-    } catch (const std::exception&) {  // the system gives no more: those that run do the work
+    } catch (const std::exception&) {  // the system has no more threads: the existing ones do the work
         no_more_threads_ = true;
         return false;
     }
@@ -123,20 +123,20 @@ bool Pool::start(Helper& helper) {
     return true;
 }
 
-/// Until helpers have finished so many parts; how long that took.
+/// Waits until helpers have finished this number of parts. Returns the time waited [ns].
 Nanoseconds Pool::wait_for(int finished) {
     if (finished_.load(std::memory_order_acquire) >= finished) return 0;
     const Nanoseconds begin = clock_now();
     while (finished_.load(std::memory_order_acquire) < finished && clock_now() - begin < short_wait) pause();
-    // A helper that waits for a processor may have this one.
+    // Sleeps, so that a helper that waits for a processor may have this one.
     for (int now; (now = finished_.load(std::memory_order_acquire)) < finished;)
         finished_.wait(now, std::memory_order_acquire);
     return clock_now() - begin;
 }
 
-void Pool::settle(Nanoseconds waited) {
-    const auto read = [](std::atomic<Nanoseconds>& told) {
-        return told.load(std::memory_order_relaxed) ? told.exchange(0, std::memory_order_relaxed) : 0;
+void Pool::record_helpers(Nanoseconds waited) {
+    const auto read = [](std::atomic<Nanoseconds>& sum) {
+        return sum.load(std::memory_order_relaxed) ? sum.exchange(0, std::memory_order_relaxed) : 0;
     };
     for (int k = 0; k < started_; ++k) {
         Helper& helper = helpers_[k];
@@ -144,8 +144,8 @@ void Pool::settle(Nanoseconds waited) {
         const Nanoseconds in_part = read(helper.put_aside_in_part);
         if (worked == 0 && put_aside == 0) continue;
         const Nanoseconds now = clock_now();
-        helper.rest.settle(now, worked, put_aside, std::min(waited, in_part));
-        if (!helper.rest.over(now)) helper.resting.store(true, std::memory_order_relaxed);
+        helper.backoff.record_loop(now, worked, put_aside, std::min(waited, in_part));
+        if (!helper.backoff.over(now)) helper.resting.store(true, std::memory_order_relaxed);
     }
 }
 
@@ -159,12 +159,12 @@ void Pool::serve(Helper& self) {
     }
 }
 
-/// Helps with one loop after the other, until none comes or the processor is wanted by others.
+/// Helps with one loop after another, until none follows or others need the processor.
 void Pool::stay_awake(Helper& self) {
     Watch watch(self);
     Nanoseconds last_loop = clock_now();
     while (!stop_.load(std::memory_order_relaxed) && !self.resting.load(std::memory_order_relaxed)) {
-        const bool put_aside = watch.give_way();
+        const bool put_aside = watch.yield_to_others();
         if (left_.load(std::memory_order_relaxed) > 0) {
             help(watch);
             last_loop = clock_now();
@@ -177,7 +177,7 @@ void Pool::stay_awake(Helper& self) {
 }
 
 void Pool::help(Watch& watch) {
-    for (int left; take(left); watch.give_way()) {
+    for (int left; take(left); watch.yield_to_others()) {
         watch.begin_part();
         const int parts = done(count_ - left, *body_);
         watch.end_part();

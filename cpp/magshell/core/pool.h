@@ -1,5 +1,5 @@
-// Threads that help with one loop at a time. The caller does a loop's parts as long as there are any, helpers
-// take some of them where they can, and at the end the caller waits only for parts that were begun.
+// A pool of helper threads for one loop at a time. The caller processes parts of the loop as long as there are any, helpers take some of
+// them, and at the end the caller waits only for parts that were begun.
 #pragma once
 
 #include <atomic>
@@ -15,7 +15,7 @@ namespace magshell {
 
 class Pool {
   public:
-    /// Its helpers are started when a loop first wants them.
+    /// Starts no thread yet; helpers are started when a loop needs them.
     explicit Pool(int helpers);
     Pool(const Pool&) = delete;
     Pool& operator=(const Pool&) = delete;
@@ -23,7 +23,7 @@ class Pool {
 
     int helpers() const { return helper_count_; }
 
-    /// As parallel_for. One loop at a time, and none from within another.
+    /// Runs a loop as parallel_for does. Only one loop at a time, and none within another.
     void run(int count, const std::function<void(int)>& body, PartTime& part_time);
 
   private:
@@ -34,7 +34,7 @@ class Pool {
     void wake(int wanted);
     bool start(Helper& helper);
     Nanoseconds wait_for(int finished);
-    void settle(Nanoseconds waited);
+    void record_helpers(Nanoseconds waited);
 
     void serve(Helper& self);
     void stay_awake(Helper& self);
@@ -46,13 +46,13 @@ class Pool {
     bool no_more_threads_ = false;
     std::atomic<bool> stop_{false};
 
-    // A loop is there while parts of it are left. Whoever takes one keeps the loop from ending until it has
-    // reported, and only then may read what the loop is.
+    // The number of parts left. A thread that takes one keeps the loop from ending until it has reported, and only such a thread may read
+    // the other members that describe the loop.
     alignas(64) std::atomic<int> left_{0};
     const std::function<void(int)>* body_ = nullptr;
     int count_ = 0;
 
-    alignas(64) std::atomic<int> finished_{0};  // by helpers
+    alignas(64) std::atomic<int> finished_{0};  // parts finished by helpers
     std::mutex error_mutex_;
     std::exception_ptr error_;
 };

@@ -1,4 +1,4 @@
-// Two numberings of the same things: the caller's, and ours. Several of the caller's may be one of ours.
+// Two numberings of the same objects, the caller's and ours. Several of the caller's may be one of ours.
 #pragma once
 
 #include <utility>
@@ -8,8 +8,8 @@
 
 namespace magshell {
 
-/// user[k] is the caller's index of our k, core[u] ours of the caller's u. Where several u are one k, user[k] is the
-/// first of them, and the others are its copies.
+/// user[k] is the caller's index of our k, core[u] is ours of the caller's u. If several u are one k, user[k] is the first of them, and the others are
+/// its copies.
 struct Renumbering {
     std::vector<Index> user, core;
 

@@ -12,7 +12,7 @@ Mat3 rotation(const Vec3& vector) {
 
 Vec3 transposed_jacobian_times(const Vec3& phi, const Vec3& v) {
     const double a = phi.norm(), a2 = a * a;
-    const bool small = a < 1e-2;  // where the closed form cancels
+    const bool small = a < 1e-2;  // below that the closed form loses digits
     const double half_angle_sine = std::sin(0.5 * a);
     const double first =
         small ? 0.5 - a2 / 24.0 + a2 * a2 / 720.0 : 2.0 * half_angle_sine * half_angle_sine / a2;

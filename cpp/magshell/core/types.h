@@ -1,4 +1,4 @@
-// The few types every floor shares. Lengths in m, SI throughout, double precision only.
+// The basic types of the core. All quantities are in SI units (lengths in m), in double precision.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,13 +8,13 @@
 
 namespace magshell {
 
-using Index = std::int32_t;  // vertices, faces, unknowns and matrix entries; 2^31 is far beyond what fits in
-                             // memory here
+using Index =
+    std::int32_t;  // of vertices, faces, dofs and matrix entries; 2^31 is far beyond what fits in memory here
 using Vec3 = Eigen::Vector3d;
 using Mat3 = Eigen::Matrix3d;
 using VectorXd = Eigen::VectorXd;
 
-// A row per vertex or face, C order, as numpy hands it over.
+// Rows of three numbers, one per vertex or face, in C order like numpy arrays.
 using Rows3 = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 
 }  // namespace magshell

@@ -1,4 +1,4 @@
-// Three-vectors and 3x3 matrices of packs: the whole vocabulary of the element kernels.
+// Three-vectors and 3 x 3 matrices of packs, with the operations that element kernels need.
 #pragma once
 
 #include "magshell/core/pack.h"
@@ -28,7 +28,7 @@ struct Pack3 {
     friend Pack3 operator*(const Pack& s, const Pack3& a) { return {s * a.x, s * a.y, s * a.z}; }
 };
 
-/// The same vector in every lane.
+/// Returns a pack with the same vector in every lane.
 inline Pack3 broadcast(const Vec3& v) {
     return {Pack(v.x()), Pack(v.y()), Pack(v.z())};
 }
@@ -45,7 +45,7 @@ inline Pack squared_norm(const Pack3& a) {
     return dot(a, a);
 }
 
-/// Row-major 3x3: at[3 * row + column].
+/// A 3 x 3 matrix in row-major order: at[3 * row + column].
 struct Pack33 {
     Pack at[9];
 
@@ -79,13 +79,13 @@ inline Pack33 transpose(const Pack33& a) {
     return {{a.at[0], a.at[3], a.at[6], a.at[1], a.at[4], a.at[7], a.at[2], a.at[5], a.at[8]}};
 }
 
-/// a b^T
+/// Returns a b^T.
 inline Pack33 outer(const Pack3& a, const Pack3& b) {
     return {
         {a.x * b.x, a.x * b.y, a.x * b.z, a.y * b.x, a.y * b.y, a.y * b.z, a.z * b.x, a.z * b.y, a.z * b.z}};
 }
 
-/// a b^T + b a^T
+/// Returns a b^T + b a^T.
 inline Pack33 symmetric_outer(const Pack3& a, const Pack3& b) {
     const Pack xy = a.x * b.y + a.y * b.x, xz = a.x * b.z + a.z * b.x, yz = a.y * b.z + a.z * b.y;
     const Pack xx = a.x * b.x, yy = a.y * b.y, zz = a.z * b.z;
@@ -98,7 +98,7 @@ inline void add_to_diagonal(Pack33& a, const Pack& s) {
     a.at[8] += s;
 }
 
-/// [v], the matrix with [v] w = v x w
+/// Returns [v], the matrix with [v] w = v x w.
 inline Pack33 cross_matrix(const Pack3& v) {
     const Pack zero(0.0);
     return {{zero, -v.z, v.y, v.z, zero, -v.x, -v.y, v.x, zero}};

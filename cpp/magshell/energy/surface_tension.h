@@ -11,7 +11,7 @@
 
 #include <string_view>
 
-#include "magshell/core/face_input.h"
+#include "magshell/core/parameters.h"
 #include "magshell/core/vector3.h"
 #include "magshell/energy/symmetric3.h"
 

@@ -13,63 +13,63 @@ Bodies::Bodies(const SceneInput& input) {
     Index n_points = input.n_vertices;
     for (const RigidInput& part : input.rigid) n_points += static_cast<Index>(part.points.rows());
     NodeNumbering numbering(n_points);
-    for (const SheetInput& sheet : input.sheets)
-        owned_.push_back(std::make_unique<Sheet>(sheet.owner, *sheet.mesh, sheet.vertices, numbering));
+    for (const ShellInput& shell : input.shells)
+        owned_.push_back(std::make_unique<Shell>(shell.owner, *shell.mesh, shell.vertices, numbering));
     for (const SolidInput& solid : input.solids)
         owned_solids_.push_back(std::make_unique<Solid>(solid.owner, solid.rest_positions, solid.elements,
                                                         solid.nodes_per_element, solid.vertices,
                                                         solid.surface, numbering));
-    for (const SixNodeSheetInput& sheet : input.six_node_sheets)
-        owned_six_node_sheets_.push_back(std::make_unique<SixNodeSheet>(sheet.owner, sheet.mesh, numbering));
+    for (const SixNodeShellInput& shell : input.six_node_shells)
+        owned_six_node_shells_.push_back(std::make_unique<SixNodeShell>(shell.owner, shell.mesh, numbering));
     for (const SkinInput& skin : input.skins)
         owned_skins_.push_back(
             std::make_unique<Surface>(skin.owner, *skin.surface.mesh, skin.surface.vertices, numbering));
-    std::vector<const Surface*> flat;  // of six-node sheets
-    for (const SixNodeSheetInput& sheet : input.six_node_sheets)
-        flat.push_back(sheet.surface_acts
+    std::vector<const Surface*> flat;  // of six-node shells
+    for (const SixNodeShellInput& shell : input.six_node_shells)
+        flat.push_back(shell.surface_acts
                            ? owned_skins_
-                                 .emplace_back(std::make_unique<Surface>(sheet.owner, *sheet.surface.mesh,
-                                                                         sheet.surface.vertices, numbering))
+                                 .emplace_back(std::make_unique<Surface>(shell.owner, *shell.surface.mesh,
+                                                                         shell.surface.vertices, numbering))
                                  .get()
                            : nullptr);
     const std::size_t n_skins = input.skins.size();
     add_rigid(input.rigid, numbering);
-    couple_links(input);
+    add_link_couplings(input);
     nodes_ = numbering.finish(input.directions, input.original);
-    couple_volumes_and_tendons(input);
-    for (const EdgeCoupleInput& couple : input.couples) {
-        if (couple.sheet < static_cast<Index>(owned_.size())) continue;
-        const std::size_t k = couple.sheet - owned_.size();
-        const Index face = input.six_node_sheets[k].mesh.corners->edge_faces().row(couple.edge).maxCoeff();
-        const SixNodeSheet& sheet = *owned_six_node_sheets_[k];
+    add_volume_and_tendon_couplings(input);
+    for (const EdgeMomentInput& couple : input.couples) {
+        if (couple.shell < static_cast<Index>(owned_.size())) continue;
+        const std::size_t k = couple.shell - owned_.size();
+        const Index face = input.six_node_shells[k].mesh.corners->edge_faces().row(couple.edge).maxCoeff();
+        const SixNodeShell& shell = *owned_six_node_shells_[k];
         std::vector<Index>& nodes = coupled_.emplace_back();
-        for (const Index node : sheet.own_nodes[sheet.faces.core[face]]) nodes.push_back(node);
+        for (const Index node : shell.own_nodes[shell.faces.core[face]]) nodes.push_back(node);
         nodes.push_back(nodes_.direction_node(couple.direction));
     }
     for (Index user = 0; user < nodes_.n_user_vertices(); ++user)
         if (nodes_.vertices.is_copy(user)) copies_.push_back(user);
     for (std::size_t k = 0; k < owned_.size(); ++k) {
-        const SheetInput& given = input.sheets[k];
-        owned_[k]->add_folds(*given.mesh, given.directed_edges, given.directors, nodes_);
+        const ShellInput& given = input.shells[k];
+        owned_[k]->add_dihedrals(*given.mesh, given.directed_edges, given.directors, nodes_);
         n_edges_ += owned_[k]->n_edges();
-        sheets_.push_back(owned_[k].get());
+        shells_.push_back(owned_[k].get());
         all_.push_back(owned_[k].get());
     }
     for (const std::unique_ptr<Solid>& solid : owned_solids_) {
         solids_.push_back(solid.get());
         all_.push_back(solid.get());
     }
-    for (std::size_t k = 0; k < sheets_.size(); ++k) faces_.push_back({sheets_[k], static_cast<Index>(k)});
+    for (std::size_t k = 0; k < shells_.size(); ++k) faces_.push_back({shells_[k], static_cast<Index>(k)});
     for (std::size_t k = 0; k < solids_.size(); ++k)
         add_surface(input.solids[k].surface_acts ? solids_[k]->surface() : nullptr);
     for (std::size_t k = 0; k < n_skins; ++k) add_surface(owned_skins_[k].get());
-    for (std::size_t k = 0; k < owned_six_node_sheets_.size(); ++k) {
-        const SixNodeSheetInput& given = input.six_node_sheets[k];
-        owned_six_node_sheets_[k]->add_folds(given.mesh, given.directed_edges, nodes_);
-        n_edges_ += owned_six_node_sheets_[k]->n_edge_rotations();
-        six_node_sheets_.push_back(owned_six_node_sheets_[k].get());
+    for (std::size_t k = 0; k < owned_six_node_shells_.size(); ++k) {
+        const SixNodeShellInput& given = input.six_node_shells[k];
+        owned_six_node_shells_[k]->add_dihedrals(given.mesh, given.directed_edges, nodes_);
+        n_edges_ += owned_six_node_shells_[k]->n_edge_rotations();
+        six_node_shells_.push_back(owned_six_node_shells_[k].get());
         six_node_bodies_.push_back(static_cast<Index>(all_.size()));
-        all_.push_back(owned_six_node_sheets_[k].get());
+        all_.push_back(owned_six_node_shells_[k].get());
     }
     for (const Surface* surface : flat) add_surface(surface);
     for (const MuscleInput& muscle : input.muscles) {
@@ -89,7 +89,7 @@ void Bodies::add_surface(const Surface* surface) {
 }
 
 void Bodies::add_rigid(const std::vector<RigidInput>& rigid, NodeNumbering& numbering) {
-    // The ten of each part, then those of their surfaces.
+    // The ten points of each rigid body come first, then those of their surfaces.
     Index user = n_body_vertices_, on_surface = user + RigidInput::own * static_cast<Index>(rigid.size());
     for (const RigidInput& part : rigid) {
         std::vector<Index>& nodes = rigid_nodes_.emplace_back();
@@ -101,7 +101,7 @@ void Bodies::add_rigid(const std::vector<RigidInput>& rigid, NodeNumbering& numb
     }
 }
 
-void Bodies::couple_links(const SceneInput& input) {
+void Bodies::add_link_couplings(const SceneInput& input) {
     const auto couple = [&](Index a, Index b) {
         std::vector<Index>& corners = coupled_.emplace_back();
         for (const Index part : {a, b})
@@ -117,7 +117,7 @@ void Bodies::couple_links(const SceneInput& input) {
     for (const ClosureInput& closure : input.closures) couple(closure.parent, closure.child);
 }
 
-void Bodies::couple_volumes_and_tendons(const SceneInput& input) {
+void Bodies::add_volume_and_tendon_couplings(const SceneInput& input) {
     const auto add = [&](std::vector<Index>& nodes, auto first, auto last) {
         for (; first != last; ++first) nodes.push_back(nodes_.vertices.core[*first]);
     };
@@ -135,7 +135,7 @@ void Bodies::couple_volumes_and_tendons(const SceneInput& input) {
                 close(nodes);
                 continue;
             }
-            // Faces of bodies are coupled by their elements; those of caps are nobody's.
+            // Faces of bodies are coupled by their elements; lids belong to no body.
             for (std::size_t f = 0; f + 2 < flat.size(); f += 3) {
                 std::vector<Index>& nodes = coupled_.emplace_back();
                 add(nodes, flat.begin() + f, flat.begin() + f + 3);
@@ -153,13 +153,13 @@ void Bodies::couple_volumes_and_tendons(const SceneInput& input) {
 
 std::vector<Stencil> Bodies::stencils(const SceneInput& input) const {
     std::vector<Stencil> all;
-    for (const Sheet* sheet : sheets_) all.insert(all.end(), sheet->stencils.begin(), sheet->stencils.end());
-    for (const EdgeCoupleInput& couple : input.couples) {
-        if (couple.sheet >= static_cast<Index>(sheets_.size())) continue;  // a clique of its own
-        const Sheet& sheet = *sheets_[couple.sheet];
-        const Index user_face = input.sheets[couple.sheet].mesh->edge_faces().row(couple.edge).maxCoeff();
+    for (const Shell* shell : shells_) all.insert(all.end(), shell->stencils.begin(), shell->stencils.end());
+    for (const EdgeMomentInput& couple : input.couples) {
+        if (couple.shell >= static_cast<Index>(shells_.size())) continue;  // coupled by a clique of its own
+        const Shell& shell = *shells_[couple.shell];
+        const Index user_face = input.shells[couple.shell].mesh->edge_faces().row(couple.edge).maxCoeff();
         Stencil s;
-        for (int k = 0; k < 3; ++k) s.nodes[k] = sheet.corners[sheet.faces.core[user_face]][k];
+        for (int k = 0; k < 3; ++k) s.nodes[k] = shell.corners[shell.faces.core[user_face]][k];
         s.nodes[3] = nodes_.direction_node(couple.direction);
         all.push_back(s);
     }
@@ -174,15 +174,15 @@ std::vector<Clique> Bodies::cliques() const {
     for (const Solid* solid : solids_)
         for (Index element = 0; element < solid->n_elements(); ++element)
             all.push_back({solid->nodes_of(element)});
-    for (const SixNodeSheet* sheet : six_node_sheets_)
-        for (Index face = 0; face < sheet->n_faces(); ++face)
-            all.push_back({sheet->nodes_of(face), sheet->scalars_of(face)});
+    for (const SixNodeShell* shell : six_node_shells_)
+        for (Index face = 0; face < shell->n_faces(); ++face)
+            all.push_back({shell->nodes_of(face), shell->scalars_of(face)});
     for (const std::vector<Index>& nodes : coupled_) all.push_back({nodes});
     return all;
 }
 
 VectorXd Bodies::rest_state() const {
-    VectorXd q = VectorXd::Zero(nodes_.n_unknowns());
+    VectorXd q = VectorXd::Zero(nodes_.n_dofs());
     for (Index node = 0; node < nodes_.n_nodes(); ++node) q.segment<3>(3 * node) = nodes_.rest[node];
     return q;
 }
@@ -201,7 +201,7 @@ VectorXd Bodies::state(const Rows3& positions, const VectorXd& edge_rotations) c
 }
 
 VectorXd Bodies::vectors(const Rows3& of_vertices) const {
-    VectorXd q = VectorXd::Zero(nodes_.n_unknowns());
+    VectorXd q = VectorXd::Zero(nodes_.n_dofs());
     for (Index v = 0; v < nodes_.n_vertices(); ++v)
         if (nodes_.user_vertex(v) < of_vertices.rows())
             q.segment<3>(3 * v) = of_vertices.row(nodes_.user_vertex(v)).transpose();
@@ -224,14 +224,14 @@ VectorXd Bodies::gradient_by_state(const Rows3& by_positions, const VectorXd& by
 
 void Bodies::add_rotations(const VectorXd& of_edges, VectorXd& q) const {
     Index first_edge = 0;
-    for (const Sheet* sheet : sheets_) {
-        for (Index r = 0; r < sheet->n_rotations(); ++r)
-            q[nodes_.first_scalar() + sheet->first_rotation + r] =
-                of_edges[first_edge + sheet->edge_of_rotation[r]];
-        first_edge += sheet->n_edges();
+    for (const Shell* shell : shells_) {
+        for (Index r = 0; r < shell->n_rotations(); ++r)
+            q[nodes_.first_scalar() + shell->first_rotation + r] =
+                of_edges[first_edge + shell->edge_of_rotation[r]];
+        first_edge += shell->n_edges();
     }
-    for (const SixNodeSheet* sheet : six_node_sheets_)
-        for (const Index rotation : sheet->rotation_of) {
+    for (const SixNodeShell* shell : six_node_shells_)
+        for (const Index rotation : shell->rotation_of) {
             if (rotation >= 0) q[nodes_.first_scalar() + rotation] = of_edges[first_edge];
             ++first_edge;
         }
@@ -248,14 +248,14 @@ Rows3 Bodies::rows(const VectorXd& q, Index count) const {
 VectorXd Bodies::edge_rotations(const VectorXd& q) const {
     VectorXd rotations = VectorXd::Zero(n_edges_);
     Index first_edge = 0;
-    for (const Sheet* sheet : sheets_) {
-        for (Index r = 0; r < sheet->n_rotations(); ++r)
-            rotations[first_edge + sheet->edge_of_rotation[r]] =
-                q[nodes_.first_scalar() + sheet->first_rotation + r];
-        first_edge += sheet->n_edges();
+    for (const Shell* shell : shells_) {
+        for (Index r = 0; r < shell->n_rotations(); ++r)
+            rotations[first_edge + shell->edge_of_rotation[r]] =
+                q[nodes_.first_scalar() + shell->first_rotation + r];
+        first_edge += shell->n_edges();
     }
-    for (const SixNodeSheet* sheet : six_node_sheets_)
-        for (const Index rotation : sheet->rotation_of) {
+    for (const SixNodeShell* shell : six_node_shells_)
+        for (const Index rotation : shell->rotation_of) {
             if (rotation >= 0) rotations[first_edge] = q[nodes_.first_scalar() + rotation];
             ++first_edge;
         }
@@ -263,7 +263,7 @@ VectorXd Bodies::edge_rotations(const VectorXd& q) const {
 }
 
 VectorXd Bodies::vertex_weights(const VectorXd& by_vertex) const {
-    VectorXd weights = VectorXd::Zero(nodes_.n_unknowns());
+    VectorXd weights = VectorXd::Zero(nodes_.n_dofs());
     for (Index v = 0; v < nodes_.n_vertices(); ++v)
         weights.segment<3>(3 * v).setConstant(by_vertex[nodes_.user_vertex(v)]);
     for (const Index copy : copies_)
@@ -271,22 +271,23 @@ VectorXd Bodies::vertex_weights(const VectorXd& by_vertex) const {
     return weights;
 }
 
-std::vector<Vec3> Bodies::unknown_points() const {
-    std::vector<Vec3> points(nodes_.n_unknowns());
+std::vector<Vec3> Bodies::dof_points() const {
+    std::vector<Vec3> points(nodes_.n_dofs());
     for (Index node = 0; node < nodes_.n_nodes(); ++node)
         std::fill_n(points.begin() + 3 * node, 3, nodes_.rest[node]);
-    for (const Sheet* sheet : sheets_) sheet->place_rotations(points, nodes_.first_scalar());
-    for (const SixNodeSheet* sheet : six_node_sheets_) sheet->place_rotations(points, nodes_.first_scalar());
+    for (const Shell* shell : shells_) shell->set_rotation_points(points, nodes_.first_scalar());
+    for (const SixNodeShell* shell : six_node_shells_)
+        shell->set_rotation_points(points, nodes_.first_scalar());
     return points;
 }
 
 double Bodies::extent() const {
     double largest = 0.0;
-    for (const Sheet* sheet : sheets_) largest = std::max(largest, sheet->extent());
+    for (const Shell* shell : shells_) largest = std::max(largest, shell->extent());
     for (const Rows3& points : rigid_points_)
         largest = std::max(largest, (points.colwise().maxCoeff() - points.colwise().minCoeff()).norm());
     for (const Solid* solid : solids_) largest = std::max(largest, solid->extent());
-    for (const SixNodeSheet* sheet : six_node_sheets_) largest = std::max(largest, sheet->extent());
+    for (const SixNodeShell* shell : six_node_shells_) largest = std::max(largest, shell->extent());
     return largest;
 }
 
@@ -305,20 +306,20 @@ double Bodies::reach() const {
 }
 
 VectorXd Bodies::area_metric() const {
-    VectorXd metric = VectorXd::Zero(nodes_.n_unknowns());
-    for (const Sheet* sheet : sheets_)
-        for (Index f = 0; f < sheet->n_faces(); ++f) {
-            const auto& [a, b, c] = sheet->rest_corners(f);
-            for (const Index node : sheet->corners[f])
+    VectorXd metric = VectorXd::Zero(nodes_.n_dofs());
+    for (const Shell* shell : shells_)
+        for (Index f = 0; f < shell->n_faces(); ++f) {
+            const auto& [a, b, c] = shell->rest_corners(f);
+            for (const Index node : shell->corners[f])
                 metric.segment<3>(3 * node).array() += (b - a).cross(c - a).norm() / 6.0;
         }
-    for (const SixNodeSheet* sheet : six_node_sheets_) sheet->add_areas(metric);
+    for (const SixNodeShell* shell : six_node_shells_) shell->add_areas(metric);
     for (const Solid* solid : solids_) {
-        VectorXd volumes = VectorXd::Zero(nodes_.n_unknowns());
+        VectorXd volumes = VectorXd::Zero(nodes_.n_dofs());
         solid->add_volumes(volumes);
         metric += volumes / std::cbrt(solid->volume());
     }
-    // As large as the faces of its tetrahedron: what moves a rigid part by itself needs a measure too.
+    // A rigid body has the area of the faces of its tetrahedron, since its motion needs a measure, too.
     for (const std::vector<Index>& part : rigid_nodes_)
         for (Index k = 0; k < 4; ++k)
             metric.segment<3>(3 * part[k]).array() +=

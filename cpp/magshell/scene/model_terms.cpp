@@ -1,4 +1,4 @@
-// The terms of a scene: which, in which order.
+// Creates the terms of a scene. Their order determines the order of summation and of energies.
 #include <algorithm>
 #include <utility>
 
@@ -29,13 +29,13 @@
 namespace magshell {
 namespace {
 
-CoupleTerm::Couple couple_of(const EdgeCoupleInput& given, const TriangleMesh& mesh, const Sheet& sheet,
+CoupleTerm::Couple couple_of(const EdgeMomentInput& given, const TriangleMesh& mesh, const Shell& shell,
                              const Nodes& at) {
     const bool forward = mesh.edge_faces()(given.edge, 0) != TriangleMesh::none;
-    const Index f = sheet.faces.core[mesh.edge_faces()(given.edge, forward ? 0 : 1)];
+    const Index f = shell.faces.core[mesh.edge_faces()(given.edge, forward ? 0 : 1)];
     int i = 0;
-    while (sheet.edges[f][i] != given.edge) ++i;
-    const std::array<Index, 3>& c = sheet.corners[f];
+    while (shell.edges[f][i] != given.edge) ++i;
+    const std::array<Index, 3>& c = shell.corners[f];
     const std::array<Index, 4> nodes = {c[(i + 1) % 3], c[(i + 2) % 3], c[i],
                                         at.direction_node(given.direction)};
     const DihedralAngle fold(broadcast(at.rest[nodes[0]]), broadcast(at.rest[nodes[1]]),
@@ -43,20 +43,20 @@ CoupleTerm::Couple couple_of(const EdgeCoupleInput& given, const TriangleMesh& m
     return {{nodes[0], nodes[1], nodes[2], nodes[3], -1, -1, -1, -1, -1},
             -1,
             fold.angle()[0],
-            sheet.rotation_of_edge[given.edge],
+            shell.rotation_of_edge[given.edge],
             forward ? 1.0 : -1.0,
             0};
 }
 
-// At both Gauss points of a six-node edge, in proportion to how far the edge goes there.
-std::array<CoupleTerm::Couple, 2> couples_of(const EdgeCoupleInput& given, const TriangleMesh& mesh,
-                                             const SixNodeSheet& sheet, const Nodes& at) {
+// Returns the edge moment at both Gauss points of an edge of a six-node shell, weighted by the length of the edge there.
+std::array<CoupleTerm::Couple, 2> couples_of(const EdgeMomentInput& given, const TriangleMesh& mesh,
+                                             const SixNodeShell& shell, const Nodes& at) {
     using six_nodes::middle;
-    const Index user = mesh.edge_faces().row(given.edge).maxCoeff(), f = sheet.faces.core[user];
+    const Index user = mesh.edge_faces().row(given.edge).maxCoeff(), f = shell.faces.core[user];
     int i = 0;
     while (mesh.face_edges()(user, i) != given.edge) ++i;
     const int from = (i + 1) % 3, to = (i + 2) % 3;
-    const std::array<Index, 6>& own = sheet.own_nodes[f];
+    const std::array<Index, 6>& own = shell.own_nodes[f];
     const std::array<Index, 9> nodes = {own[from],
                                         own[to],
                                         own[middle(i)],
@@ -68,11 +68,11 @@ std::array<CoupleTerm::Couple, 2> couples_of(const EdgeCoupleInput& given, const
                                         -1};
     Pack3 x[9] = {};
     for (int k = 0; k < 7; ++k) x[k] = broadcast(at.rest[nodes[k]]);
-    const FaceSideSix& side = sheet.sides[f][i];
+    const FaceSideSix& side = shell.sides[f][i];
     double lengths[2];
     for (int g = 0; g < 2; ++g) {
         const std::array<double, 3> along = six_nodes::along(six_nodes::gauss[g]);
-        const std::array<Vec3, 6>& rest = sheet.rest[f];
+        const std::array<Vec3, 6>& rest = shell.rest[f];
         lengths[g] = (along[0] * rest[from] + along[1] * rest[to] + along[2] * rest[middle(i)]).norm();
     }
     const auto at_point = [&](int g) {
@@ -86,34 +86,34 @@ std::array<CoupleTerm::Couple, 2> couples_of(const EdgeCoupleInput& given, const
 }  // namespace
 
 void Model::add_loops(Index body, const VectorXd& curvature_scale) {
-    const Sheet& sheet = *bodies_.sheets()[body];
-    const ChunkLoop& chunks = schedule_.of(body);
-    loops_.push_back(std::make_unique<FaceLoop>(sheet.corners, chunks, matrix_));
-    membrane_faces_.push_back(std::make_unique<MembraneFaces>(sheet, nodes(), curvature_scale));
+    const Shell& shell = *bodies_.shells()[body];
+    const ChunkLoop& chunks = coloring_.of(body);
+    loops_.push_back(std::make_unique<FaceLoop>(shell.corners, chunks, matrix_));
+    membrane_faces_.push_back(std::make_unique<MembraneFaces>(shell, nodes(), curvature_scale));
     const MembraneFaces& faces = *membrane_faces_.back();
-    membrane_loops_.push_back(faces.own() ? nullptr
-                                          : std::make_unique<FaceLoop>(faces.corners(), chunks, matrix_));
+    membrane_loops_.push_back(
+        faces.is_unchanged() ? nullptr : std::make_unique<FaceLoop>(faces.corners(), chunks, matrix_));
 }
 
 void Model::add_terms(const SceneInput& input) {
-    const Index count = static_cast<Index>(bodies_.sheets().size());
+    const Index count = static_cast<Index>(bodies_.shells().size());
     for (Index body = 0; body < count; ++body) {
         std::unique_ptr<MembraneTerm> term =
-            std::make_unique<MembraneTerm>(*bodies_.sheets()[body], body, *membrane_faces_[body],
+            std::make_unique<MembraneTerm>(*bodies_.shells()[body], body, *membrane_faces_[body],
                                            membrane_loops_[body] ? *membrane_loops_[body] : *loops_[body],
-                                           input.sheets[body].growth, nodes(), registry_);
+                                           input.shells[body].growth, nodes(), registry_);
         elastic_.add(term.get());
         terms_.push_back(std::move(term));
     }
     for (Index body = 0; body < count; ++body) {
         std::unique_ptr<BendingTerm> term =
-            std::make_unique<BendingTerm>(*bodies_.sheets()[body], body, schedule_.of(body),
-                                          input.sheets[body].growth, nodes(), matrix_, registry_);
+            std::make_unique<BendingTerm>(*bodies_.shells()[body], body, coloring_.of(body),
+                                          input.shells[body].growth, nodes(), matrix_, registry_);
         elastic_.add(term.get());
         terms_.push_back(std::move(term));
     }
-    for (std::size_t k = 0; k < input.six_node_sheets.size(); ++k)
-        add_six_node_sheet(k, input.six_node_sheets[k].growth);
+    for (std::size_t k = 0; k < input.six_node_shells.size(); ++k)
+        add_six_node_shell(k, input.six_node_shells[k].growth);
     add_magnetic_terms(input);
     add_solids(input);
     add_muscles(input);
@@ -139,44 +139,44 @@ void Model::add_terms(const SceneInput& input) {
 
 void Model::add_water(const SceneInput& input) {
     const std::vector<Bodies::Faces>& faces = bodies_.faces();
-    const std::size_t skins = input.sheets.size() + input.solids.size(), after = skins + input.skins.size();
+    const std::size_t skins = input.shells.size() + input.solids.size(), after = skins + input.skins.size();
     for (std::size_t k = 0; k < faces.size(); ++k)
         if (k < skins || k >= after)
             forces_.push_back(
                 std::make_unique<WaterTerm>(*faces[k].surface, *loops_[k], *input.water, registry_));
 }
 
-void Model::add_six_node_sheet(std::size_t number, const GrowthForm& growth) {
-    const SixNodeSheet& sheet = *bodies_.six_node_sheets()[number];
+void Model::add_six_node_shell(std::size_t number, const GrowthForm& growth) {
+    const SixNodeShell& shell = *bodies_.six_node_shells()[number];
     const Index body = bodies_.six_node_bodies()[number];
     const auto add = [&](auto term) {
         elastic_.add(term.get());
         terms_.push_back(std::move(term));
     };
-    const ChunkLoop& chunks = schedule_.of(body);
-    add(std::make_unique<MembraneSixTerm>(sheet, body, chunks, nodes(), growth, matrix_, registry_));
-    add(std::make_unique<BendingSixTerm>(sheet, body, chunks, nodes(), growth, matrix_, registry_));
+    const ChunkLoop& chunks = coloring_.of(body);
+    add(std::make_unique<MembraneSixTerm>(shell, body, chunks, nodes(), growth, matrix_, registry_));
+    add(std::make_unique<BendingSixTerm>(shell, body, chunks, nodes(), growth, matrix_, registry_));
 }
 
 void Model::add_magnetic_terms(const SceneInput& input) {
-    const std::size_t sheets = input.sheets.size(), solids = input.solids.size();
+    const std::size_t shells = input.shells.size(), solids = input.solids.size();
     const auto add = [&](std::size_t k) {
         const auto& [surface, body] = bodies_.faces()[k];
         terms_.push_back(std::make_unique<MagneticTerm>(*surface, body, *loops_[k], sources_, registry_));
     };
-    for (std::size_t k = 0; k < sheets; ++k)
-        if (input.sheets[k].magnetic) add(k);
-    for (std::size_t k = 0; k < input.skins.size(); ++k) add(sheets + solids + k);
-    for (std::size_t k = 0; k < input.six_node_sheets.size(); ++k) {
+    for (std::size_t k = 0; k < shells; ++k)
+        if (input.shells[k].magnetic) add(k);
+    for (std::size_t k = 0; k < input.skins.size(); ++k) add(shells + solids + k);
+    for (std::size_t k = 0; k < input.six_node_shells.size(); ++k) {
         const Index body = bodies_.six_node_bodies()[k];
-        if (input.six_node_sheets[k].magnetic)
+        if (input.six_node_shells[k].magnetic)
             terms_.push_back(std::make_unique<MagneticSixTerm>(
-                *bodies_.six_node_sheets()[k], body, schedule_.of(body), matrix_, sources_, registry_));
+                *bodies_.six_node_shells()[k], body, coloring_.of(body), matrix_, sources_, registry_));
     }
     for (std::size_t k = 0; k < solids; ++k) {
-        const Index body = static_cast<Index>(sheets + k);
+        const Index body = static_cast<Index>(shells + k);
         if (input.solids[k].magnetic)
-            terms_.push_back(make_magnetic_solid_term(*bodies_.solids()[k], body, schedule_.of(body), matrix_,
+            terms_.push_back(make_magnetic_solid_term(*bodies_.solids()[k], body, coloring_.of(body), matrix_,
                                                       sources_, registry_));
     }
 }
@@ -238,9 +238,9 @@ void Model::add_joints(const SceneInput& input) {
 
 void Model::add_solids(const SceneInput& input) {
     for (std::size_t k = 0; k < input.solids.size(); ++k) {
-        const Index body = static_cast<Index>(bodies_.sheets().size() + k);
+        const Index body = static_cast<Index>(bodies_.shells().size() + k);
         std::unique_ptr<SolidTerm> term =
-            make_solid_term(input.solids[k].response, *bodies_.solids()[k], body, schedule_.of(body), matrix_,
+            make_solid_term(input.solids[k].response, *bodies_.solids()[k], body, coloring_.of(body), matrix_,
                             nodes(), registry_);
         elastic_.add(term.get());
         solid_terms_.push_back(term.get());
@@ -251,7 +251,7 @@ void Model::add_solids(const SceneInput& input) {
 void Model::add_muscles(const SceneInput& input) {
     for (std::size_t k = 0; k < input.muscles.size(); ++k) {
         const auto& [fibres, body] = bodies_.fibres()[k];
-        Muscle muscle = make_muscle(input.muscles[k], *fibres, body, schedule_.of(body), matrix_, registry_);
+        Muscle muscle = make_muscle(input.muscles[k], *fibres, body, coloring_.of(body), matrix_, registry_);
         muscle_terms_.push_back(muscle.term.get());
         terms_.push_back(std::move(muscle.term));
         if (muscle.force) forces_.push_back(std::move(muscle.force));
@@ -260,17 +260,17 @@ void Model::add_muscles(const SceneInput& input) {
 
 void Model::add_couples(const SceneInput& input) {
     std::vector<CoupleTerm::Couple> couples;
-    const Index flat = static_cast<Index>(input.sheets.size());
+    const Index flat = static_cast<Index>(input.shells.size());
     Index row = 0;
     std::size_t numbered = 0;
-    for (const EdgeCoupleInput& given : input.couples) {
-        if (given.sheet < flat)
+    for (const EdgeMomentInput& given : input.couples) {
+        if (given.shell < flat)
             couples.push_back(
-                couple_of(given, *input.sheets[given.sheet].mesh, *bodies_.sheets()[given.sheet], nodes()));
+                couple_of(given, *input.shells[given.shell].mesh, *bodies_.shells()[given.shell], nodes()));
         else
             for (const CoupleTerm::Couple& couple :
-                 couples_of(given, *input.six_node_sheets[given.sheet - flat].mesh.corners,
-                            *bodies_.six_node_sheets()[given.sheet - flat], nodes()))
+                 couples_of(given, *input.six_node_shells[given.shell - flat].mesh.corners,
+                            *bodies_.six_node_shells()[given.shell - flat], nodes()))
                 couples.push_back(couple);
         for (; numbered < couples.size(); ++numbered) couples[numbered].row = row;
         ++row;

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "magshell/scene/sheet_loops.h"
+#include "magshell/scene/shell_loops.h"
 #include "magshell/scene/six_node_stresses.h"
 #include "magshell/term/bending_term.h"
 #include "magshell/term/membrane_term.h"
@@ -10,10 +10,10 @@
 namespace magshell {
 namespace {
 
-using sheet_loops::fold_turns;
-using sheet_loops::over_blocks;
+using shell_loops::angle_changes;
+using shell_loops::over_blocks;
 
-/// A symmetric 2x2 tensor a lane.
+/// A symmetric 2 x 2 tensor in each lane.
 struct Tensor2 {
     Pack xx, xy, yy;
 
@@ -36,7 +36,7 @@ struct FlatFace {
         height = sqrt(squared_norm(cross(d1, d2))) / along;
     }
 
-    /// From how the products of its two edges from x0 have changed.
+    /// Returns Green's strain from the change of the inner products of its two edges at x0.
     Tensor2 green(const Pack3 rest[3], const Pack3 x[3]) const {
         const Pack3 d1 = rest[1] - rest[0], d2 = rest[2] - rest[0], e1 = x[1] - x[0], e2 = x[2] - x[0];
         const Pack c11 = squared_norm(e1) - squared_norm(d1), c12 = dot(e1, e2) - dot(d1, d2),
@@ -46,7 +46,7 @@ struct FlatFace {
                 half * (c22 - Pack(2.0) * slant * c12 + slant * slant * c11) / (height * height)};
     }
 
-    /// Edge i is opposite corner i: t~ = (y, -x) for an edge (x, y).
+    /// Returns the curvature from the bending strains of the edges. Edge i is opposite corner i: t~ = (y, -x) for an edge (x, y).
     Tensor2 curvature(const Pack delta[3]) const {
         const Pack x[3] = {across - along, -across, along}, y[3] = {height, -height, Pack(0.0)};
         const Pack inverse_area = Pack(2.0) / (along * height);
@@ -61,18 +61,18 @@ struct FlatFace {
     }
 };
 
-// The rows of one sheet, whose first face is that row.
-void add_sheet(const Model& model, Index body, const VectorXd& q, const VectorXd& thickness, Index first_row,
+// Computes the rows of one shell, whose first face has row first_row.
+void add_shell(const Model& model, Index body, const VectorXd& q, const VectorXd& thickness, Index first_row,
                PrincipalStrains& out) {
-    const Sheet& sheet = *model.bodies().sheets()[body];
+    const Shell& shell = *model.bodies().shells()[body];
     const MembraneFaces& membrane = model.membrane_faces(body);
     const Index first_scalar = model.nodes().first_scalar();
     const MembraneTerm& stretching = dynamic_cast<const MembraneTerm&>(model.elastic_term(body, "membrane"));
     const BendingTerm& bending = dynamic_cast<const BendingTerm&>(model.elastic_term(body, "bending"));
-    const std::vector<double> turns = fold_turns(sheet, q.data());
-    const auto turn_of = [&](Index fold) { return turns[fold]; };
+    const std::vector<double> changes = angle_changes(shell, q.data());
+    const auto change_of = [&](Index dihedral) { return changes[dihedral]; };
     const double* rotations = q.data() + first_scalar;
-    over_blocks(sheet.n_faces(), [&](Index from, Index to) {
+    over_blocks(shell.n_faces(), [&](Index from, Index to) {
         for (Index first = from; first < to; first += Pack::width) {
             Pack3 own_rest[3], rest[3], x[3];
             Pack delta[3], half_thickness;
@@ -81,21 +81,21 @@ void add_sheet(const Model& model, Index body, const VectorXd& q, const VectorXd
                 const std::array<Vec3, 3> corners = stretching.grows() ? stretching.grown(f).corners()
                                                                        : membrane.rest_corners(f),
                                           own = bending.grows() ? bending.grown(f).corners()
-                                                                : sheet.rest_corners(f);
+                                                                : shell.rest_corners(f);
                 const Vec3 turned = bending.natural_angle_changes(f);
                 for (int k = 0; k < 3; ++k) {
                     set_lane(own_rest[k], lane, own[k]);
                     set_lane(rest[k], lane, corners[k]);
                     set_lane(x[k], lane, q.data() + 3 * membrane.corners()[f][k]);
-                    delta[k].set(lane, bending_strain(sheet.sides[f][k], turn_of, rotations) - turned[k]);
+                    delta[k].set(lane, bending_strain(shell.sides[f][k], change_of, rotations) - turned[k]);
                 }
-                half_thickness.set(lane, 0.5 * thickness[first_row + sheet.faces.user[f]]);
+                half_thickness.set(lane, 0.5 * thickness[first_row + shell.faces.user[f]]);
             }
             Pack values[4];
             FlatFace(rest).green(rest, x).principal(values[0], values[1]);
             FlatFace(own_rest).curvature(delta).principal(values[2], values[3]);
             for (int lane = 0; lane < std::min(Pack::width, to - first); ++lane) {
-                const Index row = first_row + sheet.faces.user[first + lane];
+                const Index row = first_row + shell.faces.user[first + lane];
                 for (int k = 0; k < 4; ++k)
                     out(row, k) = k < 2 ? values[k][lane] : half_thickness[lane] * values[k][lane];
             }
@@ -108,12 +108,12 @@ void add_sheet(const Model& model, Index body, const VectorXd& q, const VectorXd
 PrincipalStrains principal_strains(const Model& model, const VectorXd& q, const VectorXd& thickness) {
     PrincipalStrains out(thickness.size(), 4);
     Index first_row = 0;
-    for (Index body = 0; body < static_cast<Index>(model.bodies().sheets().size()); ++body) {
-        add_sheet(model, body, q, thickness, first_row, out);
-        first_row += model.bodies().sheets()[body]->n_faces();
+    for (Index body = 0; body < static_cast<Index>(model.bodies().shells().size()); ++body) {
+        add_shell(model, body, q, thickness, first_row, out);
+        first_row += model.bodies().shells()[body]->n_faces();
     }
-    for (Index sheet = 0; sheet < static_cast<Index>(model.bodies().six_node_sheets().size()); ++sheet)
-        for (const auto& [green, curvature] : six_node_strains(model, sheet, q)) {
+    for (Index shell = 0; shell < static_cast<Index>(model.bodies().six_node_shells().size()); ++shell)
+        for (const auto& [green, curvature] : six_node_strains(model, shell, q)) {
             const Eigen::Vector2d stretched = principal_in_plane(green), bent = principal_in_plane(curvature);
             for (Index k = 0; k < 2; ++k) {
                 out(first_row, k) = stretched[k];
@@ -127,7 +127,7 @@ PrincipalStrains principal_strains(const Model& model, const VectorXd& q, const 
 LargestStrains largest_of(const PrincipalStrains& strains) {
     LargestStrains found;
     const auto take = [](double value, Index face, double& largest, Index& at) {
-        if (std::isnan(largest) || value <= largest) return;  // what is no number counts as the largest
+        if (std::isnan(largest) || value <= largest) return;  // NaN counts as the largest
         largest = value;
         at = face;
     };

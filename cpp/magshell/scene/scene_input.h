@@ -1,14 +1,14 @@
-// A scene as the caller describes it, in the caller's numbering: everything that no solve can change.
+// The description of a scene by the caller, in the caller's numbering: everything that a solve cannot change.
 #pragma once
 
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "magshell/assembly/reduction.h"
+#include "magshell/assembly/dof_map.h"
 #include "magshell/body/joint.h"
-#include "magshell/body/sheet.h"
-#include "magshell/body/six_node_sheet.h"
+#include "magshell/body/shell.h"
+#include "magshell/body/six_node_shell.h"
 #include "magshell/body/solid.h"
 #include "magshell/field/applied_field.h"
 #include "magshell/force/drag.h"
@@ -24,101 +24,103 @@
 
 namespace magshell {
 
-/// A couple on a free edge of a sheet; `direction` is a row of SceneInput::directions.
-struct EdgeCoupleInput {
-    Index sheet, edge, direction;
+/// A moment on a free edge of a shell; `direction` is a row of SceneInput::directions.
+struct EdgeMomentInput {
+    Index shell, edge, direction;
 };
 
-struct SheetInput {
-    std::string owner;  // under which its parameters are registered
+struct ShellInput {
+    std::string owner;  // name of the owner of its parameters
     std::shared_ptr<const TriangleMesh> mesh;
-    std::vector<Index> vertices;  // the scene's vertex of each vertex of the mesh
-    VectorXd curvature_scale;     // of each edge, as the scene was made with: where hinges are
+    std::vector<Index> vertices;  // the scene vertex of each vertex of the mesh
+    VectorXd curvature_scale;     // of each edge when the scene was made; it tells where hinges are
     GrowthForm growth;
-    bool directors = true;  // midedge; false: hinge
+    bool directors = true;  // true: midedge elements; false: hinge elements
     bool magnetic = false;
     std::vector<DirectedEdge> directed_edges;  // directions are rows of SceneInput::directions
 };
 
-/// A sheet of six-node faces.
-struct SixNodeSheetInput {
-    std::string owner;  // under which its parameters are registered
+/// A shell of six-node faces.
+struct SixNodeShellInput {
+    std::string owner;  // name of the owner of its parameters
     SixNodeInput mesh;
     GrowthForm growth;
     std::vector<DirectedEdge>
         directed_edges;    // of mesh.corners; directions are rows of SceneInput::directions
-    SolidSurface surface;  // four flat triangles a face
+    SolidSurface surface;  // four flat triangles per face
     bool magnetic = false;
-    bool surface_acts = false;  // whether water, or a face energy, acts on its surface
+    bool surface_acts = false;  // whether water or a face energy acts on its surface
 };
 
 struct SolidInput {
-    std::string owner;     // under which its parameters are registered
+    std::string owner;     // name of the owner of its parameters
     Rows3 rest_positions;  // (n, 3) [m]
     std::vector<Index> elements;
     int nodes_per_element = 4;    // or 10
-    std::vector<Index> vertices;  // the scene's vertex of each row
+    std::vector<Index> vertices;  // the scene vertex of each row
     SolidSurface surface;
     SolidResponse response;
     bool magnetic = false;
-    bool surface_acts = false;  // whether water, or a face energy, acts on its surface
+    bool surface_acts = false;  // whether water or a face energy acts on its surface
 };
 
-/// Magnetized triangles on nodes of solids.
+/// Magnetized triangles on the nodes of solids.
 struct SkinInput {
-    std::string owner;  // under which its parameters are registered
+    std::string owner;  // name of the owner of its parameters
     SolidSurface surface;
 };
 
-/// An energy of a body's faces beside its elastic and magnetic ones.
+/// An energy of a body's faces in addition to its elastic and magnetic ones.
 struct FaceEnergyInput {
-    std::string owner;  // under which its inputs are registered
-    Index body;         // sheets first, then solids
+    std::string owner;  // name of the owner of its parameters
+    Index body;         // shells first, then solids
     std::shared_ptr<const FaceEnergy> energy;
 };
 
-/// Vertices of bodies that move as one, with ten points of its own: the four corners of a regular tetrahedron, and the
-/// middles of its edges.
+/// A rigid body: vertices of bodies that move together, and ten points of its own, the corners and edge midpoints of a regular
+/// tetrahedron.
 struct RigidInput {
     std::string owner;
-    Rows3 points;                 // (10, 3) at rest, then its surface's: the tens of all parts come first
-    std::vector<Index> vertices;  // the scene's
+    Rows3
+        points;  // (10, 3) at rest [m], then the points of its surface; in the scene the tens of all rigid bodies come first
+    std::vector<Index> vertices;  // of the scene
     bool magnetic = false;
 
     static constexpr Index own = 10;
 };
 
-/// Rigid parts that are joined in a tree: joints[k] leads to the part links[k], parents first.
+/// Rigid bodies joined in a tree: joints[k] connects the body links[k] to its parent; parents come first.
 struct SkeletonInput {
-    std::vector<Index> links;  // of SceneInput::rigid
+    std::vector<Index> links;  // indices of SceneInput::rigid
     std::vector<Joint> joints;
-    std::vector<std::string> owners;  // of joints in which something acts; empty where nothing does
-    std::vector<std::string> labels;  // of all joints; empty where there is none
+    std::vector<std::string> owners;  // of joints with a spring, damper, motor or limit; empty for all others
+    std::vector<std::string> labels;  // of all joints; empty if there is none
 };
 
-/// A point of one rigid part that is pulled to a point of another, or of the world (negative).
+/// A loop closure: a point of one rigid body that a spring pulls to a point of another, or of the world if negative.
 struct ClosureInput {
     std::string owner;
-    Index parent, child;  // of SceneInput::rigid
-    Vec3 place;           // at rest
+    Index parent, child;  // parent, child: indices of SceneInput::rigid
+    Vec3 place;           // at rest [m]
 };
 
-/// Held nodes count the scene's vertices first, then directions.
+/// The whole scene. Nodes of supports count the vertices first, then directions.
 struct SceneInput {
-    Index n_vertices = 0;         // of sheets and solids
-    std::vector<Index> original;  // of each vertex: itself, or the one that it is welded to; empty if none is
-    std::vector<SheetInput> sheets;
-    std::vector<SixNodeSheetInput> six_node_sheets;
-    std::vector<SolidInput> solids;  // numbered on after the sheets
+    Index n_vertices = 0;  // of shells and solids
+    std::vector<Index>
+        original;  // of each vertex: itself, or the one that it is welded to; empty without welds
+    std::vector<ShellInput> shells;
+    std::vector<SixNodeShellInput> six_node_shells;
+    std::vector<SolidInput> solids;  // numbered after the shells
     std::vector<SkinInput> skins;
     std::vector<MuscleInput> muscles;
     std::vector<RigidInput> rigid;
     std::vector<SkeletonInput> skeletons;
     std::vector<ClosureInput> closures;
-    Rows3 directions;  // (n_d, 3), of directed edges and of couples
-    std::vector<HeldNode> held;
-    Index moves = 0;  // that held nodes refer to
-    std::vector<EdgeCoupleInput> couples;
+    Rows3 directions;  // (n_d, 3), of clamped edges and edge moments
+    std::vector<PrescribedNode> held;
+    Index moves = 0;  // number of support moves that `held` refers to
+    std::vector<EdgeMomentInput> couples;
     std::vector<FaceEnergyInput> face_energies;
     std::vector<PressureInput> pressures;
     std::vector<VolumeInput> volumes;

@@ -22,7 +22,7 @@ Numbers numbers_of(const Strains& of, Index f) {
     return found;
 }
 
-/// The tangent plane of a face at rest at a point of it.
+/// The tangent plane of a face at rest, at one of its points.
 class Tangents {
   public:
     Tangents(const std::array<Vec3, 6>& rest, const std::array<double, 3>& at) {
@@ -37,14 +37,14 @@ class Tangents {
 
     Mat3 plane() const { return Mat3::Identity() - normal_ * normal_.transpose(); }
 
-    /// T_i = - sym(t_j (x) t_k) / J^2
+    /// Returns T_i = - sym(t_j (x) t_k) / J^2.
     Mat3 direction(int i) const {
         const Mat3 product = along_[(i + 1) % 3] * along_[(i + 2) % 3].transpose();
         return -0.5 / (jacobian_ * jacobian_) * (product + product.transpose());
     }
 
-    /// E with t_i . E t_i = stretches[i] / 2: t_i . T_l^ t_i is zero but for i = l with T_l^ = - sym(n_j (x) n_k), where
-    /// n_i . t_i = 0.
+    /// Returns E with t_i . E t_i = stretches[i] / 2, using T_l^ = - sym(n_j (x) n_k) with n_i . t_i = 0, for which t_i . T_l^ t_i is zero unless
+    /// i = l.
     Mat3 green(const Vec3& stretches) const {
         Mat3 sum = Mat3::Zero();
         for (int i = 0; i < 3; ++i) {
@@ -79,27 +79,27 @@ Mat3 moment_at(const SixNodeFace& face, const Tangents& tangents, const std::arr
 }
 
 struct Terms {
-    const SixNodeSheet& sheet;
+    const SixNodeShell& shell;
     const MembraneSixTerm& membrane;
     const BendingSixTerm& bending;
 
     Terms(const Model& model, Index number)
-        : sheet(*model.bodies().six_node_sheets()[number]),
+        : shell(*model.bodies().six_node_shells()[number]),
           membrane(dynamic_cast<const MembraneSixTerm&>(
               model.elastic_term(model.bodies().six_node_bodies()[number], "membrane"))),
           bending(dynamic_cast<const BendingSixTerm&>(
               model.elastic_term(model.bodies().six_node_bodies()[number], "bending"))) {}
 
-    /// take(row, face, tangents, point, Green's strain) for all.
+    /// Calls take(row, face, tangents, point, Green's strain) for all rows.
     template <class Take>
     void each(const Strains& stretches, const Take& take) const {
-        for (Index f = 0; f < sheet.n_faces(); ++f) {
+        for (Index f = 0; f < shell.n_faces(); ++f) {
             const Numbers stretched = numbers_of(stretches, f);
             for (std::size_t k = 0; k < middles.size(); ++k) {
                 const Tangents tangents = bending.grows()
                                               ? Tangents(bending.grown(f).grown_tangents(middles[k]))
-                                              : Tangents(sheet.rest[f], middles[k]);
-                take(4 * sheet.faces.user[f] + static_cast<Index>(k), f, tangents, middles[k],
+                                              : Tangents(shell.rest[f], middles[k]);
+                take(4 * shell.faces.user[f] + static_cast<Index>(k), f, tangents, middles[k],
                      tangents.green(membrane_interpolation(middles[k]) * stretched));
             }
         }
@@ -111,9 +111,9 @@ struct Terms {
 std::vector<SixNodeStrain> six_node_strains(const Model& model, Index number, const VectorXd& q) {
     const Terms terms(model, number);
     const Strains bends = terms.bending.strains_at(q.data());
-    // On a flat face the curvature that the moments see is the same for all materials.
+    // On a flat face the curvature that belongs to the moments is the same for all materials.
     const ShellMaterial unit{.thickness = 1.0, .young_modulus = 12.0, .poisson_ratio = 0.0};
-    std::vector<SixNodeStrain> out(4 * static_cast<std::size_t>(terms.sheet.n_faces()));
+    std::vector<SixNodeStrain> out(4 * static_cast<std::size_t>(terms.shell.n_faces()));
     Index last = -1;
     Numbers moments;
     terms.each(terms.membrane.strains_at(q.data()), [&](Index row, Index f, const Tangents& tangents,
@@ -128,9 +128,9 @@ std::vector<SixNodeStrain> six_node_strains(const Model& model, Index number, co
 std::vector<FaceStress> six_node_stresses(const Model& model, Index number, const VectorXd& q) {
     const Terms terms(model, number);
     const Strains moments = terms.bending.stresses(terms.bending.strains_at(q.data()));
-    std::vector<FaceStress> out(4 * static_cast<std::size_t>(terms.sheet.n_faces()));
+    std::vector<FaceStress> out(4 * static_cast<std::size_t>(terms.shell.n_faces()));
     terms.each(terms.membrane.strains_at(q.data()), [&](Index row, Index f, const Tangents& tangents,
-                                                        const std::array<double, 3>& at, const Mat3& green) {
+                                                  const std::array<double, 3>& at, const Mat3& green) {
         const auto& [thickness, modulus, nu] = terms.membrane.material(f);
         const Mat3 plane = tangents.plane(),
                    moment = moment_at(terms.bending.rest(f), tangents, at, numbers_of(moments, f));

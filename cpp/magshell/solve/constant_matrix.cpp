@@ -8,37 +8,39 @@
 namespace magshell {
 namespace {
 
-// More would make the dense part the larger one.
-constexpr std::size_t most_special = 2000;
+// [-] Largest number of special dofs, whose dense Schur complement is factorized; see test_on_a_slanted_support_beside_edge_rotations.
+constexpr std::size_t max_special_dofs = 2000;
 
 }  // namespace
 
 ConstantMatrix::ConstantMatrix(const Model& model)
     : model_(model),
       version_(model.values_version()),
-      stiffness_(model.surrogate()),
+      stiffness_(model.projective_stiffness()),
       normals_(stiffness_.scalars(), Vec3::UnitZ()) {
-    const Reduction& reduction = model.reduction();
-    const std::vector<Index>& free = reduction.free_unknowns();
+    const DofMap& dof_map = model.dof_map();
+    const std::vector<Index>& free = dof_map.free_dofs();
     const Index scalars = 3 * stiffness_.nodes();
     std::vector<Index> of_axis[3], place[3], rotations;
-    for (Index k = 0; k < reduction.size(); ++k) {
+    for (Index k = 0; k < dof_map.size(); ++k) {
         if (k < static_cast<Index>(free.size()) && free[k] >= scalars) {
             rotations.push_back(k);
             continue;
         }
-        if (k >= static_cast<Index>(free.size()) || reduction.framed(free[k] / 3)) {
+        if (k >= static_cast<Index>(free.size()) || dof_map.is_rotated(free[k] / 3)) {
             special_.push_back(k);
             continue;
         }
         of_axis[free[k] % 3].push_back(free[k] / 3);
         place[free[k] % 3].push_back(k);
     }
-    if (special_.size() > most_special)
+    if (special_.size() > max_special_dofs)
         throw InvalidInput(
-            "Projective Dynamics eliminates nodes that are held along slanted directions densely, and there "
-            "are " +
-            std::to_string(special_.size()) + " such unknowns: hold them along x, y or z, or entirely");
+            "Projective Dynamics treats nodes that are held along slanted directions by a dense matrix, and "
+            "this scene "
+            "has " +
+            std::to_string(special_.size()) + " such dofs, more than " + std::to_string(max_special_dofs) +
+            ": hold the nodes along x, y or z, or entirely");
     for (int axis = 0; axis < 3; ++axis) {
         for (const Index k : rotations) {
             of_axis[axis].push_back(stiffness_.point(free[k] - scalars));
@@ -62,8 +64,9 @@ ConstantMatrix::ConstantMatrix(const Model& model)
 void ConstantMatrix::require_isotropic() const {
     if (!special_.empty() || groups_.size() > 1 || (groups_.size() == 1 && groups_[0].axes.size() != 3))
         throw InvalidInput(
-            "Coulomb's law node by node is for scenes whose supports hold vertices entirely, and without "
-            "rigid parts or skeletons");
+            "Coulomb contact in Projective Dynamics requires supports that hold vertices entirely, and a "
+            "scene "
+            "without rigid bodies or skeletons");
 }
 
 const VectorXd& ConstantMatrix::inverse_column(Group& group, Index column) const {
@@ -91,7 +94,7 @@ void ConstantMatrix::analyse(Group& group) {
         }
         pattern->column_starts.push_back(static_cast<Index>(pattern->rows.size()));
     }
-    const std::vector<Vec3> all = model_.bodies().unknown_points();
+    const std::vector<Vec3> all = model_.bodies().dof_points();
     std::vector<Vec3> points;
     for (const Index point : group.points)
         points.push_back(is_scalar(point) ? all[2 * stiffness_.nodes() + point] : model_.nodes().rest[point]);
@@ -102,9 +105,9 @@ void ConstantMatrix::set(double scale, const VectorXd& weights, const VectorXd& 
     VectorXd sum = VectorXd::Zero(stiffness_.points());
     for (Index node = 0; node < of_nodes.size(); ++node) sum[node] = of_nodes[node] + weights[3 * node];
     bool same = scale == scale_ && sum == weights_;
-    if (version_ != model_.values_version()) {  // perhaps of what does not enter
+    if (version_ != model_.values_version()) {  // the change may concern parameters that L does not depend on
         version_ = model_.values_version();
-        NodeMatrix now = model_.surrogate();
+        NodeMatrix now = model_.projective_stiffness();
         same &= now.values() == stiffness_.values();
         stiffness_ = std::move(now);
     }
@@ -126,13 +129,14 @@ void ConstantMatrix::factorize() {
         const FactorReport report = group.factor->factorize();
         ++factorizations_;
         if (!report.succeeded)
-            throw InvalidInput("the constant matrix of Projective Dynamics: " + report.reason);
+            throw InvalidInput("the constant matrix of Projective Dynamics cannot be factorized: " +
+                               report.reason);
     }
 }
 
 void ConstantMatrix::find_normals(const VectorXd& q) {
     for (Vec3& normal : normals_) normal.setZero();
-    for (const NodeMatrix::Beside& each : stiffness_.beside()) {
+    for (const NodeMatrix::AdjacentFace& each : stiffness_.adjacent_faces()) {
         const Vec3 x = q.segment<3>(3 * each.corners[0]);
         const Vec3 across =
             (q.segment<3>(3 * each.corners[1]) - x).cross(q.segment<3>(3 * each.corners[2]) - x);
@@ -220,19 +224,19 @@ void ConstantMatrix::solve_wide(VectorXd& wide) const {
 void ConstantMatrix::linearize(const VectorXd& q) {
     const bool turns = stiffness_.scalars() > 0;
     if (turns) find_normals(q);
-    if (special_.empty() || (linearized_ && !turns && !model_.reduction().carries())) return;
+    if (special_.empty() || (linearized_ && !turns && !model_.dof_map().has_reduced_coordinates())) return;
     linearized_ = true;
-    const Reduction& reduction = model_.reduction();
+    const DofMap& dof_map = model_.dof_map();
     const Eigen::Index count = static_cast<Eigen::Index>(special_.size());
     forces_.resize(wide_size_, count);
     Eigen::MatrixXd own(count, count);
     for (Eigen::Index k = 0; k < count; ++k) {
-        VectorXd unit = VectorXd::Zero(reduction.size());
+        VectorXd unit = VectorXd::Zero(dof_map.size());
         unit[special_[k]] = 1.0;
-        const VectorXd points = times_points(by_point(reduction.expand(unit)));
+        const VectorXd points = times_points(by_point(dof_map.expand(unit)));
         VectorXd image = VectorXd::Zero(model_.size());
         image.head(3 * stiffness_.nodes()) = points.head(3 * stiffness_.nodes());
-        image = reduction.vector(image);
+        image = dof_map.vector(image);
         for (Eigen::Index l = 0; l < count; ++l) own(l, k) = image[special_[l]];
         forces_.col(k) = wide_of(points);
     }
@@ -258,15 +262,15 @@ void ConstantMatrix::solve(VectorXd& reduced) const {
 Eigen::MatrixXd ConstantMatrix::compliance(const std::vector<Forces>& of) const {
     const Eigen::Index count = static_cast<Eigen::Index>(of.size());
     Eigen::MatrixXd product = Eigen::MatrixXd::Zero(count, count);
-    Eigen::MatrixXd pushed(static_cast<Eigen::Index>(special_.size()), count);  // of the special ones
+    Eigen::MatrixXd pushed(static_cast<Eigen::Index>(special_.size()), count);  // forces on the special dofs
     for (Eigen::Index k = 0; k < count && !special_.empty(); ++k) {
         VectorXd full = VectorXd::Zero(model_.size());
         for (int i = 0; i < of[k].count; ++i) full.segment<3>(3 * of[k].nodes[i]) += of[k].forces[i];
-        const VectorXd reduced = model_.reduction().vector(full);
+        const VectorXd reduced = model_.dof_map().vector(full);
         for (std::size_t l = 0; l < special_.size(); ++l) pushed(l, k) = reduced[special_[l]];
     }
     for (Group& group : groups_) {
-        std::vector<Index> columns;  // what is pushed, each once
+        std::vector<Index> columns;  // of all loaded nodes, each once
         std::vector<std::array<Eigen::Index, 4>> at(of.size());
         std::map<Index, Eigen::Index> number;
         for (Eigen::Index k = 0; k < count; ++k)

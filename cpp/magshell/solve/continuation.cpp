@@ -10,13 +10,25 @@
 namespace magshell {
 namespace {
 
-constexpr int corrector_iterations = 8, wanted_iterations = 3;
-constexpr double smallest_turn_cosine =
-    0.5;  // of successive tangents; a sharper bend asks for a shorter step
-// Of the largest step, while the parameter goes from 0 to 1: below that nothing moves but by rounding, and arc
-// length is that of the parameter.
-constexpr double least_movement = 1e-3;
-constexpr double coincident = 1e-6;  // of a step: critical points closer than that count as one
+// Newton iterations of the corrector: most per step, and the number that the step length aims at; see
+// test_buckling_is_where_the_path_branches.
+constexpr int max_corrector_iterations = 8, target_iterations = 3;
+// [-] Smallest cosine between successive tangents; a sharper bend halves the step. See test_buckling_is_where_the_path_branches.
+constexpr double min_tangent_cosine = 0.5;
+// [-] Least movement for which psi is scaled, of the largest step. Below it only round-off moves the bodies, and arc length is
+// that of the parameter. See test_nothing_to_buckle_under.
+constexpr double min_movement = 1e-3;
+// [-] Critical points closer than this share of a step count as one; see test_buckling_is_where_the_path_branches.
+constexpr double coincident_step = 1e-6;
+// [-] Distance of supports from their target below which they are in place, over the extent; see test_a_clamp_that_shakes.
+constexpr double support_tolerance = 1e-14;
+// [-] Shortest step along the path, over the step first tried; see test_buckling_is_where_the_path_branches.
+constexpr double min_step_ratio = 1e-7;
+// [-] Eigenvalue and step length at which a critical point is located, over their initial sizes; see test_buckling_is_where_the_path_branches.
+constexpr double eigenvalue_tolerance = 1e-6, location_tolerance = 1e-9;
+// [-] Cosine between mode and load rate above which a critical point is a limit point; see test_buckling_is_where_the_path_branches.
+constexpr double limit_alignment = 1e-3;
+constexpr double no_norm = 1e-300;  // keeps a division by zero out; plain-words: ok
 
 struct Tangent {
     VectorXd state;
@@ -35,7 +47,7 @@ class Follower {
           options_(options),
           until_(until),
           result_(result) {
-        // The mean over the area: three components of each vertex carry its area in the metric.
+        // The metric gives every component of a vertex the area of the vertex, so the area is a third of the sum.
         const double area = model_.metric().sum() / 3.0;
         weight_ = model_.metric() / (area * model_.extent() * model_.extent());
     }
@@ -44,10 +56,10 @@ class Follower {
         PathPoint here{start, 0.0, {}, 0};
         const NewtonReport at_rest = newton_.solve(here.state, controls(0.0));
         if (!at_rest.converged) return fail("the start is not an equilibrium: " + at_rest.reason);
-        here.turns = model_.turns();
+        here.angle_branches = model_.angle_branches();
         Tangent tangent;
         if (!find_tangent(here, tangent)) return fail("the tangent does not exist at the start");
-        psi_ = std::max(length(tangent.state), least_movement * options_.largest_step);
+        psi_ = std::max(length(tangent.state), min_movement * options_.largest_step);
         normalize(tangent);
         if (tangent.parameter < 0.0) flip(tangent);
         result_.points.push_back(here);
@@ -59,15 +71,15 @@ class Follower {
             if (last.parameter >= options_.highest_parameter || last.parameter <= options_.lowest_parameter)
                 return true;
         }
-        return fail("the path has max_points = " + std::to_string(options_.max_points) +
-                    " points and goes on");
+        return fail("the path reached max_points = " + std::to_string(options_.max_points) +
+                    " points before its end");
     }
 
   private:
-    /// Those at a parameter, with what varies in place.
+    /// Returns the load parameters at a path parameter and applies the values that vary with them to the model.
     Controls controls(double parameter) const {
         Controls there = interpolate(from_, to_, parameter);
-        model_.take(there);
+        model_.set_time_varying(there);
         return there;
     }
 
@@ -94,48 +106,49 @@ class Follower {
         return product(a.state, b.state) + psi_ * psi_ * a.parameter * b.parameter;
     }
 
-    // K dq = -(dR/dlambda + K dq_held) with the factorization at hand; the pull of dq_held is handed in.
+    // Returns dq/dlambda from K dq = -(dR/dlambda + K dq_held), with the last factorization; pull: K dq_held.
     VectorXd response(const VectorXd& q, const Controls& at, const VectorXd& held,
                       const VectorXd& pull) const {
         return held + newton_.solve_with_factor(-model_.gradient_rate(q, at, rate_) - pull);
     }
 
-    // Factorizes at a point: its tangent (not normalized) and its stability.
+    // Factorizes at a point; sets its tangent, not normalized, and its number of unstable directions.
     bool find_tangent(PathPoint& point, Tangent& tangent) {
         const Controls at = controls(point.parameter);
         model_.evaluate(point.state, at);
         const VectorXd held = model_.prescribed_rate(point.state, at, rate_);
         Eigen::MatrixXd pull = held;
         const FactorReport factor = newton_.factorize(point.state, at, false, {}, pull);
-        model_.require_symmetric();  // or the pivots say nothing of stability
+        model_.require_symmetric();  // for an unsymmetric matrix the pivots are no measure of stability
         if (!factor.succeeded) return false;
         point.unstable_directions = factor.negative_pivots;
         tangent = {response(point.state, at, held, pull.col(0)), 1.0};
         return true;
     }
 
-    // From a point along its tangent; the model's last evaluated state must be that point. False: no convergence.
+    // Corrects a step along the tangent of a point, at which the model must have been evaluated last. Returns false if it does not
+    // converge.
     bool correct(const PathPoint& base, const Tangent& along, double step, PathPoint& found,
                  int& iterations) {
         VectorXd q = base.state;
-        model_.set_turns(base.turns);
+        model_.set_angle_branches(base.angle_branches);
         double parameter = base.parameter + step * along.parameter;
         VectorXd increment = step * along.state;
         for (iterations = 0;; ++iterations, newton_.count_iteration()) {
-            if (model_.has_body_contact()) increment *= model_.share_of_step(q, increment);
+            if (model_.has_body_contact()) increment *= model_.admissible_step_length(q, increment);
             if (newton_.options().mixed) model_.extrapolate(increment);
-            model_.reduction().advance(q, increment);
+            model_.dof_map().retract(q, increment);
             const Controls at = controls(parameter);
             model_.evaluate(q, at);
             const double residual = newton_.relative_residual(q, {});
             newton_.watch(residual);
-            const VectorXd gap = model_.reduction().prescribed_increment(q, at);
-            const bool in_place = gap.lpNorm<Eigen::Infinity>() <= 1e-14 * model_.extent();
+            const VectorXd gap = model_.dof_map().prescribed_increment(q, at);
+            const bool in_place = gap.lpNorm<Eigen::Infinity>() <= support_tolerance * model_.extent();
             if (in_place && residual <= newton_.options().tolerance) {
-                found = {q, parameter, model_.turns(), 0};
+                found = {q, parameter, model_.angle_branches(), 0};
                 return true;
             }
-            if (!std::isfinite(residual) || iterations == corrector_iterations) return false;
+            if (!std::isfinite(residual) || iterations == max_corrector_iterations) return false;
             const VectorXd held = model_.prescribed_rate(q, at, rate_);
             Eigen::MatrixXd pulls(q.size(), 2);
             pulls << gap, held;
@@ -152,8 +165,8 @@ class Follower {
 
     bool advance(Tangent& tangent) {
         const PathPoint base = result_.points.back();
-        const double shortest = 1e-7 * step_;
-        bool at_base = true;  // whether the model was last evaluated there
+        const double shortest = min_step_ratio * step_;
+        bool at_base = true;  // whether the model was last evaluated at the base point
         for (step_ = std::min(step_, options_.largest_step);; step_ *= 0.5, at_base = false) {
             if (step_ < shortest) return fail("no step along the path converges, however short");
             if (!at_base) model_.evaluate(base.state, controls(base.parameter));
@@ -169,29 +182,29 @@ class Follower {
                 flip(there);
                 turn = -turn;
             }
-            if (turn < smallest_turn_cosine) continue;
+            if (turn < min_tangent_cosine) continue;
             if (options_.locate_critical && next.unstable_directions != base.unstable_directions)
                 locate({0.0, base}, {step_, next}, tangent);
-            model_.set_turns(next.turns);
+            model_.set_angle_branches(next.angle_branches);
             model_.evaluate(next.state, controls(next.parameter));
             result_.points.push_back(std::move(next));
             tangent = std::move(there);
-            step_ *= std::clamp(std::sqrt(double(wanted_iterations) / std::max(iterations, 1)), 0.5, 2.0);
+            step_ *= std::clamp(std::sqrt(double(target_iterations) / std::max(iterations, 1)), 0.5, 2.0);
             return true;
         }
     }
 
-    // A point past the end of the range is exchanged for the one at its end.
+    // Replaces a point beyond the end of the parameter range by the equilibrium at the end.
     bool end_in_range(PathPoint& point) {
         const double end = std::clamp(point.parameter, options_.lowest_parameter, options_.highest_parameter);
         if (end == point.parameter) return true;
         if (!newton_.solve(point.state, controls(end)).converged) return false;
         point.parameter = end;
-        point.turns = model_.turns();
+        point.angle_branches = model_.angle_branches();
         return true;
     }
 
-    // The eigenvalue next to zero at the point just factorized, positive on the side of `count` unstable directions.
+    // Returns the eigenvalue nearest to zero at the point factorized last, positive if it has `count` unstable directions.
     double signed_eigenvalue(const PathPoint& point, Index count, VectorXd* mode) {
         const std::vector<Mode> modes = modes_near_zero(newton_, 1);
         if (mode) *mode = modes.front().shape;
@@ -199,13 +212,13 @@ class Follower {
         return point.unstable_directions == count ? size : -size;
     }
 
-    // A point of the path between two of its points, `step` along the tangent of the first.
+    // A point of the path between two accepted points, at `step` along the tangent of the first one.
     struct Probe {
         double step;
         PathPoint point;
     };
 
-    // Factorizes at a point between; the model and the factor are there afterwards. Empty: no convergence.
+    // Computes and factorizes a point between two accepted points. Returns an empty value if it does not converge.
     std::optional<Probe> probe(const PathPoint& base, const Tangent& along, double step) {
         Probe found{step, base};
         Tangent unused;
@@ -215,18 +228,19 @@ class Follower {
         return there && find_tangent(found.point, unused) ? std::optional(found) : std::nullopt;
     }
 
-    // Every critical point between two points of different stability; halves until each stands alone.
+    // Locates every critical point between two points of different stability, by bisection until each is alone in its interval.
     void locate(const Probe& low, const Probe& high, const Tangent& along) {
         const Index crossings = std::abs(high.point.unstable_directions - low.point.unstable_directions);
         if (crossings == 0) return;
-        if (crossings == 1 || high.step - low.step <= coincident * step_) return locate_one(low, high, along);
+        if (crossings == 1 || high.step - low.step <= coincident_step * step_)
+            return locate_one(low, high, along);
         const std::optional<Probe> middle = probe(result_.points.back(), along, 0.5 * (low.step + high.step));
         if (!middle) return;
         locate(low, *middle, along);
         locate(*middle, high, along);
     }
 
-    // By the Illinois variant of regula falsi on the eigenvalue next to zero.
+    // Locates one critical point by regula falsi (Illinois variant) on the eigenvalue nearest to zero.
     void locate_one(const Probe& below, const Probe& above, const Tangent& along) {
         const PathPoint& base = result_.points.back();
         const Index count = below.point.unstable_directions;
@@ -235,10 +249,10 @@ class Follower {
         double low = below.step, high = above.step, at_low = signed_eigenvalue(below.point, count, nullptr);
         if (!probe(base, along, above.step)) return;
         double at_high = signed_eigenvalue(above.point, count, &mode);
-        const double tolerance = 1e-6 * std::max(std::abs(at_low), std::abs(at_high));
+        const double tolerance = eigenvalue_tolerance * std::max(std::abs(at_low), std::abs(at_high));
         PathPoint best = above.point;
         int side = 0;
-        for (int k = 0; k < 30 && high - low > 1e-9 * step_; ++k) {
+        for (int k = 0; k < 30 && high - low > location_tolerance * step_; ++k) {
             const double step = low + (high - low) * at_low / (at_low - at_high);
             const std::optional<Probe> between = probe(base, along, step);
             if (!between) break;
@@ -258,11 +272,11 @@ class Follower {
             }
         }
         const VectorXd drive = model_.gradient_rate(best.state, controls(best.parameter), rate_);
-        const VectorXd free_drive = model_.reduction().vector(drive),
-                       free_mode = model_.reduction().vector(mode);
+        const VectorXd free_drive = model_.dof_map().vector(drive), free_mode = model_.dof_map().vector(mode);
         const double alignment =
-            std::abs(free_drive.dot(free_mode)) / (free_drive.norm() * free_mode.norm() + 1e-300);
-        const CriticalKind kind = alignment > 1e-3 ? CriticalKind::limit : CriticalKind::bifurcation;
+            std::abs(free_drive.dot(free_mode)) / (free_drive.norm() * free_mode.norm() + no_norm);
+        const CriticalKind kind =
+            alignment > limit_alignment ? CriticalKind::limit : CriticalKind::bifurcation;
         result_.critical.push_back({best, kind, mode, static_cast<Index>(result_.points.size()) - 1});
     }
 
@@ -278,11 +292,11 @@ class Follower {
 
 }  // namespace
 
-PathResult follow_path(Model& model, const VectorXd& start, const Model::Turns& turns, const Controls& from,
-                       const Controls& to, const PathOptions& options, const Until& until,
-                       const StaticsWatch& watch, const Varying& varying) {
-    const WhileVarying while_varying(model, varying);
-    model.set_turns(turns);
+PathResult follow_path(Model& model, const VectorXd& start, const Model::AngleBranches& angle_branches,
+                       const Controls& from, const Controls& to, const PathOptions& options,
+                       const Until& until, const StaticsWatch& watch, const TimeVaryingParameters& varying) {
+    const ScopedTimeVarying while_varying(model, varying);
+    model.set_angle_branches(angle_branches);
     PathResult result;
     Newton newton(model, options.newton, [&](double residual) {
         if (watch) watch(result.points.empty() ? 0.0 : result.points.back().parameter, residual);

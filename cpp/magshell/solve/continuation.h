@@ -1,12 +1,13 @@
-// Paths of equilibria: pseudo-arclength continuation in the controls, through limit points, with critical
-// points located.
+// Follows a path of equilibria by pseudo-arclength continuation in the load parameters, through limit points, and locates its
+// critical points [Riks; Crisfield 9].
 //
-// A point is a state and a parameter, 0 at the old controls and 1 at the new. Lengths are measured by
+// A point of the path is a state and a path parameter lambda, 0 at the initial load parameters and 1 at the final ones. The arc
+// length is measured by
 //
-//   ds^2 = |dx|^2 / extent^2 + psi^2 dlambda^2          |.|: root mean square over the sheet's area
+//   ds^2 = |dx|^2 / extent^2 + psi^2 dlambda^2          |.|: root mean square over the area of the bodies
 //
-// with psi such that both parts weigh the same at the start. Corrections are mixed Newton steps perpendicular
-// to the tangent.
+// with psi chosen so that both parts have the same weight at the start. The corrector takes mixed Newton steps perpendicular to
+// the tangent.
 #pragma once
 
 #include <functional>
@@ -19,8 +20,8 @@ namespace magshell {
 
 struct PathOptions {
     NewtonOptions newton;
-    double first_step = 0.05;    // of the parameter
-    double largest_step = 0.02;  // of the arc length: root mean square displacement over the sheet's extent
+    double first_step = 0.05;    // initial step, of the path parameter [-]
+    double largest_step = 0.02;  // largest step, of the arc length [-]: rms displacement over the extent
     int max_points = 1000;
     double lowest_parameter = -1e300, highest_parameter = 1.0;
     bool locate_critical = true;
@@ -29,7 +30,7 @@ struct PathOptions {
 struct PathPoint {
     VectorXd state;
     double parameter = 0.0;
-    Model::Turns turns;
+    Model::AngleBranches angle_branches;
     Index unstable_directions = 0;
 };
 
@@ -38,7 +39,7 @@ enum class CriticalKind { limit, bifurcation };
 struct CriticalPoint {
     PathPoint point;
     CriticalKind kind;
-    VectorXd mode;      // all unknowns
+    VectorXd mode;      // of all dofs, largest displacement 1
     Index after_point;  // index of the last path point before it
 };
 
@@ -46,17 +47,17 @@ struct PathResult {
     Outcome outcome = Outcome::failed;
     std::vector<PathPoint> points;
     std::vector<CriticalPoint> critical;
-    std::string reason;  // why it ended
+    std::string reason;  // why the path ended
     int iterations = 0, factorizations = 0, failed_factorizations = 0;
 };
 
-/// Called with every accepted point; true ends the path there.
+/// Called with every accepted point; the path ends there if it returns true.
 using Until = std::function<bool(const PathPoint&)>;
 
-/// From an equilibrium at `from`, following the controls towards `to`; the numbers of what varies follow the others
-/// in both.
-PathResult follow_path(Model& model, const VectorXd& start, const Model::Turns& turns, const Controls& from,
-                       const Controls& to, const PathOptions& options, const Until& until,
-                       const StaticsWatch& watch = {}, const Varying& varying = {});
+/// Follows the path from an equilibrium at the load parameters `from` towards `to`. The values of `varying` are appended to both.
+PathResult follow_path(Model& model, const VectorXd& start, const Model::AngleBranches& angle_branches,
+                       const Controls& from, const Controls& to, const PathOptions& options,
+                       const Until& until, const StaticsWatch& watch = {},
+                       const TimeVaryingParameters& varying = {});
 
 }  // namespace magshell

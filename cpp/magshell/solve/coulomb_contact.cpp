@@ -6,12 +6,18 @@
 #include "magshell/core/errors.h"
 
 namespace magshell {
+namespace {
 
-StandingAside::StandingAside(const Model& model) : model_(model) {
+// [-] Penetration that counts as none, over the extent; see test_it_slides_above_it_with_all_of_its_friction.
+constexpr double negligible_gap = 1e-14;
+
+}  // namespace
+
+ScopedContactOff::ScopedContactOff(const Model& model) : model_(model) {
     stand(true);
 }
 
-void StandingAside::stand(bool aside) const {
+void ScopedContactOff::stand(bool aside) const {
     if (model_.contact()) model_.contact()->set_switched_off(aside);
     if (model_.body_contact()) model_.body_contact()->set_switched_off(aside);
 }
@@ -22,7 +28,7 @@ CoulombContact::CoulombContact(const Model& model, const ConstantMatrix& matrix,
       matrix_(matrix),
       begin_(begin),
       time_(time),
-      negligible_(1e-14 * model.extent()),
+      negligible_(negligible_gap * model.extent()),
       forces_(VectorXd::Zero(model.size())) {
     matrix.require_isotropic();
     if (model.body_contact()) model.body_contact()->require_one_coefficient();
@@ -34,30 +40,31 @@ CoulombContact::CoulombContact(const Model& model, const ConstantMatrix& matrix,
     }
 }
 
-Vec3 CoulombContact::answer(const Pair& pair, const Vec3& ahead, const Vec3& without, double own) const {
+Vec3 CoulombContact::contact_force(const Pair& pair, const Vec3& ahead, const Vec3& without,
+                                   double own) const {
     const double gap = pair.gap + pair.normal.dot(ahead);
     if (!(gap < 0.0)) return Vec3::Zero();
     const double push = -gap / own;
-    const Vec3 slip = without - pair.of(begin_) - pair.carried;
+    const Vec3 slip = without - pair.of(begin_) - pair.prescribed;
     Vec3 rub = -(slip - pair.normal.dot(slip) * pair.normal) / own;
     const double limit = pair.friction * push, wanted = rub.norm();
     if (wanted > limit) rub *= limit / wanted;
     return push * pair.normal + rub;
 }
 
-void CoulombContact::look_at_obstacles(const VectorXd& q) {
+void CoulombContact::update_obstacle_pairs(const VectorXd& q) {
     for (std::size_t k = 0; k < obstacles_.size(); ++k) {
         Pair& pair = pairs_[k];
         const Vec3 x = q.segment<3>(3 * pair.nodes[0]);
         const Distance at = obstacles_[k].obstacle.distance(x);
         pair.gap = at.value - obstacles_[k].keeping.offset;
         pair.normal = at.normal;
-        pair.carried = time_ * obstacles_[k].obstacle.velocity(x);
+        pair.prescribed = time_ * obstacles_[k].obstacle.velocity(x);
     }
 }
 
-// What is near changes; the forces stay with their pairs.
-void CoulombContact::look_at_bodies(const VectorXd& q) {
+// Finds the pairs that are near at q. Pairs that were near before keep their forces.
+void CoulombContact::update_body_pairs(const VectorXd& q) {
     if (!model_.body_contact()) return;
     using Key = std::array<Index, 6>;
     const auto key = [](const NearPair& near) {
@@ -92,9 +99,9 @@ Eigen::MatrixXd CoulombContact::compliance(const std::vector<std::size_t>& of) c
     return matrix_.compliance(columns);
 }
 
-double CoulombContact::look(const VectorXd& q) {
-    look_at_obstacles(q);
-    look_at_bodies(q);
+double CoulombContact::assess(const VectorXd& q) {
+    update_obstacle_pairs(q);
+    update_body_pairs(q);
     double off = 0.0;
     std::vector<std::size_t> pushing;
     for (std::size_t k = 0; k < pairs_.size(); ++k)
@@ -106,29 +113,33 @@ double CoulombContact::look(const VectorXd& q) {
     for (std::size_t a = 0; a < pushing.size(); ++a) {
         const Pair& pair = pairs_[pushing[a]];
         const Vec3 back = -own[a] * pair.force;
-        off = std::max(off, own[a] * (answer(pair, back, pair.of(q) + back, own[a]) - pair.force).norm());
+        off = std::max(off,
+                       own[a] * (contact_force(pair, back, pair.of(q) + back, own[a]) - pair.force).norm());
     }
     return off;
 }
 
-void CoulombContact::push(VectorXd& move) {
+void CoulombContact::apply_forces(VectorXd& move) {
     VectorXd now = VectorXd::Zero(forces_.size());
     for (const Pair& pair : pairs_)
         for (int i = 0; i < pair.count; ++i)
             now.segment<3>(3 * pair.nodes[i]) += pair.weights[i] * pair.force;
-    VectorXd change = model_.reduction().vector(now - forces_);
+    VectorXd change = model_.dof_map().vector(now - forces_);
     forces_ = std::move(now);
     if (change.isZero(0.0)) return;
     matrix_.solve(change);
-    move += model_.reduction().expand(change);
+    move += model_.dof_map().expand(change);
 }
 
-void CoulombContact::settle(const VectorXd& q, VectorXd& move) {
-    constexpr int most_rounds = 50, most_sweeps = 200;
-    constexpr double settled = 1e-4;  // of the first sweep: the next round moves the nodes anyway
-    push(move);                       // closest points have moved
-    for (int round = 0; round < most_rounds; ++round) {
-        // Those that push, and those that would go in.
+void CoulombContact::solve_forces(const VectorXd& q, VectorXd& move) {
+    // Limits of the active-set loop and of the Gauss-Seidel sweeps; see test_a_block_sticks_or_slides_on_another.
+    constexpr int max_rounds = 50, max_sweeps = 200;
+    // [-] Reduction of the largest displacement, relative to the first sweep, that ends the sweeps: the next iteration moves the
+    // nodes anyway. See test_it_sticks_below_the_angle_of_friction.
+    constexpr double sweep_tolerance = 1e-4;
+    apply_forces(move);  // the closest points have moved
+    for (int round = 0; round < max_rounds; ++round) {
+        // Collects the pairs that carry a force or would interpenetrate.
         std::vector<std::size_t> active;
         bool more_go_in = false;
         for (std::size_t k = 0; k < pairs_.size(); ++k) {
@@ -140,25 +151,25 @@ void CoulombContact::settle(const VectorXd& q, VectorXd& move) {
         }
         if (round > 0 && !more_go_in) return;
         const Eigen::MatrixXd between = compliance(active);
-        std::vector<Vec3> ahead;  // of where they are at q
+        std::vector<Vec3> ahead;  // displacement of the active pairs since q
         for (const std::size_t k : active) ahead.push_back(pairs_[k].of(move));
         double enough = negligible_;
-        for (int sweep = 0; sweep < most_sweeps; ++sweep) {
+        for (int sweep = 0; sweep < max_sweeps; ++sweep) {
             double moved = 0.0;
             for (std::size_t a = 0; a < active.size(); ++a) {
                 Pair& pair = pairs_[active[a]];
                 const double own = between(a, a);
                 const Vec3 without = ahead[a] - own * pair.force;
-                const Vec3 more = answer(pair, without, pair.of(q) + without, own) - pair.force;
+                const Vec3 more = contact_force(pair, without, pair.of(q) + without, own) - pair.force;
                 if (more.isZero(0.0)) continue;
                 for (std::size_t b = 0; b < active.size(); ++b) ahead[b] += between(b, a) * more;
                 pair.force += more;
                 moved = std::max(moved, own * more.norm());
             }
-            if (sweep == 0) enough = std::max(enough, settled * moved);
+            if (sweep == 0) enough = std::max(enough, sweep_tolerance * moved);
             if (moved <= enough) break;
         }
-        push(move);
+        apply_forces(move);
     }
 }
 

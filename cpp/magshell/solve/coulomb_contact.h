@@ -1,18 +1,19 @@
-// Hard contact under Coulomb's law, with obstacles and between bodies, for Projective Dynamics.    [Qiao21] 5, [Ly et al. 2020]
+// Hard contact with Coulomb friction, against obstacles and between bodies, for Projective Dynamics.   [Qiao21] 5, [Ly et al. 2020]
 //
-// A round of Projective Dynamics moves the nodes by d = d0 + A^-1 f with forces f [N] on the nodes that touch. A is the same
-// along x, y and z, so that its inverse between nodes is one number W_ij, and where a sum of places x = sum_i w_i x_i touches
-// (a node and an obstacle; the difference of the closest points of two bodies) the law has a closed answer:
+// One iteration of Projective Dynamics moves the nodes by d = d0 + A^-1 f, with contact forces f [N] on the nodes. A^-1 is the same
+// along x, y and z, so it couples two nodes by one number W_ij. The relative position of a contact is a weighted sum of nodes,
+// x = sum_i w_i x_i: a node against an obstacle, or the difference of the closest points of two bodies. For one contact alone
+// Coulomb's law has a closed-form solution:
 //
-//   gap = g + n . x,  slip = x - x_begin - dt v_obstacle,  x = y + W f,  W = sum_ij w_i w_j W_ij   (y: without its own f)
-//   gap >= 0, f_n >= 0, gap f_n = 0;  |f_t| <= mu f_n, and where it slips f_t = - mu f_n slip/|slip|
+//   gap = g + n . x,  slip = x - x_begin - dt v_obstacle,  x = y + W f,  W = sum_ij w_i w_j W_ij   (y: position without its force f)
+//   gap >= 0, f_n >= 0, gap f_n = 0;  |f_t| <= mu f_n, and if it slips f_t = - mu f_n slip/|slip|
 //
-// Node i gets w_i f: what bodies do to each other sums to zero. They keep what a contact's reach and minimal distance are
-// together, as they do with a stiffness without end.
+// Node i receives w_i f, so the forces between two bodies sum to zero. Bodies are kept apart by the sum of the activation distance and the
+// minimum separation of their contact, as with infinite stiffness.
 //
-// [Qiao21] (21) has (M + dt^2 D)^-1 in the place of W and leaves everything between nodes to its rounds, of which it then
-// takes hundreds, as they carry a push from a node to its neighbours only. Here sweeps over what touches (Gauss and
-// Seidel's; Moreau, Jean) use all W_ij: A is factorized anyway. Both end at the same forces.
+// [Qiao21] (21) uses (M + dt^2 D)^-1 in place of W and leaves the coupling between nodes to the outer iterations. These then
+// number hundreds, since each one transmits a force only to the neighbours of a node. Here Gauss-Seidel sweeps over the active contacts
+// (Moreau; Jean) use all W_ij, because A is factorized anyway. Both converge to the same forces.
 #pragma once
 
 #include <map>
@@ -25,13 +26,13 @@
 
 namespace magshell {
 
-/// The smooth laws of all contacts are off while it lives.
-class StandingAside {
+/// RAII guard that switches off the smooth contact laws of all contacts while it exists.
+class ScopedContactOff {
   public:
-    explicit StandingAside(const Model& model);
-    StandingAside(const StandingAside&) = delete;
-    StandingAside& operator=(const StandingAside&) = delete;
-    ~StandingAside() { stand(false); }
+    explicit ScopedContactOff(const Model& model);
+    ScopedContactOff(const ScopedContactOff&) = delete;
+    ScopedContactOff& operator=(const ScopedContactOff&) = delete;
+    ~ScopedContactOff() { stand(false); }
 
   private:
     void stand(bool aside) const;
@@ -41,18 +42,19 @@ class StandingAside {
 
 class CoulombContact {
   public:
-    /// At a stage that began at `begin` [m] so long ago [s]. Throws InvalidInput where points on faces touch, or where what
-    /// sticks has another coefficient than what slides.
+    /// Starts a stage whose step began at `begin` [m], `time` [s] ago. Throws InvalidInput if points on faces may come into
+    /// contact, or if a contact has different static and kinetic coefficients of friction.
     CoulombContact(const Model& model, const ConstantMatrix& matrix, const Controls& controls,
                    const VectorXd& begin, double time);
 
-    /// Forces on all unknowns so far [N].
+    /// Returns the current contact forces, of all dofs [N].
     const VectorXd& forces() const { return forces_; }
 
-    /// Looks where q is. How far [m] the law would have a pair from there, given its force.
-    double look(const VectorXd& q);
-    /// Changes the forces, and with them a move of all unknowns from q, looked at last, until they fit each other there.
-    void settle(const VectorXd& q, VectorXd& move);
+    /// Updates gaps and normals at q. Returns the largest violation of the law, as the distance by which a pair
+    /// would have to move [m].
+    double assess(const VectorXd& q);
+    /// Solves for the contact forces at q, assessed last, and updates the displacement `move` from q that they cause.
+    void solve_forces(const VectorXd& q, VectorXd& move);
 
   private:
     struct Pair {
@@ -60,11 +62,11 @@ class CoulombContact {
         int count;
         PairWeights weights;
         double friction;
-        double gap = 0.0;  // [m] at q
+        double gap = 0.0;  // [m], at q
         Vec3 normal = Vec3::Zero(), force = Vec3::Zero();
-        Vec3 carried = Vec3::Zero();  // [m] what the other side goes by itself
+        Vec3 prescribed = Vec3::Zero();  // [m], displacement of the other side by its own motion
 
-        /// The weighted sum of what nodes have in a vector of all unknowns.
+        /// Returns the relative position or displacement of the pair, from a vector of all dofs.
         Vec3 of(const VectorXd& all) const {
             Vec3 sum = Vec3::Zero();
             for (int i = 0; i < count; ++i) sum += weights[i] * all.segment<3>(3 * nodes[i]);
@@ -76,21 +78,22 @@ class CoulombContact {
         ObstacleState obstacle;
     };
 
-    /// The force on a pair that would be at `without`, `ahead` of where it was looked at, if it had none.
-    Vec3 answer(const Pair& pair, const Vec3& ahead, const Vec3& without, double own) const;
-    void look_at_obstacles(const VectorXd& q);
-    void look_at_bodies(const VectorXd& q);
-    /// c^T A^-1 c between some of the pairs, the same along x, y and z [m/N].
+    /// Returns the force of Coulomb's law on a pair. ahead: its displacement since it was assessed, without: its position with no
+    /// force on it, own: its compliance W [m/N].
+    Vec3 contact_force(const Pair& pair, const Vec3& ahead, const Vec3& without, double own) const;
+    void update_obstacle_pairs(const VectorXd& q);
+    void update_body_pairs(const VectorXd& q);
+    /// Returns c^T A^-1 c between some pairs, the same along x, y and z [m/N].
     Eigen::MatrixXd compliance(const std::vector<std::size_t>& of) const;
-    /// Has the forces on the nodes be those of the pairs, and the move follow.
-    void push(VectorXd& move);
+    /// Applies the forces of the pairs to the nodes and updates the displacement accordingly.
+    void apply_forces(VectorXd& move);
 
     const Model& model_;
     const ConstantMatrix& matrix_;
     const VectorXd& begin_;
     double time_, negligible_;
     std::vector<OnObstacle> obstacles_;
-    std::vector<Pair> pairs_;  // of obstacles, in their order, then of bodies
+    std::vector<Pair> pairs_;  // pairs with obstacles in their order, then pairs of bodies
     std::vector<BodyContactTerm::HardContactPair> between_;
     VectorXd forces_;
 };

@@ -1,13 +1,13 @@
-// Further equilibria at the same controls: Newton's steps deflected away from those already known.
+// Finds further equilibria at the same load parameters, by deflation of Newton's method.  [Farrell, Birkisson, Funke 2015]
 //
-// Deflation (Farrell, Birkisson, Funke 2015): instead of g(q) = 0, M(q) g(q) = 0 is solved, which has all other solutions
-// and none where M has its poles,
+// Instead of g(q) = 0, the deflated problem M(q) g(q) = 0 is solved. It has all other solutions, but none of the known ones q_i, at which M
+// has a pole:
 //
 //   M(q) = prod_i (1 + (s / |q - q_i|)^2)
 //
-// and whose Newton step is that of g itself times a number, since the Jacobian differs by a rank-one matrix:
+// The Jacobians differ by a rank-one matrix, so the deflated Newton step is the one of g times a number (Sherman-Morrison):
 //
-//   p_M = p / (1 - d(ln M) . p)                                                          (Sherman, Morrison)
+//   p_M = p / (1 - d(ln M) . p)
 #pragma once
 
 #include <vector>
@@ -16,15 +16,15 @@
 
 namespace magshell {
 
-/// What to stay away from.
-struct Known {
+/// The equilibria from which the search is kept away.
+struct KnownEquilibria {
     const std::vector<VectorXd>& states;
-    double reach;  // [m], s: root mean square over the bodies
+    double length;  // [m] s, as root mean square displacement over the bodies
 };
 
-/// From q to a stationary point at the controls, where held nodes must be already, that is none of `known`; or to where it
-/// failed.
-NewtonReport solve_away_from(Newton& newton, VectorXd& q, const Controls& controls, const Known& known,
-                             int max_iterations);
+/// Searches from q for a stationary point that is none of the known ones, at load parameters for which the supports are in
+/// place. Leaves q at the last state if it fails.
+NewtonReport solve_away_from(Newton& newton, VectorXd& q, const Controls& controls,
+                             const KnownEquilibria& known, int max_iterations);
 
 }  // namespace magshell

@@ -1,5 +1,7 @@
-// A motion: steps of equal length, halved where one fails, and what is kept of them for the way back. Where bodies touch
-// and a step gains energy that nobody put in, implicit Euler takes it instead, in halves where even that does.
+// Time integration of a motion: equal steps, which are repeated in substeps if one fails, and what is stored for the adjoint.
+//
+// If bodies in contact gain energy in a step that no force put in, implicit Euler repeats the step (the dissipative fallback), in substeps
+// if it gains energy as well.
 #pragma once
 
 #include <map>
@@ -9,85 +11,89 @@
 
 namespace magshell {
 
-/// What the steps are taken with.
+/// Everything a motion is computed from.
 struct MotionInput {
     MotionState start;
-    bool rotations_given = true;  // false: those of the start are to be at rest first
+    bool rotations_given = true;  // false: the edge rotations of the start are computed from equilibrium
     Inertia inertia;
     Viscosity viscosity;
     Tableau tableau;
     double time_step = 0.0;  // [s]
     Index steps = 0;
-    /// Per step, at its beginning and at its stages: steps (stages + 1). In between, straight lines.
+    /// Load parameters at the beginning of each step and at its stages, steps (stages + 1) in all; linear in between.
     std::vector<Controls> controls;
-    Varying varying;  // values whose numbers stand in them, after the others
+    TimeVaryingParameters varying;  // the values that vary in time; their numbers are appended to `controls`
     NewtonOptions newton;
-    ProjectiveOptions projective;  // where it solves the stages
-    Index record_every = 1;        // steps between the states handed out, from the start on
+    ProjectiveOptions projective;  // used if it solves the stages
+    Index record_every = 1;        // steps between recorded states
 
-    /// At a share of a step.
-    Controls controls_at(Index step, double share) const;
-    /// The two of `controls` next to it, and the weight of the second.
-    std::pair<Index, double> between(Index step, double share) const;
+    /// Returns the load parameters at a fraction of a step.
+    Controls controls_at(Index step, double fraction) const;
+    /// Returns the index of the entry of `controls` before a fraction of a step, and the weight of the entry after it.
+    std::pair<Index, double> between(Index step, double fraction) const;
 };
 
-/// How much of a motion is kept for gradients. Less means more steps taken again on the way back.
-enum class Keep { nothing, checkpoints, stages, factors };
+/// The data of a motion that are stored for its adjoint. The less is stored, the more steps are computed again.
+enum class AdjointStorage { nothing, checkpoints, stages, factors };
 
-struct KeepOptions {
+struct AdjointStorageOptions {
     bool gradients = false;
-    std::size_t budget = 0;       // [bytes]
-    Keep wanted = Keep::nothing;  // nothing: stages, or checkpoints where the budget does not hold them
+    std::size_t budget = 0;  // [bytes]
+    AdjointStorage wanted =
+        AdjointStorage::nothing;  // nothing: all stages, or checkpoints if the budget is too small for them
 };
 
-/// A part of a step, from a share of it to another; dissipative: by implicit Euler, whatever the method is.
+/// A part of a step, from one fraction of it to another; dissipative: taken by implicit Euler instead of the method chosen.
 struct Substep {
     double begin = 0.0, end = 1.0;
     bool dissipative = false;
 
-    double share() const { return end - begin; }
+    double fraction() const { return end - begin; }
 };
 using Substeps = std::vector<Substep>;
 
-/// At the beginning of a step or of a part of one, and at its stages.
-std::vector<Controls> controls_of(const MotionInput& input, const Tableau& tableau, Index step,
-                                  const Substep& substep);
+/// Returns the load parameters at the beginning of a substep and at its stages.
+std::vector<Controls> stage_controls(const MotionInput& input, const Tableau& tableau, Index step,
+                                     const Substep& substep);
 
 struct MotionResult {
     Outcome outcome = Outcome::failed;
     std::string reason;
     Index steps_done = 0;
-    bool begun = false;                         // whether the start's edge rotations are those it moves with
-    MotionState start, last;                    // start: as the first step took it
-    std::vector<MotionState> recorded;          // every record_every steps, the start first
-    std::vector<double> kinetic_energy;         // [J], of those
-    std::vector<std::vector<double>> energies;  // [J], of those, term by term; NaN if interrupted meanwhile
-    std::map<Index, Substeps> halved;  // the steps that were taken in substeps, or in a dissipative one
-    Keep keep = Keep::nothing;
-    std::vector<std::vector<SubstepRecord>> steps;  // where stages are kept
+    bool begun = false;                  // whether `start` has the edge rotations that the motion begins with
+    MotionState start, last;             // start: as the first step used it
+    std::vector<MotionState> recorded;   // every record_every steps, including the start
+    std::vector<double> kinetic_energy;  // [J], of the recorded states
+    std::vector<std::vector<double>>
+        energies;  // [J], of the recorded states, term by term; NaN if interrupted before they were known
+    std::map<Index, Substeps>
+        substeps;  // of the steps that were taken in substeps, or by the dissipative fallback
+    AdjointStorage keep = AdjointStorage::nothing;
+    std::vector<std::vector<SubstepRecord>> steps;  // if stages are stored
     std::map<Index, MotionState> checkpoints;       // by the step that begins there
-    Index leaf = 0, slots = 0;                      // steps that fit at once; checkpoints that do
+    Index leaf = 0,
+          slots = 0;  // steps whose stages fit into the budget at once, and number of checkpoints that do
     int iterations = 0, factorizations = 0;
     double linear_time = 0.0;
-    std::size_t bytes = 0;  // of what is kept for gradients
+    std::size_t bytes = 0;  // of what is stored for the adjoint
 };
 
-/// Called now and then; throws Interrupted to stop.
+/// Called once per iteration; throws Interrupted to stop the motion.
 using MotionWatch = std::function<void(double progress, double residual)>;
 
-/// Takes the steps. Interrupted or failed, it hands back those that were done.
-MotionResult simulate(Model& model, const MotionInput& input, const KeepOptions& keep,
+/// Computes a motion. If it fails or is interrupted, the result holds the steps done until then.
+MotionResult simulate(Model& model, const MotionInput& input, const AdjointStorageOptions& keep,
                       const MotionWatch& watch = {});
 
-/// The substeps in which a step was taken.
-Substeps substeps_of(const std::map<Index, Substeps>& halved, Index step);
+/// Returns the substeps in which a step was taken.
+Substeps substeps_of(const std::map<Index, Substeps>& substeps, Index step);
 
-/// Takes one step again exactly as it was taken; `kept` gets its substeps.
+/// Repeats one step exactly as it was taken; `kept` receives its substeps if it is not null.
 void repeat_step(Stepper& stepper, const MotionInput& input, Index step, const Substeps& substeps,
                  MotionState& state, std::vector<SubstepRecord>* kept);
 
-/// Where to put the next checkpoint in a stretch of so many steps (Griewank and Walther's revolve): the
-/// number of steps before it, or 0 where the stretch fits at once.
+/// Returns the number of steps before the next checkpoint in an interval of `steps` steps, or 0 if the interval fits into storage at
+/// once: the optimal schedule `revolve` [Griewank and Walther 2000], with `slots` checkpoints and `leaf` steps that fit at once.
 Index next_checkpoint(Index steps, Index leaf, Index slots);
 
 }  // namespace magshell

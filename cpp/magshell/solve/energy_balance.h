@@ -1,12 +1,13 @@
-// Whether a step in which bodies touched has gained energy that nobody put in.
+// Detects whether a step with bodies in contact has gained energy that no force put in.
 //
-// Methods of higher order than implicit Euler gain some in an impact that their steps do not resolve: forces that have
-// long ceased, or only begin, act over most of the step. What is put in, by all that has no energy of its own, is what
-// the method itself lets it do,
+// Methods of higher order than implicit Euler can gain energy in an impact that the time step does not resolve, since contact forces
+// that have ended or only begun act over most of the step. The energy that forces without potential and supports put in is
+// evaluated with the quadrature of the method itself:
 //
-//   W = dt sum_j b_j v_j . (M w_j + dE/dx_j)  +  what changing controls do to the energy
+//   W = dt sum_j b_j v_j . (M w_j + dE/dx_j)  +  change of the energy with the load parameters
 //
-// which supports, friction, water and viscosity share. Loads that follow a body put in what cannot be told from a gain.
+// It comprises supports, friction, drag and viscosity. With follower loads the test does not apply: their work cannot be told from
+// a gain.
 #pragma once
 
 #include <span>
@@ -19,30 +20,31 @@ class EnergyBalance {
   public:
     EnergyBalance(Model& model, const Inertia& inertia) : model_(model), mass_(inertia.mass) {}
 
-    /// Whether there is anything to watch: bodies that touch, and no load without an energy.
-    bool watches() const { return model_.has_body_contact() && !model_.follows(); }
-    /// Of a step to `end`, with the controls at its beginning and at its stages. Leaves the model as evaluated elsewhere.
-    bool gains(const StepAlgebra& step, const SubstepRecord& record, const MotionState& end,
-               std::span<const Controls> controls);
+    /// Returns true if the test applies: there is contact between bodies, and no load without potential.
+    bool applies() const { return model_.has_body_contact() && !model_.has_follower_loads(); }
+    /// Returns true if a step to `end` gained energy; controls: load parameters at its beginning and at its stages. Leaves the model
+    /// evaluated at another state.
+    bool gains_energy(const StepAlgebra& step, const SubstepRecord& record, const MotionState& end,
+                      std::span<const Controls> controls);
 
   private:
     double kinetic(const MotionState& state) const { return 0.5 * state.v.dot(mass_.cwiseProduct(state.v)); }
-    double energy(const VectorXd& q, const Model::Turns& turns, const Controls& controls);
-    /// What there is at one end of a step, but its motion.
-    struct Standing {
+    double energy(const VectorXd& q, const Model::AngleBranches& angle_branches, const Controls& controls);
+    /// A state with its load parameters and its potential energies.
+    struct StateEnergy {
         VectorXd q;
-        Model::Turns turns;
+        Model::AngleBranches angle_branches;
         Controls controls;
-        double energy, of_contact;  // [J] of all terms, of bodies that touch
+        double energy, of_contact;  // [J] of all terms, and of the contact between bodies
     };
-    Standing standing(const MotionState& state, const Controls& controls);
-    bool touches(const StepAlgebra& step, const SubstepRecord& record) const;
-    /// What forces without an energy do over the step, and supports [J].
+    StateEnergy state_energy(const MotionState& state, const Controls& controls);
+    bool has_contact(const StepAlgebra& step, const SubstepRecord& record) const;
+    /// Returns the work of supports and of forces without potential over the step [J].
     double work(const StepAlgebra& step, const SubstepRecord& record, std::span<const Controls> controls);
 
     Model& model_;
     const VectorXd& mass_;
-    Standing end_;  // of the last step
+    StateEnergy end_;  // of the last step
 };
 
 }  // namespace magshell

@@ -9,8 +9,9 @@ namespace {
 
 using Eigen::MatrixXd;
 
-// A start that no symmetry of the sheet is likely to be orthogonal to, the same on every run.
+// Returns pseudo-random start vectors, the same in every run; no symmetry of a scene is likely to be orthogonal to them.
 MatrixXd generic_start(Index rows, int columns) {
+    constexpr double two_to_53 = 9007199254740992.0;  // the number of doubles in [0.5, 1); plain-words: ok
     MatrixXd start(rows, columns);
     std::uint64_t state = 88172645463325252ull;
     for (int c = 0; c < columns; ++c)
@@ -18,7 +19,7 @@ MatrixXd generic_start(Index rows, int columns) {
             state ^= state << 13;
             state ^= state >> 7;
             state ^= state << 17;
-            start(r, c) = static_cast<double>(state >> 11) / 9007199254740992.0 - 0.5;
+            start(r, c) = static_cast<double>(state >> 11) / two_to_53 - 0.5;
         }
     return start;
 }
@@ -27,30 +28,32 @@ MatrixXd generic_start(Index rows, int columns) {
 
 std::vector<Mode> modes_near_zero(Newton& newton, int count) {
     const Model& model = newton.model();
-    const Reduction& reduction = model.reduction();
-    const VectorXd metric = reduction.weights(model.metric());
-    // With carriers it is no diagonal.
+    const DofMap& dof_map = model.dof_map();
+    const VectorXd metric = dof_map.weights(model.metric());
+    // With reduced coordinates the metric is not diagonal.
     const auto weighed = [&](const MatrixXd& x) -> MatrixXd {
-        if (!reduction.carries()) return metric.asDiagonal() * x;
+        if (!dof_map.has_reduced_coordinates()) return metric.asDiagonal() * x;
         MatrixXd product(x.rows(), x.cols());
         for (Index c = 0; c < x.cols(); ++c)
-            product.col(c) = reduction.vector(model.metric().cwiseProduct(reduction.expand(x.col(c))));
+            product.col(c) = dof_map.vector(model.metric().cwiseProduct(dof_map.expand(x.col(c))));
         return product;
     };
     const Index massive = static_cast<Index>((metric.array() > 0.0).count());
     const int columns = std::min(count + 3, massive);
 
-    // With X = K^-1 M Y: X^T K X = X^T M Y, so K itself is not needed. X = Q R is made orthonormal in M
-    // first: next to a critical point all its columns are almost the same.
-    const VectorXd root = (reduction.carries() ? model.metric() : metric).cwiseSqrt();
+    // X = K^-1 M Y satisfies X^T K X = X^T M Y, so K itself is not needed. X = Q R is made orthonormal in M first, because near a
+    // critical point all of its columns are almost the same.
+    const VectorXd root = (dof_map.has_reduced_coordinates() ? model.metric() : metric).cwiseSqrt();
     const auto scaled = [&](const MatrixXd& x) -> MatrixXd {
-        if (!reduction.carries()) return root.asDiagonal() * x;
+        if (!dof_map.has_reduced_coordinates()) return root.asDiagonal() * x;
         MatrixXd product(root.size(), x.cols());
-        for (Index c = 0; c < x.cols(); ++c) product.col(c) = root.cwiseProduct(reduction.expand(x.col(c)));
+        for (Index c = 0; c < x.cols(); ++c) product.col(c) = root.cwiseProduct(dof_map.expand(x.col(c)));
         return product;
     };
-    MatrixXd y = generic_start(reduction.size(), columns);
+    MatrixXd y = generic_start(dof_map.size(), columns);
     VectorXd eigenvalues = VectorXd::Zero(columns);
+    // [-] Relative change of the eigenvalue nearest to zero at convergence; see test_the_modes_solve_the_problem.
+    constexpr double eigenvalue_change = 1e-7;
     for (int round = 0; round < 40; ++round) {
         MatrixXd my = weighed(y), x = my;
         newton.factor()->solve(x);
@@ -67,7 +70,8 @@ std::vector<Mode> modes_near_zero(Newton& newton, int count) {
         Index nearest, nearest_before;
         eigenvalues.cwiseAbs().minCoeff(&nearest);
         before.cwiseAbs().minCoeff(&nearest_before);
-        if (round > 2 && std::abs(eigenvalues[nearest] - before[nearest_before]) <= 1e-7 * scale) break;
+        if (round > 2 && std::abs(eigenvalues[nearest] - before[nearest_before]) <= eigenvalue_change * scale)
+            break;
     }
     std::vector<int> order(columns);
     for (int c = 0; c < columns; ++c) order[c] = c;
@@ -77,7 +81,7 @@ std::vector<Mode> modes_near_zero(Newton& newton, int count) {
     std::sort(order.begin(), order.end());  // Ritz values ascend
     std::vector<Mode> modes;
     for (const int c : order) {
-        VectorXd shape = reduction.expand(y.col(c));
+        VectorXd shape = dof_map.expand(y.col(c));
         Index largest;
         shape.head(model.n_coordinates()).cwiseAbs().maxCoeff(&largest);
         modes.push_back({eigenvalues[c], shape / shape[largest]});
@@ -86,12 +90,13 @@ std::vector<Mode> modes_near_zero(Newton& newton, int count) {
 }
 
 Mode most_unstable_mode(Newton& newton, const VectorXd& q, const Controls& controls, Index negative_pivots) {
+    // Modes computed at most, and beyond the number of negative pivots; see test_more_unstable_directions_than_modes_asked_for.
     constexpr Index most = 12, spare = 6;
     const int count = std::min(negative_pivots, most) + spare;
     std::vector<Mode> modes = modes_near_zero(newton, count);
     if (modes.front().eigenvalue < 0.0 || negative_pivots == 0) return modes.front();
 
-    // Many stable modes lie nearer to zero. Shift until all are stable; the most unstable one is then the nearest.
+    // Many stable modes have eigenvalues nearer to zero. A shift makes all of them positive; the most unstable mode is then the nearest.
     double shift = std::max(std::abs(modes.front().eigenvalue), std::abs(modes.back().eigenvalue));
     Eigen::MatrixXd no_moves(q.size(), 0);
     for (FactorReport factor; !factor.succeeded || factor.negative_pivots > 0;) {

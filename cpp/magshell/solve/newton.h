@@ -1,12 +1,13 @@
-// Newton's method at fixed controls, on the stationarity of the energy.
+// Newton's method for stationary points of the energy at fixed load parameters.
 //
-// Mixed (mixed integration points, Magisano, Leonetti, Garcea 2017): the element stresses are unknowns of
-// their own, condensed element by element. Only the geometric stiffness sees them,
+// Mixed iterations (mixed integration points [Magisano, Leonetti, Garcea 2017]) treat the element stresses as independent unknowns that are
+// condensed element by element. Only the geometric stiffness depends on them:
 //
 //   K = J^T C J + sum sigma_i d2d_i,   K p = - (J^T C d - f),   q += p,   sigma = C (d(q_old) + J p)
 //
-// and where plain Newton takes sigma = C d(q), a stress that the strains of a trial step have spoiled, the
-// linearized one keeps a thin shell's bending alive. Same matrix, same solution, many fewer iterations.
+// Standard Newton uses sigma = C d(q), which a trial step with large membrane strains spoils. The linearized stress does not
+// contain these strains, so a thin shell keeps its bending stiffness. The matrix pattern and the solution are the same, and many
+// fewer iterations are needed.
 #pragma once
 
 #include <functional>
@@ -22,130 +23,134 @@ namespace magshell {
 
 struct NewtonOptions {
     bool mixed = true;
-    double tolerance = 1e-10;  // of the residual, relative to the forces that cancel in it
+    double tolerance = 1e-10;  // [-] of the residual, relative to the forces that cancel in it
     int max_iterations = 20;
 };
 
-/// The last of the mixed steps to a state, by which its stresses are known where they have not come to rest.
-struct LastStep {
-    VectorXd from, step;  // empty: at rest, its strains tell them
+/// The last mixed iteration of an inexact load step, from which the next one extrapolates its stresses.
+struct StressPredictor {
+    VectorXd from, step;  // empty: the stresses follow from the strains of the state
 };
 
-/// How a load step begins, and where it may end.
+/// How a load step begins and when it may end.
 struct LoadStep {
-    bool roughly = false;                  // where what is left is little beside what the first step moved
-    const LastStep* last = nullptr;        // to where it begins
-    const FactorReport* factor = nullptr;  // of the last factorization, if that is of where it begins
-    std::function<VectorXd(const VectorXd&)> bend = {};  // what to add to its first step, or an empty vector
+    bool inexact = false;  // may end once the remaining displacement is small beside the first step
+    const StressPredictor* stress_predictor = nullptr;  // of the previous load step
+    const FactorReport* factor = nullptr;  // of the last factorization, if it was made where the step begins
+    std::function<VectorXd(const VectorXd&)> correction =
+        {};  // returns what to add to the first step, or an empty vector
 };
 
-/// What happened in one solve at fixed controls.
+/// The result of one solve at fixed load parameters.
 struct NewtonReport {
     bool converged = false;
     int iterations = 0;
     double residual = 0.0;
-    FactorReport factor;    // of the last matrix factorized
-    bool rough = false;     // whether it was ended where little was left
-    LastStep last;          // then
-    VectorXd tangent;       // the first step, before anything was added to it
-    bool in_place = false;  // whether that may stand for the solution's own, nothing having moved since
-    bool touched = false;   // whether bodies touched, or were in each other's way, at any of its iterations
-    std::string blocked;    // what was in the way of the last step of which little could be taken, in words
-    bool lost = false;      // far from any solution: a step half as long will hardly do
+    FactorReport factor;               // of the last matrix that was factorized
+    bool inexact = false;              // whether it ended before full convergence
+    StressPredictor stress_predictor;  // if it did
+    VectorXd tangent;                  // the first step, without the correction of the load step
+    bool factor_is_current = false;    // whether the last factorization may serve at the solution
+    bool had_contact = false;          // whether bodies were in contact, or limited a step, in any iteration
+    std::string blocked_by;     // the elements or faces that limited the last step to a small part, in words
+    bool diverged = false;      // far from any solution: half the load step will hardly converge
     double first_length = 0.0;  // [m] of the first step
-    std::string reason;         // why not converged
+    std::string reason;         // why it did not converge
 };
 
-/// A quadratic pull, 1/2 sum w_i (q_i - target_i)^2: the inertia of a time step, or one implicit Euler step
-/// of a gradient flow. Among all unknowns; weights are the same along the three axes of a node. Those of nodes that a
-/// carrier moves may be negative, as long as the sum over them is not.
-struct Anchor {
+/// The proximal (quadratic) term 1/2 sum w_i (q_i - target_i)^2 added to the energy: the inertia of a time stage, or of an implicit
+/// Euler step of a gradient flow. Of all dofs; the weights [N/m] are the same along the three axes of a node. Weights of nodes of rigid
+/// bodies may be negative as long as their sum over the body is positive.
+struct ProximalTerm {
     const VectorXd* weights = nullptr;
     const VectorXd* target = nullptr;
-    const StageMotion* motion = nullptr;  // of a time step: forces that no energy has act as well
+    const StageMotion* motion =
+        nullptr;  // kinematics of a time stage, in which forces without potential act as well
 };
 
-/// A model with its factorization, counting what it costs. Everything that solves goes through here.
+/// A model with its factorization, and counters of what solving has cost. All solvers use this class.
 class Newton {
   public:
-    /// Called once an iteration, and now and then while a pattern is analysed; throws to stop.
+    /// Called once per iteration and from time to time during the analysis of a pattern; throws to stop.
     using Watch = std::function<void(double residual)>;
 
     Newton(Model& model, const NewtonOptions& options, Watch watch = {});
     Newton(const Newton&) = delete;
     Newton& operator=(const Newton&) = delete;
-    ~Newton() { model_.keep_spare(std::move(factor_)); }
+    ~Newton() { model_.store_spare_factor(std::move(factor_)); }
 
-    /// From q to a stationary point at the controls, or to where it failed. Held nodes are moved to where the
-    /// controls want them, in the first iteration and with its linearization.
-    NewtonReport solve(VectorXd& q, const Controls& controls, const Anchor& anchor = {});
+    /// Solves from q for a stationary point at these load parameters; leaves q at the last state if it fails. Prescribed nodes are moved to
+    /// their target in the first iteration, with its linearization. If bodies come into contact and the iteration fails,
+    /// solve_with_line_search() follows.
+    NewtonReport solve(VectorXd& q, const Controls& controls, const ProximalTerm& proximal = {});
 
-    /// Whether a factorization before a step serves after it as well, for gradients too.
-    bool negligible(const VectorXd& step) const;
+    /// Returns true if a step is so short that a factorization made before it is valid after it, for gradients too.
+    bool is_negligible(const VectorXd& step) const;
 
-    /// As solve(), with another limit on iterations, or with plain steps whatever the options say.
-    NewtonReport solve(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations);
-    /// As solve(), and given up as soon as the matrix has unstable directions that it had not at the beginning and steps
-    /// do not get much shorter, or as steps get longer.
-    NewtonReport solve_wary(VectorXd& q, const Controls& controls, const LoadStep& load);
-    /// As solve(), beginning and ending as a load step.
+    /// Solves like the above, with another limit on the iterations.
+    NewtonReport solve(VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
+                       int max_iterations);
+    /// Solves a load step, and stops as soon as the matrix has negative pivots that it had not at the beginning while the steps
+    /// do not get much shorter, or if the second step grows too long (early termination on loss of stability; Crisfield 9.5).
+    NewtonReport solve_until_unstable(VectorXd& q, const Controls& controls, const LoadStep& load);
+    /// Solves a load step without stopping on loss of stability.
     NewtonReport solve_load(VectorXd& q, const Controls& controls, const LoadStep& load);
-    NewtonReport solve_plain(VectorXd& q, const Controls& controls, const Anchor& anchor = {});
-    /// With plain steps that are shortened until they contract (Deuflhard's natural monotonicity), in rounds
-    /// of held normal forces: slower, and sure of foot where contacts open and close, stick and slip.
-    NewtonReport solve_damped(VectorXd& q, const Controls& controls, const Anchor& anchor);
-    /// With plain steps that end where the energy along them has stopped falling fast, from matrices that are nowhere
-    /// negative where bodies touch: what bodies in contact need, far from the solution. solve() ends with it where it
-    /// fails.
-    NewtonReport solve_searching(VectorXd& q, const Controls& controls, const Anchor& anchor,
-                                 int max_iterations);
+    /// Solves by standard instead of mixed Newton steps.
+    NewtonReport solve_standard(VectorXd& q, const Controls& controls, const ProximalTerm& proximal = {});
+    /// Solves by standard Newton steps that are shortened until they contract (natural monotonicity test [Deuflhard]), in rounds
+    /// with fixed normal forces of friction. It is slower, and robust if contacts open and close, stick and slip.
+    NewtonReport solve_damped(VectorXd& q, const Controls& controls, const ProximalTerm& proximal);
+    /// Solves by standard Newton steps with a line search on the slope of the energy, with matrices projected to be
+    /// positive semidefinite where bodies are in contact. Contact between bodies requires it far from the solution.
+    NewtonReport solve_with_line_search(VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
+                                        int max_iterations);
 
-    /// The residual's parts at q, with the forces of a time step.
-    void evaluate(const VectorXd& q, const Controls& controls, const Anchor& anchor);
-    /// Evaluates, assembles with the state's own stresses and factorizes.
-    FactorReport factorize_at(const VectorXd& q, const Controls& controls, const Anchor& anchor = {});
-    /// That of the energy at the last evaluated state, with the pull of the anchor.
-    VectorXd gradient(const VectorXd& q, const Anchor& anchor) const;
-    /// Assembles at the last evaluated state and factorizes. Each column of `moves`, a motion of held nodes,
-    /// is replaced by the forces K moves that it causes.
+    /// Evaluates the residual at q, with the forces of a time stage.
+    void evaluate(const VectorXd& q, const Controls& controls, const ProximalTerm& proximal);
+    /// Evaluates, assembles with the stresses of the state itself, and factorizes.
+    FactorReport factorize_at(const VectorXd& q, const Controls& controls, const ProximalTerm& proximal = {});
+    /// Returns the gradient of the energy at the last evaluated state plus that of the proximal term [N].
+    VectorXd gradient(const VectorXd& q, const ProximalTerm& proximal) const;
+    /// Assembles at the last evaluated state and factorizes. Replaces each column of `moves`, a motion of prescribed nodes, by the
+    /// forces K moves that it causes. project_psd: makes the contribution of contact and low-rank terms positive semidefinite.
     FactorReport factorize(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
-                           const Anchor& anchor, Eigen::Ref<Eigen::MatrixXd> moves, bool cautious = false);
-    /// Replaces rhs by the solution of K^T p = rhs with the Hessian at q, the last evaluated state, by GMRES
-    /// with a factorization from nearby; both among all unknowns, zero where held. Once converged, the
-    /// residual is 1e-14 of rhs, each component over the root of its own stiffness.
-    GmresReport solve_nearby(const VectorXd& q, const Controls& controls, const Anchor& anchor,
-                             const Factor& nearby, VectorXd& rhs);
-    /// K p = rhs with the last factorization, rhs and p among all unknowns; zero where held. Only where
-    /// forces make K unsymmetric the tolerance counts: of the residual, over the norm of rhs.
+                           const ProximalTerm& proximal, Eigen::Ref<Eigen::MatrixXd> moves,
+                           bool project_psd = false);
+    /// Replaces rhs by the solution of K^T p = rhs with the Hessian at q, the last evaluated state, by GMRES with a factorization made
+    /// nearby. Both are of all dofs, zero where prescribed. The residual is below 1e-14 of rhs, each component
+    /// scaled by the root of its own stiffness.
+    GmresReport solve_gmres_adjoint(const VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
+                                    const Factor& nearby, VectorXd& rhs);
+    /// Returns p with K p = rhs by the last factorization; both are of all dofs, zero where prescribed. tolerance: residual over rhs,
+    /// used only if K is nonsymmetric and GMRES is needed.
     VectorXd solve_with_factor(const VectorXd& rhs, double tolerance = 1e-9) const;
-    /// K^T p = rhs likewise, to round-off. Throws InvalidInput where forces make K too unsymmetric for that.
+    /// Returns p with K^T p = rhs, to round-off. Throws InvalidInput if K is too nonsymmetric for that.
     VectorXd solve_transposed(const VectorXd& rhs) const;
 
-    /// As far along a step as there are states; the share of it, negative where that leads nowhere, and the report
-    /// says why.
-    double advance(VectorXd& q, VectorXd& step, double shortest, NewtonReport& report);
-    /// From the end of a step, last evaluated, back towards `from` where the energy has risen again there, which fell
-    /// at `slope` [J] at the beginning, to where it hardly changes, between too far and not far enough; the share of the
-    /// step that is left.
-    double search(VectorXd& q, const Controls& controls, const Anchor& anchor, const VectorXd& from,
-                  const VectorXd& step, double slope);
+    /// Applies as much of a step to q as leads to states with an energy. Returns the step length in [0, 1], or -1 with a reason
+    /// in the report if it is below `shortest`.
+    double apply_increment(VectorXd& q, VectorXd& step, double shortest, NewtonReport& report);
+    /// Line search along a step that was applied completely and evaluated last. slope: initial decrease of the energy along it [J].
+    /// Goes back towards `from` if the energy rises at the end, until its slope is less than half of the initial one.
+    /// Returns the step length that is left.
+    double line_search(VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
+                       const VectorXd& from, const VectorXd& step, double slope);
 
-    /// The residual at the last evaluated state, relative to the forces that cancel in it and to their
-    /// round-off, if that is to count.
-    double relative_residual(const VectorXd& q, const Anchor& anchor, bool with_floor = true) const;
-    /// Whether nothing is left to do at q, which was found at these controls before.
-    bool still_holds(const VectorXd& q, const Controls& controls);
+    /// Returns the residual at the last evaluated state, relative to the forces that cancel in it and, with_floor, to their round-off.
+    double relative_residual(const VectorXd& q, const ProximalTerm& proximal, bool with_floor = true) const;
+    /// Returns true if q, found at these load parameters before, is still an equilibrium.
+    bool is_equilibrium(const VectorXd& q, const Controls& controls);
 
     Model& model() { return model_; }
-    /// Null until something has been factorized.
+    /// The last factorization; null before the first.
     const std::shared_ptr<Factor>& factor() const { return factor_; }
     const NewtonOptions& options() const { return options_; }
     int factorizations() const { return factorizations_; }
     int failed_factorizations() const { return failed_factorizations_; }
     int iterations() const { return iterations_; }
-    /// The factorization, for somebody to keep; the next one goes elsewhere.
+    /// Returns the last factorization and gives it up; the next one is made in new memory.
     std::shared_ptr<Factor> release_factor();
-    double linear_time() const { return linear_time_; }  // [s] in factorizations and solves
+    double linear_time() const { return linear_time_; }  // [s] spent in factorizations and solves
     void count_iteration() { ++iterations_; }
     void count_factorizations(int more) { factorizations_ += more; }
     void watch(double residual) const {
@@ -154,36 +159,38 @@ class Newton {
     }
 
   private:
-    NewtonReport iterate(VectorXd& q, const Controls& controls, const Anchor& anchor, int max_iterations,
-                         bool mixed, const LoadStep& load, bool wary = false);
-    /// What is left of a motion that supports and motors prescribe after a share of it.
-    VectorXd left_of(const VectorXd& move, double share, const VectorXd& q, const Controls& controls) const;
-    /// Of a step, which is a share of a whole one, the part up to which bodies that touch do not push back by more than it
-    /// expects, more than 1 where they go on pushing as before. It has the energy fall at `slope` [J] at its beginning, the
-    /// last evaluated state.
-    double part_into_contact(const VectorXd& q, const VectorXd& step, double share, double slope) const;
-    /// The reason of a report, and what touched.
-    void tell_contact(NewtonReport& report) const;
-    /// Shortened steps with held normal forces, from the last evaluated state until the residual is small
-    /// enough or so many are done; false where none can be taken, and the report says why.
-    bool descend(VectorXd& q, const Controls& controls, const Anchor& anchor, double enough, int most_steps,
-                 NewtonReport& report);
-    void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress, const Anchor& anchor,
-                  bool cautious = false);
-    /// Whether steps with the last factorization will do, which are as good as free.
-    bool factor_serves(double contraction, double residual, double last_step) const;
-    /// The norm of the forces [N] by which a step from the last evaluated state differs, for the normal forces of obstacles,
-    /// from what the last factorization has of them.
-    double obstacles_change(const VectorXd& step) const;
-    FactorReport factorize_assembled(const VectorXd& q, const Anchor& anchor);
+    NewtonReport iterate(VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
+                         int max_iterations, bool mixed, const LoadStep& load,
+                         bool stop_on_instability = false);
+    /// Returns the rest of a prescribed motion of supports and motors after a step of this length.
+    VectorXd remaining_motion(const VectorXd& move, double share, const VectorXd& q,
+                              const Controls& controls) const;
+    /// Returns the length, in units of `step`, at which bodies in contact do not push back by more than the step predicts; more than 1 if the
+    /// predicted force is not reached. alpha: length of `step` over the full Newton step. slope: initial decrease of the energy along
+    /// it [J], at q, the last evaluated state.
+    double contact_step_length(const VectorXd& q, const VectorXd& step, double share, double slope) const;
+    /// Appends the blocking faces, or those with the largest contact force, to the reason of a report.
+    void describe_contact(NewtonReport& report) const;
+    /// Takes damped steps with fixed normal forces of friction from the last evaluated state, until the residual is below `enough` or
+    /// most_steps are done. Returns false, with a reason in the report, if no step can be taken.
+    bool damped_iterations(VectorXd& q, const Controls& controls, const ProximalTerm& proximal, double enough,
+                           int most_steps, NewtonReport& report);
+    void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
+                  const ProximalTerm& proximal, bool project_psd = false);
+    /// Returns true if the expected iterations with the last factorization are cheaper than a new one.
+    bool can_reuse_factor(double contraction, double residual, double last_step) const;
+    /// Returns the norm of the change of obstacle contact forces [N] along a step, between the contacts now and those of the last
+    /// factorization.
+    double contact_matrix_change(const VectorXd& step) const;
+    FactorReport factorize_assembled(const VectorXd& q, const ProximalTerm& proximal);
 
     Model& model_;
     NewtonOptions options_;
     Watch watch_;
-    mutable double watched_ = 1.0;  // the residual that the watch was told last
+    mutable double watched_ = 1.0;  // the residual last reported to the watch
     std::shared_ptr<Factor> factor_;
-    std::vector<ContactTerm::ActiveContact> touched_;  // what touched obstacles where that was factorized
-    bool unsymmetric_ = false;                         // whether what was assembled last is
+    std::vector<ContactTerm::ActiveContact> touched_;  // contacts with obstacles at the last factorization
+    bool unsymmetric_ = false;                 // whether the matrix assembled last is
     int factorizations_ = 0, failed_factorizations_ = 0, iterations_ = 0;
     mutable double linear_time_ = 0.0;
 };

@@ -5,23 +5,21 @@
 #include <utility>
 
 #include "magshell/solve/anderson.h"
-#include "magshell/solve/secants.h"
+#include "magshell/solve/lbfgs_history.h"
 
 namespace magshell {
 namespace {
 
-// A shorter share of a step than that leads nowhere.
-constexpr double shortest_move = 1e-9;
-// How far a node may be from where Coulomb's law has it, of the extent of the scene.
+// [-] Shortest admissible step length; see test_rounds_without_a_tolerance_do_not_run_away.
+constexpr double min_projective_step = 1e-9;
+// [-] Largest violation of Coulomb's law at convergence, over the extent; see test_it_sticks_below_the_angle_of_friction.
 constexpr double law_tolerance = 1e-10;
+// Iterations between two checks whether contacts have opened or closed, which changes the matrix; see test_free_bodies_and_obstacles_by_penalty.
+constexpr int iterations_between_checks = 5;
+// [-] Change of a diagonal entry, over its size, that is left to L-BFGS; see test_free_bodies_and_obstacles_by_penalty.
+constexpr double max_diagonal_change = 0.5;
 
-// Points that begin or cease to touch make another matrix, which is looked for now and then.
-constexpr int rounds_between_looks = 5;
-
-// What changes the diagonal of the matrix by less, of what it is, secants learn.
-constexpr double much = 0.5;
-
-// What pairs add to the diagonal, by node.
+// Returns what contact pairs add to the diagonal, by node [N/m].
 VectorXd diagonal_of(const std::vector<PairStiffness>& pairs, Index nodes) {
     VectorXd of_nodes = VectorXd::Zero(nodes);
     for (const PairStiffness& pair : pairs)
@@ -41,69 +39,72 @@ ProjectiveSolver::ProjectiveSolver(Newton& newton, const ProjectiveOptions& opti
     if (options.coulomb) aside_.emplace(model_);
 }
 
-VectorXd ProjectiveSolver::reduced_gradient(const VectorXd& q, const Anchor& anchor) const {
-    return model_.reduction().vector(newton_.gradient(q, anchor));
+VectorXd ProjectiveSolver::reduced_gradient(const VectorXd& q, const ProximalTerm& proximal) const {
+    return model_.dof_map().vector(newton_.gradient(q, proximal));
 }
 
-bool ProjectiveSolver::touches_otherwise(const Anchor& anchor, VectorXd& before) const {
+bool ProjectiveSolver::contact_stiffness_changed(const ProximalTerm& proximal, VectorXd& before) const {
     if (!model_.has_contact()) return false;
-    VectorXd now = model_.touching_stiffness();
+    VectorXd now = model_.contact_stiffness_diagonal();
     bool changed = false;
     for (Index node = 0; node < now.size() && !changed; ++node)
-        changed = std::abs(now[node] - before[node]) >
-                  much * ((*anchor.weights)[3 * node] + matrix_.stiffness(node) + before[node]);
+        changed =
+            std::abs(now[node] - before[node]) >
+            max_diagonal_change * ((*proximal.weights)[3 * node] + matrix_.stiffness(node) + before[node]);
     if (changed) before = std::move(now);
     return changed;
 }
 
-void ProjectiveSolver::prepare(const VectorXd& q, const Anchor& anchor, double scale) {
+void ProjectiveSolver::prepare(const VectorXd& q, const ProximalTerm& proximal, double scale) {
     const int factorized = matrix_.factorizations();
-    matrix_.set(scale, *anchor.weights, model_.touching_stiffness());
+    matrix_.set(scale, *proximal.weights, model_.contact_stiffness_diagonal());
     newton_.count_factorizations(matrix_.factorizations() - factorized);
     matrix_.linearize(q);
 }
 
-NewtonReport ProjectiveSolver::solve(VectorXd& q, const Controls& controls, const Anchor& anchor,
+NewtonReport ProjectiveSolver::solve(VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
                                      double scale) {
     const bool touches = options_.coulomb && (model_.has_contact() || model_.has_body_contact());
-    return touches ? solve_touching(q, controls, anchor, scale) : solve_rounds(q, controls, anchor, scale);
+    return touches ? solve_with_coulomb(q, controls, proximal, scale)
+                   : solve_smooth(q, controls, proximal, scale);
 }
 
-NewtonReport ProjectiveSolver::solve_rounds(VectorXd& q, const Controls& controls, const Anchor& anchor,
-                                            double scale) {
+NewtonReport ProjectiveSolver::solve_smooth(VectorXd& q, const Controls& controls,
+                                            const ProximalTerm& proximal, double scale) {
     NewtonReport report;
     const auto fail = [&](std::string reason) {
         report.reason = std::move(reason);
         return report;
     };
-    if (std::string reason = model_.refusal(q); !reason.empty()) return fail(std::move(reason));
-    const Reduction& reduction = model_.reduction();
-    VectorXd move = reduction.prescribed_increment(q, controls);
-    newton_.evaluate(q, controls, anchor);
-    prepare(q, anchor, scale);
-    Secants secants(options_.history);
-    VectorXd touched = model_.touching_stiffness(), between;
-    // A small matrix of many pairs costs more than a round.
+    if (std::string reason = model_.invalid_state_reason(q); !reason.empty()) return fail(std::move(reason));
+    const DofMap& dof_map = model_.dof_map();
+    VectorXd move = dof_map.prescribed_increment(q, controls);
+    newton_.evaluate(q, controls, proximal);
+    prepare(q, proximal, scale);
+    LbfgsHistory lbfgs(options_.history);
+    VectorXd touched = model_.contact_stiffness_diagonal(), between;
+    // Updates the contact pairs in the matrix if they have changed by much: a dense matrix of many pairs costs more than an iteration.
     const auto take_pairs = [&] {
         if (!model_.has_body_contact()) return;
-        const std::vector<PairStiffness> pairs = model_.touching_pairs();
+        const std::vector<PairStiffness> pairs = model_.contact_pair_stiffness();
         VectorXd now = diagonal_of(pairs, model_.nodes().n_nodes());
         bool changed = between.size() == 0;
         for (Index node = 0; node < now.size() && !changed; ++node)
-            changed = std::abs(now[node] - between[node]) > much * (matrix_.diagonal(node) + between[node]);
+            changed = std::abs(now[node] - between[node]) >
+                      max_diagonal_change * (matrix_.diagonal(node) + between[node]);
         if (!changed) return;
         touching_.set(pairs);
         between = std::move(now);
     };
-    VectorXd gradient = reduced_gradient(q, anchor);
+    VectorXd gradient = reduced_gradient(q, proximal);
     for (;; ++report.iterations, newton_.count_iteration()) {
         const bool last = report.iterations == options_.iterations;
         const bool in_place = move.isZero(0.0);
-        report.residual = newton_.relative_residual(q, anchor);
+        report.residual = newton_.relative_residual(q, proximal);
         newton_.watch(report.residual);
         if (!std::isfinite(report.residual)) return fail("the iteration diverged");
         if (in_place && options_.tolerance > 0.0 && report.residual <= options_.tolerance &&
-            (report.iterations > 0 || newton_.relative_residual(q, anchor, false) <= options_.tolerance))
+            (report.iterations > 0 || newton_.relative_residual(q, proximal, false) <= options_.tolerance))
             report.converged = true;
         if (last && in_place && options_.tolerance == 0.0) report.converged = true;
         if (report.converged) return report;
@@ -111,54 +112,55 @@ NewtonReport ProjectiveSolver::solve_rounds(VectorXd& q, const Controls& control
             return fail("no convergence in " + std::to_string(report.iterations) +
                         " iterations of Projective Dynamics: the residual is " +
                         std::to_string(report.residual));
-        if (report.iterations % rounds_between_looks == rounds_between_looks - 1 &&
-            touches_otherwise(anchor, touched)) {
-            prepare(q, anchor, scale);
-            secants.clear();
+        if (report.iterations % iterations_between_checks == iterations_between_checks - 1 &&
+            contact_stiffness_changed(proximal, touched)) {
+            prepare(q, proximal, scale);
+            lbfgs.clear();
             between.resize(0);
         }
         take_pairs();
         VectorXd direction = -gradient;
-        if (!in_place) direction -= reduction.vector(matrix_.times(move));
-        secants.solve(direction, [&](VectorXd& rhs) { touching_.solve(rhs); });
+        if (!in_place) direction -= dof_map.vector(matrix_.times(move));
+        lbfgs.solve(direction, [&](VectorXd& rhs) { touching_.solve(rhs); });
         double slope = -gradient.dot(direction);
-        if (in_place && !(slope > 0.0) && !secants.empty()) {
-            secants.clear();
+        if (in_place && !(slope > 0.0) && !lbfgs.empty()) {
+            lbfgs.clear();
             direction = -gradient;
             touching_.solve(direction);
             slope = -gradient.dot(direction);
         }
         const VectorXd from = q;
-        VectorXd step = move + reduction.expand(direction);
-        double share = newton_.advance(q, step, shortest_move, report);
-        if (share < 0.0) return report;
-        move *= 1.0 - share;
-        newton_.evaluate(q, controls, anchor);
-        if (in_place) share *= newton_.search(q, controls, anchor, from, step, share * slope);
-        VectorXd now = reduced_gradient(q, anchor);
-        if (in_place) secants.add(share * direction, now - gradient);
+        VectorXd step = move + dof_map.expand(direction);
+        double alpha = newton_.apply_increment(q, step, min_projective_step, report);
+        if (alpha < 0.0) return report;
+        move *= 1.0 - alpha;
+        newton_.evaluate(q, controls, proximal);
+        if (in_place) alpha *= newton_.line_search(q, controls, proximal, from, step, alpha * slope);
+        VectorXd now = reduced_gradient(q, proximal);
+        if (in_place) lbfgs.add(alpha * direction, now - gradient);
         gradient = std::move(now);
     }
 }
 
-// The forces of contact shift the anchor's target, so that what is left over is a residual as any other.
-NewtonReport ProjectiveSolver::solve_touching(VectorXd& q, const Controls& controls, const Anchor& anchor,
-                                              double scale) {
+// The contact forces are put into the target of the proximal term, so that the residual contains them.
+NewtonReport ProjectiveSolver::solve_with_coulomb(VectorXd& q, const Controls& controls,
+                                                  const ProximalTerm& proximal, double scale) {
     NewtonReport report;
     const auto fail = [&](std::string reason) {
         report.reason = std::move(reason);
         return report;
     };
-    const Reduction& reduction = model_.reduction();
-    VectorXd first_move = reduction.prescribed_increment(q, controls);
-    if (const double share = newton_.advance(q, first_move, shortest_move, report); share < 1.0)
-        return fail(share < 0.0 ? report.reason : "what supports move is in the way of another body");
-    if (std::string reason = model_.refusal(q); !reason.empty()) return fail(std::move(reason));
-    newton_.evaluate(q, controls, anchor);
-    prepare(q, anchor, scale);
-    CoulombContact contact(model_, matrix_, controls, *anchor.motion->x_hat, anchor.motion->time);
-    VectorXd target = *anchor.target;
-    const Anchor pushed{anchor.weights, &target, anchor.motion};
+    const DofMap& dof_map = model_.dof_map();
+    VectorXd first_move = dof_map.prescribed_increment(q, controls);
+    if (const double alpha = newton_.apply_increment(q, first_move, min_projective_step, report); alpha < 1.0)
+        return fail(alpha < 0.0 ? report.reason
+                                : "a prescribed support motion pushes two bodies into each other");
+    if (std::string reason = model_.invalid_state_reason(q); !reason.empty()) return fail(std::move(reason));
+    newton_.evaluate(q, controls, proximal);
+    prepare(q, proximal, scale);
+    CoulombContact contact(model_, matrix_, controls, *proximal.motion->x_hat, proximal.motion->time);
+    VectorXd target = *proximal.target;
+    const ProximalTerm pushed{proximal.weights, &target, proximal.motion};
     Anderson anderson(options_.history);
     const auto last_round = [&](const NewtonReport& now) {
         return now.iterations + 1 == options_.iterations;
@@ -168,7 +170,7 @@ NewtonReport ProjectiveSolver::solve_touching(VectorXd& q, const Controls& contr
         newton_.watch(report.residual);
         if (!std::isfinite(report.residual)) return fail("the iteration diverged");
         const bool last = report.iterations == options_.iterations;
-        const double off = contact.look(q);
+        const double off = contact.assess(q);
         report.converged = options_.tolerance > 0.0 ? report.residual <= options_.tolerance &&
                                                           off <= law_tolerance * model_.extent()
                                                     : last;
@@ -179,18 +181,18 @@ NewtonReport ProjectiveSolver::solve_touching(VectorXd& q, const Controls& contr
                         std::to_string(report.residual));
         VectorXd direction = -reduced_gradient(q, pushed);
         matrix_.solve(direction);
-        VectorXd move = reduction.expand(direction);
-        contact.settle(q, move);
+        VectorXd move = dof_map.expand(direction);
+        contact.solve_forces(q, move);
         VectorXd end = q;
-        const double share = newton_.advance(end, move, shortest_move, report);
-        if (share < 0.0) return report;
+        const double alpha = newton_.apply_increment(end, move, min_projective_step, report);
+        if (alpha < 0.0) return report;
         VectorXd ahead =
-            share < 1.0 || last_round(report) ? VectorXd(end - q) : VectorXd(anderson.next(end, move) - q);
-        if (newton_.advance(q, ahead, shortest_move, report) < 0.0) return report;
-        target = *anchor.target;
+            alpha < 1.0 || last_round(report) ? VectorXd(end - q) : VectorXd(anderson.next(end, move) - q);
+        if (newton_.apply_increment(q, ahead, min_projective_step, report) < 0.0) return report;
+        target = *proximal.target;
         for (Index k = 0; k < model_.n_coordinates(); ++k)
-            if (contact.forces()[k] != 0.0) target[k] += contact.forces()[k] / (*anchor.weights)[k];
-        newton_.evaluate(q, controls, anchor);
+            if (contact.forces()[k] != 0.0) target[k] += contact.forces()[k] / (*proximal.weights)[k];
+        newton_.evaluate(q, controls, proximal);
     }
 }
 

@@ -1,57 +1,62 @@
-// Projective Dynamics: the stages of implicit Euler with a matrix that stays factorized.
+// Projective Dynamics: stages of implicit Euler whose matrix stays factorized.
 //
-// Of energies sum_i w_i/2 |G_i q - p_i(q)|^2, p_i the projection of G_i q, a local step finds all p_i and a global one solves
-// (M/dt^2 + L) q = M/dt^2 s + J p, L = sum w_i G_i^T G_i.                          [Qiao21] (3)-(5), Algorithm 1
-// As p_i is the nearest point, dE/dq = sum w_i G_i^T (G_i q - p_i), and the round is
+// For energies sum_i w_i/2 |G_i q - p_i(q)|^2, with p_i the projection of G_i q onto a constraint set, the local step computes all p_i,
+// and the global step solves                                                      [Qiao21] (3)-(5), Algorithm 1
+//
+//   (M/dt^2 + L) q = M/dt^2 s + J p,    L = sum_i w_i G_i^T G_i
+//
+// Since p_i is the nearest point, dE/dq = sum_i w_i G_i^T (G_i q - p_i), and both steps together are the quasi-Newton step
 //
 //   q <- q - (M/dt^2 + L)^-1 r(q)                                           [Liu, Bouaziz, Kavan 2017]
 //
-// with the residual r of implicit Euler that Newton has too: a quasi-Newton step. So terms evaluate their forces, which is
-// the local step, and any energy will do for which a constant L is stiff enough. The last few steps correct the matrix
-// (solve/secants.h), and a step ends where the energy has begun to rise along it. Bodies that touch each other are stiff,
-// and nothing of them is constant: they add to the matrix in every round (solve/touching_matrix.h).
+// with the residual r of implicit Euler. Evaluating the forces of the terms is therefore the local step, and any energy can be used
+// for which a constant matrix L is stiff enough. L-BFGS corrects the matrix by the last few steps (solve/lbfgs_history.h),
+// and a line search ends a step where the energy begins to rise. Contact between bodies is stiff and changes, so it is added to the
+// matrix in every iteration by a low-rank update (solve/contact_woodbury.h).
 #pragma once
 
 #include <memory>
 #include <optional>
 
+#include "magshell/solve/contact_woodbury.h"
 #include "magshell/solve/coulomb_contact.h"
 #include "magshell/solve/newton.h"
-#include "magshell/solve/touching_matrix.h"
 
 namespace magshell {
 
 struct ProjectiveOptions {
     bool on = false;
-    int iterations = 0;      // at most; without a tolerance just so many
-    double tolerance = 0.0;  // of the residual, as Newton's; 0: none
-    int history = 0;         // pairs of secants; 0: the rounds as they are
-    bool coulomb = false;    // contact is hard, with Coulomb's law: solve/coulomb_contact.h
+    int iterations = 0;      // most iterations; without a tolerance exactly this number
+    double tolerance = 0.0;  // [-] of the residual, as in NewtonOptions; 0: none
+    int history = 0;         // pairs of the L-BFGS history; 0: no correction of the matrix
+    bool coulomb = false;    // hard contact with Coulomb friction, solve/coulomb_contact.h
 };
 
 class ProjectiveSolver {
   public:
     ProjectiveSolver(Newton& newton, const ProjectiveOptions& options);
 
-    /// From q to a stationary point at the controls, or to where it failed, as Newton::solve. `scale`: of the elastic
-    /// stiffness, see Model::set_history.
-    NewtonReport solve(VectorXd& q, const Controls& controls, const Anchor& anchor, double scale);
+    /// Solves from q for a stationary point at these load parameters, or leaves q where it failed, as Newton::solve does. scale:
+    /// factor of the elastic stiffness, see ViscousTerms::set_history.
+    NewtonReport solve(VectorXd& q, const Controls& controls, const ProximalTerm& proximal, double scale);
 
   private:
-    NewtonReport solve_rounds(VectorXd& q, const Controls& controls, const Anchor& anchor, double scale);
-    /// Rounds with Coulomb's law in each.
-    NewtonReport solve_touching(VectorXd& q, const Controls& controls, const Anchor& anchor, double scale);
-    /// Whether what obstacles add has changed by much since it was `before`, which then is what it is now.
-    bool touches_otherwise(const Anchor& anchor, VectorXd& before) const;
-    void prepare(const VectorXd& q, const Anchor& anchor, double scale);
-    VectorXd reduced_gradient(const VectorXd& q, const Anchor& anchor) const;
+    NewtonReport solve_smooth(VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
+                              double scale);
+    /// Solves with Coulomb contact in each iteration.
+    NewtonReport solve_with_coulomb(VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
+                                    double scale);
+    /// Returns true if the contact stiffness of obstacles has changed by much since it was `before`, and then updates `before`.
+    bool contact_stiffness_changed(const ProximalTerm& proximal, VectorXd& before) const;
+    void prepare(const VectorXd& q, const ProximalTerm& proximal, double scale);
+    VectorXd reduced_gradient(const VectorXd& q, const ProximalTerm& proximal) const;
 
     Newton& newton_;
     Model& model_;
     ProjectiveOptions options_;
     ConstantMatrix matrix_;
-    TouchingMatrix touching_;
-    std::optional<StandingAside> aside_;  // with Coulomb's law
+    ContactWoodbury touching_;
+    std::optional<ScopedContactOff> aside_;  // engaged with Coulomb friction
 };
 
 }  // namespace magshell

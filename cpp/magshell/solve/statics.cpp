@@ -2,19 +2,29 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "magshell/core/errors.h"
 #include "magshell/solve/deflation.h"
-#include "magshell/solve/load_predictor.h"
-#include "magshell/solve/load_steps.h"
-#include "magshell/solve/put_in_joints.h"
-#include "magshell/solve/relaxation.h"
+#include "magshell/solve/load_control.h"
+#include "magshell/solve/pseudo_transient.h"
 
 namespace magshell {
 namespace {
 
-constexpr double longest_turn =
-    0.5;  // [rad] of a support in one load step: full circles must be gone through
+// [rad] Largest rotation of a support in one load step, since rotations are known up to full turns; see test_an_end_turned_by_180_degrees_twists_the_strip.
+constexpr double max_support_rotation = 0.5;
+
+// Moves links to where their joints lead them, for example after the origin of a motor has changed. No force would do that, since
+// motors hold in any position.
+void project_onto_joints(const Model& model, VectorXd& q) {
+    // [-] over the extent; see test_a_start_goes_along_with_the_place_of_a_motor
+    constexpr double round_off = 1e-13;
+    VectorXd projected = q;
+    model.dof_map().project_state(projected, nullptr);
+    const double off = (projected - q).head(model.n_coordinates()).lpNorm<Eigen::Infinity>();
+    if (off > round_off * model.extent()) q = std::move(projected);
+}
 
 class Statics {
   public:
@@ -25,7 +35,7 @@ class Statics {
           to_(to),
           options_(options),
           result_(result),
-          wary_(goes_warily()),
+          stop_on_instability_(can_stop_on_instability()),
           predictor_(newton.model().n_coordinates()) {}
 
     bool run() {
@@ -34,160 +44,169 @@ class Statics {
         return found;
     }
 
-    /// Where the way ends early, what was reached roughly is made exact.
+    /// Makes an inexact state exact if the load path ends early.
     void finish() {
-        if (!rough_) return;
+        if (!inexact_) return;
         VectorXd trial = result_.state;
-        newton_.model().set_turns(result_.turns);
+        newton_.model().set_angle_branches(result_.angle_branches);
         const NewtonReport report = newton_.solve(trial, controls_at(result_.progress));
-        rough_ = false;
-        if (!report.converged) return newton_.model().set_turns(result_.turns);
+        inexact_ = false;
+        if (!report.converged) return newton_.model().set_angle_branches(result_.angle_branches);
         result_.state = trial;
-        result_.turns = newton_.model().turns();
+        result_.angle_branches = newton_.model().angle_branches();
         result_.residual = report.residual;
     }
 
   private:
     bool search() {
         controls_at(0.0);
-        put_in_joints(newton_.model(), result_.state);
-        result_.reason = newton_.model().refusal(result_.state);
-        if (!result_.reason.empty() || !(options_.away_from.empty() ? load() : go_elsewhere())) return false;
-        return result_.stable || !options_.require_stable || descend(1.0);
+        project_onto_joints(newton_.model(), result_.state);
+        result_.reason = newton_.model().invalid_state_reason(result_.state);
+        if (!result_.reason.empty() || !(options_.away_from.empty() ? load() : find_other_equilibrium()))
+            return false;
+        return result_.stable || !options_.require_stable || relax_to_stable(1.0);
     }
 
-    // Supports must be gone along with, through saddles too; solids have unstable directions on the way to stable states.
-    bool goes_warily() const {
+    // Returns true if load steps may stop on instability. Not with moving supports, which pass through saddles, nor with solids, whose
+    // iterations have negative pivots on the way to stable states.
+    bool can_stop_on_instability() const {
         const Model& model = newton_.model();
         return options_.start_at_rest && options_.require_stable && !model.has_body_contact() &&
-               !model.follows() && model.bodies().solids().empty() &&
-               model.reduction().prescribed_increment(result_.state, to_).isZero(0.0);
+               !model.has_follower_loads() && model.bodies().solids().empty() &&
+               model.dof_map().prescribed_increment(result_.state, to_).isZero(0.0);
     }
 
-    // On the way, with what varies in place.
+    // Returns the load parameters at a fraction of the load path, and applies the values that vary to the model.
     Controls controls_at(double progress) {
         Controls there = interpolate(from_, to_, progress);
-        newton_.model().take(there);
+        newton_.model().set_time_varying(there);
         return there;
     }
 
     bool load() {
-        if (options_.start_at_rest && from_ == to_ && newton_.still_holds(result_.state, to_))
+        if (options_.start_at_rest && from_ == to_ && newton_.is_equilibrium(result_.state, to_))
             accept(result_.state, to_, 1.0, newton_.relative_residual(result_.state, {}));
-        const Reduction& reduction = newton_.model().reduction();
-        const double turn =
-            std::abs(reduction.progress(to_) - reduction.progress(from_)) * reduction.largest_turn();
-        const double longest_step = turn > longest_turn ? longest_turn / turn : 1.0;
-        LoadSteps steps(options_.first_step, longest_step, options_.smallest_step, newton_.model().extent(),
-                        wary_);
-        FactorReport factor;  // at the last load step
+        const DofMap& dof_map = newton_.model().dof_map();
+        const double turn = std::abs(dof_map.support_factor(to_) - dof_map.support_factor(from_)) *
+                            dof_map.largest_rotation();
+        const double longest_step = turn > max_support_rotation ? max_support_rotation / turn : 1.0;
+        LoadStepController steps(options_.first_step, longest_step, options_.smallest_step,
+                                 newton_.model().extent(), stop_on_instability_);
+        FactorReport factor;  // at the end of the last load step
         while (result_.progress < 1.0) {
-            const double left = 1.0 - result_.progress, step = steps.next(left);
+            const double left = 1.0 - result_.progress, step = steps.propose(left);
             const double target = step < left ? result_.progress + step : 1.0;
             const Controls controls = controls_at(target);
             VectorXd trial = result_.state;
-            NewtonReport report = step_to(trial, controls, target - result_.progress, target < 1.0);
-            if (report.converged && strays(report, step)) {
+            NewtonReport report = solve_load_step(trial, controls, target - result_.progress, target < 1.0);
+            if (report.converged && jumped_branch(report, step)) {
                 report.converged = false;
-                report.reason = "a step ended on another branch, which is not stable";
+                report.reason = "a load step converged to another branch, which is unstable";
             }
             if (report.converged) {
                 was_stable_ = report.factor.negative_pivots == 0;
-                predictor_.went(result_.state, report.tangent, target - result_.progress);
+                predictor_.record(result_.state, report.tangent, target - result_.progress);
                 accept(trial, controls, target, report.residual);
-                rough_ = report.rough;
-                last_ = std::move(report.last);
-                factor = report.in_place ? report.factor : FactorReport();
-                steps.succeeded(step, report);
+                inexact_ = report.inexact;
+                last_ = std::move(report.stress_predictor);
+                factor = report.factor_is_current ? report.factor : FactorReport();
+                steps.accept(step, report);
                 continue;
             }
-            newton_.model().set_turns(result_.turns);
+            newton_.model().set_angle_branches(result_.angle_branches);
             result_.reason = report.reason;
             result_.failed.shortest_step = std::min(result_.failed.shortest_step, step);
-            if (steps.failed(step, report) && options_.start_at_rest) continue;
-            // What a support turns must be gone through; everything else may be relaxed at its end at once.
+            if (steps.reject(step, report) && options_.start_at_rest) continue;
+            // Rotations of supports must be followed in steps; other loads may be relaxed at their final values at once.
             factor = {};
             const double end = longest_step < 1.0 ? std::min(1.0, result_.progress + longest_step) : 1.0;
-            if ((wary_ || !plain_steps(end)) && !descend(end)) {
-                if (wary_ && steps.insist()) continue;
+            if ((stop_on_instability_ || !try_standard_newton(end)) && !relax_to_stable(end)) {
+                if (stop_on_instability_ && steps.retry_once()) continue;
                 return false;
             }
-            rough_ = false;
+            inexact_ = false;
             last_ = {};
-            predictor_.forget();
-            steps.again_with(longest_step);
+            predictor_.reset();
+            steps.reset_to(longest_step);
         }
         return factor.succeeded ? judge(factor) : check_stability();
     }
 
-    // States on the way need not be exact.
-    NewtonReport step_to(VectorXd& q, const Controls& controls, double step, bool on_the_way) {
-        if (!goes_roughly()) return newton_.solve(q, controls);
-        LoadStep load{on_the_way, keeps_stresses() ? &last_ : nullptr};
-        if (!wary_) return newton_.solve_load(q, controls, load);
-        load.bend = [&](const VectorXd& tangent) { return predictor_.bend(result_.state, tangent, step); };
-        return newton_.solve_wary(q, controls, load);
+    // Solves one load step; intermediate states need not be exact.
+    NewtonReport solve_load_step(VectorXd& q, const Controls& controls, double step, bool on_the_way) {
+        if (!allows_inexact_steps()) return newton_.solve(q, controls);
+        LoadStep load{on_the_way, predicts_stresses() ? &last_ : nullptr};
+        if (!stop_on_instability_) return newton_.solve_load(q, controls, load);
+        load.correction = [&](const VectorXd& tangent) {
+            return predictor_.correction(result_.state, tangent, step);
+        };
+        return newton_.solve_until_unstable(q, controls, load);
     }
 
-    bool goes_roughly() const { return options_.start_at_rest && !newton_.model().has_body_contact(); }
+    bool allows_inexact_steps() const {
+        return options_.start_at_rest && !newton_.model().has_body_contact();
+    }
 
-    // A liquid begins with the pressure of a volume that it is not to have, and a solid with stretched elements.
-    bool keeps_stresses() const {
+    // Returns true if the stresses of the last step may be extrapolated. Not with liquids, whose pressure belongs to another volume at
+    // first, nor with solids, whose elements are stretched at first.
+    bool predicts_stresses() const {
         const Model& model = newton_.model();
         return model.bodies().solids().empty() && model.low_rank().empty();
     }
 
-    bool go_elsewhere() {
-        constexpr int times_longer = 3;  // than Newton's way to an equilibrium that is near
+    bool find_other_equilibrium() {
+        // of the usual limit of iterations; see test_its_saddles_if_asked_for
+        constexpr int iteration_factor = 3;
         controls_at(1.0);
         VectorXd trial = result_.state;
         const NewtonReport report =
             solve_away_from(newton_, trial, to_, {options_.away_from, options_.away_length},
-                            times_longer * newton_.options().max_iterations);
+                            iteration_factor * newton_.options().max_iterations);
         result_.reason = report.reason;
         if (!report.converged) return false;
         accept(trial, to_, 1.0, report.residual);
         return check_stability();
     }
 
-    // Whether a step from a stable state went far and ended on an unstable branch, that a shorter one may not meet.
-    bool strays(const NewtonReport& report, double step) const {
-        constexpr double long_step = 0.125;
-        constexpr int quick_iterations = 8;
+    // Returns true if a long step from a stable state converged to an unstable branch, which a shorter step may avoid.
+    bool jumped_branch(const NewtonReport& report, double step) const {
+        constexpr double long_step =
+            0.125;  // [-] of the load path; see test_a_semi_cylinder_pulled_and_pushed
+        constexpr int quick_iterations = 8;  // see test_a_semi_cylinder_pulled_and_pushed
         return options_.start_at_rest && options_.require_stable && was_stable_ && step > long_step &&
                report.iterations > quick_iterations && report.factor.negative_pivots > 0;
     }
 
-    // A sheet bent far already may be too much for the mixed steps, and not for plain ones.
-    bool plain_steps(double target) {
+    // Tries standard Newton steps, which may converge for a strongly bent shell if mixed ones do not.
+    bool try_standard_newton(double target) {
         if (!newton_.options().mixed) return false;
         VectorXd trial = result_.state;
         const Controls controls = controls_at(target);
-        const NewtonReport report = newton_.solve_plain(trial, controls);
+        const NewtonReport report = newton_.solve_standard(trial, controls);
         if (report.converged)
             accept(trial, controls, target, report.residual);
         else
-            newton_.model().set_turns(result_.turns);
+            newton_.model().set_angle_branches(result_.angle_branches);
         return report.converged;
     }
 
     void accept(const VectorXd& state, const Controls& controls, double progress, double residual) {
         result_.state = state;
-        result_.turns = newton_.model().turns();
+        result_.angle_branches = newton_.model().angle_branches();
         result_.controls = controls;
         result_.progress = progress;
         result_.residual = residual;
-        tell_roundoff();
+        update_at_roundoff();
         ++result_.load_steps;
     }
 
-    // Of the result's state, where the model was evaluated last.
-    void tell_roundoff() {
+    // Updates at_roundoff for the state of the result, at which the model was evaluated last.
+    void update_at_roundoff() {
         result_.at_roundoff = result_.progress == 1.0 && newton_.relative_residual(result_.state, {}, false) >
                                                              newton_.options().tolerance;
     }
 
-    // The factorization at the solution itself, with its own stresses, decides.
+    // Decides about stability by the factorization at the solution, with its own stresses.
     bool check_stability() { return judge(newton_.factorize_at(result_.state, result_.controls)); }
 
     bool judge(const FactorReport& factor) {
@@ -197,83 +216,86 @@ class Statics {
         return factor.succeeded;
     }
 
-    // Relaxes at the controls of `target`. Newton, which finishes a relaxation, may still have been drawn to
-    // a saddle: then once more from there.
-    bool descend(double target) {
-        constexpr int attempts = 5;
+    // Relaxes at a load fraction. The Newton iteration that finishes a relaxation may still converge to a saddle; the
+    // relaxation is then repeated from there.
+    bool relax_to_stable(double target) {
+        constexpr int attempts = 5;  // see test_a_compressed_strip_leaves_the_saddle
         for (int k = 0; k < attempts; ++k) {
             VectorXd trial = result_.state;
             const Controls controls = controls_at(target);
             const RelaxationReport report =
                 relax(newton_, trial, controls, options_.max_relaxation_steps, options_.start_at_rest);
             result_.relaxation_steps += report.steps;
-            result_.saddles_left += report.saddles_left;
+            result_.saddles_escaped += report.saddles_escaped;
             if (!report.converged) {
-                newton_.model().set_turns(result_.turns);
+                newton_.model().set_angle_branches(result_.angle_branches);
                 result_.reason = report.reason;
                 result_.failed.state = std::move(trial);
                 result_.failed.controls = controls;
-                result_.failed.last_move = report.last_move;
-                result_.failed.falling = report.falling;
+                result_.failed.last_displacement = report.last_displacement;
+                result_.failed.descent_direction = report.descent_direction;
                 return false;
             }
             accept(trial, controls, target, report.residual);
             if (!check_stability()) return false;
-            if (result_.stable) polish();
+            if (result_.stable) refine_solution();
             if (result_.stable) return true;
             if (result_.unstable_directions == 0) {
-                result_.reason = "the equilibrium is neutral: its Hessian is singular";
+                result_.reason =
+                    "the equilibrium is neither stable nor unstable: its stiffness matrix is singular";
                 return false;
             }
         }
-        result_.reason = "every equilibrium that was found is a saddle";
+        result_.reason =
+            "all " + std::to_string(attempts) + " equilibria that the relaxation found are saddle points";
         return false;
     }
 
-    // One more step, which the factorization that told stability makes cheap, where it brings forces closer to balance.
-    void polish() {
+    // Takes one more step with the factorization at hand, if that reduces the residual.
+    void refine_solution() {
         if (newton_.model().has_body_contact()) return;
         const double before = newton_.relative_residual(result_.state, {}, false);
         const VectorXd p = newton_.solve_with_factor(-newton_.gradient(result_.state, {}));
         VectorXd trial = result_.state;
-        newton_.model().reduction().advance(trial, p);
+        newton_.model().dof_map().retract(trial, p);
         newton_.evaluate(trial, result_.controls, {});
         const double after = newton_.relative_residual(trial, {}, false);
-        // Under the floor rounding decides which residual is smaller: of so short a step the matrix knows more.
-        constexpr double rounding = 1e-9;  // of the extent
+        // Below the floor, round-off decides which residual is smaller; for a step this short the matrix is more reliable.
+        constexpr double rounding = 1e-9;  // [-] over the extent; see test_fine_roof_takes_small_steps
         const bool tiny = p.head(newton_.model().n_coordinates()).lpNorm<Eigen::Infinity>() <=
                           rounding * newton_.model().extent();
         if (!(after < before) &&
             !(tiny && newton_.relative_residual(trial, {}) <= newton_.options().tolerance))
             return;
         result_.state = trial;
-        result_.turns = newton_.model().turns();
+        result_.angle_branches = newton_.model().angle_branches();
         result_.residual = std::min(result_.residual, after);
-        tell_roundoff();
-        if (!newton_.negligible(p)) check_stability();
+        update_at_roundoff();
+        if (!newton_.is_negligible(p)) check_stability();
     }
 
     Newton& newton_;
     const Controls from_, to_;
     const StaticsOptions& options_;
     StaticsResult& result_;
-    const bool wary_;         // load steps are given up at once where they leave the stable states
-    bool was_stable_ = true;  // where the last load step ended
-    bool rough_ = false;      // whether it ended before it was exact
-    LastStep last_;           // of that
+    const bool stop_on_instability_;  // load steps end at once when they leave the stable states
+    bool was_stable_ = true;          // at the end of the last load step
+    bool inexact_ = false;            // whether the last load step ended before full convergence
+    StressPredictor last_;            // of the last load step, if it was inexact
     LoadPredictor predictor_;
 };
 
 }  // namespace
 
-StaticsResult find_equilibrium(Model& model, const VectorXd& start, const Model::Turns& turns,
-                               const Controls& from, const Controls& to, const StaticsOptions& options,
-                               const StaticsWatch& watch, const Varying& varying) {
-    const WhileVarying while_varying(model, varying);
-    model.set_turns(turns);
+StaticsResult find_equilibrium(Model& model, const VectorXd& start,
+                               const Model::AngleBranches& angle_branches, const Controls& from,
+                               const Controls& to, const StaticsOptions& options, const StaticsWatch& watch,
+                               const TimeVaryingParameters& varying) {
+    const ScopedTimeVarying while_varying(model, varying);
+    model.set_angle_branches(angle_branches);
     StaticsResult result;
     result.state = start;
-    result.turns = turns;
+    result.angle_branches = angle_branches;
     result.controls = from;
     Newton newton(model, options.newton, [&](double residual) {
         if (watch) watch(result.progress, residual);
@@ -282,7 +304,7 @@ StaticsResult find_equilibrium(Model& model, const VectorXd& start, const Model:
         Statics statics(newton, from, to, options, result);
         result.outcome = statics.run() ? Outcome::converged : Outcome::failed;
     } catch (const Interrupted&) {
-        model.set_turns(result.turns);
+        model.set_angle_branches(result.angle_branches);
         result.outcome = Outcome::interrupted;
         result.reason = "interrupted";
     }

@@ -8,16 +8,16 @@ namespace magshell {
 
 GmresReport solve_unsymmetric(const Model& model, const Factor& factor, bool transposed,
                               const GmresOptions& options, VectorXd& reduced) {
-    const Reduction& reduction = model.reduction();
-    // What is preconditioned comes back from the symmetric part as it went in, to round-off of the factorization: only
-    // where that counts the product is made.
-    constexpr double coarse = 1e-10;
+    const DofMap& dof_map = model.dof_map();
+    // Multiplying a preconditioned vector by the symmetric part returns it up to the round-off of the factorization. The product is
+    // therefore computed only for tight tolerances. [-] See test_methods_of_second_order_stick.
+    constexpr double coarse = 1e-10;  // [-] see test_methods_of_second_order_stick
     const bool known = options.tolerance > coarse;
     VectorXd before;
     const auto assembled = [&](const VectorXd& x) {
         VectorXd rest = VectorXd::Zero(model.size());
-        model.remainder().add_product(reduction.expand(x), transposed, rest);
-        return VectorXd((known ? before : factor.image(x)) + reduction.vector(rest));
+        model.nonsymmetric_tangent().add_product(dof_map.expand(x), transposed, rest);
+        return VectorXd((known ? before : factor.image(x)) + dof_map.vector(rest));
     };
     const auto precondition = [&](VectorXd& x) {
         if (known) before = x;
@@ -33,8 +33,9 @@ void solve_at_equilibrium(const Model& model, const Factor& factor, bool transpo
     }
     const GmresReport report = solve_unsymmetric(model, factor, transposed, to_round_off, reduced);
     if (!report.converged)
-        throw InvalidInput("a linear solve with a pressure that has no potential stopped at a residual of " +
-                           std::to_string(report.residual));
+        throw InvalidInput(
+            "a linear solve with a pressure without potential did not converge: its relative residual is " +
+            std::to_string(report.residual));
 }
 
 }  // namespace magshell

@@ -1,5 +1,4 @@
-// Solves with a Hessian that is a symmetric matrix, which is factorized, and a remainder: by GMRES, preconditioned with the
-// factorization.
+// Solves with a nonsymmetric Hessian: GMRES, preconditioned with the factorization of its symmetric part.
 #pragma once
 
 #include "magshell/linalg/factor.h"
@@ -8,15 +7,15 @@
 
 namespace magshell {
 
-/// Of solves for gradients, to round-off.
+/// Tolerance and iterations of solves for gradients. [-] Fixed by round-off; see test_gradient_in_flesh_over_200_steps.
 constexpr GmresOptions to_round_off{1e-13, 300};
 
-/// Replaces a vector of the free unknowns by K^-1 or K^-T of it; the remainder is the model's, as assembled last.
+/// Replaces a vector of the free dofs by K^-1 or K^-T of it, with the nonsymmetric tangent that the model assembled last.
 GmresReport solve_unsymmetric(const Model& model, const Factor& factor, bool transposed,
                               const GmresOptions& options, VectorXd& reduced);
 
-/// The same to round-off, at an equilibrium whose factorization was kept and whose Hessian was assembled last; one that is
-/// symmetric takes no iteration. Throws InvalidInput where it does not converge.
+/// Does the same to round-off, at an equilibrium whose factorization was stored and whose Hessian was assembled last; a symmetric
+/// Hessian takes no iteration. Throws InvalidInput if GMRES does not converge.
 void solve_at_equilibrium(const Model& model, const Factor& factor, bool transposed, VectorXd& reduced);
 
 }  // namespace magshell

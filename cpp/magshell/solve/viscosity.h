@@ -1,13 +1,12 @@
-// Linear viscoelasticity of the sheet's strains d, integrated by the stages of a step.
+// Linear viscoelasticity of the strains d of a shell or solid, integrated by the stages of a step:
 //
 //   sigma = C (d + beta d' + g (d - e)),   e' = (d - e)/tau
 //
-// beta [s]: stiffness-proportional damping (Kelvin-Voigt); for small motions the matrix beta K. g and tau
-// [s]: the modulus of a Maxwell branch beside the elastic one, and its relaxation time. With T = a dt and r = T/tau,
+// beta [s]: stiffness-proportional damping (Kelvin-Voigt), for small motions the matrix beta K. g [-] and tau [s]: modulus of a
+// Maxwell branch relative to the elastic one, and its relaxation time. With T = a dt, r = T/tau, and ^ for the start of a stage,
 //
 //   d'_i = (d_i - d^_i)/T,   e_i = (e^_i + r d_i)/(1 + r),
-//   sigma_i = C (scale d_i - shift_i),  scale = 1 + beta/T + g/(1 + r),  shift_i = beta/T d^_i + g/(1 + r)
-//   e^_i
+//   sigma_i = C (scale d_i - shift_i),  scale = 1 + beta/T + g/(1 + r),  shift_i = beta/T d^_i + g/(1 + r) e^_i
 #pragma once
 
 #include "magshell/scene/model.h"
@@ -16,8 +15,8 @@ namespace magshell {
 
 struct Viscosity {
     double stiffness_damping = 0.0;                    // beta [s]
-    double maxwell_modulus = 0.0, maxwell_time = 1.0;  // g, over the elastic one; tau [s]
-    double elastic = 1.0;                              // 0: there is no stress at rest
+    double maxwell_modulus = 0.0, maxwell_time = 1.0;  // g [-], tau [s]
+    double elastic = 1.0;                              // factor of the elastic stress; 0: none
 
     bool any() const { return stiffness_damping != 0.0 || maxwell(); }
     bool maxwell() const { return maxwell_modulus != 0.0; }
@@ -28,15 +27,15 @@ struct Viscosity {
     }
 };
 
-/// Dampers in joints: their strains have no other stress.
+/// The law of joint dampers, which have a viscous stress only.
 inline constexpr Viscosity damper_law{1.0, 0.0, 1.0, 0.0};
 
-/// How fast strains change in a stage, and those of the Maxwell branch.
+/// Rates of the strains and of the Maxwell strains at a stage.
 struct StrainRates {
     StrainSet d, e;
 };
 
-/// How fast things change in a stage: positions, velocities, strains, and what dampers in joints feel.
+/// Rates at a stage: of positions, velocities, elastic strains, and strains of joint dampers.
 struct StageRates {
     VectorXd v, w;
     StrainRates elastic, joints;
@@ -44,26 +43,26 @@ struct StageRates {
     bool empty() const { return v.size() == 0; }
 };
 
-/// The strains of one stage: what it starts from, and what comes out.
+/// The strains of one stage: at its start (d_hat, e_hat), the history of the stress (shift), and at its solution (d, e).
 struct ViscousStage {
     StrainSet d_hat, e_hat, shift;
     StrainSet d, e;
 
     ViscousStage() = default;
-    /// From the strains at the beginning of the step and all rates until then, those of one kind.
+    /// Computes the start of a stage from the strains at the beginning of the step and all rates of one kind before it.
     using Kind = StrainRates StageRates::*;
     ViscousStage(const Viscosity& law, double stage_time, double dt, const double* a,
                  const std::vector<StageRates>& rates, Kind kind, const StrainSet& d_begin,
                  const StrainSet& e_begin);
-    /// Once the stage is solved: the rates of its strains too.
+    /// Computes the strains and their rates once the stage is solved.
     void finish(const Viscosity& law, double stage_time, StrainSet strains, StrainRates& rates);
 };
 
-/// Elastic again when it goes.
-class ElasticAfterwards {
+/// RAII guard that makes terms elastic again, without a strain history, at the end of its scope.
+class ScopedStrainHistory {
   public:
-    explicit ElasticAfterwards(Model& model) : model_(model) {}
-    ~ElasticAfterwards() {
+    explicit ScopedStrainHistory(Model& model) : model_(model) {}
+    ~ScopedStrainHistory() {
         model_.elastic().set_history(1.0, nullptr);
         model_.dampers().set_history(1.0, nullptr);
     }

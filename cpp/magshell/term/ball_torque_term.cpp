@@ -48,12 +48,12 @@ void BallTorqueTerm::evaluate(const double* q, const Controls&, Residual& out) {
     }
 }
 
-void BallTorqueTerm::add_nonsymmetric_tangent(const double*, const Controls&, Remainder& out) const {
+void BallTorqueTerm::add_nonsymmetric_tangent(const double*, const Controls&, NonsymmetricTangent& out) const {
     for (const Side& side : sides_)
         for (int i = 0; i < 4; ++i)
             for (int j = 0; j <= i; ++j)
-                out.add(Remainder::Skew{{side.corners[i], side.corners[j]},
-                                        ((i == j ? 0.75 : -0.25) * -side.moment).eval()});
+                out.add(NonsymmetricTangent::SkewBlock{{side.corners[i], side.corners[j]},
+                                                       ((i == j ? 0.75 : -0.25) * -side.moment).eval()});
 }
 
 void BallTorqueTerm::vjp(const double* q, const Controls&, const double* lambda, Gradient& out) {

@@ -29,7 +29,7 @@ class BallTorqueTerm final : public Term {
     bool depends_on_loads() const override { return false; }
     double energy(const double*, const Controls&) const override { return 0.0; }
     void evaluate(const double* q, const Controls& controls, Residual& out) override;
-    void add_nonsymmetric_tangent(const double* q, const Controls& controls, Remainder& out) const override;
+    void add_nonsymmetric_tangent(const double* q, const Controls& controls, NonsymmetricTangent& out) const override;
     void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
     std::size_t bytes() const override { return sides_.capacity() * sizeof(Side); }
 

@@ -17,10 +17,10 @@ void BendingSixTerm::count_rotations_from_rest(bool from_rest) {
 
 void BendingSixTerm::prepare_assembly(const double* q, const Controls&) {
     if (!from_rest_) return;
-    side_rotations_.resize(sheet_.folds.size());
+    side_rotations_.resize(sheet_.dihedrals.size());
     chunks_.each([&](const Chunk& chunk) {
-        for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width) {
-            const Index last = std::min(first + Pack::width, chunk.last_fold);
+        for (Index first = chunk.first_dihedral; first < chunk.last_dihedral; first += Pack::width) {
+            const Index last = std::min(first + Pack::width, chunk.last_dihedral);
             for (int g = 0; g < 2; ++g) {
                 const std::array<DihedralAngleSix::Side, 2> sides = dihedrals_at(first, last, g, q).sides();
                 for (int lane = 0; lane < last - first; ++lane)
@@ -36,8 +36,8 @@ void BendingSixTerm::prepare_assembly(const double* q, const Controls&) {
 /// rotations.
 template <class Visit>
 void BendingSixTerm::each_half_rotation(const Visit& visit) const {
-    for (std::size_t h = 0; h < sheet_.folds.size(); ++h) {
-        const FoldSixStencil& fold = sheet_.folds[h];
+    for (std::size_t h = 0; h < sheet_.dihedrals.size(); ++h) {
+        const DihedralSixStencil& fold = sheet_.dihedrals[h];
         if (!fold.right_is_face) continue;
         const FaceSideSix& left = sheet_.sides[fold.left.face][fold.left.corner];
         for (int g = 0; g < 2; ++g)
@@ -77,15 +77,15 @@ void BendingSixTerm::assemble_from_rest(Index pack, const double* q, SystemMatri
         for (int i = 0; i < 3; ++i) {
             const FaceSideSix& side = sheet_.sides[loop_.element(pack, lane)][i];
             sign[i].set(lane, side.sign);
-            if (side.fold < 0) continue;
-            const bool is_held = !sheet_.folds[side.fold].right_is_face;
+            if (side.dihedral < 0) continue;
+            const bool is_held = !sheet_.dihedrals[side.dihedral].right_is_face;
             any_held[i] |= is_held;
             const SideNodes& at = side.on_left ? left_side : right_side;
             const std::array<int, 6> own = face_order(i);
             for (int g = 0; g < 2; ++g) {
                 const int point = side.point(g);
-                const std::array<double, 27>& by_node = dihedrals_[side.fold][point].gradient;
-                const SideRotation& turn = side_rotations_[side.fold][point][side.on_left ? 0 : 1];
+                const std::array<double, 27>& by_node = dihedrals_[side.dihedral][point].gradient;
+                const SideRotation& turn = side_rotations_[side.dihedral][point][side.on_left ? 0 : 1];
                 const auto part = [&](int a) -> Vec3 {
                     if (is_held) return Vec3(by_node.data() + 3 * a);
                     return DihedralAngleSix::side_weight(point, index_on_side(a), turn.foot) * turn.along;
@@ -128,8 +128,8 @@ void BendingSixTerm::add_held(Index pack, const Pack3 (&held)[3][2], const Pack 
         const Index f = loop_.element(pack, lane);
         const std::array<Index, 15>& nodes = sheet_.stencils[f].nodes;
         const auto is_held = [&](int i) {
-            const Index fold = sheet_.sides[f][i].fold;
-            return fold >= 0 && !sheet_.folds[fold].right_is_face;
+            const Index fold = sheet_.sides[f][i].dihedral;
+            return fold >= 0 && !sheet_.dihedrals[fold].right_is_face;
         };
         const auto add = [&](int row, int column, const Pack33& block) {
             const SystemMatrix::Slot slot = face_slots_[f].nodes[lower_index(row - 1, column)];

@@ -14,7 +14,7 @@ Vec3 normal_of(const std::array<Vec3, 6>& x) {
 
 }  // namespace
 
-BendingSixTerm::BendingSixTerm(const SixNodeSheet& sheet, Index body, const ChunkLoop& chunks,
+BendingSixTerm::BendingSixTerm(const SixNodeShell& sheet, Index body, const ChunkLoop& chunks,
                                const Nodes& nodes, const GrowthForm& growth, const SystemMatrix& matrix,
                                Registry& registry)
     : StrainScaffold(sheet.n_faces()),
@@ -30,7 +30,7 @@ BendingSixTerm::BendingSixTerm(const SixNodeSheet& sheet, Index body, const Chun
       elements_(loop_.packs()),
       rest_measures_(loop_.packs()),
       stiffness_(loop_.packs()),
-      dihedrals_(sheet.folds.size()) {
+      dihedrals_(sheet.dihedrals.size()) {
     for (Index pack = 0; pack < loop_.packs(); ++pack) {
         Pack3 x[6];
         for (int lane = 0; lane < Pack::width; ++lane) {
@@ -45,7 +45,7 @@ BendingSixTerm::BendingSixTerm(const SixNodeSheet& sheet, Index body, const Chun
     if (growth_.any())
         for (Index f = 0; f < sheet.n_faces(); ++f)
             rest_inside_.push_back(lane_of<9>(rest_measures_[f / Pack::width].data(), f % Pack::width));
-    for (const SixNodeSheet::Stencil& s : sheet.stencils) {
+    for (const SixNodeShell::Stencil& s : sheet.stencils) {
         FaceSlots& slots = face_slots_.emplace_back();
         slots.nodes = pair_slots<15>(matrix, s.nodes);
         for (int a = 0; a < 6; ++a) {
@@ -58,7 +58,7 @@ BendingSixTerm::BendingSixTerm(const SixNodeSheet& sheet, Index body, const Chun
                     r < 0 || s.rotations[b] < 0 ? -1 : matrix.rotations_slot(r, s.rotations[b]);
         }
     }
-    for (const FoldSixStencil& fold : sheet.folds) {
+    for (const DihedralSixStencil& fold : sheet.dihedrals) {
         PairSlots<9>& slots = dihedral_slots_.emplace_back(pair_slots<9>(matrix, fold.nodes));
         for (int a = 6; a < 9; ++a)  // the two half-planes do not meet in d2theta
             for (int b = 3; b < 6; ++b) slots[lower_index(a - 1, b)] = -1;
@@ -69,7 +69,7 @@ DihedralAngleSix BendingSixTerm::dihedrals_at(Index first, Index last, int point
     Pack3 x[9] = {};
     Pack right_is_face(0.0);
     for (int lane = 0; lane < Pack::width; ++lane) {
-        const FoldSixStencil& fold = sheet_.folds[std::min(first + lane, last - 1)];
+        const DihedralSixStencil& fold = sheet_.dihedrals[std::min(first + lane, last - 1)];
         for (int a = 0; a < 9; ++a)
             if (fold.nodes[a] >= 0) set_lane(x[a], lane, q + 3 * fold.nodes[a]);
         right_is_face.set(lane, fold.right_is_face ? 1.0 : 0.0);
@@ -78,14 +78,14 @@ DihedralAngleSix BendingSixTerm::dihedrals_at(Index first, Index last, int point
 }
 
 double BendingSixTerm::angle_change(Index fold, int point, double angle) const {
-    return std::remainder(angle - sheet_.folds[fold].rest_angle[point], 2.0 * std::numbers::pi);
+    return std::remainder(angle - sheet_.dihedrals[fold].rest_angle[point], 2.0 * std::numbers::pi);
 }
 
 void BendingSixTerm::store_dihedrals(const double* q) {
     state_.assign(q, q + 3 * nodes_.n_nodes());
     chunks_.each([&](const Chunk& chunk) {
-        for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width) {
-            const Index last = std::min(first + Pack::width, chunk.last_fold);
+        for (Index first = chunk.first_dihedral; first < chunk.last_dihedral; first += Pack::width) {
+            const Index last = std::min(first + Pack::width, chunk.last_dihedral);
             for (int g = 0; g < 2; ++g) {
                 const DihedralAngleSix fold = dihedrals_at(first, last, g, q);
                 const Pack angle = fold.angle();
@@ -107,11 +107,11 @@ void BendingSixTerm::store_dihedrals(const double* q) {
 
 void BendingSixTerm::store_rates(const double* p) {
     chunks_.each([&](const Chunk& chunk) {
-        for (Index h = chunk.first_fold; h < chunk.last_fold; ++h)
+        for (Index h = chunk.first_dihedral; h < chunk.last_dihedral; ++h)
             for (DihedralState& state : dihedrals_[h]) {
                 state.rate = 0.0;
                 for (int a = 0; a < 9; ++a) {
-                    const Index node = sheet_.folds[h].nodes[a];
+                    const Index node = sheet_.dihedrals[h].nodes[a];
                     if (node < 0) continue;
                     for (int c = 0; c < 3; ++c) state.rate += state.gradient[3 * a + c] * p[3 * node + c];
                 }
@@ -128,7 +128,7 @@ void BendingSixTerm::measure(Index pack, const double* q, const Turn& turn, Pack
         for (int i = 0; i < 3; ++i) {
             const FaceSideSix& side = sheet_.sides[loop_.element(pack, lane)][i];
             for (int g = 0; g < 2; ++g) {
-                double delta = side.fold < 0 ? 0.0 : side.weight * turn(side.fold, side.point(g));
+                double delta = side.dihedral < 0 ? 0.0 : side.weight * turn(side.dihedral, side.point(g));
                 if (side.rotation[g] >= 0) delta += side.sign * rotation[side.rotation[g]];
                 d[3 * i + g].set(lane, d[3 * i + g][lane] + delta);
             }
@@ -160,8 +160,8 @@ void BendingSixTerm::rate(Index pack, const double* p, Pack d[9]) const {
 std::vector<std::array<double, 2>> BendingSixTerm::angle_changes_at(const double* q) const {
     std::vector<std::array<double, 2>> changes(dihedrals_.size());
     chunks_.each([&](const Chunk& chunk) {
-        for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width) {
-            const Index last = std::min(first + Pack::width, chunk.last_fold);
+        for (Index first = chunk.first_dihedral; first < chunk.last_dihedral; first += Pack::width) {
+            const Index last = std::min(first + Pack::width, chunk.last_dihedral);
             for (int g = 0; g < 2; ++g) {
                 const Pack angle = dihedrals_at(first, last, g, q).angle();
                 for (Index h = first; h < last; ++h) changes[h][g] = angle_change(h, g, angle[h - first]);
@@ -205,7 +205,7 @@ void BendingSixTerm::evaluate(const double* q, const Controls&, Residual& out) {
 }
 
 /// Returns dE/dtheta at a point of a dihedral stencil: the sum of the stresses whose strains depend on theta.
-double BendingSixTerm::moment(const FoldSixStencil& fold, int point, const Strains& stress) const {
+double BendingSixTerm::moment(const DihedralSixStencil& fold, int point, const Strains& stress) const {
     double sum = 0.0;
     if (fold.left.face >= 0) sum += stress.number(fold.left.face, 3 * fold.left.corner + point);
     if (fold.right.face >= 0) sum += stress.number(fold.right.face, 3 * fold.right.corner + 1 - point);
@@ -224,11 +224,11 @@ void BendingSixTerm::add_forces(const Strains& stresses, Residual& out) {
     // Faces that share a rotation share an edge and hence a node, so chunks of one colour do not share
     // rotations either.
     chunks_.scatter([&](const Chunk& chunk) {
-        for (Index h = chunk.first_fold; h < chunk.last_fold; ++h)
+        for (Index h = chunk.first_dihedral; h < chunk.last_dihedral; ++h)
             for (int g = 0; g < 2; ++g) {
-                const double m = moment(sheet_.folds[h], g, stresses);
+                const double m = moment(sheet_.dihedrals[h], g, stresses);
                 for (int a = 0; a < 9; ++a) {
-                    const Index node = sheet_.folds[h].nodes[a];
+                    const Index node = sheet_.dihedrals[h].nodes[a];
                     if (node < 0) continue;
                     for (int c = 0; c < 3; ++c)
                         out.add(3 * node + c, m * dihedrals_[h][g].gradient[3 * a + c]);
@@ -252,8 +252,8 @@ void BendingSixTerm::assemble(const Chunk& chunk, const double* q, const Control
         return;
     }
     ElementLoop<6>::over_packs(chunk, [&](Index pack) { assemble_faces(pack, q, stress, out); });
-    for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width)
-        assemble_dihedrals(first, std::min(first + Pack::width, chunk.last_fold), q, stress, out);
+    for (Index first = chunk.first_dihedral; first < chunk.last_dihedral; first += Pack::width)
+        assemble_dihedrals(first, std::min(first + Pack::width, chunk.last_dihedral), q, stress, out);
 }
 
 void BendingSixTerm::assemble_faces(Index pack, const double* q, const Strains& stress,
@@ -271,11 +271,11 @@ void BendingSixTerm::assemble_faces(Index pack, const double* q, const Strains& 
         for (int i = 0; i < 3; ++i) {
             const FaceSideSix& side = sheet_.sides[loop_.element(pack, lane)][i];
             sign[i].set(lane, side.sign);
-            if (side.fold < 0) continue;
+            if (side.dihedral < 0) continue;
             const SideNodes& at = side.on_left ? left_side : right_side;
             const std::array<int, 6> own = face_order(i);
             for (int g = 0; g < 2; ++g) {
-                const std::array<double, 27>& by_node = dihedrals_[side.fold][side.point(g)].gradient;
+                const std::array<double, 27>& by_node = dihedrals_[side.dihedral][side.point(g)].gradient;
                 const auto part = [&](int a) -> Vec3 { return side.weight * Vec3(by_node.data() + 3 * a); };
                 for (int k = 0; k < 6; ++k) {
                     Pack3& row = rows.at[3 * i + g][own[k]];
@@ -319,7 +319,7 @@ void BendingSixTerm::assemble_faces(Index pack, const double* q, const Strains& 
         }
     for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
         const Index f = loop_.element(pack, lane);
-        const SixNodeSheet::Stencil& stencil = sheet_.stencils[f];
+        const SixNodeShell::Stencil& stencil = sheet_.stencils[f];
         const FaceSlots& slots = face_slots_[f];
         scatter_blocks<15>(out, stencil.nodes, slots.nodes, h, lane);
         for (int a = 0; a < 6; ++a) {
@@ -350,11 +350,11 @@ void BendingSixTerm::assemble_dihedrals(Index first, Index last, const double* q
     for (int g = 0; g < 2; ++g) {
         Pack moments(0.0);
         for (Index fold = first; fold < last; ++fold)
-            moments.set(fold - first, moment(sheet_.folds[fold], g, stress));
+            moments.set(fold - first, moment(sheet_.dihedrals[fold], g, stress));
         dihedrals_at(first, last, g, q).add_curvature(moments, h);
     }
     for (Index fold = first; fold < last; ++fold)
-        scatter_blocks<9>(out, sheet_.folds[fold].nodes, dihedral_slots_[fold], h, fold - first);
+        scatter_blocks<9>(out, sheet_.dihedrals[fold].nodes, dihedral_slots_[fold], h, fold - first);
 }
 
 // Bounds round-off as BendingTerm does: an angle is exact to one unit of round-off, or to that of the positions
@@ -398,8 +398,8 @@ Vec9 BendingSixTerm::rest_angles(Index face) const {
     Vec9 angles = Vec9::Zero();
     for (int i = 0; i < 3; ++i) {
         const FaceSideSix& side = sheet_.sides[face][i];
-        for (int g = 0; g < 2 && side.fold >= 0; ++g)
-            angles[3 * i + g] = side.weight * sheet_.folds[side.fold].rest_angle[side.point(g)];
+        for (int g = 0; g < 2 && side.dihedral >= 0; ++g)
+            angles[3 * i + g] = side.weight * sheet_.dihedrals[side.dihedral].rest_angle[side.point(g)];
     }
     return angles;
 }
@@ -505,7 +505,7 @@ void BendingSixTerm::strains_vjp(const Strains& stresses, Gradient& out) const {
 std::vector<std::array<std::array<double, 9>, 2>> BendingSixTerm::slopes_at_rest() const {
     VectorXd q(3 * nodes_.n_nodes());
     for (Index node = 0; node < nodes_.n_nodes(); ++node) q.segment<3>(3 * node) = nodes_.rest[node];
-    const Index n = sheet_.n_folds();
+    const Index n = sheet_.n_dihedrals();
     std::vector<std::array<std::array<double, 9>, 2>> slopes(n);
     for (Index first = 0; first < n; first += Pack::width) {
         const Index last = std::min<Index>(first + Pack::width, n);
@@ -514,7 +514,7 @@ std::vector<std::array<std::array<double, 9>, 2>> BendingSixTerm::slopes_at_rest
             dihedrals_at(first, last, g, q.data()).gradient(by_node);
             for (Index h = first; h < last; ++h) {
                 Vec3 normal = Vec3::Zero();
-                for (const FoldStencil::Side& side : {sheet_.folds[h].left, sheet_.folds[h].right})
+                for (const DihedralStencil::Side& side : {sheet_.dihedrals[h].left, sheet_.dihedrals[h].right})
                     if (side.face >= 0) normal += normal_of(sheet_.rest[side.face]);
                 normal.normalize();
                 for (int a = 0; a < 9; ++a) slopes[h][g][a] = lane_of(by_node[a], h - first).dot(normal);
@@ -542,13 +542,13 @@ bool BendingSixTerm::add_projective_stiffness(NodeMatrix& out) const {
             for (int i = 0; i < 3; ++i) {
                 const FaceSideSix& side = sheet_.sides[f][i];
                 for (int g = 0; g < 2; ++g) {
-                    for (int a = 0; a < 9 && side.fold >= 0; ++a)
-                        if (const Index node = sheet_.folds[side.fold].nodes[a]; node >= 0)
-                            rows.add(3 * i + g, node, side.weight * slopes[side.fold][side.point(g)][a]);
+                    for (int a = 0; a < 9 && side.dihedral >= 0; ++a)
+                        if (const Index node = sheet_.dihedrals[side.dihedral].nodes[a]; node >= 0)
+                            rows.add(3 * i + g, node, side.weight * slopes[side.dihedral][side.point(g)][a]);
                     if (side.rotation[g] < 0) continue;
                     rows.add(3 * i + g, out.point(side.rotation[g]), side.sign);
                     const std::array<Index, 6>& own = sheet_.own_nodes[f];
-                    out.add_beside(side.rotation[g], {own[0], own[1], own[2]});
+                    out.add_adjacent_face(side.rotation[g], {own[0], own[1], own[2]});
                 }
             }
             rows.add_to(out, [&](int r, int s) { return stiffness_[pack](r, s)[lane]; });

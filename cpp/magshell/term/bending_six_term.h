@@ -8,7 +8,7 @@
 #pragma once
 
 #include "magshell/assembly/element_loop.h"
-#include "magshell/body/six_node_sheet.h"
+#include "magshell/body/six_node_shell.h"
 #include "magshell/energy/bending_six.h"
 #include "magshell/energy/grown_six.h"
 #include "magshell/energy/six_node_face.h"
@@ -21,7 +21,7 @@ namespace magshell {
 
 class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
   public:
-    BendingSixTerm(const SixNodeSheet& sheet, Index body, const ChunkLoop& chunks, const Nodes& nodes,
+    BendingSixTerm(const SixNodeShell& sheet, Index body, const ChunkLoop& chunks, const Nodes& nodes,
                    const GrowthForm& growth, const SystemMatrix& matrix, Registry& registry);
 
     std::string_view name() const override { return "bending"; }
@@ -100,7 +100,7 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     std::vector<std::array<std::array<double, 9>, 2>> slopes_at_rest() const;
     void store_dihedrals(const double* q);
     void store_rates(const double* p);
-    double moment(const FoldSixStencil& fold, int point, const Strains& stress) const;
+    double moment(const DihedralSixStencil& fold, int point, const Strains& stress) const;
     void assemble_faces(Index pack, const double* q, const Strains& stress, SystemMatrix& out) const;
     void assemble_from_rest(Index pack, const double* q, SystemMatrix& out) const;
     void add_held(Index pack, const Pack3 (&held)[3][2], const Pack sign[3], const Symmetric9& stiffness,
@@ -112,7 +112,7 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     void assemble_dihedrals(Index first, Index last, const double* q, const Strains& stress,
                             SystemMatrix& out) const;
 
-    const SixNodeSheet& sheet_;
+    const SixNodeShell& sheet_;
     const Index body_;
     const Nodes& nodes_;
     const Index first_scalar_;

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "magshell/assembly/folds.h"
+#include "magshell/assembly/dihedral_angles.h"
 
 namespace magshell {
 namespace {
@@ -19,7 +19,7 @@ void fetch(const Array& array, Index first, Index count) {
 
 }  // namespace
 
-BendingTerm::BendingTerm(const Sheet& sheet, Index body, const ChunkLoop& chunks, const GrowthForm& growth,
+BendingTerm::BendingTerm(const Shell& sheet, Index body, const ChunkLoop& chunks, const GrowthForm& growth,
                          const Nodes& nodes, const SystemMatrix& matrix, Registry& registry)
     : StrainScaffold(sheet.n_faces()),
       sheet_(sheet),
@@ -31,11 +31,11 @@ BendingTerm::BendingTerm(const Sheet& sheet, Index body, const ChunkLoop& chunks
       growth_(sheet.owner, sheet.faces, growth, registry),
       curvature_scale_(registry.values.add(sheet.owner, "curvature_scale", "1", sheet.n_edges(), 1)),
       stiffness_(face_packs()),
-      angle_changes_(sheet.folds.size()),
-      rates_(sheet.folds.size()),
-      gradients_(sheet.folds.size()) {
+      angle_changes_(sheet.dihedrals.size()),
+      rates_(sheet.dihedrals.size()),
+      gradients_(sheet.dihedrals.size()) {
     face_slots_.reserve(sheet.n_faces());
-    fold_slots_.reserve(sheet.folds.size());
+    fold_slots_.reserve(sheet.dihedrals.size());
     for (const Stencil& s : sheet.stencils) {
         FaceSlots& slots = face_slots_.emplace_back();
         slots.nodes = pair_slots<6>(matrix, s.nodes);
@@ -49,7 +49,7 @@ BendingTerm::BendingTerm(const Sheet& sheet, Index body, const ChunkLoop& chunks
                     r < 0 || s.rotations[j] < 0 ? -1 : matrix.rotations_slot(r, s.rotations[j]);
         }
     }
-    for (const FoldStencil& fold : sheet.folds) {
+    for (const DihedralStencil& fold : sheet.dihedrals) {
         fold_slots_.push_back(pair_slots<4>(matrix, fold.nodes));
         fold_slots_.back()[lower_index(2, 2)] = -1;  // (3, 2): the two half-planes do not meet in d2theta
     }
@@ -79,7 +79,7 @@ Vec3 BendingTerm::rest_angles(Index face) const {
     Vec3 angles = Vec3::Zero();
     for (int i = 0; i < 3; ++i) {
         const FaceSide& side = sheet_.sides[face][i];
-        if (side.fold >= 0) angles[i] = side.weight * sheet_.folds[side.fold].rest_angle;
+        if (side.dihedral >= 0) angles[i] = side.weight * sheet_.dihedrals[side.dihedral].rest_angle;
     }
     return angles;
 }
@@ -102,11 +102,11 @@ Vec3 BendingTerm::shared(const std::vector<Vec3>& of_faces, Index face) const {
     for (int i = 0; i < 3; ++i) {
         const FaceSide& side = sheet_.sides[face][i];
         if (side.rotation >= 0) continue;
-        if (side.fold < 0) {
+        if (side.dihedral < 0) {
             numbers[i] = 0.0;
             continue;
         }
-        const FoldStencil& fold = sheet_.folds[side.fold];
+        const DihedralStencil& fold = sheet_.dihedrals[side.dihedral];
         if (!fold.right_is_point) continue;
         numbers[i] =
             0.5 * (of_faces[fold.left.face][fold.left.corner] + of_faces[fold.right.face][fold.right.corner]);
@@ -142,14 +142,14 @@ Vec3 BendingTerm::scales_of(Index face) const {
 
 void BendingTerm::store_dihedrals(const double* q) {
     chunks_.each([&](const Chunk& chunk) {
-        for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width) {
-            const Index last = std::min(first + Pack::width, chunk.last_fold);
-            const DihedralAngle fold = folds_at(sheet_, first, last, q);
+        for (Index first = chunk.first_dihedral; first < chunk.last_dihedral; first += Pack::width) {
+            const Index last = std::min(first + Pack::width, chunk.last_dihedral);
+            const DihedralAngle fold = dihedral_angles_at(sheet_, first, last, q);
             const Pack angle = fold.angle();
             Pack3 g[4];
             fold.gradient(g);
             for (int lane = 0; lane < last - first; ++lane) {
-                angle_changes_[first + lane] = turn_from(sheet_.folds[first + lane], angle[lane]);
+                angle_changes_[first + lane] = angle_change(sheet_.dihedrals[first + lane], angle[lane]);
                 double* const gradient = gradients_[first + lane].data();
                 for (int k = 0; k < 4; ++k) {
                     gradient[3 * k] = g[k].x[lane];
@@ -173,12 +173,12 @@ void BendingTerm::measure(Index pack, const double* q, const std::vector<double>
 }
 
 double BendingTerm::energy(const double* q, const Controls&) const {
-    std::vector<double> changes(sheet_.folds.size());
+    std::vector<double> changes(sheet_.dihedrals.size());
     chunks_.each([&](const Chunk& chunk) {
-        for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width) {
-            const Index last = std::min(first + Pack::width, chunk.last_fold);
-            const Pack angle = folds_at(sheet_, first, last, q).angle();
-            for (Index h = first; h < last; ++h) changes[h] = turn_from(sheet_.folds[h], angle[h - first]);
+        for (Index first = chunk.first_dihedral; first < chunk.last_dihedral; first += Pack::width) {
+            const Index last = std::min(first + Pack::width, chunk.last_dihedral);
+            const Pack angle = dihedral_angles_at(sheet_, first, last, q).angle();
+            for (Index h = first; h < last; ++h) changes[h] = angle_change(sheet_.dihedrals[h], angle[h - first]);
         }
     });
     const auto turn_of = [&](Index fold) { return changes[fold]; };
@@ -210,9 +210,9 @@ void BendingTerm::evaluate(const double* q, const Controls&, Residual& out) {
 }
 
 /// Returns dE/dtheta of a dihedral angle: the sum of the stresses whose strains depend on it.
-double BendingTerm::moment(const FoldStencil& fold, const Strains& stress) const {
+double BendingTerm::moment(const DihedralStencil& fold, const Strains& stress) const {
     double sum = 0.0;
-    for (const FoldStencil::Side& side : {fold.left, fold.right})
+    for (const DihedralStencil::Side& side : {fold.left, fold.right})
         if (side.face >= 0) sum += stress.number(side.face, side.corner);
     return fold.weight() * sum;
 }
@@ -222,13 +222,13 @@ void BendingTerm::add_forces(const Strains& stresses, Residual& out) {
     // rotations either.
     constexpr Index ahead = 24;  // prefetch distance [dihedral stencils]
     chunks_.scatter([&](const Chunk& chunk) {
-        for (Index h = chunk.first_fold; h < chunk.last_fold; ++h) {
-            fetch(sheet_.folds, h + ahead, 1);
+        for (Index h = chunk.first_dihedral; h < chunk.last_dihedral; ++h) {
+            fetch(sheet_.dihedrals, h + ahead, 1);
             fetch(gradients_, h + ahead, 1);
-            const double m = moment(sheet_.folds[h], stresses);
+            const double m = moment(sheet_.dihedrals[h], stresses);
             for (int k = 0; k < 4; ++k)
                 for (int c = 0; c < 3; ++c)
-                    out.add(3 * sheet_.folds[h].nodes[k] + c, m * gradients_[h][3 * k + c]);
+                    out.add(3 * sheet_.dihedrals[h].nodes[k] + c, m * gradients_[h][3 * k + c]);
         }
         for (Index f = chunk.first; f < chunk.last; ++f)
             for (int i = 0; i < 3; ++i) {
@@ -243,8 +243,8 @@ void BendingTerm::assemble(const Chunk& chunk, const double* q, const Controls&,
                            SystemMatrix& out) const {
     FaceLoop::over_packs(chunk, [&](Index pack) { assemble_faces(pack, out); });
     const Strains& stress = extrapolated_stress ? extrapolated_ : stress_;
-    for (Index first = chunk.first_fold; first < chunk.last_fold; first += Pack::width)
-        assemble_dihedrals(first, std::min(first + Pack::width, chunk.last_fold), q, stress, out);
+    for (Index first = chunk.first_dihedral; first < chunk.last_dihedral; first += Pack::width)
+        assemble_dihedrals(first, std::min(first + Pack::width, chunk.last_dihedral), q, stress, out);
 }
 
 void BendingTerm::assemble_faces(Index pack, SystemMatrix& out) const {
@@ -263,7 +263,7 @@ void BendingTerm::assemble_faces(Index pack, SystemMatrix& out) const {
         int swap[Pack::width];
         for (int lane = 0; lane < Pack::width; ++lane) {
             const FaceSide& side = (*sides[lane])[i];
-            gradient[lane] = (side.fold < 0 ? nothing : gradients_[side.fold]).data();
+            gradient[lane] = (side.dihedral < 0 ? nothing : gradients_[side.dihedral]).data();
             swap[lane] = side.on_left ? 0 : 3;
         }
         face.sign[i] = pack_of([&](int lane) { return (*sides[lane])[i].sign; });
@@ -306,19 +306,19 @@ void BendingTerm::assemble_faces(Index pack, SystemMatrix& out) const {
 void BendingTerm::assemble_dihedrals(Index first, Index last, const double* q, const Strains& stress,
                                      SystemMatrix& out) const {
     const Pack moments =
-        pack_of([&](int lane) { return moment(sheet_.folds[std::min(first + lane, last - 1)], stress); });
-    const DihedralHessian curvature(folds_at(sheet_, first, last, q), moments);
+        pack_of([&](int lane) { return moment(sheet_.dihedrals[std::min(first + lane, last - 1)], stress); });
+    const DihedralHessian curvature(dihedral_angles_at(sheet_, first, last, q), moments);
     for (Index h = first; h < last; ++h)
-        scatter_blocks<4>(out, sheet_.folds[h].nodes, fold_slots_[h], curvature.block, h - first);
+        scatter_blocks<4>(out, sheet_.dihedrals[h].nodes, fold_slots_[h], curvature.block, h - first);
 }
 
 void BendingTerm::store_rates(const double* p) {
     chunks_.each([&](const Chunk& chunk) {
-        for (Index h = chunk.first_fold; h < chunk.last_fold; ++h) {
+        for (Index h = chunk.first_dihedral; h < chunk.last_dihedral; ++h) {
             rates_[h] = 0.0;
             for (int k = 0; k < 4; ++k)
                 for (int c = 0; c < 3; ++c)
-                    rates_[h] += gradients_[h][3 * k + c] * p[3 * sheet_.folds[h].nodes[k] + c];
+                    rates_[h] += gradients_[h][3 * k + c] * p[3 * sheet_.dihedrals[h].nodes[k] + c];
         }
     });
 }

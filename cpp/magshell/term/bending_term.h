@@ -6,8 +6,8 @@
 // its edge.
 #pragma once
 
-#include "magshell/assembly/face_loop.h"
-#include "magshell/body/sheet.h"
+#include "magshell/assembly/element_loop.h"
+#include "magshell/body/shell.h"
 #include "magshell/energy/bending.h"
 #include "magshell/energy/grown_face.h"
 #include "magshell/strain/dihedral_angle.h"
@@ -19,7 +19,7 @@ namespace magshell {
 
 class BendingTerm final : public StrainScaffold<BendingTerm> {
   public:
-    BendingTerm(const Sheet& sheet, Index body, const ChunkLoop& chunks, const GrowthForm& growth,
+    BendingTerm(const Shell& sheet, Index body, const ChunkLoop& chunks, const GrowthForm& growth,
                 const Nodes& nodes, const SystemMatrix& matrix, Registry& registry);
 
     std::string_view name() const override { return "bending"; }
@@ -79,7 +79,7 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     /// Returns the derivative of each reference dihedral angle with respect to its nodes along the mean normal
     /// of the two adjacent faces.
     std::vector<std::array<double, 4>> slopes_at_rest() const;
-    double moment(const FoldStencil& fold, const Strains& stress) const;
+    double moment(const DihedralStencil& fold, const Strains& stress) const;
     void store_dihedrals(const double* q);
     void store_rates(const double* p);
     Vec3 scales_of(Index face) const;
@@ -94,7 +94,7 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     void assemble_dihedrals(Index first, Index last, const double* q, const Strains& stress,
                             SystemMatrix& out) const;
 
-    const Sheet& sheet_;
+    const Shell& sheet_;
     const Index body_;
     const ChunkLoop& chunks_;
     const Nodes& nodes_;

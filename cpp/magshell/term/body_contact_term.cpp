@@ -215,7 +215,7 @@ void BodyContactTerm::prepare_assembly(const double* q, const Controls&) {
         coupled_margin_ = candidates_.margin_ahead(ahead_);
         for (std::size_t k = 0; k < near.size(); ++k)
             if (candidates_.may_be_active(k, coupled_margin_)) groups.push_back(near[k].pair.nodes);
-        layer_.couple(std::move(groups));
+        layer_.add_couplings(std::move(groups));
     }
 }
 

@@ -89,7 +89,7 @@ class BodyContactTerm final : public Term {
     void forget() const {
         candidates_.forget();
         found_.clear();
-        layer_.couple({});
+        layer_.add_couplings({});
         layer_.use(false);
         assemblies_without_contact_ = 0;
         assemblies_since_coupling_ = often;

@@ -37,14 +37,14 @@ void BodyFrictionTerm::set_frozen(bool frozen) {
 }
 
 void BodyFrictionTerm::assemble(const Kinematics& at, const Controls&, bool convexified, SystemMatrix&,
-                                Remainder& rest) const {
+                                NonsymmetricTangent& rest) const {
     for (const FrictionContact& each : friction_contacts_) {
         const std::array<Index, 4>& nodes = each.active->near.pair.nodes;
         contact_.layer().add(nodes, [&](int i, int j) -> Mat3 {
             return -at.rate * each.friction.by_velocity(i, j, convexified);
         });
         if (each.lagged || frozen_) continue;
-        Remainder::Pair& pair = rest.add_pair();
+        NonsymmetricTangent::PairBlock& pair = rest.append_pair();
         pair.nodes = nodes;
         each.friction.by_position(pair.blocks);
         for (Mat3& block : pair.blocks) block *= -1.0;

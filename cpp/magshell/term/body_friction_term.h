@@ -25,7 +25,7 @@ class BodyFrictionTerm final : public ForceTerm {
     void begin_step(const VectorXd& q, const Controls& controls) override;
     void evaluate(const Kinematics& at, const Controls& controls, Residual& out) override;
     void assemble(const Kinematics& at, const Controls& controls, bool convexified, SystemMatrix& out,
-                  Remainder& rest) const override;
+                  NonsymmetricTangent& rest) const override;
     void add_stiffness(const Kinematics& at, std::vector<PairStiffness>& out) const override;
     void vjp(const Kinematics& at, const Controls& controls, const VectorXd& lambda, KinematicsGradient& by,
              Gradient& out) const override;

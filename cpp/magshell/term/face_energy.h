@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "magshell/assembly/face_loop.h"
+#include "magshell/assembly/element_loop.h"
 #include "magshell/body/surface.h"
-#include "magshell/core/face_input.h"
+#include "magshell/core/parameters.h"
 #include "magshell/term/term.h"
 
 namespace magshell {

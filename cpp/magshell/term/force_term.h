@@ -10,7 +10,7 @@
 // nonsymmetric tangent, which only GMRES multiplies by.
 #pragma once
 
-#include "magshell/assembly/remainder.h"
+#include "magshell/assembly/nonsymmetric_tangent.h"
 #include "magshell/term/pair_stiffness.h"
 #include "magshell/term/term.h"
 
@@ -51,7 +51,7 @@ class ForceTerm {
     /// Adds K at the last evaluated state. convexified: adds a majorant of the force's dissipation potential
     /// instead of the exact derivatives where there is one, which keeps Newton's iteration from overshooting.
     virtual void assemble(const Kinematics& at, const Controls& controls, bool convexified, SystemMatrix& out,
-                          Remainder& rest) const = 0;
+                          NonsymmetricTangent& rest) const = 0;
 
     /// Adds, for each frictional pair at the last evaluated state, a positive semidefinite stiffness that
     /// bounds its exact one from above.

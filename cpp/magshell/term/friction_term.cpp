@@ -53,7 +53,7 @@ void FrictionTerm::set_frozen(bool frozen) {
 }
 
 void FrictionTerm::assemble(const Kinematics& at, const Controls&, bool convexified, SystemMatrix& out,
-                            Remainder& rest) const {
+                            NonsymmetricTangent& rest) const {
     for (const FrictionContact& each : friction_contacts_) {
         const double coefficient = contact_.law(each.active).friction;
         const Mat3& by_velocity = convexified ? each.friction.secant : each.friction.by_velocity;
@@ -65,7 +65,7 @@ void FrictionTerm::assemble(const Kinematics& at, const Controls&, bool convexif
             rest.add(point.nodes[0], block);
             continue;
         }
-        Remainder::Shared shared{point.nodes, point.weights, {}};
+        NonsymmetricTangent::FaceBlock shared{point.nodes, point.weights, {}};
         for (int k = 0; k < 3; ++k) shared.block.middleCols<3>(3 * k) = point.weights[k] * block;
         rest.add(shared);
     }

@@ -23,7 +23,7 @@ class FrictionTerm final : public ForceTerm {
     void begin_step(const VectorXd& q, const Controls& controls) override;
     void evaluate(const Kinematics& at, const Controls& controls, Residual& out) override;
     void assemble(const Kinematics& at, const Controls& controls, bool convexified, SystemMatrix& out,
-                  Remainder& rest) const override;
+                  NonsymmetricTangent& rest) const override;
     void vjp(const Kinematics& at, const Controls& controls, const VectorXd& lambda, KinematicsGradient& by,
              Gradient& out) const override;
     /// Freezes normal forces and normals. Friction is then the gradient of a convex potential of the

@@ -4,7 +4,7 @@
 
 namespace magshell {
 
-MagneticSixTerm::MagneticSixTerm(const SixNodeSheet& sheet, Index body, const ChunkLoop& chunks,
+MagneticSixTerm::MagneticSixTerm(const SixNodeShell& sheet, Index body, const ChunkLoop& chunks,
                                  const SystemMatrix& matrix, const FieldSources& sources, Registry& registry)
     : sheet_(sheet),
       body_(body),

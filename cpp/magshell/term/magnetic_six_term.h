@@ -3,7 +3,7 @@
 #pragma once
 
 #include "magshell/assembly/element_loop.h"
-#include "magshell/body/six_node_sheet.h"
+#include "magshell/body/six_node_shell.h"
 #include "magshell/energy/magnetic_six.h"
 #include "magshell/term/field_packs.h"
 #include "magshell/term/term.h"
@@ -14,7 +14,7 @@ namespace magshell {
 class MagneticSixTerm final : public Term {
   public:
     /// Creates the term; the sources must outlive it.
-    MagneticSixTerm(const SixNodeSheet& sheet, Index body, const ChunkLoop& chunks,
+    MagneticSixTerm(const SixNodeShell& sheet, Index body, const ChunkLoop& chunks,
                     const SystemMatrix& matrix, const FieldSources& sources, Registry& registry);
 
     std::string_view name() const override { return Magnetic::name; }
@@ -43,7 +43,7 @@ class MagneticSixTerm final : public Term {
     /// AppliedField::add_samples.
     std::vector<Fields> sample(const double* q, const Controls& controls, int order) const;
 
-    const SixNodeSheet& sheet_;
+    const SixNodeShell& sheet_;
     const Index body_;
     const ElementLoop<6> loop_;
     const TotalAppliedField field_;

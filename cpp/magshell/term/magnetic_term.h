@@ -5,7 +5,7 @@
 // depend on the deformation, and there is no Hessian to add.
 #pragma once
 
-#include "magshell/assembly/face_loop.h"
+#include "magshell/assembly/element_loop.h"
 #include "magshell/body/surface.h"
 #include "magshell/energy/magnetic.h"
 #include "magshell/term/term.h"

@@ -7,7 +7,7 @@
 
 namespace magshell {
 
-MembraneSixTerm::MembraneSixTerm(const SixNodeSheet& sheet, Index body, const ChunkLoop& chunks,
+MembraneSixTerm::MembraneSixTerm(const SixNodeShell& sheet, Index body, const ChunkLoop& chunks,
                                  const Nodes& nodes, const GrowthForm& growth, const SystemMatrix& matrix,
                                  Registry& registry)
     : StrainScaffold(sheet.n_faces()),

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "magshell/assembly/element_loop.h"
-#include "magshell/body/six_node_sheet.h"
+#include "magshell/body/six_node_shell.h"
 #include "magshell/energy/grown_six.h"
 #include "magshell/energy/membrane_six.h"
 #include "magshell/energy/six_node_face.h"
@@ -14,7 +14,7 @@ namespace magshell {
 
 class MembraneSixTerm final : public StrainScaffold<MembraneSixTerm, 9> {
   public:
-    MembraneSixTerm(const SixNodeSheet& sheet, Index body, const ChunkLoop& chunks, const Nodes& nodes,
+    MembraneSixTerm(const SixNodeShell& sheet, Index body, const ChunkLoop& chunks, const Nodes& nodes,
                     const GrowthForm& growth, const SystemMatrix& matrix, Registry& registry);
 
     std::string_view name() const override { return "membrane"; }
@@ -51,7 +51,7 @@ class MembraneSixTerm final : public StrainScaffold<MembraneSixTerm, 9> {
     void rate(Index pack, const double* p, Pack d[9]) const;
     const Symmetric9& stiffness(Index pack) const { return stiffness_[pack]; }
 
-    const SixNodeSheet& sheet_;
+    const SixNodeShell& sheet_;
     const Index body_, nodes_;
     ElementLoop<6> loop_;
     ShellMaterials materials_;

@@ -26,7 +26,7 @@ MembraneTerm::MembraneTerm(const Surface& surface, Index body, const MembraneFac
 // Returns the natural configuration of a face. A face that combines parts of two faces takes their mean growth.
 GrownFace MembraneTerm::grown(Index face) const {
     Mat3 growth = Mat3::Zero();
-    for (const MembraneFaces::Share& share : faces_.shares(face))
+    for (const MembraneFaces::FacePart& share : faces_.parts(face))
         growth += share.part * growth_.growth(share.face);
     return {faces_.rest_corners(face), growth, Mat3::Zero()};
 }
@@ -45,7 +45,7 @@ bool MembraneTerm::set_values(const Values& values) {
             const Index f = loop_.face(pack, lane);
             const RestFace rest = rest_face(f);
             Mat3 stiffness = Mat3::Zero();
-            for (const MembraneFaces::Share& share : faces_.shares(f))
+            for (const MembraneFaces::FacePart& share : faces_.parts(f))
                 if (share.part > 0.0)
                     stiffness += share.part * rest.membrane_stiffness(materials_[share.face]);
             set_lane(elements_[pack].stiffness, lane, stiffness);
@@ -61,7 +61,7 @@ bool MembraneTerm::set_values(const Values& values) {
 bool MembraneTerm::add_projective_stiffness(NodeMatrix& out) const {
     for (Index f = 0; f < surface_.n_faces(); ++f) {
         double modulus = 0.0;
-        for (const MembraneFaces::Share& share : faces_.shares(f)) {
+        for (const MembraneFaces::FacePart& share : faces_.parts(f)) {
             const ShellMaterial& material = materials_[share.face];
             modulus += share.part * material.thickness * material.young_modulus /
                        (1.0 - material.poisson_ratio * material.poisson_ratio);
@@ -144,7 +144,7 @@ void MembraneTerm::vjp(const double* q, const Controls&, const double* lambda, G
             const Vec3 d = lane_of(strains, lane), along = lane_of(rates, lane);
             const RestFace rest = rest_face(f);
             for (int k = 0; k < 2; ++k) {
-                const MembraneFaces::Share share = faces_.shares(f)[k];
+                const MembraneFaces::FacePart share = faces_.parts(f)[k];
                 if (share.part == 0.0) continue;
                 const ShellMaterial& m = materials_[share.face];
                 by_shares[f][k] =
@@ -155,7 +155,7 @@ void MembraneTerm::vjp(const double* q, const Controls&, const double* lambda, G
     });
     for (Index f = 0; f < surface_.n_faces(); ++f)
         for (int k = 0; k < 2; ++k)
-            materials_.add_vjp(faces_.shares(f)[k].face, 1, by_shares[f][k][0], by_shares[f][k][1], out);
+            materials_.add_vjp(faces_.parts(f)[k].face, 1, by_shares[f][k][0], by_shares[f][k][1], out);
     if (!growth_.any()) return;
     std::vector<Mat3> by_faces(surface_.n_faces());
     each_pack([&](Index pack) {
@@ -169,7 +169,7 @@ void MembraneTerm::vjp(const double* q, const Controls&, const double* lambda, G
             const GrownFace own = grown(f);
             const Vec3 d = lane_of(strains, lane), along = lane_of(rates, lane);
             Mat2 by_growth = own.lengths_by_growth(-history_.factor() * lane_of(stresses, lane));
-            for (const MembraneFaces::Share& share : faces_.shares(f))
+            for (const MembraneFaces::FacePart& share : faces_.parts(f))
                 if (share.part > 0.0)
                     by_growth +=
                         share.part * own.triangle().membrane_by_growth(materials_[share.face], along, d);
@@ -192,7 +192,7 @@ void MembraneTerm::strains_vjp(const Strains& stresses, Gradient& out) const {
 
 void MembraneTerm::add_growth_vjp(const std::vector<Mat3>& by_faces, Gradient& out) const {
     for (Index f = 0; f < surface_.n_faces(); ++f)
-        for (const MembraneFaces::Share& share : faces_.shares(f))
+        for (const MembraneFaces::FacePart& share : faces_.parts(f))
             if (share.part > 0.0) growth_.add_vjp(share.face, share.part * by_faces[f], Mat3::Zero(), out);
 }
 

@@ -1,7 +1,7 @@
 // MembraneTerm: the membrane energy of a shell of linear triangles, energy/membrane.h on every face.
 #pragma once
 
-#include "magshell/assembly/face_loop.h"
+#include "magshell/assembly/element_loop.h"
 #include "magshell/body/membrane_faces.h"
 #include "magshell/energy/grown_face.h"
 #include "magshell/energy/membrane.h"

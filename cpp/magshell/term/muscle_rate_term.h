@@ -49,7 +49,7 @@ class MuscleRateTerm final : public ForceTerm {
     }
 
     void assemble(const Kinematics& at, const Controls&, bool convexified, SystemMatrix& out,
-                  Remainder& rest) const override {
+                  NonsymmetricTangent& rest) const override {
         std::vector<std::array<Vec3, N*(N + 1) / 2>> axes(fibres_->fibres.n_elements());
         const Pack rate(at.rate), half(0.5);
         loop_.scatter_packs([&](Index pack) {
@@ -91,7 +91,8 @@ class MuscleRateTerm final : public ForceTerm {
                 for (int l = 0; l <= k; ++l) {
                     const double twice = k != l && nodes[k] == nodes[l] ? 2.0 : 1.0;
                     const Vec3 axis = twice * axes[t][lower_index(k, l)];
-                    if (!axis.isZero(0.0)) rest.add(Remainder::Skew{{nodes[k], nodes[l]}, axis});
+                    if (!axis.isZero(0.0))
+                        rest.add(NonsymmetricTangent::SkewBlock{{nodes[k], nodes[l]}, axis});
                 }
         }
     }

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "magshell/assembly/skew_blocks.h"
+#include "magshell/assembly/lanes.h"
 
 namespace magshell {
 namespace {
@@ -159,7 +159,7 @@ void PressureTerm::finish_assembly(const double* q, const Controls& controls, Sy
     });
 }
 
-void PressureTerm::add_nonsymmetric_tangent(const double* q, const Controls& controls, Remainder& out) const {
+void PressureTerm::add_nonsymmetric_tangent(const double* q, const Controls& controls, NonsymmetricTangent& out) const {
     const double factor = controls[factor_.first];
     if (factor == 0.0) return;
     std::vector<Vec3> axes(pairs_.size(), Vec3::Zero());

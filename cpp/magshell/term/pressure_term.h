@@ -36,7 +36,7 @@ class PressureTerm final : public Term {
     double energy(const double* q, const Controls& controls) const override;
     void evaluate(const double* q, const Controls& controls, Residual& out) override;
     void finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const override;
-    void add_nonsymmetric_tangent(const double* q, const Controls& controls, Remainder& out) const override;
+    void add_nonsymmetric_tangent(const double* q, const Controls& controls, NonsymmetricTangent& out) const override;
     void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
     std::size_t bytes() const override;
 

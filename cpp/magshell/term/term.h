@@ -9,10 +9,10 @@
 #include <string_view>
 #include <vector>
 
+#include "magshell/assembly/element_coloring.h"
 #include "magshell/assembly/node_matrix.h"
-#include "magshell/assembly/remainder.h"
-#include "magshell/assembly/residual.h"
-#include "magshell/assembly/schedule.h"
+#include "magshell/assembly/nonsymmetric_tangent.h"
+#include "magshell/assembly/out_of_balance.h"
 #include "magshell/assembly/system_matrix.h"
 #include "magshell/core/parameters.h"
 
@@ -72,7 +72,7 @@ class Term {
 
     /// Adds the nonsymmetric part of the gradient's derivative, which forces without a potential have (follower
     /// loads).
-    virtual void add_nonsymmetric_tangent(const double* /*q*/, const Controls&, Remainder& /*out*/) const {}
+    virtual void add_nonsymmetric_tangent(const double* /*q*/, const Controls&, NonsymmetricTangent& /*out*/) const {}
 
     /// Stores the stresses at the end of a linearized step p from the last evaluated state: sigma = C (d + J
     /// p).

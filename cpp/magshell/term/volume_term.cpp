@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "magshell/assembly/skew_blocks.h"
+#include "magshell/assembly/lanes.h"
 
 namespace magshell {
 namespace {

@@ -46,8 +46,8 @@ void WaterTerm::evaluate(const Kinematics& at, const Controls&, Residual& out) {
 // a whole goes into the system matrix, which stays positive definite; the rest goes into the nonsymmetric
 // tangent.
 void WaterTerm::assemble(const Kinematics& at, const Controls&, bool, SystemMatrix& out,
-                         Remainder& rest) const {
-    Remainder::Shared* const shared = rest.extend(surface_.n_faces());
+                         NonsymmetricTangent& rest) const {
+    NonsymmetricTangent::FaceBlock* const shared = rest.append_face_blocks(surface_.n_faces());
     loop_.scatter_packs([&](Index pack) {
         Pack33 h[6];
         for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
@@ -58,7 +58,7 @@ void WaterTerm::assemble(const Kinematics& at, const Controls&, bool, SystemMatr
             const Mat3 symmetric = 0.5 * (by_motion + by_motion.transpose());
             for (int r = 0; r < 3; ++r)
                 for (int c = 0; c < 3; ++c) h[0].at[3 * r + c].set(lane, symmetric(r, c));
-            Remainder::Shared& left = shared[f];
+            NonsymmetricTangent::FaceBlock& left = shared[f];
             left.nodes = surface_.corners[f];
             left.weights.setOnes();
             for (int k = 0; k < 3; ++k)

@@ -2,7 +2,7 @@
 // force/drag.h
 #pragma once
 
-#include "magshell/assembly/face_loop.h"
+#include "magshell/assembly/element_loop.h"
 #include "magshell/body/surface.h"
 #include "magshell/force/drag.h"
 #include "magshell/term/force_term.h"
@@ -19,7 +19,7 @@ class WaterTerm final : public ForceTerm {
     void set_values(const Values& values) override;
     void evaluate(const Kinematics& at, const Controls& controls, Residual& out) override;
     void assemble(const Kinematics& at, const Controls& controls, bool convexified, SystemMatrix& out,
-                  Remainder& rest) const override;
+                  NonsymmetricTangent& rest) const override;
     void vjp(const Kinematics& at, const Controls& controls, const VectorXd& lambda, KinematicsGradient& by,
              Gradient& out) const override;
 

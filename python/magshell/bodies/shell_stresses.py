@@ -97,7 +97,7 @@ def stresses_of(values: Any, body: Shell, state: np.ndarray) -> ShellStresses:
     if number is None:
         raise ValueError(f"a shell of the scene has stresses at its faces, got {body!r:.60}")
     with values.in_core():
-        tensors = _core.sheet_stresses(scene._model, number, state)
+        tensors = _core.shell_stresses(scene._model, number, state)
         positions = scene._model.positions(state)
     mesh = body.mesh
     positions = positions[scene._bodies.spans[scene._bodies.number(body)].vertices]

@@ -1,0 +1,172 @@
+#include "magshell/assembly/element_coloring.h"
+
+#include <algorithm>
+
+#include "magshell/core/pack.h"
+#include "magshell/core/parallel.h"
+
+namespace magshell {
+namespace {
+
+// Returns the number of elements of a chunk, a multiple of the pack width. 512 faces have about 600 kB of Hessian, slots and element
+// data; a small body gets at least a few chunks of each colour. Tetrahedra of four nodes take a quarter of the memory of a
+// face and share more nodes with neighbouring chunks, so their chunks are longer if there are enough elements.
+Index part_length(const Body& of) {
+    // Elements per chunk, and chunks per body; only speed depends on them. See test_any_number_of_threads_gives_the_same_bits_on_a_large_sheet.
+    constexpr Index shortest = 128, longest = 512, chunks = 8, longest_of_four = 2048, chunks_of_four = 32;
+    const Index elements = of.n_elements();
+    Index length = std::clamp(elements / chunks, shortest, longest);
+    if (elements > 0 && of.n_dihedrals() == 0 && of.nodes_of(0).size() == 4)
+        length = std::max(length, std::min(elements / chunks_of_four, longest_of_four));
+    return length / Pack::width * Pack::width;
+}
+
+// Finds which chunks share nodes.
+class Neighbours {
+  public:
+    Neighbours(Index nodes, const std::vector<const Body*>& bodies, const std::vector<Chunk>& chunks)
+        : chunks_at_(nodes), nodes_in_(chunks.size()) {
+        for (const Chunk& chunk : chunks)
+            for (Index element = chunk.first; element < chunk.last; ++element)
+                for (const Index node : bodies[chunk.body]->nodes_of(element))
+                    if (node >= 0 && (chunks_at_[node].empty() || chunks_at_[node].back() != chunk.number)) {
+                        chunks_at_[node].push_back(chunk.number);
+                        nodes_in_[chunk.number].push_back(node);
+                    }
+    }
+
+    /// Returns the colour of each chunk: the first that no neighbour has had before (greedy colouring).
+    std::vector<Index> colours() const {
+        std::vector<Index> colour_of(nodes_in_.size(), -1);
+        Index count = 0;
+        for (std::size_t p = 0; p < nodes_in_.size(); ++p) {
+            std::vector<bool> taken(count + 1, false);
+            each_beside(p, [&](Index other) {
+                if (colour_of[other] >= 0) taken[colour_of[other]] = true;
+            });
+            colour_of[p] = static_cast<Index>(std::find(taken.begin(), taken.end(), false) - taken.begin());
+            count = std::max(count, colour_of[p] + 1);
+        }
+        return colour_of;
+    }
+
+    /// Returns the chunks by number, but each after its neighbours of earlier colours.
+    std::vector<Index> order(const std::vector<Index>& colour_of) const {
+        std::vector<Index> order;
+        std::vector<bool> taken(nodes_in_.size(), false);
+        const auto take = [&](const auto& self,
+                              Index p) -> void {  // the recursion is as deep as there are colours
+            if (taken[p]) return;
+            taken[p] = true;
+            each_beside(p, [&](Index other) {
+                if (colour_of[other] < colour_of[p]) self(self, other);
+            });
+            order.push_back(p);
+        };
+        for (Index p = 0; p < static_cast<Index>(nodes_in_.size()); ++p) take(take, p);
+        return order;
+    }
+
+  private:
+    template <class Visit>
+    void each_beside(std::size_t p, const Visit& visit) const {
+        for (const Index node : nodes_in_[p])
+            for (const Index other : chunks_at_[node]) visit(other);
+    }
+
+    std::vector<std::vector<Index>> chunks_at_, nodes_in_;
+};
+
+// Cuts an order into segments, and each segment into its colours. A segment holds enough chunks of a colour for several threads.
+std::vector<std::vector<Index>> rounds(const std::vector<Index>& order, const std::vector<Index>& colour_of) {
+    constexpr std::size_t stretch =
+        32;  // chunks per segment; see test_more_threads_than_processors_give_the_same_bits
+    std::vector<std::vector<Index>> rounds;
+    for (std::size_t first = 0; first < order.size(); first += stretch) {
+        std::vector<std::vector<Index>> of_colours;
+        for (std::size_t k = first; k < std::min(first + stretch, order.size()); ++k) {
+            const std::size_t colour = colour_of[order[k]];
+            if (colour >= of_colours.size()) of_colours.resize(colour + 1);
+            of_colours[colour].push_back(order[k]);
+        }
+        for (std::vector<Index>& chunks : of_colours)
+            if (!chunks.empty()) rounds.push_back(std::move(chunks));
+    }
+    return rounds;
+}
+
+}  // namespace
+
+ElementColoring::ElementColoring(Index nodes, const std::vector<const Body*>& bodies)
+    : loops_(bodies.size()) {
+    for (Index body = 0; body < static_cast<Index>(bodies.size()); ++body) cut(*bodies[body], body);
+    set_order(nodes, bodies);
+}
+
+void ElementColoring::cut(const Body& of, Index body) {
+    Index dihedral = 0;
+    const Index elements = of.n_elements(), dihedrals = of.n_dihedrals(), length = part_length(of);
+    for (Index first = 0; first < elements; first += length) {
+        const Index last = std::min(elements, first + length);
+        const Index first_dihedral = dihedral;
+        while (dihedral < dihedrals && of.element_of_dihedral(dihedral) < last) ++dihedral;
+        const Chunk chunk{
+            static_cast<Index>(all_.chunks_.size()), body, first, last, first_dihedral, dihedral};
+        all_.chunks_.push_back(chunk);
+        loops_[body].chunks_.push_back(chunk);
+    }
+}
+
+void ElementColoring::set_order(Index nodes, const std::vector<const Body*>& bodies) {
+    const Neighbours neighbours(nodes, bodies, all_.chunks_);
+    const std::vector<Index> colour_of = neighbours.colours();
+    all_.order_ = neighbours.order(colour_of);
+    all_.rounds_ = rounds(all_.order_, colour_of);
+    for (ChunkLoop& loop : loops_) {
+        if (loop.chunks_.empty()) continue;
+        const Index first = loop.chunks_.front().number, last = loop.chunks_.back().number;
+        const auto own = [&](const std::vector<Index>& of_all) {
+            std::vector<Index> of_body;
+            for (const Index p : of_all)
+                if (first <= p && p <= last) of_body.push_back(p - first);
+            return of_body;
+        };
+        loop.order_ = own(all_.order_);
+        for (const std::vector<Index>& round : all_.rounds_)
+            if (std::vector<Index> of_body = own(round); !of_body.empty())
+                loop.rounds_.push_back(std::move(of_body));
+    }
+}
+
+std::vector<Chunk> ElementColoring::in_order() const {
+    std::vector<Chunk> order;
+    for (const Index p : all_.order_) order.push_back(all_.chunks_[p]);
+    return order;
+}
+
+std::size_t ElementColoring::bytes() const {
+    return 2 * all_.chunks_.size() * (sizeof(Chunk) + 2 * sizeof(Index));
+}
+
+void ChunkLoop::scatter(const std::function<void(const Chunk&)>& body) const {
+    if (num_threads() == 1) {
+        for (const Index p : order_) body(chunks_[p]);
+        return;
+    }
+    for (const std::vector<Index>& chunks : rounds_)
+        parallel_for(static_cast<int>(chunks.size()), [&](int k) { body(chunks_[chunks[k]]); });
+}
+
+void ChunkLoop::each(const std::function<void(const Chunk&)>& body) const {
+    parallel_for(static_cast<int>(chunks_.size()), [&](int p) { body(chunks_[p]); });
+}
+
+double ChunkLoop::sum(const std::function<double(const Chunk&)>& body) const {
+    std::vector<double> shares(chunks_.size());
+    parallel_for(static_cast<int>(chunks_.size()), [&](int p) { shares[p] = body(chunks_[p]); });
+    double total = 0.0;
+    for (const double share : shares) total += share;
+    return total;
+}
+
+}  // namespace magshell

@@ -1,0 +1,26 @@
+// Edge rotations in equilibrium at fixed vertices. They have no inertia, and the energy is quadratic in them.
+#pragma once
+
+#include <Eigen/SparseCholesky>
+
+#include "magshell/scene/model.h"
+
+namespace magshell {
+
+class EdgeRotationEquilibrium {
+  public:
+    /// Evaluates and assembles at q, and factorizes the stiffness of the rotations.
+    EdgeRotationEquilibrium(Model& model, const VectorXd& q, const Controls& controls);
+
+    /// Returns the increment of the edge rotations of q to equilibrium; zero for all other dofs.
+    VectorXd correction() const;
+    /// Returns - H^-1 by_state on the rotations and zero elsewhere: the adjoint of the equilibrium.
+    VectorXd adjoint(const VectorXd& by_state) const;
+
+  private:
+    Model& model_;
+    Index first_;  // index of the first edge rotation among the dofs
+    Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor_;
+};
+
+}  // namespace magshell

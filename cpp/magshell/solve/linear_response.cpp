@@ -1,0 +1,143 @@
+#include "magshell/solve/linear_response.h"
+
+#include "magshell/core/errors.h"
+#include "magshell/linalg/loaded_part.h"
+#include "magshell/linalg/residual.h"
+#include "magshell/solve/unsymmetric.h"
+
+namespace magshell {
+namespace {
+
+// Dofs up to which a faster, possibly worse ordering is used: the better one takes longer than it saves. See test_the_same_as_of_the_whole.
+constexpr Index few_dofs = 20000;
+
+// RAII guard that counts edge rotations from the reference shape, for which the Hessian has fewer entries.
+class RotationsFromRest {
+  public:
+    explicit RotationsFromRest(Model& model) : terms_(model.elastic().all()) { count(true); }
+    ~RotationsFromRest() { count(false); }
+    RotationsFromRest(const RotationsFromRest&) = delete;
+    RotationsFromRest& operator=(const RotationsFromRest&) = delete;
+
+    VectorXd forces(VectorXd of_sides) const {
+        for (const ElasticTerm* term : terms_) term->forces_from_rest(of_sides);
+        return of_sides;
+    }
+    VectorXd motion(VectorXd from_rest) const {
+        for (const ElasticTerm* term : terms_) term->rotations_from_sides(from_rest);
+        return from_rest;
+    }
+
+  private:
+    void count(bool from_rest) {
+        for (ElasticTerm* term : terms_) term->count_rotations_from_rest(from_rest);
+    }
+    const std::vector<ElasticTerm*>& terms_;
+};
+
+// Solves with one step of iterative refinement in extended precision: if stiffnesses differ by 1e6, the order of elimination would
+// otherwise decide how many digits the soft directions keep.
+VectorXd refined(const Factor& factor, const std::vector<double>& values, const VectorXd& forces) {
+    VectorXd solution = forces;
+    factor.solve(solution);
+    VectorXd rest = residual(*factor.pattern(), values.data(), solution, forces);
+    factor.solve(rest);
+    return solution + rest;
+}
+
+LoadedPart part_of_model(Model& model, const VectorXd& free_forces) {
+    LargeVector<double> values;
+    model.reduce_matrix(values);
+    model.dof_map().add_curvature(model.residual().gradient, values);
+    return loaded_part(*model.dof_map().pattern(), values, free_forces);
+}
+
+std::unique_ptr<Factor> analysed(const Model& model, const std::vector<Index>& unknowns,
+                                 SparsePattern pattern) {
+    FactorOptions options;
+    if (pattern.size <= few_dofs) {
+        options.ordering = Ordering::amd;
+    } else {
+        const std::vector<Vec3> points = model.free_points();
+        for (const Index unknown : unknowns) options.points.push_back(points[unknown]);
+    }
+    return analyze(std::make_shared<const SparsePattern>(std::move(pattern)), options);
+}
+
+// Returns the motion of supports and motors.
+VectorXd prescribed(const Model& model, const VectorXd& q, const Controls& unloaded,
+                    const Controls& controls) {
+    const DofMap& dof_map = model.dof_map();
+    return dof_map.support_factor(controls) * dof_map.prescribed_rate(unloaded) +
+           dof_map.prescribed_increment(q, unloaded);
+}
+
+// Returns K times a motion, at the last evaluated state.
+VectorXd stiffness_times(const VectorXd& motion, Model& model, const VectorXd& q, const Controls& controls) {
+    model.assemble(q, controls, false);
+    model.require_symmetric();
+    VectorXd forces(motion.size());
+    model.matrix().multiply(motion.data(), forces.data());
+    if (const SystemMatrix* touching = model.contact_matrix())
+        touching->add_product(motion.data(), forces.data());
+    return forces;
+}
+
+}  // namespace
+
+SmallDeflection small_deflection(Model& model, const VectorXd& q, const Controls& unloaded,
+                                 const Controls& controls, const std::optional<VectorXd>& at_rest) {
+    const VectorXd moved = prescribed(model, q, unloaded, controls);
+    model.evaluate(q, controls);
+    const VectorXd loaded = model.residual().gradient;
+    model.evaluate(q, unloaded);
+    VectorXd forces = at_rest.value_or(model.residual().gradient) - loaded;
+    if (!moved.isZero(0.0)) forces -= stiffness_times(moved, model, q, unloaded);
+
+    const RotationsFromRest counted(model);
+    model.assemble(q, unloaded, false);
+    model.require_symmetric();
+    const VectorXd free_forces = model.dof_map().vector(counted.forces(std::move(forces)));
+    LoadedPart part = part_of_model(model, free_forces);
+    const std::unique_ptr<Factor> factor = analysed(model, part.unknowns, std::move(part.pattern));
+    std::copy(part.values.begin(), part.values.end(), factor->values().begin());
+    const Index count = factor->size();
+    SmallDeflection found{.motion = {}, .report = factor->factorize(), .unknowns = count};
+    if (!found.report.succeeded || found.report.negative_pivots || found.report.perturbed_pivots)
+        return found;
+
+    VectorXd loads(count);
+    for (Index k = 0; k < count; ++k) loads[k] = free_forces[part.unknowns[k]];
+    const VectorXd solution = refined(*factor, part.values, loads);
+    VectorXd free_motion = VectorXd::Zero(free_forces.size());
+    for (Index k = 0; k < count; ++k) free_motion[part.unknowns[k]] = solution[k];
+    found.motion = moved + counted.motion(model.dof_map().expand(free_motion));
+    return found;
+}
+
+VectorXd first_order_change(Model& model, const StaticsResult& equilibrium, const Controls& to) {
+    if (!equilibrium.factor)
+        throw InvalidInput("the equilibrium has no factorization: it was solved without gradients");
+    const VectorXd& q = equilibrium.state;
+    const DofMap& dof_map = model.dof_map();
+
+    model.set_angle_branches(equilibrium.angle_branches);
+    model.evaluate(q, to);
+    VectorXd change = dof_map.prescribed_increment(q, to);
+    VectorXd force = model.residual().gradient;
+    const bool moves = !change.isZero(0.0);
+    if (moves || model.has_follower_loads()) model.assemble(q, to, false);
+    if (moves) {
+        VectorXd pull(q.size());
+        model.multiply(change, pull);
+        model.nonsymmetric_tangent().add_product(change, false, pull);
+        dof_map.add_motor_increment_forces(model.residual().gradient, change, pull);
+        force += pull;
+    }
+    VectorXd reduced = -dof_map.vector(force);
+    solve_at_equilibrium(model, *equilibrium.factor, false, reduced);
+    change += dof_map.expand(reduced);
+    return change;
+}
+
+}  // namespace magshell
