@@ -43,8 +43,9 @@ def _is_counted(name: str) -> bool:
     return name not in COSTLY
 
 
-# Cases of effort.py that take seconds each.
+# Cases that take seconds each, or (scaling) repeat their solve until a clock says so.
 COSTLY = {
+    "hard solids/scaling",
     "hard contact/slides down in steps, 1e-05",
     "hard contact/dropped, 10",
     "hard time steps/weak jumps",
