@@ -2,10 +2,13 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from magshell.bench import check as module
+from magshell.bench.accuracy import _print_orders
 from magshell.bench.check import LAST_RELEASE, PARTS, check, measured
+from magshell.bench.convergence import REQUIRED_ORDER, STUDIES, Convergence
 from magshell.bench.ratios import KINDS, Ratio, collected, note
 
 
@@ -206,6 +209,52 @@ def test_a_part_is_measured_with_its_times_over_the_loops(monkeypatch, capsys):
 
 def test_the_loop_takes_time():
     assert 1e-3 < module.loop(rounds=2) < 1e4
+
+
+def test_quickest_form_runs_every_part_and_nothing_is_worse_than_in_the_last_release(capsys):
+    """Under half a minute of one idle core: counts and errors only, which other people's work does not disturb."""
+    pytest.importorskip("torch")
+    assert check(["--quickest"]) == 0, capsys.readouterr().out
+
+
+def test_quickest_form_leaves_out_times_and_says_what_does_not_end(release, capsys):
+    content = json.loads(release().read_text())
+    content["quickest"] = {"statics": {"factorizations": 9, "deflection": 1e-3}}
+    path = release()
+    path.write_text(json.dumps(content))
+
+    def run(part, arguments):
+        return {**NOW["statics"], **ratios(Ratio("time", "a step", 1e9))}
+
+    arguments = ["--ratios", str(path), "--quickest", "--only", "statics"]
+    assert check(arguments, run) == 0
+    assert "a step" not in capsys.readouterr().out
+
+    def broken(part, arguments):
+        raise TypeError("main() got an unexpected keyword argument 'iterations'")
+
+    assert check(arguments, broken) == 1
+    assert "DID NOT END: statics: TypeError" in capsys.readouterr().out
+
+
+def test_quickest_form_is_written_beside_the_numbers_of_the_whole_one(tmp_path, capsys):
+    path = tmp_path / "new.json"
+    assert run_check(path, "--write", str(path)) == 0
+    path_of = ["--quickest", "--only", "statics", "--write", str(path)]
+    assert check(path_of, lambda part, arguments: NOW[part]) == 0
+    content = json.loads(path.read_text())
+    assert content["quickest"] == {"statics": {"factorizations": 9.0, "deflection": 1e-3}}
+    assert content["ratios"]["statics"]["worth"] == 11.0
+    assert check(["--quickest", "--only", "statics", "--ratios", str(path)], lambda *_: NOW["statics"]) == 0
+
+
+def test_orders_of_convergence_have_a_name_for_each_element(capsys):
+    """Two notes of one name are refused by `check`, which then does not end."""
+    cells, errors = np.array([10, 20]), np.array([[1e-2, 2.5e-3]])
+    study = Convergence(cells, 4 * cells, errors, errors)
+    with collected() as notes:
+        _print_orders({(name, bending): study for name in STUDIES for bending in REQUIRED_ORDER})
+    assert len({ratio.name for ratio in notes}) == len(notes) == 4
 
 
 def test_the_last_release_is_kept():

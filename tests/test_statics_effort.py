@@ -5,7 +5,7 @@ import pytest
 
 import magshell as ms
 from magshell.bench.cases import magnetic_strip
-from magshell.bench.statics import oblique_field, semi_cylinder
+from magshell.bench.statics import oblique_field, semi_cylinder, strongly_bent
 
 
 @pytest.mark.parametrize(
@@ -37,6 +37,15 @@ def test_a_field_from_behind(angle, beta, most):
     for turned in np.linspace(30.0, angle, 13)[1:]:
         warm = ms.equilibrium(scene, start=warm, **oblique_field(turned, beta)[1])
     np.testing.assert_allclose(found.positions, warm.positions, atol=1e-6 * magnetic_strip.LENGTH)
+
+
+@pytest.mark.parametrize("faces", [512, 2048, 8192])
+def test_strongly_bent_sheet_takes_10_factorizations_in_one_load_step_on_every_mesh(faces):
+    """Its steps are 2.51, 1.37, 1.60, 0.77, ... of the extent: the third is longer than the second, and not astray."""
+    scene, controls = strongly_bent(faces)
+    found = ms.equilibrium(scene, **controls)
+    assert found.stable
+    assert found.load_steps == 1 and found.factorizations <= 10
 
 
 @pytest.mark.parametrize(

@@ -179,7 +179,8 @@ def _print_orders(studies: dict[tuple[str, str], Convergence]) -> list[dict[str,
         required = REQUIRED_ORDER.get(bending)
         missed = ""
         if required is not None:
-            missed = note("error", f"{name}: order of convergence", study.order, at_least=required)
+            title = f"{name}, {bending}: order of convergence"
+            missed = note("error", title, study.order, at_least=required)
         rows.append(
             [
                 name,

@@ -36,6 +36,17 @@ PARTS = {
     "scaling": ["--quick", "--faces", "2048", "8192", "--company", "5"],
     "paper": ["--quick"],
 }
+# Whether the parts run and what they count, in seconds. Not `scaling`, which starts processes beside busy ones.
+QUICKEST = {
+    "accuracy": ["--quick", "--only", "A1", "C4", "T4a", "--rounds", "1"],
+    "kernels": ["--quick", "--faces", "32"],
+    "terms": ["--quick"],
+    "statics": ["--quick"],
+    "gradients": ["--quick"],
+    "dynamics": ["--quick", "--cells", "6", "2", "--long", "0", "--no-memory"],
+    "paper": ["--quick", "--only", "bending_twisting", "kirigami_tower", "octopus"],
+}
+STEADY = ("count", "error")  # kinds that are nearly the same on every machine
 TIMED = ("share", "time")  # kinds that other people's work disturbs: worse is only what is so twice
 
 
@@ -43,6 +54,8 @@ def check(arguments: list[str], run: Callable[[str, list[str]], dict[str, float]
     """run(part, arguments) -> the ratios of a part, for tests."""
     options = _parser().parse_args(arguments)
     run = measured if run is None else run
+    if options.quickest:
+        return _quickest(options, run)
     last = {} if options.write else _read(options.ratios)
     began, now, failed = time.perf_counter(), {}, {}
     for part in options.only or PARTS:
@@ -58,6 +71,23 @@ def check(arguments: list[str], run: Callable[[str, list[str]], dict[str, float]
         return _write(options.write, now, failed, kept)
     _print_missed(now)
     _print_failed(failed)
+    asked = [part for part in last if part not in failed and part in (options.only or last)]
+    return _print_changes(now, {part: last[part] for part in asked}) or int(bool(failed))
+
+
+def _quickest(options: argparse.Namespace, run: Callable[[str, list[str]], dict[str, Ratio]]) -> int:
+    """Run the parts as small as they go, and compare their counts and errors."""
+    now, failed = {}, {}
+    for part in options.only or QUICKEST:
+        try:
+            found = run(part, QUICKEST[part])
+            now[part] = {name: ratio for name, ratio in found.items() if ratio.kind in STEADY}
+        except (Exception, SystemExit) as error:
+            failed[part] = f"{type(error).__name__}: {error}"
+    _print_failed(failed)
+    if options.write:
+        return _write(options.write, now, failed, _read(options.write, "quickest"), "quickest")
+    last = _read(options.ratios, "quickest")
     asked = [part for part in last if part not in failed and part in (options.only or last)]
     return _print_changes(now, {part: last[part] for part in asked}) or int(bool(failed))
 
@@ -174,11 +204,11 @@ def _tolerance(name: str) -> str:
     return f"{name} ({kind.means}) {kind.factor:g} times{slack}"
 
 
-def _read(path: Path) -> dict[str, dict[str, float]]:
+def _read(path: Path, section: str = "ratios") -> dict[str, dict[str, float]]:
     """{part: {name: value}}"""
     try:
         content = json.loads(path.read_text())
-        ratios = content["ratios"]
+        ratios = content["ratios"] if section == "ratios" else content.get(section, {})
         return {part: {name: float(value) for name, value in of.items()} for part, of in ratios.items()}
     except OSError as error:
         raise SystemExit(f"cannot read {path}: {error.strerror}. Make it with --write {path}") from error
@@ -186,8 +216,14 @@ def _read(path: Path) -> dict[str, dict[str, float]]:
         raise SystemExit(f"{path} holds no ratios of a release: {error}") from error
 
 
-def _write(path: Path, now: dict[str, dict[str, Ratio]], failed: dict[str, str], kept: dict[str, Any]) -> int:
-    """kept: of the parts that were not asked for."""
+def _write(
+    path: Path,
+    now: dict[str, dict[str, Ratio]],
+    failed: dict[str, str],
+    kept: dict[str, Any],
+    section: str = "ratios",
+) -> int:
+    """kept: of the parts that were not asked for. The other section stays."""
     _print_missed(now)
     _print_failed(failed)
     if failed:
@@ -196,8 +232,11 @@ def _write(path: Path, now: dict[str, dict[str, Ratio]], failed: dict[str, str],
     ratios = {part: {name: float(f"{r.value:.4g}") for name, r in of.items()} for part, of in now.items()}
     ratios = {part: {**kept, **ratios}[part] for part in PARTS if part in {**kept, **ratios}}
     made = {name: value for name, value in setting().items() if name in ("magshell", "processor", "numpy")}
+    before = json.loads(path.read_text()) if path.is_file() else {}
+    content = {**before, section: ratios}
+    content = {"made": made, **content} | ({"made": made} if section == "ratios" else {})
     written = path.with_name(f"{path.name}.new")
-    written.write_text(json.dumps({"made": made, "ratios": ratios}, indent=1) + "\n")
+    written.write_text(json.dumps(content, indent=1) + "\n")
     written.replace(path)
     print(f"\n{path} holds {sum(map(len, ratios.values()))} numbers of magshell {ms.__version__}.")
     return 0
@@ -218,6 +257,11 @@ def _parser() -> argparse.ArgumentParser:
         default=LAST_RELEASE,
         metavar="JSON",
         help="what to compare with (default: the last release's)",
+    )
+    parser.add_argument(
+        "--quickest",
+        action="store_true",
+        help="whether the parts run, and their counts and errors only, in seconds",
     )
     parser.add_argument("--only", nargs="+", choices=list(PARTS), metavar="PART", help="some parts")
     parser.add_argument(

@@ -39,6 +39,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--long", type=int, default=100_000, help="steps of the long run (default 100000; 0: none)"
     )
+    parser.add_argument(
+        "--no-memory",
+        dest="memory",
+        action="store_false",
+        help="leave out what is measured in processes of their own",
+    )
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
@@ -53,9 +59,9 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         "periods": periods,
         "errors": _errors(STEPS[:2] if options.quick else STEPS, options.rounds),
         "energies": _energies(periods),
-        **motion_costs.measure(options.rounds, options.quick, cells),
+        **motion_costs.measure(options.rounds, options.quick, cells, options.memory),
         **solid_motions.measure(options.rounds, options.quick),
-        **projective_motions.measure(options.rounds, options.quick),
+        **projective_motions.measure(options.rounds, options.quick, options.memory),
         "thrown bars": thrown_bars.measure(options.rounds, options.quick),
         "surroundings": surrounding_costs.measure(options.rounds, options.quick),
     }

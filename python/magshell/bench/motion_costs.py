@@ -54,14 +54,17 @@ def budget(scene: ms.Scene, integrator: Integrator, steps: int) -> float:
     return min(0.6 * record * steps, 4e6)
 
 
-def measure(rounds: int, quick: bool, cells: tuple[int, int]) -> dict[str, Any]:
+def measure(rounds: int, quick: bool, cells: tuple[int, int], memory: bool = True) -> dict[str, Any]:
     """Prints the tables, returns their numbers."""
     steps = 5 if quick else STEPS
-    return {
+    results = {
         "step": _steps(strip(cells), steps, rounds),
         "gradient": _gradients(strip(cells), steps, rounds),
-        "memory": _memory(["checkpoints"], KEPT_STEPS[:1]) if quick else _memory(ALLOWED_SHARE, KEPT_STEPS),
     }
+    if not memory:
+        return results
+    kept = _memory(["checkpoints"], KEPT_STEPS[:1]) if quick else _memory(ALLOWED_SHARE, KEPT_STEPS)
+    return {**results, "memory": kept}
 
 
 def _steps(scene: ms.Scene, steps: int, rounds: int) -> dict[str, Any]:

@@ -6,6 +6,7 @@ that runs them. The functions import the example, which must be on the path by t
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -68,11 +69,26 @@ def track(curve: str) -> Callable[[int], Run]:
 
 
 def octopus(channel: str) -> Callable[[int], Run]:
-    def run(iterations: int) -> Run:
-        from octopus import main
+    """An iteration is a horizon's motion with the gradient of its objective, by the fields of all steps."""
 
-        found = main((channel,), iterations=iterations)[channel]
-        return _of_history(found["history"], "mean square distance / m2, and prices")
+    def run(iterations: int) -> Run:
+        import torch
+        from _octopus.channels import CHANNELS
+        from _octopus.task import HORIZON, Swim
+
+        from magshell.control import Horizon
+
+        swim = Swim.of(CHANNELS[channel], HORIZON)
+        first = Horizon(0, HORIZON, HORIZON)
+        field, seconds, value = torch.from_numpy(swim.swing()), 0.0, 0.0
+        for _ in range(iterations):
+            field = field.detach().requires_grad_()
+            began = time.perf_counter()
+            objective = sum(swim.objective(field, first, None).values())
+            objective.backward()
+            seconds += time.perf_counter() - began
+            value = float(objective.detach())
+        return Run(seconds / iterations, iterations, value, "mean square distance / m2, and prices")
 
     return run
 

@@ -31,12 +31,10 @@ ARCH_CELLS, ARCH_STEPS = (40, 4, 3), 200
 ALLOWED_ARCH = 0.1e9  # bytes with checkpoints; 15.7e9 there without
 
 
-def measure(rounds: int, quick: bool) -> dict[str, Any]:
+def measure(rounds: int, quick: bool, memory: bool = True) -> dict[str, Any]:
     """Prints the tables, returns their numbers."""
-    return {
-        "projective errors": _errors(rounds, quick),
-        "projective memory": _memory(quick),
-    }
+    errors = {"projective errors": _errors(rounds, quick)}
+    return {**errors, "projective memory": _memory(quick)} if memory else errors
 
 
 def beam(material: ms.bodies.materials.SolidMaterial, cells: tuple[int, int, int]) -> ms.Scene:

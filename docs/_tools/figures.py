@@ -1,0 +1,185 @@
+"""python docs/_tools/figures.py [--measure [WORDS ...]] [--page]: the figures of README and manual beside their commands.
+
+Every figure in a text is in figures.json: what the page says word for word, and the command that makes the number, or the
+source that it was published in, or why it is no measurement. `--measure` runs the commands whose numbers can be read from
+their JSON and compares: counts and errors as exactly as the text gives them, times and memory within a factor of two.
+`tests/test_figures.py` holds that each figure of a page is in the file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+DOCS = Path(__file__).parents[1]
+ROOT = DOCS.parent
+FILE = DOCS / "figures.json"
+ORIGINS = (
+    "command",
+    "source",
+    "given",
+)  # a run of ours, a publication, or a choice that the text itself makes
+KINDS = {
+    "count": 1.0,
+    "error": 1.0,
+    "time": 2.0,
+    "memory": 2.0,
+}  # how far a number may be from the text, a factor
+
+NUMBER = r"\d[\d,]*(?:\.\d+)?(?:e-?\d+)?"
+_UNIT = (
+    r"(?:%|times\b|percent\b|us\b|ms\b|s (?:a|an)\b|microseconds?\b|minutes?\b|hours?\b|MB\b|GB\b|"
+    r"factorizations?\b|iterations?\b|episodes?\b|rounds\b|motions\b|unknowns\b)"
+)
+FIGURE = re.compile(rf"(?<![\w.])({NUMBER})(?:\*\*)? {_UNIT}")
+_FENCE = re.compile(r"^(```|~~~).*?^\1$", re.DOTALL | re.MULTILINE)
+
+
+def pages() -> list[Path]:
+    """Return README and the manual's pages."""
+    manual = [
+        page
+        for page in DOCS.rglob("*.md")
+        if not {"_build", "_gallery", "_tools"} & set(page.parts)
+    ]
+    return [ROOT / "README.md", *sorted(manual)]
+
+
+def name_of(page: Path) -> str:
+    """Return the page's path from the root of the checkout."""
+    return page.relative_to(ROOT).as_posix()
+
+
+def prose(text: str) -> str:
+    """Return the text with code blocks blanked, a line's end as any other space."""
+    blank = _FENCE.sub(lambda code: " " * len(code[0]), text)
+    return re.sub(r"\s", " ", blank)
+
+
+def uncovered(page: Path, entries: list[dict[str, Any]]) -> list[str]:
+    """Return the figures of a page that no entry of the file holds, each with what stands before it."""
+    text = prose(page.read_text())
+    held = [
+        span
+        for entry in entries
+        if entry["page"] == name_of(page)
+        for span in _spans(entry["says"], text)
+    ]
+    return [
+        text[max(0, found.start() - 60) : found.end()]
+        for found in FIGURE.finditer(text)
+        if not any(begin <= found.start() and found.end() <= end for begin, end in held)
+    ]
+
+
+def _spans(says: str, text: str) -> list[tuple[int, int]]:
+    return [
+        found.span()
+        for found in re.finditer(r"\s+".join(map(re.escape, says.split())), text)
+    ]
+
+
+def stale(entries: list[dict[str, Any]]) -> list[str]:
+    """Return what entries say that their pages do not."""
+    return [
+        f"{entry['page']}: {entry['says']}"
+        for entry in entries
+        if not _spans(entry["says"], prose((ROOT / entry["page"]).read_text()))
+    ]
+
+
+def shown(entry: dict[str, Any]) -> list[str]:
+    """Return the numbers of an entry's text, as they are written there."""
+    return re.findall(rf"(?<![\w.])-?{NUMBER}", entry["says"])
+
+
+def agrees(text: str, value: float, kind: str) -> bool:
+    """Whether a written number is a measured one: to the digits that are written, or within the factor of its kind."""
+    written = float(text.replace(",", ""))
+    if KINDS[kind] > 1.0:
+        return written / KINDS[kind] <= value <= written * KINDS[kind]
+    digits = len(text.partition(".")[2])
+    return abs(value - written) <= 0.5001 * 10.0**-digits
+
+
+def disagreements(entry: dict[str, Any], values: list[float]) -> list[str]:
+    """Return those numbers of an entry's text that are not the values of the same place."""
+    return [
+        f"{entry['page']}: {entry['says']!r} says {text}, {entry['command']} gives {value:.4g}"
+        for text, value in zip(shown(entry), values, strict=True)
+        if value is not None and not agrees(text, value, entry["kind"])
+    ]
+
+
+def read() -> list[dict[str, Any]]:
+    """Return the entries of figures.json."""
+    return json.loads(FILE.read_text())
+
+
+def measured(entry: dict[str, Any], results: Any) -> list[float | None]:
+    """Return the values of an entry's numbers from a command's JSON; None for one that the entry does not place."""
+    return [None if place is None else _at(results, place) for place in entry["at"]]
+
+
+def _at(results: Any, place: list[Any]) -> float:
+    *path, last = place
+    scale = 1.0
+    if isinstance(last, dict):
+        scale, (*path, last) = last["times"], path
+    for key in (*path, last):
+        results = results[key]
+    return scale * float(results)
+
+
+def run(command: str) -> Any:
+    """Return what a command writes with --json, its tables unseen."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "results.json"
+        words = [sys.executable, *command.split()[1:], "--json", str(path)]
+        subprocess.run(words, check=True, stdout=subprocess.DEVNULL, cwd=ROOT)
+        content = json.loads(path.read_text())
+        return content.get("results", content)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Print figures and what disagrees; 1 where something does."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "words", nargs="*", help="only entries whose command has all of them"
+    )
+    parser.add_argument(
+        "--measure", action="store_true", help="run the commands and compare"
+    )
+    options = parser.parse_args(arguments)
+    entries = [
+        e for e in read() if all(word in e.get("command", "") for word in options.words)
+    ]
+    wrong = stale(entries) + [
+        each for page in pages() for each in uncovered(page, read())
+    ]
+    for command in sorted(
+        {entry["command"] for entry in entries if "command" in entry}
+    ):
+        of = [entry for entry in entries if entry.get("command") == command]
+        print(f"\n{command}")
+        compared = options.measure and any("at" in entry for entry in of)
+        results = run(command) if compared else None
+        for entry in of:
+            by = "" if "at" in entry else "   (to be read from what it prints)"
+            print(f"  {entry['page']}: {entry['says']}{by}")
+            if results is not None and "at" in entry:
+                wrong += disagreements(entry, measured(entry, results))
+    print("".join(f"\nWRONG {each}" for each in wrong) or "\nNo figure disagrees.")
+    return int(bool(wrong))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
