@@ -7,17 +7,18 @@ from typing import Any
 import numpy as np
 
 from .._machine.entry import grouped
+from .._machine.frozen import Frozen
 
 
-class Owner:
+class Owner(Frozen):
     """An object whose replaceable values are the core's under the same names. Others override the two methods, together:
     each is the transpose of the other."""
 
     def __init_subclass__(cls, **options: Any) -> None:
         """A keyword that its constructor does not have is told with those that it has."""
-        super().__init_subclass__(**options)
         if "__init__" in vars(cls) and not hasattr(cls.__init__, "__wrapped__"):
             setattr(cls, "__init__", grouped()(cls.__init__))  # noqa: B010 - assigned, it were declared to type checkers
+        super().__init_subclass__(**options)
 
     _replaceable: tuple[str, ...] = ()
     _in_time: tuple[str, ...] = ()  # those that may change during a motion

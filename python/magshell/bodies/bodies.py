@@ -45,7 +45,7 @@ class Bodies:
         touching: Iterable[Rigid] = (),
     ):
         self.touching: tuple[Rigid, ...] = tuple(touching)
-        listed = checked_list("bodies", bodies, (*BODIES, Rigid, Skeleton))
+        listed = checked_list("bodies", bodies, (*BODIES, Rigid, Skeleton), repeats=True)
         self.skeletons: tuple[Skeleton, ...] = tuple(body for body in listed if isinstance(body, Skeleton))
         self.listed: tuple[Any, ...] = tuple(listed)
         self.shells: tuple[Shell | Solid, ...] = tuple(body for body in listed if isinstance(body, BODIES))

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .._machine.frozen import Frozen
 from .joint import Joint
 from .rigid_result import RigidResult, _cross
 from .skeleton_input import motor_rows
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from .._checks.kinds import Computed, SolveResult
 
 
-class JointResult:
+class JointResult(Frozen):
     """A joint of a result. Of tensors in their graph, tensors."""
 
     joint: Joint

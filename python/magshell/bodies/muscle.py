@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from copy import copy
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from .._checks.quantity import quantity, real_numbers, shape_of
 from .._checks.scalars import positive
+from .._machine.frozen import variant
 from .actuator import Actuator
 from .fibre_tables import checked_force_velocity, checked_table, core_curve
 from .fibres import checked_directions, checked_weights, fibres_of
@@ -192,7 +192,7 @@ class Muscle(Actuator):
 
     def replaced(self, **values: Any) -> Muscle:
         """The same muscle with other numbers."""
-        other, count = copy(self), len(self.elements)
+        now, count = {}, len(self.elements)
         for name, value in values.items():
             if name not in self._replaceable:
                 raise ValueError(f"the Muscle was made without {name}")
@@ -208,8 +208,8 @@ class Muscle(Actuator):
                 checked = checked_weights(value, count)
             else:
                 checked = positive(name, "1/s" if name == "shortening_rate" else "Pa", value)
-            setattr(other, name, checked)
-        return other
+            now[name] = checked
+        return variant(self, **now)
 
     @property
     def strength(self) -> float:

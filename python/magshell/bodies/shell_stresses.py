@@ -7,11 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
+from .._machine.frozen import immutable
 from ..mesh.face_shapes import corner_axes
 from .at_points import mean, von_mises
 from .shell import Shell
 
 
+@immutable
 class ShellStresses(NamedTuple):
     """Of every face; elastic, as the energies have them: also with caps recut, and with a curvature_scale.
 

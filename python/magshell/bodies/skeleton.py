@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .._checks.checked_list import checked_list
+from .._machine.frozen import FixedDict, Frozen, remember, variant
 from .joint import Joint
 from .joints import Closure, Fixed, Prismatic
 from .rigid import Rigid
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from .link import Link
 
 
-class Skeleton:
+class Skeleton(Frozen):
     """Links and the joints between them: one tree, or several. One of the bodies of a scene, and so are its links.
 
     links: Link (or Rigid) objects: vertices of a body that they carry, or numbers alone, or both.
@@ -45,15 +46,20 @@ class Skeleton:
         self.joints: tuple[Joint, ...] = checked_list("joints", joints, (Joint,))
         if not self.links:
             raise ValueError("links must hold at least one Link")
-        for name, items in (("links", self.links), ("joints", self.joints)):
-            if len({id(item) for item in items}) < len(items):
-                raise ValueError(f"{name} must differ, but one is there twice")
-        self.named: dict[str, Rigid | Joint] = {}  # of a file
+        self.named: dict[str, Rigid | Joint] = FixedDict()  # of a file
         self._leading: dict[int, Joint] = {}
         for k, joint in enumerate(self.joints):
             self._check(k, joint)
         self._order = self._in_order()
         self._check_velocities()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy, or another process, makes it from again: it knows links by where they are in memory."""
+        return {"links": self.links, "joints": self.joints, "named": self.named}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(state["links"], state["joints"])
+        remember(self, named=state["named"])
 
     @classmethod
     def from_urdf(
@@ -87,8 +93,7 @@ class Skeleton:
             limit_smoothing=limit_smoothing,
         )
         skeleton = cls(links, joints)
-        skeleton.named = named
-        return skeleton
+        return variant(skeleton, named=FixedDict(named))
 
     def _check(self, k: int, joint: Joint) -> None:
         for role in ("child", "parent"):

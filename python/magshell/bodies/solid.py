@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import copy
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from .._checks.owner import Owner
 from .._checks.quantity import quantity, real_numbers
 from .._machine.entry import grouped
+from .._machine.frozen import variant
 from ..mesh.tet_integrals import shape_integrals, shape_products
 from ..mesh.tet_mesh import TetMesh
 from .materials import Projective, SolidMaterial
@@ -138,16 +138,16 @@ class Solid(Owner):
 
     def replaced(self, **values: Any) -> Solid:
         """The same solid with other values: those of its material, and the mass density."""
-        other = copy(self)  # not made anew, which would warn anew
+        now: dict[str, Any] = {}
         if "mass_density" in values:
             density = values.pop("mass_density")
-            other.mass_density = None if density is None else self._density(density)
+            now["mass_density"] = None if density is None else self._density(density)
         if "remanent_magnetization" in values:
-            other.remanent_magnetization = self._magnetization(values.pop("remanent_magnetization"))
-        other.material = self.material.replaced(**values)
+            now["remanent_magnetization"] = self._magnetization(values.pop("remanent_magnetization"))
+        material = self.material.replaced(**values)
         for name in values:
-            other.material.rows(name, self.mesh.n_tetrahedra)
-        return other
+            material.rows(name, self.mesh.n_tetrahedra)
+        return variant(self, material=material, **now)  # not made anew, which would warn anew
 
     def _core_input(self, owner: str, vertices: np.ndarray) -> dict[Any, Any]:
         """As the core takes it. vertices: the scene's, (n_v,)."""

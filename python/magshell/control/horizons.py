@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from .._checks.arrays import count
 from .._checks.scalars import not_negative
 from .._checks.tensors import detached, require_torch
+from .._machine.frozen import immutable
 from .._machine.log import log
 from .._machine.progress import progress_bar
 from ..design.answer import Answer
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from .._checks.kinds import Numbers
 
 
+@immutable
 @dataclass(frozen=True)
 class Horizon:
     """Rows first ... end of the control are searched, and those up to `settled` are kept and done."""
@@ -33,6 +35,7 @@ class Horizon:
     end: int
 
 
+@immutable
 @dataclass(frozen=True)
 class Receding:
     """What `receding` found.
@@ -41,6 +44,8 @@ class Receding:
     state: what `advance` returned last. searches: [(Horizon, Minimum)], in their order; failures: [(Horizon, why)], of those
     whose search ended early. trials: controls that were tried without gradient.
     """
+
+    _as_given: ClassVar = ("state",)
 
     controls: Any
     reached: int

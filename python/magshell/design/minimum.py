@@ -6,9 +6,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
+from .._machine.frozen import immutable
 from .rejections import effort_in_words, in_words, total
 
 
+@immutable
 @dataclass(frozen=True)
 class Record:
     """One iteration.
@@ -31,7 +33,8 @@ class Record:
     rejections: dict[str, int] = field(default_factory=dict)
 
 
-@dataclass
+@immutable
+@dataclass(frozen=True)
 class Minimum:
     """What `minimize` found. parameters: the best design, as tensors in the order given; history: a Record an
     iteration, from the start; reason: why it ended. rejections: why trial designs could not be evaluated, {reason: how

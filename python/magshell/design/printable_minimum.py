@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from .._machine.frozen import immutable
 from ..ink import Ink
 
 
+@immutable
 @dataclass(frozen=True)
 class PrintableStage:
     """One stage of a search.
@@ -29,7 +31,8 @@ class PrintableStage:
     seconds: float
 
 
-@dataclass
+@immutable
+@dataclass(frozen=True)
 class PrintableMinimum:
     """What `minimize_printable` found.
 

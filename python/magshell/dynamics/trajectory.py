@@ -12,6 +12,7 @@ from .._checks.arrays import index_array
 from .._checks.quantity import quantity
 from .._checks.tensors import detached, plain_arrays
 from .._machine.files import replace_file
+from .._machine.frozen import immutable
 from .._machine.npz import open_npz
 from .._machine.offered import Filmed
 from ..bodies.actuator import Actuator
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from .._checks.kinds import Computed
 
 
+@immutable
 @dataclass(frozen=True)
 class MotionState:
     """Where a sheet is and how fast it moves, exactly: what ms.simulate(..., start=...) goes on from with the same bits,
@@ -111,6 +113,7 @@ class MotionState:
 _ARRAYS = ("state", "velocity", "acceleration", "strain_rates", "maxwell_strains", "maxwell_strain_rates")
 
 
+@immutable
 @dataclass(frozen=True, repr=False)
 class Trajectory(Filmed):
     """A motion. With several bodies, rows are those of one after another; `trajectory[body]` has those of one.
@@ -180,7 +183,7 @@ class Trajectory(Filmed):
         values = Values.again(kept["scene"], kept["_values"])
         for obstacle, path in kept["_values"]["paths"].items():
             values.move(obstacle, path)
-        vars(self).update(kept, _values=values)
+        Filmed.__setstate__(self, {**kept, "_values": values})
 
     def __getitem__(self, body: Any) -> Any:
         """What it says of one body of the scene."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._checks.quantity import quantity
+from .._machine.frozen import Frozen
 from .._machine.keywords import CONTROLS, FLUX_DENSITY, controls_of, nearest_first
 from ..scene.courses import changes_at_once, names_in_time, row_in_time
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from ..scene.scene import Scene
 
 
-class Actuator:
+class Actuator(Frozen):
     """A value that actions set. All its numbers are entries of the action, which run from -1 at `lower` to 1 at `upper`.
 
     owner: the scene, for applied_flux_density [T] and the factors of ms.simulate; or one of its objects, for what may

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .._machine.frozen import immutable
 from ..bodies.of_body import result_of
 from ..dynamics.trajectory import Trajectory
 from ..scene.scene import Scene
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from ..bodies.strains import Strains
 
 
+@immutable
 @dataclass(frozen=True)
 class Snapshot:
     """One state of a motion.
@@ -30,6 +32,9 @@ class Snapshot:
     index: int
     action: np.ndarray
     before: Snapshot | None = field(repr=False, default=None)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "action", np.array(self.action))
 
     @property
     def scene(self) -> Scene:

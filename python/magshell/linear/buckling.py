@@ -11,6 +11,7 @@ import scipy
 
 from .._checks.arrays import count
 from .._machine.entry import solve_entry
+from .._machine.frozen import immutable
 from ..errors import NotConverged
 from ..scene.inputs import Inputs
 from ..scene.scene import Scene
@@ -30,6 +31,7 @@ _PRE_LOAD = 1e-4  # displacement at which the change of the Hessian is measured,
 _LARGEST_DISPLACEMENT = 0.1  # before buckling, over the sheet's size: beyond, linear theory says nothing
 
 
+@immutable
 @dataclass(frozen=True, repr=False)
 class Buckling:
     """The lowest buckling modes of a scene.

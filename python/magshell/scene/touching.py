@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _core
+from .._machine.frozen import immutable
 from ..surroundings.body_contact import BodyContact
 from ..surroundings.contact import Contact
 from .touching_obstacles import pairs_with_obstacles
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from .scene import Scene
 
 
+@immutable
 @dataclass(frozen=True)
 class Touching:
     """What of a contact touches in one state.

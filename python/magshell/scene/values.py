@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._checks.quantity import quantity
+from .._machine.frozen import remember, variant
 from ..bodies.bodies import Whole, joined
 from ..bodies.shell import Shell
 from ..surroundings.constraints import Constraints, gather
@@ -51,8 +52,7 @@ class Values:
         }
         for body in scene._bodies.solids:
             if body.skin in self._now:
-                self._now[body] = copy(self.current(body))
-                self._now[body].skin = self._now[body.skin]
+                self._now[body] = variant(self.current(body), skin=self._now[body.skin])
         self.sheets: tuple[Any, ...] = tuple(self.current(body) for body in scene.bodies)
         self.rigid: tuple[Any, ...] = tuple(self.current(span) for span in scene.rigid_parts)
         self.constraints: Constraints = scene._constraints
@@ -85,7 +85,7 @@ class Values:
         with scene._exclusive():
             if scene._in_core is not self:
                 scene._model.set_values(self.numbers)
-                scene._in_core = self
+                remember(scene, _in_core=self)
             yield
 
     @contextmanager

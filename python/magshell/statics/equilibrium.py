@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._checks.tensors import detached, plain_arrays
+from .._machine.frozen import immutable
 from .._machine.offered import Kept
 from ..bodies.of_body import result_of
 from ..bodies.solid_result import told_strains
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from .._checks.kinds import Computed
 
 
+@immutable
 @dataclass(frozen=True, repr=False)
 class Equilibrium(Kept):
     """A scene at rest. With several bodies, rows are those of one after another; `equilibrium[body]` has those of one.
@@ -78,7 +80,8 @@ class Equilibrium(Kept):
         return {**plain_arrays(vars(self)), "_values": self._values.kept()}
 
     def __setstate__(self, kept: dict[Any, Any]) -> None:
-        vars(self).update(kept, _values=Values.again(kept["scene"], kept["_values"]))
+        values = Values.again(kept["scene"], kept["_values"])
+        Kept.__setstate__(self, {**kept, "_values": values})
 
     def __getitem__(self, body: Any) -> Any:
         """What it says of one body of the scene."""

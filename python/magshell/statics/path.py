@@ -13,6 +13,7 @@ from .. import _core
 from .._checks.arrays import count, number
 from .._checks.scalars import positive
 from .._machine.entry import grouped, solve_entry
+from .._machine.frozen import immutable
 from .._machine.log import log
 from .._machine.offered import Filmed
 from .._machine.progress import SolveBar
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from .._checks.kinds import Numbers
 
 
+@immutable
 @dataclass(frozen=True)
 class CriticalPoint:
     """Where a path gains or loses an unstable direction.
@@ -51,6 +53,7 @@ class CriticalPoint:
     after_point: int
 
 
+@immutable
 @dataclass(frozen=True, repr=False)
 class Path(Filmed):
     """A path of equilibria, stable and unstable. `path[body]` has those of one body.

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._checks.tensors import stacked
+from .._machine.frozen import Frozen
 from .closed_surface import of_tetrahedra
 
 if TYPE_CHECKING:
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from ..bodies.actuator import Actuator
 
 
-class ActuatorResult:
+class ActuatorResult(Frozen):
     """One actuator of a result."""
 
     actuator: Actuator

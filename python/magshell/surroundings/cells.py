@@ -57,7 +57,7 @@ class Cells(Actuator):
         if not isinstance(body, Solid):
             raise ValueError(f"Cells are of a Solid, got {body!r:.60}")
         self.bodies: tuple[Any, ...] = (body,)
-        self._groups = _groups(groups, body.mesh.n_tetrahedra)
+        self._groups = tuple(_groups(groups, body.mesh.n_tetrahedra))
         self.stiffness: np.ndarray = numbers(
             "stiffness", "Pa", stiffness, self.count, "cell", 0.0, above=True
         )
@@ -66,7 +66,7 @@ class Cells(Actuator):
         )
 
     @property
-    def groups(self) -> list[np.ndarray]:
+    def groups(self) -> tuple[np.ndarray, ...]:
         """The tetrahedra of each cell."""
         return self._groups
 

@@ -95,8 +95,8 @@ class Contact(Owner):
     ):
         self.body: Shell | Solid | None = checked_body(body)
         listed = checked_list("obstacles", obstacles, (Obstacle,), "objects of ms.obstacles")
-        if not listed or len({id(item) for item in listed}) < len(listed):
-            raise ValueError("obstacles must hold at least one obstacle, and each of them once")
+        if not listed:
+            raise ValueError("obstacles must hold at least one obstacle")
         self.obstacles = listed
         self.contact_stiffness: float = positive("contact_stiffness", "N/m", contact_stiffness)
         self.friction_coefficient: float | None = (
