@@ -168,3 +168,122 @@ def test_a_solve_leaves_the_arrays_of_its_caller_writable() -> None:
     made = made_objects(given)
     found_results(given, made)
     assert all(array.flags.writeable for array in given.made)
+
+
+def one_more(name: str, thing, **others) -> ms.Scene:
+    """A scene with the thing twice in one of its lists."""
+    bodies = others.pop("bodies", MADE["shell"])
+    return ms.Scene(bodies, **{"allow_rigid_motions": True, **others, name: [thing, thing]})
+
+
+TWICE = {
+    **{
+        name: ("loads", name)
+        for name in ("point load", "edge load", "area load", "couple", "pressure", "tension")
+    },
+    **{name: ("supports", name) for name in ("pin", "clamp", "symmetry")},
+    **{
+        name: ("field", name)
+        for name in ("uniform", "dipoles", "sampled", "custom", "placed", "cuboid", "cylinder")
+    },
+    **{name: ("contacts", name) for name in ("contact", "body contact", "self contact")},
+    **{name: ("actuators", name) for name in ("muscle", "cavity", "cells", "tendon")},
+    "tie": ("ties", "tie"),
+}
+
+
+@pytest.mark.parametrize("name", TWICE)
+def test_what_a_scene_holds_twice_is_refused(name) -> None:
+    argument, thing = TWICE[name][0], MADE[TWICE[name][1]]
+    message = (
+        rf"{argument} must differ, but {argument}\[0\] and {argument}\[1\] are one {type(thing).__name__}"
+    )
+    with pytest.raises(ValueError, match=message):
+        one_more(argument, thing)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: ms.Scene([MADE["shell"]] * 2, allow_rigid_motions=True), "bodies 0 and 1 are one Shell"),
+        (lambda: ms.Scene([MADE["rigid"]] * 2), "rigid parts 0 and 1 are one Rigid"),
+        (lambda: ms.Scene([MADE["skeleton"]] * 2), "rigid parts 0 and 2 are one Rigid"),
+        (lambda: ms.Contact([MADE["plane"]] * 2), r"obstacles\[0\] and obstacles\[1\] are one Plane"),
+        (lambda: ms.Skeleton([MADE["link"]] * 2), r"links\[0\] and links\[1\] are one Link"),
+        (lambda: ms.Skeleton(MADE["skeleton"].links, [MADE["hinge"]] * 2), r"joints\[1\] are one Revolute"),
+        (lambda: ms.Cavity([MADE["balloon"]] * 2, pressure=1.0), "names each body once"),
+    ],
+)
+def test_what_another_list_holds_twice_is_refused(make, message) -> None:
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def test_a_result_of_one_body_has_its_stresses_and_strains() -> None:
+    rest, move, path, of_solid = (
+        OBJECTS[name] for name in ("equilibrium", "trajectory", "path", "solid result")
+    )
+    for result in (rest, move, path, OBJECTS["equilibria"]):
+        body = result.scene.bodies[0]
+        assert digest(result.stresses()) == digest(result[body].stresses())
+        assert digest(result.strains()) == digest(result[body].strains())
+    whole = of_solid._result
+    assert digest(whole.stresses()) == digest(of_solid.stresses()) == digest(whole.strains())
+
+
+def test_stresses_of_several_bodies_are_asked_of_one_of_them() -> None:
+    sheets = [MADE["tie"].a, MADE["tie"].b]
+    both = ms.Scene(
+        sheets, supports=[ms.Pin([0, 1, 2, 3, 4, 5], body=each) for each in sheets], field=ms.UniformField()
+    )
+    rest = ms.equilibrium(both, remanent_magnetization=(1e3, 0, 0), applied_flux_density=(0, 0, 0))
+    with pytest.raises(ValueError, match=r"has 2 bodies: say which, result\[body\]\.stresses\(\)"):
+        rest.stresses()
+
+
+PRIVATE = {
+    *(
+        "add_numbers",
+        "gradients",
+        "by_thickness",
+        "for_all",
+        "grown_by",
+        "has_grown",
+        "filling",
+        "is_spring",
+        "riding",
+    ),
+    *(
+        "directed",
+        "distance_given",
+        "has_axis",
+        "in_order",
+        "joint_to",
+        "parent_of",
+        "wave_modulus",
+        "weighed_masses",
+    ),
+    *(
+        "nearly_incompressible",
+        "face_thickness",
+        "face_magnetization",
+        "edge_couples",
+        "pressure_at",
+        "tension_at",
+    ),
+    *("check_in", "courses", "at_start", "acts", "resting", "driven", "drifts", "moved_by", "tree"),
+}
+
+
+def test_names_of_the_inside_are_not_offered(thing) -> None:
+    """help() and tab completion show what a user may call."""
+    assert PRIVATE & {name for name in dir(thing) if not name.startswith("_")} == set()
+
+
+@pytest.mark.parametrize(
+    "module", ["objectives", "parametrize", "control", "optim", "shapes", "obstacles", "meshes"]
+)
+def test_a_module_offers_its_public_names_alone(module) -> None:
+    found = getattr(ms, module)
+    assert dir(found) == sorted(found.__all__)
+    assert all(getattr(found, name).__module__.startswith("magshell") for name in found.__all__)

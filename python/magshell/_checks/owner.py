@@ -23,7 +23,7 @@ class Owner(Frozen):
     _replaceable: tuple[str, ...] = ()
     _in_time: tuple[str, ...] = ()  # those that may change during a motion
 
-    def add_numbers(self, label: str, values: Any, numbers: dict[tuple[str, str], np.ndarray]) -> None:
+    def _add_numbers(self, label: str, values: Any, numbers: dict[tuple[str, str], np.ndarray]) -> None:
         """Puts its numbers in place, by owner and name. values: those of the solve; label: its own name there."""
         for name in self._replaceable:
             numbers[label, name] = getattr(self, name)
@@ -31,6 +31,6 @@ class Owner(Frozen):
     def _check_in_time(self, name: str, rows: np.ndarray) -> None:
         """Raises ValueError where it cannot have one of the numbers (n, ...) over time."""
 
-    def gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
+    def _gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
         """By its values, from the core's gradient; a row for each of its parts."""
         return {name: gradient.value(label, name) for name in self._replaceable}

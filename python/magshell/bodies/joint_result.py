@@ -92,7 +92,7 @@ class JointResult(Frozen):
         return self._motor("prismatic", "motor_displacement")
 
     def _motor(self, kind: str, value: str):
-        if self.joint._kind != kind or not self.joint.driven:
+        if self.joint._kind != kind or not self.joint._driven:
             raise ValueError(f"only a {kind.capitalize()} with a {value} has a motor")
         return self._result._driving[..., motor_rows(self._result.scene._bodies.skeletons, self.joint)]
 

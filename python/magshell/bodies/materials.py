@@ -88,11 +88,11 @@ class SolidMaterial(Frozen):
         return {}
 
     @property
-    def nearly_incompressible(self) -> bool:
+    def _nearly_incompressible(self) -> bool:
         """Whether it hardly changes its volume anywhere."""
         return bool(np.max(self.poisson_ratio) > NEARLY_INCOMPRESSIBLE)
 
-    def wave_modulus(self, n_tetrahedra: int) -> np.ndarray:
+    def _wave_modulus(self, n_tetrahedra: int) -> np.ndarray:
         """Pa, (n_t,): a modulus that its stiffness for small strains is of the size of."""
         return self.rows("young_modulus", n_tetrahedra)
 
@@ -227,7 +227,7 @@ class Projective(_Isotropic):
     }
 
     @property
-    def nearly_incompressible(self) -> bool:
+    def _nearly_incompressible(self) -> bool:
         return False
 
 
@@ -288,8 +288,8 @@ class Guccione(SolidMaterial):
         return {"fibres": (3,)}
 
     @property
-    def nearly_incompressible(self) -> bool:
+    def _nearly_incompressible(self) -> bool:
         return True
 
-    def wave_modulus(self, n_tetrahedra: int) -> np.ndarray:
+    def _wave_modulus(self, n_tetrahedra: int) -> np.ndarray:
         return self.rows("stiffness", n_tetrahedra) * self.rows("fibre_exponent", n_tetrahedra)

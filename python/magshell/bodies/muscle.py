@@ -72,7 +72,7 @@ class Muscle(Actuator):
     _replaceable = ("activation", "fibres", "weights", "stiffness", "peak_stress", "shortening_rate")
     _in_time = ("activation",)
     _units: ClassVar[dict[str, str]] = {"activation": "1"}
-    is_spring = False  # its stiffness is there at rest, as its solid's
+    _is_spring = False  # its stiffness is there at rest, as its solid's
 
     def __init__(
         self,
@@ -234,14 +234,14 @@ class Muscle(Actuator):
             **{name: core_curve(getattr(self, name)) for name in _TABLES},
         }
 
-    def add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
+    def _add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         numbers[label, "fibres"] = self.fibres / np.linalg.norm(self.fibres, axis=1, keepdims=True)
         numbers[label, "strength"] = self.strength * self.weights
         numbers[label, "activation"] = np.atleast_1d(self.activation)
         if self.shortening_rate is not None:
             numbers[label, "shortening_rate"] = self.shortening_rate
 
-    def gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
+    def _gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
         by_strength, by_fibres = gradient.value(label, "strength"), gradient.value(label, "fibres")
         lengths = np.linalg.norm(self.fibres, axis=1, keepdims=True)
         along = self.fibres / lengths

@@ -116,7 +116,7 @@ class Skin(Owner):
         now = {name: getattr(self, name) for name in self._replaceable}
         return variant(Skin(faces=self.faces, **(now | values)), _corners=self._corners, _areas=self._areas)
 
-    def gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
+    def _gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
         """With what its values do to the masses of the vertices."""
         found = {
             "thickness": np.zeros(len(self.faces)),
@@ -139,7 +139,7 @@ class Skin(Owner):
             np.add.at(masses, self._corners, (of_faces / 3.0)[:, None])
         return masses
 
-    def add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
+    def _add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         count = len(self.faces)
         numbers[label, "thickness"] = np.broadcast_to(self.thickness, count)
         given = self.remanent_magnetization

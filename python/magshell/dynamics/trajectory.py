@@ -16,10 +16,10 @@ from .._machine.frozen import immutable
 from .._machine.npz import open_npz
 from .._machine.offered import Filmed
 from ..bodies.actuator import Actuator
-from ..bodies.of_body import result_of
+from ..bodies.of_body import OfOneBody, result_of
 from ..bodies.shell import Shell
 from ..bodies.solid_result import told_strains
-from ..bodies.strains import StrainHistory, Strains, strains_of
+from ..bodies.strains import StrainHistory, strains_of
 from ..fields.field import AppliedField
 from ..mesh.crossings import told
 from ..methods.clock import Clock, clock_of
@@ -115,7 +115,7 @@ _ARRAYS = ("state", "velocity", "acceleration", "strain_rates", "maxwell_strains
 
 @immutable
 @dataclass(frozen=True, repr=False)
-class Trajectory(Filmed):
+class Trajectory(Filmed, OfOneBody):
     """A motion. With several bodies, rows are those of one after another; `trajectory[body]` has those of one.
 
     times: (n,) s, of the recorded states, the start among them. positions: (n, n_v, 3) m; velocities: (n, n_v, 3) m/s;
@@ -251,8 +251,11 @@ class Trajectory(Filmed):
         positions = self.scene._model.points(self._state_at(index))
         return near_body_kinks(self.scene, self.touching(contact, index), smoothing, positions)
 
-    def strains(self, index: int = -1) -> Strains:
-        """The principal strains of every face in a recorded state, by default the last."""
+    def strains(self, index: int = -1) -> Any:
+        """The principal strains of every face of the sheets, Strains, in a recorded state, by default the last; where a
+        solid is alone, what result[solid] says."""
+        if (solid := self._one_solid()) is not None:
+            return solid.strains(index)
         state = self._state_at(index)
         with self._values_at(index).growth_in_core():
             return strains_of(self.scene, state, self._thickness)

@@ -55,7 +55,7 @@ class AppliedField(Owner):
     _replaceable: tuple[str, ...] = ()
     _made_from: Mapping[str, object] = MappingProxyType({})
 
-    def add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
+    def _add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         for name in self._replaceable:
             numbers[label, name] = self._made_from[name]
 

@@ -124,7 +124,7 @@ def linear_buckling(
             "the scene has contact of bodies, which holds in one direction only, so that no linear mode buckles: ms.follow "
             "follows it as it opens and closes, or leave it out"
         )
-    driven = [joint for joint in map(inputs.values.current, scene.joints) if joint.driven]
+    driven = [joint for joint in map(inputs.values.current, scene.joints) if joint._driven]
     if equilibrium is None and (acting := [*pulling_joints(inputs), *driven]):
         raise ValueError(
             f"linear buckling multiplies the controls, and {acting[0]!r:.80} acts whatever they are: ms.follow has it"

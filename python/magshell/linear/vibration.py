@@ -307,7 +307,7 @@ def _slow_square(body: Shell | Solid) -> float:
     if isinstance(body, Solid):
         mesh = body.mesh
         modulus, thickness = (
-            body.material.wave_modulus(mesh.n_tetrahedra),
+            body.material._wave_modulus(mesh.n_tetrahedra),
             2.0 * mesh.volume / mesh.face_areas.sum(),
         )
     else:

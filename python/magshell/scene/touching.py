@@ -105,7 +105,7 @@ def touching_in(
     velocities = np.zeros((scene.mesh.n_vertices, 3)) if velocities is None else velocities
     if isinstance(contact, Contact) and any(each is contact for each in scene._obstacle_contacts):
         found = pairs_with_obstacles(scene, values, contact, scene._model.positions(state), velocities, time)
-        *_, coefficient, sticking_speed = values.current(contact).law(*values.touching(contact))
+        *_, coefficient, sticking_speed = values.current(contact)._law(*values.touching(contact))
         return _gathered(scene, found, coefficient, sticking_speed)
     numbers = [k for k, each in enumerate(scene._body_contacts) if each is contact]
     if not numbers:

@@ -45,7 +45,7 @@ def pairs_with_obstacles(
 ) -> dict[str, np.ndarray]:
     """What touching_pairs of the core has of bodies; positions and velocities (n_v, 3)."""
     vertices, weights = scene._bodies.contact_points(contact)
-    numbers = values.current(contact).law(*values.touching(contact))
+    numbers = values.current(contact)._law(*values.touching(contact))
     stiffness, smoothing, offset, coefficient, sticking_speed = numbers
     corners = np.where(weights != 0.0, vertices, 0)
     places = np.einsum("pk,pkc->pc", weights, positions[corners])

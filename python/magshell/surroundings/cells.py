@@ -79,10 +79,10 @@ class Cells(Actuator):
         now = {name: getattr(self, name) for name in self._replaceable} | values
         return self._keep_shapes(Cells(self.body, self._groups, **now))
 
-    def filling(self, scene: Scene) -> float:
+    def _filling(self, scene: Scene) -> float:
         return float(np.abs(np.asarray(self.volume_ratio) - 1.0).max(initial=0.0))
 
-    def pressure_at(self, ratios: Numbers, load_factor: float) -> Computed:
+    def _pressure_at(self, ratios: Numbers, load_factor: float) -> Computed:
         """(k,) Pa, at volume ratios (k,)."""
         target = 1.0 + load_factor * (self.volume_ratio - 1.0)
         if isinstance(ratios, np.ndarray):

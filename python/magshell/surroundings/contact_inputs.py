@@ -112,7 +112,7 @@ def check_neighbours(scene: Scene, warns: bool = False) -> None:
             f"the minimal_distance of a {kind}, {wanted:g} m, is larger than what neighbours along a surface have at rest: "
             f"{faces} are {nearest:g} m apart"
         )
-        if contact.distance_given or wanted != contact.minimal_distance:
+        if contact._distance_given or wanted != contact.minimal_distance:
             raise ValueError(f"{told}. Give it at most {nearest:g} m, or a mesh with longer edges")
         if warns:
             kept = 0.5 * nearest * wanted / (wanted + contact.reach)
@@ -196,7 +196,7 @@ def near_kinks(
     """
     vertices, weights = bodies.contact_points(contact)
     places = np.einsum("pk,pkc->pc", weights, positions[vertices])
-    reach = contact.law(*sheets)[1] * np.concatenate([np.eye(3), -np.eye(3)])
+    reach = contact._law(*sheets)[1] * np.concatenate([np.eye(3), -np.eye(3)])
     found = [np.zeros(0, dtype=vertices.dtype)]
     for obstacle in obstacles:
         touching = obstacle.signed_distance(places, time) < contact.offset

@@ -91,7 +91,7 @@ class Tendon(Actuator):
         self.smoothing: np.ndarray = number("smoothing", "m", smooth, 0.0, above=True)
 
     @property
-    def is_spring(self) -> bool:
+    def _is_spring(self) -> bool:
         """Whether it has a stiffness; else it pulls with a tension that is given."""
         return bool(self.stiffness > 0.0)
 
@@ -109,7 +109,7 @@ class Tendon(Actuator):
         now = {name: getattr(self, name) for name in self._replaceable} | values
         return self._keep_shapes(Tendon(self._points, sliding=self.sliding, **now))
 
-    def tension_at(self, length: Numbers) -> Computed:
+    def _tension_at(self, length: Numbers) -> Computed:
         """N, at a length, m; of a tendon that does not slide, at those of its segments, (..., segments)."""
         shares = 1.0 if self.sliding else _like(self._shares, length)
         beyond = length - shares * float(self.rest_length)
@@ -120,7 +120,7 @@ class Tendon(Actuator):
         )
         return float(self.tension) + float(self.stiffness) / shares * pull
 
-    def riding(self, scene_bodies: Bodies, places: list[Place]) -> list[tuple[np.ndarray, np.ndarray]]:
+    def _riding(self, scene_bodies: Bodies, places: list[Place]) -> list[tuple[np.ndarray, np.ndarray]]:
         """Of each point the core's vertices that it rides on, and their weights."""
         return riding_points(self._points, scene_bodies, places)
 
@@ -131,7 +131,7 @@ class Tendon(Actuator):
             "shares": self._shares.tolist(),
             "points": [
                 {"vertices": vertices.tolist(), "weights": weights.tolist()}
-                for vertices, weights in self.riding(bodies, places)
+                for vertices, weights in self._riding(bodies, places)
             ],
         }
 
