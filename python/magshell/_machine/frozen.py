@@ -44,9 +44,8 @@ class Frozen:
         object.__delattr__(self, name)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Takes what a copy or another process hands over: arrays arrive writable."""
-        vars(self).update(state)
-        read_only(state)
+        """Takes what a copy, another process or a file hands over: arrays arrive writable, dicts plain."""
+        vars(self).update(_of_fixed_parts(self, state))
 
 
 def immutable(cls: C) -> C:
@@ -60,7 +59,7 @@ def immutable(cls: C) -> C:
         if not hasattr(cls, "__setstate__"):
             cls.__setstate__ = Frozen.__setstate__
     else:
-        cls.__new__ = _of_fixed_parts(cls.__new__)
+        cls.__new__ = _new_of_fixed_parts(cls.__new__)
     return cls
 
 
@@ -133,17 +132,22 @@ def _with_fixed_parts(init: Any) -> Any:
     @functools.wraps(init)
     def made(self, *arguments, **named):
         init(self, *arguments, **named)
-        as_given = getattr(self, "_as_given", ())
-        for name, value in vars(self).items():
-            if name.startswith("_"):
-                read_only(value)
-            elif name not in as_given:
-                vars(self)[name] = _fixed(value)
+        vars(self).update(_of_fixed_parts(self, vars(self)))
 
     return made
 
 
-def _of_fixed_parts(new: Any) -> Any:
+def _of_fixed_parts(thing: Any, state: dict[str, Any]) -> dict[str, Any]:
+    """The attributes of an object so that they cannot be edited. What is private stays what it is, with read-only arrays."""
+    as_given = getattr(thing, "_as_given", ())
+    read_only({name: value for name, value in state.items() if name not in as_given})
+    return {
+        name: value if name.startswith("_") or name in as_given else _fixed(value)
+        for name, value in state.items()
+    }
+
+
+def _new_of_fixed_parts(new: Any) -> Any:
     """The `__new__` of a named tuple, likewise."""
 
     @functools.wraps(new)

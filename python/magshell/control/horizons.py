@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -50,8 +50,8 @@ class Receding:
     controls: Any
     reached: int
     state: Any = field(repr=False)
-    searches: list[tuple[Horizon, Minimum]] = field(repr=False)
-    failures: list[tuple[Horizon, str]] = field(default_factory=list)
+    searches: Sequence[tuple[Horizon, Minimum]] = field(repr=False)
+    failures: Sequence[tuple[Horizon, str]] = ()
     trials: int = 0
 
     @property
@@ -147,7 +147,7 @@ def receding(
         raise ValueError("max_iterations and trials are both 0: there is nothing to search with")
     rng = np.random.default_rng(count("seed", seed, least=0))
     steps, planned, state = len(given), given.clamp(low, high), start
-    searches: list[tuple[Horizon, Minimum]] = []
+    searches: Sequence[tuple[Horizon, Minimum]] = []
     failures: list[tuple[Horizon, str]] = []
     reached = known = tried = 0
 

@@ -40,8 +40,8 @@ class Windows:
     [(Window, why)], of those whose search ended early, which left what was best until then."""
 
     controls: object
-    searches: list[tuple[Window, Minimum]] = field(repr=False)
-    failures: list[tuple[Window, str]] = field(default_factory=list)
+    searches: Sequence[tuple[Window, Minimum]] = field(repr=False)
+    failures: Sequence[tuple[Window, str]] = ()
 
     @property
     def evaluations(self) -> int:
@@ -100,7 +100,7 @@ def in_windows(
     check_functions(objective=objective, **({} if optimizer is None else {"optimizer": optimizer}))
     count("max_iterations", max_iterations)
     tolerance, hold = not_negative("tolerance", "", tolerance), flag("hold", hold)
-    searches: list[tuple[Window, Minimum]] = []
+    searches: Sequence[tuple[Window, Minimum]] = []
     failures: list[tuple[Window, str]] = []
     reached = windows[0].steps
     for window in windows:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -41,10 +41,10 @@ class Minimum:
     many}, in all. conflict: what seems to keep the objective from falling, where it is one and the same jump of the
     equilibrium in every one of the last iterations; else empty."""
 
-    parameters: list[Any]
+    parameters: Sequence[Any]
     objective: float
     violation: float
-    history: list[Record] = field(default_factory=list)
+    history: Sequence[Record] = ()
     reason: str = ""
     rejections: dict[str, int] = field(default_factory=dict)
     conflict: str = ""

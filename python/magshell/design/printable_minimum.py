@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -47,7 +48,7 @@ class PrintableMinimum:
     objective: float
     free_objective: float
     rounded_at_once: float | None
-    history: list[PrintableStage] = field(default_factory=list)
+    history: Sequence[PrintableStage] = ()
     reason: str = ""
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -64,7 +65,7 @@ class MotionState:
     time: float
     state: np.ndarray = field(repr=False)
     velocity: np.ndarray = field(repr=False)
-    turns: list[Any] = field(repr=False, default_factory=list)
+    turns: Sequence[Any] = field(repr=False, default=())
     acceleration: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
     strain_rates: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
     maxwell_strains: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))

@@ -127,7 +127,7 @@ class BodyContact(Owner):
         if law not in LAWS:
             raise ValueError(f'law must be "barrier" or "penalty", got {law!r:.60}')
         self.law, self.lagged_friction = law, flag("lagged_friction", lagged_friction)
-        bodies = [side_of(side) for side in self.sides]
+        bodies = [side_of(side) for side in self._sides]
 
         def number(name, unit, default, check=positive):
             return default if given[name] is None else check(name, unit, given[name])
@@ -164,7 +164,7 @@ class BodyContact(Owner):
         return min(map(_reach, bodies))
 
     @property
-    def sides(self) -> tuple[Any, ...]:
+    def _sides(self) -> tuple[Any, ...]:
         return self.a, self.b
 
     @property
@@ -207,7 +207,7 @@ class BodyContact(Owner):
     def __repr__(self) -> str:
         friction = "" if self.friction_coefficient is None else f", friction {self.friction_coefficient:g}"
         return (
-            f"{type(self).__name__}({' and '.join(type(side).__name__ for side in self.sides)}; {self.law}, "
+            f"{type(self).__name__}({' and '.join(type(side).__name__ for side in self._sides)}; {self.law}, "
             f"{self.contact_stiffness:g} Pa within {self.reach:g} m beyond {self.minimal_distance:g} m{friction})"
         )
 
@@ -265,7 +265,7 @@ class SelfContact(BodyContact):
         return _thickness(self.a)
 
     @property
-    def sides(self) -> tuple[Any, ...]:
+    def _sides(self) -> tuple[Any, ...]:
         return (self.a,)
 
     def replaced(self, **values: Any) -> SelfContact:

@@ -127,6 +127,7 @@ class Cavity(Actuator):
     _replaceable = _in_time = tuple(name for names in _LAWS.values() for name in names)
 
     def replaced(self, **values: Any) -> Cavity:
+        """Returns the same cavity with other numbers of what is inside."""
         now = {name: getattr(self, name) for name in self._replaceable} | values
         return self._keep_shapes(Cavity(self._parts, cap_rims=self.cap_rims, **now))
 

@@ -76,6 +76,7 @@ class Cells(Actuator):
         return len(self._groups)
 
     def replaced(self, **values: Any) -> Cells:
+        """Returns the same cells with other numbers."""
         now = {name: getattr(self, name) for name in self._replaceable} | values
         return self._keep_shapes(Cells(self.body, self._groups, **now))
 

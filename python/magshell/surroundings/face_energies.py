@@ -61,6 +61,7 @@ class FaceEnergy(Owner):
         return {name: gradient.value(label, name)[chosen] for name in self._replaceable}
 
     def replaced(self, **values: Any) -> FaceEnergy:
+        """Returns the same energy with other numbers, on the same faces."""
         now = {name: getattr(self, name) for name in self._replaceable}
         return type(self)(*(now | values).values(), faces=self.faces, body=self.body)
 

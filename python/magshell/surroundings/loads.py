@@ -76,6 +76,7 @@ class PointLoad(DeadLoad):
         super().__init__("force [N]", force, body)
 
     def replaced(self, *, force: Numbers) -> PointLoad:
+        """Returns the same load with another force [N]."""
         return PointLoad(self.vertices, force, self.body)
 
     def _shares(self, mesh: TriangleMesh):
@@ -105,6 +106,7 @@ class EdgeLoad(DeadLoad):
         super().__init__("force_per_length [N/m]", force_per_length, body)
 
     def replaced(self, *, force_per_length: Numbers) -> EdgeLoad:
+        """Returns the same load with another force per length [N/m]."""
         return EdgeLoad(self.edges, force_per_length, self.body)
 
     def _shares(self, mesh: TriangleMesh):
@@ -134,6 +136,7 @@ class AreaLoad(DeadLoad):
         super().__init__("force_per_area [N/m2]", force_per_area, body)
 
     def replaced(self, *, force_per_area: Numbers) -> AreaLoad:
+        """Returns the same load with another force per area [N/m2]."""
         return AreaLoad(force_per_area, self.faces, self.body)
 
     def _shares(self, mesh: TriangleMesh):
@@ -197,6 +200,7 @@ class EdgeCouple(Owner):
         return {"couple_per_length": gradient.value("couples", "couples")[of_edges] @ along}
 
     def replaced(self, *, couple_per_length: Numbers) -> EdgeCouple:
+        """Returns the same load with another couple per length [N], of the same shape."""
         changed = EdgeCouple(self.edges, couple_per_length, self.body)
         if changed.couple_per_length.shape != self.couple_per_length.shape:
             raise ValueError(

@@ -59,6 +59,7 @@ class Pressure(Owner):
         self.pressure: np.ndarray = quantity("pressure", "Pa", array, array.shape)
 
     def replaced(self, *, pressure: Numbers) -> Pressure:
+        """Returns the same load with another pressure [Pa], of the same shape."""
         changed = Pressure(pressure, faces=self.faces, body=self.body)
         if changed.pressure.shape != self.pressure.shape:
             raise ValueError(

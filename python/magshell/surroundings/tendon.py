@@ -106,6 +106,7 @@ class Tendon(Actuator):
         return next((each for each in self.bodies if isinstance(each, BODIES)), None)
 
     def replaced(self, **values: Any) -> Tendon:
+        """Returns the same tendon with other numbers."""
         now = {name: getattr(self, name) for name in self._replaceable} | values
         return self._keep_shapes(Tendon(self._points, sliding=self.sliding, **now))
 
