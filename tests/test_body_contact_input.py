@@ -102,7 +102,7 @@ def test_what_touches_twice():
     lower, upper = pair()
     touch = ms.Contact(lower, upper)
     for twice in (
-        [touch, touch],
+        [touch, touch.replaced()],
         [touch, ms.Contact(upper, lower)],
         [ms.SelfContact(lower), ms.SelfContact(lower)],
     ):
