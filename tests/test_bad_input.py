@@ -106,7 +106,11 @@ test_scene_is_refused = refused(
             lambda: scene(field=ms.UniformField),
             "field must hold .* the class UniformField: call it",
         ),
-        ("two uniform", lambda: scene(field=[ms.UniformField(), ms.UniformField()]), "field holds several UniformFields"),
+        (
+            "two uniform",
+            lambda: scene(field=[ms.UniformField(), ms.UniformField()]),
+            "field holds several UniformFields",
+        ),
         ("a field without value", lambda: scene(field=ms.AppliedField()), "AppliedField without a value"),
         ("gravity without mass", lambda: scene(gravity=(0, 0, -9.81)), r"no mass_density \[kg/m3\]"),
         (

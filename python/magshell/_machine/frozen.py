@@ -14,13 +14,14 @@ T = TypeVar("T")
 
 # The ids of the objects whose __init__ is running; each is there for that long only, so that it is that of one object.
 _being_made: set[int] = set()
+_HOLDERS = (np.ndarray, tuple, dict)
 
 
 class Frozen:
     """A base of objects whose attributes are set while `__init__` runs, and never after.
 
     Setting or deleting one later raises FrozenInstanceError, an AttributeError, which says how to get another value. The
-    arrays that an object holds are read-only from the end of `__init__` on, in copies and in other processes too. Cached
+    arrays that an object holds are read-only as soon as it has them, in copies and in other processes too. Cached
     properties still work: Python keeps them without setting an attribute. Code of the package makes a changed copy by
     `variant`, and keeps what it found by `remember`.
     """
@@ -36,6 +37,8 @@ class Frozen:
     def __setattr__(self, name: str, value: Any) -> None:
         if id(self) not in _being_made:
             refuse(self, name)
+        if isinstance(value, _HOLDERS):
+            read_only(value)
         object.__setattr__(self, name, value)
 
     def __delattr__(self, name: str) -> None:
@@ -109,7 +112,10 @@ class FixedDict(dict[Any, Any]):
 
 
 def _closing(init: Any) -> Any:
-    """The `__init__` of a class, in which attributes can be set, with read-only arrays at its end."""
+    """The `__init__` of a class, in which attributes can be set.
+
+    It leaves `__dict__` alone: once that is asked for, every look at an attribute takes twice as long.
+    """
 
     @functools.wraps(init)
     def made(self, *arguments, **named):
@@ -121,7 +127,6 @@ def _closing(init: Any) -> Any:
             init(self, *arguments, **named)
         finally:
             _being_made.discard(id(self))
-        read_only(vars(self))
 
     return made
 
@@ -132,7 +137,10 @@ def _with_fixed_parts(init: Any) -> Any:
     @functools.wraps(init)
     def made(self, *arguments, **named):
         init(self, *arguments, **named)
-        vars(self).update(_of_fixed_parts(self, vars(self)))
+        before = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        for name, value in _of_fixed_parts(self, before).items():
+            if value is not before[name]:
+                object.__setattr__(self, name, value)
 
     return made
 

@@ -47,14 +47,12 @@ class Joint(Owner):
         self.axis: np.ndarray = np.zeros(3)
         self._axis_length = 1.0  # of what was given
         if axis is not None:
-            self.axis = np.array(quantity("axis", "", axis, (3,)))
-            self._axis_length = np.linalg.norm(self.axis)
+            along = quantity("axis", "", axis, (3,))
+            self._axis_length = np.linalg.norm(along)
             if not self._axis_length > 0:
                 raise ValueError("axis must not be zero")
-            self.axis /= self._axis_length
-        self._given = {name: value for name, value in law.items() if value is not None}
-        for name, value in self._given.items():
-            self._given[name] = self._checked(name, value)
+            self.axis = along / self._axis_length
+        self._given = {name: self._checked(name, value) for name, value in law.items() if value is not None}
         self._check_together()
         self.rate: float | np.ndarray | None = None if rate is None else self._checked_rate(rate)
         # What it was made without, a solve cannot give it.

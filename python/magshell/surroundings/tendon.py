@@ -82,7 +82,7 @@ class Tendon(Actuator):
             raise ValueError(
                 f"points {np.argmin(self._shares)} and {np.argmin(self._shares) + 1} of the Tendon are one"
             )
-        self._shares /= length
+        self._shares = self._shares / length
         self.tension: np.ndarray = number("tension", "N", tension, 0.0)
         self.stiffness: np.ndarray = number("stiffness", "N/m", stiffness, 0.0)
         rest = length if rest_length is None else rest_length
