@@ -287,3 +287,18 @@ def test_a_module_offers_its_public_names_alone(module) -> None:
     found = getattr(ms, module)
     assert dir(found) == sorted(found.__all__)
     assert all(getattr(found, name).__module__.startswith("magshell") for name in found.__all__)
+
+
+def test_replaced_makes_another_with_every_value_that_the_message_names() -> None:
+    """Of objects that a solve gives other values: the message sends users there."""
+    for name, each in MADE.items():
+        replaceable = [value for value in getattr(each, "_replaceable", ()) if hasattr(each, value)]
+        values = {value: getattr(each, value) for value in replaceable if not callable(getattr(each, value))}
+        given = {value: now for value, now in values.items() if now is not None}
+        if not given or not hasattr(each, "replaced"):
+            continue
+        other = each.replaced(**given)
+        assert type(other) is type(each) and other is not each, name
+        test_no_attribute_can_be_assigned(other)
+        for value, now in given.items():
+            np.testing.assert_array_equal(getattr(other, value), now, err_msg=f"{name}.{value}")
