@@ -62,7 +62,7 @@ def main(edges_per_side=12, n_vertices=1097, iterations=50) -> dict:
         "runs": runs,
         "magnetization": magnetization,
         "positions": best["positions"],
-        "plain_sum": float(star.misses(torch.from_numpy(best["positions"]))),
+        "plain_sum": float(star.misses(torch.tensor(best["positions"]))),
         "rms": ARM_LENGTH * np.sqrt(best["objective"] / len(FIELDS)),
         "largest_magnetization": np.linalg.norm(magnetization, axis=1).max(),
         "normal_magnetization": np.abs(magnetization[:, 2]).max(),

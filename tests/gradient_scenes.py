@@ -200,7 +200,7 @@ def _values_of(scene: ms.Scene, owner, moving: bool) -> dict[str, object]:
         values = {"gravity": scene.gravity, "vertex_loads": loads}
         absent = {name for name, value in values.items() if not np.any(value)}
     elif isinstance(owner, ms.Contact):
-        values = dict(zip(names, owner.law(*scene._values.touching(owner)), strict=True))
+        values = dict(zip(names, owner._law(*scene._values.touching(owner)), strict=True))
         absent = set() if scene.has_forces_of_motion else {"friction_coefficient"}
     elif isinstance(owner, ms.BodyContact):
         values = {name: getattr(owner, name) for name in names}
@@ -210,7 +210,7 @@ def _values_of(scene: ms.Scene, owner, moving: bool) -> dict[str, object]:
         if not moving:
             absent |= {"friction_coefficient", "static_friction_coefficient", "sticking_speed"}
     elif isinstance(owner, ms.Pin | ms.Clamp):
-        motion = owner.held(scene._bodies.of(owner).mesh)[0].move
+        motion = owner._held(scene._bodies.of(owner).mesh)[0].move
         values = {} if motion is None else {**motion._asdict(), "displacement": motion.translation}
         absent = set(names) if motion is None else set()
     elif isinstance(owner, ms.PlacedField):

@@ -106,7 +106,11 @@ test_scene_is_refused = refused(
             lambda: scene(field=ms.UniformField),
             "field must hold .* the class UniformField: call it",
         ),
-        ("two uniform", lambda: scene(field=[ms.UniformField()] * 2), "field holds several UniformFields"),
+        (
+            "two uniform",
+            lambda: scene(field=[ms.UniformField(), ms.UniformField()]),
+            "field holds several UniformFields",
+        ),
         ("a field without value", lambda: scene(field=ms.AppliedField()), "AppliedField without a value"),
         ("gravity without mass", lambda: scene(gravity=(0, 0, -9.81)), r"no mass_density \[kg/m3\]"),
         (
@@ -215,7 +219,7 @@ test_support_is_refused = refused(
             lambda: ms.Pin([0], center=(0, 0, 0)),
             r"center is that of a rotation: give a rotation \[rad\]",
         ),
-        ("held twice", held_by(CLAMP, CLAMP), "two supports hold the direction across edge 0"),
+        ("held twice", held_by(CLAMP, CLAMP.replaced()), "two supports hold the direction across edge 0"),
         (
             "still and moved",
             held_by(CLAMP, ms.Pin(END[:1], displacement=(0, 0, 1e-3))),

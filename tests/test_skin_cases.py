@@ -157,7 +157,7 @@ def test_a_solid_on_a_floor_is_carried_by_it(element):
     motion = ms.simulate(scene, steps=400, time_step=1e-3, integrator=ms.ImplicitEuler())
     bottom = np.flatnonzero(np.abs(solid.mesh.rest_positions[:, 2] - low[2]) < 1e-9)
     depths = low[2] - motion.positions[-1][bottom, 2]
-    smoothing = floor.law(solid)[1]
+    smoothing = floor._law(solid)[1]
     carried = 100.0 * np.where(depths > smoothing, depths - smoothing / 2, depths**2 / (2 * smoothing)).sum()
     assert carried == pytest.approx(8e-6 * 1e3 * 9.81, rel=1e-3)
 

@@ -215,7 +215,7 @@ def test_a_skin_with_mass_weighs_and_is_inert(element):
     assert more.sum() == pytest.approx(1e-3 * mesh.face_areas @ rows)
     on_surface = np.isin(np.arange(len(more)), heavy.mesh.boundary_vertices)
     assert (more[on_surface] > 0).all() and not more[~on_surface].any()
-    assert np.allclose(heavy.weighed_masses - light.weighed_masses, more)
+    assert np.allclose(heavy._weighed_masses - light._weighed_masses, more)
     scene = in_field(heavy, gravity=(0, 0, -9.81))
     values = {heavy.skin: {"thickness": 2e-3}}
     for given, factor in (({}, 1.0), (values, 2.0)):

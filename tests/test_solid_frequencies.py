@@ -76,7 +76,7 @@ def test_consistent_masses_of_turned_welded_and_curved_bodies():
     curved = ms.Solid(tube, material=material, mass_density=2.0)
     nodes, masses = curved.element_masses
     totals = np.bincount(nodes.ravel(), weights=masses.sum(axis=2).ravel())
-    assert np.allclose(totals, curved.weighed_masses, rtol=0, atol=1e-14)
+    assert np.allclose(totals, curved._weighed_masses, rtol=0, atol=1e-14)
     moment = np.einsum("tki,tkl,tli->i", tube.rest_positions[nodes], masses, tube.rest_positions[nodes])
     assert np.allclose(
         moment[:2], 2.0 * np.pi * (2.0**4 - 1) / 32, rtol=3e-3

@@ -145,7 +145,7 @@ def test_flat_quarters_of_a_side_carry_a_quarter_each():
 def test_the_weight_of_curved_elements_is_where_it_is():
     """Its sum and its moments, which shapes of the second degree have exactly: by integration with many points."""
     solid = curved_tube()
-    mesh, weights = solid.mesh, solid.weighed_masses
+    mesh, weights = solid.mesh, solid._weighed_masses
     points, lengths = np.polynomial.legendre.leggauss(6)
     grid = np.stack([each.ravel() for each in np.meshgrid(points, points, points)], axis=1) / 2 + 0.5
     a, b, c = grid.T

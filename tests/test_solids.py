@@ -78,8 +78,8 @@ def test_masses_and_weights_add_up_and_masses_are_positive(element):
     solid, _ = finger(element)
     total = 1e3 * 0.1 * 0.02 * 0.02
     assert solid.vertex_masses.min() > 0
-    assert np.isclose(solid.vertex_masses.sum(), total) and np.isclose(solid.weighed_masses.sum(), total)
-    center = solid.weighed_masses @ solid.mesh.rest_positions / total
+    assert np.isclose(solid.vertex_masses.sum(), total) and np.isclose(solid._weighed_masses.sum(), total)
+    center = solid._weighed_masses @ solid.mesh.rest_positions / total
     assert np.allclose(center, solid.mesh.rest_positions.mean(axis=0) * 0 + [0.05, 0.01, 0.01])
 
 

@@ -59,7 +59,11 @@ test_contacts_refuse = refused(
             lambda: contact(obstacles=Plane),
             r"objects of ms\.obstacles, got the class Plane: call it",
         ),
-        ("twice the same", lambda: contact(obstacles=[GROUND, GROUND]), "each of them once"),
+        (
+            "twice the same",
+            lambda: contact(obstacles=[GROUND, GROUND]),
+            r"obstacles\[0\] and obstacles\[1\] are one Plane",
+        ),
         (
             "negative stiffness",
             lambda: contact(contact_stiffness=-1.0),

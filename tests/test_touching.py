@@ -11,7 +11,7 @@ POINT = np.array([0.3, 0.1, -0.2])
 
 
 def weight(scene):
-    return scene._values.weighed_masses[:, None] * np.array(DOWN)
+    return scene._values._weighed_masses[:, None] * np.array(DOWN)
 
 
 def inertia(scene, motion, k):

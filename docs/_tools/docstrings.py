@@ -6,18 +6,8 @@ _FIELD = re.compile(
     r"^((?:\*{0,2}[A-Za-z_][\w.]*(?:\([^)]*\))?)(?:, \*{0,2}[A-Za-z_][\w.]*)*): (.*)$"
 )
 _SECTION = re.compile(r"^(Args|Raises|Returns):$")
-# Of classes, for those who extend them; a user calls none of these.
-_INNER = {
-    "add_numbers",
-    "gradients",
-    "replaced",
-    "held",
-    "directed",
-    "by_thickness",
-    "sides",
-    "riding",
-    "current",
-}
+# For those who extend the package; a user calls none of these.
+_INNER = {"current"}
 
 
 def process(app, what, name, obj, options, lines) -> None:

@@ -23,7 +23,7 @@ class Problem:
 
     def __init__(self, sheet: Sheet, positions: np.ndarray, noise: float, nodes: tuple[int, int]):
         self.sheet, self.noise, self.nodes = sheet, noise, nodes
-        self.positions = torch.from_numpy(positions)
+        self.positions = torch.tensor(positions)
         self.n_nodes = nodes[0] * nodes[1]
         self._barycenters = torch.tensor(sheet.mesh.face_barycenters)
         self._warm = ms.WarmStart(sheet.scene)

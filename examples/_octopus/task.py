@@ -111,10 +111,16 @@ class Swim:
         """The frames in which all of the octopus is beyond the channel's narrow part."""
         return np.flatnonzero(positions[:, :, 0].min(axis=1) > self.channel.end)
 
+    @staticmethod
+    def positions(motion: ms.Trajectory) -> torch.Tensor:
+        """As a tensor; of an array a copy, because those of results are read-only."""
+        found = motion.positions
+        return found if torch.is_tensor(found) else torch.tensor(found)
+
     def objective(self, field, horizon: ms.control.Horizon, before: ms.Trajectory | None) -> dict:
         """Terms in m2, of the steps of a horizon: how late the center is, in the later half; how far the center and the
         nose, which leads, are from the axis; what the field costs."""
-        positions = torch.as_tensor(self.move(field, before).positions)[1:]
+        positions = self.positions(self.move(field, before))[1:]
         center, nose = self.center(positions), positions[:, NOSE]
         path = torch.from_numpy(self.path(np.arange(horizon.first + 1, horizon.end + 1)))
         late = (path - center[:, 0]).clamp(min=0)[len(field) // 2 :]

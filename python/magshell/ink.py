@@ -9,6 +9,7 @@ import numpy as np
 from ._checks.quantity import one_or_more, quantity
 from ._checks.scalars import positive
 from ._checks.tensors import detached, is_tensor, like, real_tensor, require_torch
+from ._machine.frozen import Frozen
 
 if TYPE_CHECKING:
     import torch
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 _UNIT = 1e-6  # how far frames may be from orthonormal
 
 
-class Ink:
+class Ink(Frozen):
     """The magnetizations that can be printed: a few directions, one strength, and any share of it or a few.
 
     strength: A/m, of a face that is magnetized fully.

@@ -18,6 +18,23 @@ if TYPE_CHECKING:
     from ._checks.kinds import Numbers
 
 
+__all__ = [
+    "bilinear",
+    "cap",
+    "extension",
+    "height_map",
+    "magnitude",
+    "printable",
+    "shape_matching",
+    "total_variation",
+]
+
+
+def __dir__() -> list[str]:
+    """Returns what is public, for tab completion."""
+    return sorted(__all__)
+
+
 def shape_matching(
     positions: Numbers, target: Numbers, vertices: Numbers | None = None, weights: Numbers | None = None
 ) -> torch.Tensor:

@@ -19,6 +19,23 @@ if TYPE_CHECKING:
     from .mesh.triangle_mesh import TriangleMesh
 
 
+__all__ = [
+    "along",
+    "capped",
+    "frames_along",
+    "from_regions",
+    "log_scaled",
+    "log_shares",
+    "project_to_cap",
+    "radial_frames",
+]
+
+
+def __dir__() -> list[str]:
+    """Returns what is public, for tab completion."""
+    return sorted(__all__)
+
+
 def from_regions(values: Numbers, regions: Numbers) -> torch.Tensor:
     """Values a face, (n_f, ...), equal within a region.
 

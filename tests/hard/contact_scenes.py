@@ -57,7 +57,7 @@ def drawn(seed: int) -> Drawn:
     gravity = min(
         9.81 * (1e3 if kind == "squeeze" and rng.random() < 0.5 else 1.0), 0.2 * modulus / (1e3 * size)
     )
-    alone = [body for body in bodies if not any(contact.sides == (body,) for contact in contacts)]
+    alone = [body for body in bodies if not any(contact._sides == (body,) for contact in contacts)]
     contacts += [ms.SelfContact(body, **law) for body in alone]  # whatever may meet is told so
     scene = ms.Scene(
         bodies, supports=supports, contacts=contacts, gravity=(0.0, 0.0, -gravity), allow_rigid_motions=True

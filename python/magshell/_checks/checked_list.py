@@ -19,9 +19,9 @@ def listed(name: str, given: Any, is_one: Callable[[Any], bool]) -> list[Any]:
 
 
 def checked_list(
-    name: str, items, kinds: tuple[type[Any], ...], wanted: str | None = None
+    name: str, items, kinds: tuple[type[Any], ...], wanted: str | None = None, repeats: bool = False
 ) -> tuple[Any, ...]:
-    """Of one object or several; raises ValueError where one is of none of the kinds."""
+    """Of one object or several; raises ValueError where one is of none of the kinds, or is there twice, unless repeats."""
     wanted = wanted or ", ".join(kind.__name__ for kind in kinds) + " objects"
     several = (
         isinstance(items, Iterable) and getattr(items, "ndim", 1) > 0
@@ -31,4 +31,17 @@ def checked_list(
         if not isinstance(item, kinds):
             what = f"the class {item.__name__}: call it" if isinstance(item, type) else type(item).__name__
             raise ValueError(f"{name} must hold {wanted}, got {what}")
+    if not repeats:
+        _refuse_repeats(name, listed)
     return tuple(listed)
+
+
+def _refuse_repeats(name: str, items: list[Any]) -> None:
+    """What is there twice would act twice, while values and gradients know it once."""
+    first: dict[int, int] = {}
+    for k, item in enumerate(items):
+        if (before := first.setdefault(id(item), k)) < k:
+            raise ValueError(
+                f"{name} must differ, but {name}[{before}] and {name}[{k}] are one {type(item).__name__}: list it once, or "
+                "make another like it"
+            )

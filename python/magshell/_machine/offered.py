@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+from .frozen import Frozen
+
 F = TypeVar("F", bound=Callable)
 
 _FUNCTIONS: dict[str, Callable] = {}
@@ -17,7 +19,7 @@ def offered(function: F) -> F:
     return function
 
 
-class Drawn:
+class Drawn(Frozen):
     """What ms.plot draws."""
 
     def plot(self, **options: Any) -> Any:
@@ -27,6 +29,11 @@ class Drawn:
 
 class Kept(Drawn):
     """A result that ms.save writes."""
+
+    _way = (
+        "It is what a solve found; to go on from other positions, start the next solve from a changed copy: "
+        "ms.equilibrium(scene, start=positions)"
+    )
 
     def save(self, path: Any) -> None:
         """Writes it into one .npz file: ms.save(path, self). ms.load(path, scene) makes it again."""

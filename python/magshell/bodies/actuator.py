@@ -21,8 +21,8 @@ class Actuator(Owner):
     out.
     """
 
-    for_all = False
-    is_spring = True
+    _for_all = False
+    _is_spring = True
     bodies: tuple[Any, ...] = ()
     _units: ClassVar[dict[str, str]] = {}
 
@@ -34,7 +34,7 @@ class Actuator(Owner):
         """The one body, or None where there are several."""
         return self.bodies[0] if len(self.bodies) == 1 else None
 
-    def filling(self, scene: Scene) -> float:
+    def _filling(self, scene: Scene) -> float:
         """How much of a volume at rest a load factor of 1 adds to it, or takes away."""
         return 0.0
 

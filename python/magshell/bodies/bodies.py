@@ -45,7 +45,7 @@ class Bodies:
         touching: Iterable[Rigid] = (),
     ):
         self.touching: tuple[Rigid, ...] = tuple(touching)
-        listed = checked_list("bodies", bodies, (*BODIES, Rigid, Skeleton))
+        listed = checked_list("bodies", bodies, (*BODIES, Rigid, Skeleton), repeats=True)
         self.skeletons: tuple[Skeleton, ...] = tuple(body for body in listed if isinstance(body, Skeleton))
         self.listed: tuple[Any, ...] = tuple(listed)
         self.shells: tuple[Shell | Solid, ...] = tuple(body for body in listed if isinstance(body, BODIES))
@@ -162,23 +162,23 @@ class Bodies:
     def moved_by(self, joint: Joint) -> list[int]:
         """The numbers of the rigid parts that a joint carries."""
         (skeleton,) = (each for each in self.skeletons if any(joint is own for own in each.joints))
-        return [self.rigid_number(each) for each in skeleton.moved_by(joint)]
+        return [self.rigid_number(each) for each in skeleton._moved_by(joint)]
 
     def started_by(self, part: Rigid) -> list[int]:
         """The numbers of the rigid parts that start with the velocity of a free one: of a skeleton, its tree."""
         skeleton = self.skeleton_of(part)
-        moved = [part] if skeleton is None else skeleton.tree(part)
+        moved = [part] if skeleton is None else skeleton._tree(part)
         return [self.rigid_number(each) for each in moved]
 
     def drifts(self, part: Rigid) -> bool:
         """Whether nothing but itself tells a rigid part where to be."""
         skeleton = self.skeleton_of(part)
-        return part.vertices is None if skeleton is None else skeleton.drifts(part)
+        return part.vertices is None if skeleton is None else skeleton._drifts(part)
 
     def held_by_joints(self, part: Rigid) -> bool:
         """Whether joints lead from it to the world."""
         skeleton = self.skeleton_of(part)
-        return skeleton is not None and skeleton.held(part)
+        return skeleton is not None and skeleton._held(part)
 
     @property
     def sheets(self) -> tuple[Shell, ...]:
@@ -276,7 +276,7 @@ class Bodies:
         if item.body is None:
             if len(self) == 1:
                 return self.spans[0]
-            if item.for_all:
+            if item._for_all:
                 return Span(self.mesh, slice(None))
             raise ValueError(
                 f"the scene has {len(self)} bodies, so a {kind} must say which of them it is about: {kind}(..., body=...)"
@@ -336,7 +336,7 @@ class Whole:
 
     def __init__(self, mesh: TriangleMesh, sheets: tuple[Shell, ...]):
         self.mesh = mesh
-        self.thickness: np.ndarray = joined([sheet.face_thickness for sheet in sheets] or [np.zeros(0)])
+        self.thickness: np.ndarray = joined([sheet._face_thickness for sheet in sheets] or [np.zeros(0)])
         self.young_modulus: np.ndarray = joined([sheet.young_modulus for sheet in sheets] or [np.zeros(0)])
 
     @cached_property

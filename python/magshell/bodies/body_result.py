@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .._machine.frozen import Frozen
 from ..mesh.triangle_mesh import TriangleMesh
 from .shell import Shell
 from .shell_stresses import ShellStresses, stresses_of
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from .._checks.kinds import Computed, SolveResult
 
 
-class BodyResult:
+class BodyResult(Frozen):
     """One body of a result: its share of each array, of a tensor in its graph, with the body's own numbers.
 
     body: Shell, as it is in the scene. mesh: its own.

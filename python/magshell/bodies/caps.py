@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._machine.callers import callers_level
+from .._machine.frozen import remember
 from ..errors import MeshQualityWarning
 
 if TYPE_CHECKING:
@@ -86,7 +87,7 @@ def warn_of_caps(
     shares = caps.held_back(positions, shell, bending_energy)
     if shares.sum() <= TRUSTED_SHARE:
         return
-    scene._warned_of_caps = True
+    remember(scene, _warned_of_caps=True)
     worst = np.argsort(-shares, kind="stable")
     worst = worst[shares[worst] > 0.01 * shares.max()]
     warnings.warn(

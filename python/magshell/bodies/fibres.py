@@ -11,6 +11,7 @@ import numpy as np
 from .._checks.quantity import quantity, shape_of
 from .._checks.scalars import positive
 from .._checks.selections import indices, selection
+from .._machine.frozen import immutable
 from ..mesh.tet_mesh import TetMesh
 from .solid import Solid
 
@@ -21,6 +22,7 @@ _BACK = -0.98  # the cosine between two pieces beyond which what is between them
 _LEAST = 1e-3  # weights below are left out: the reach times 6.9
 
 
+@immutable
 @dataclass(frozen=True)
 class Fibres:
     """Fibres of some of a solid's tetrahedra, as ms.fibres_along finds them, or made by hand.

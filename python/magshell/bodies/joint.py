@@ -47,21 +47,19 @@ class Joint(Owner):
         self.axis: np.ndarray = np.zeros(3)
         self._axis_length = 1.0  # of what was given
         if axis is not None:
-            self.axis = np.array(quantity("axis", "", axis, (3,)))
-            self._axis_length = np.linalg.norm(self.axis)
+            along = quantity("axis", "", axis, (3,))
+            self._axis_length = np.linalg.norm(along)
             if not self._axis_length > 0:
                 raise ValueError("axis must not be zero")
-            self.axis /= self._axis_length
-        self._given = {name: value for name, value in law.items() if value is not None}
-        for name, value in self._given.items():
-            self._given[name] = self._checked(name, value)
+            self.axis = along / self._axis_length
+        self._given = {name: self._checked(name, value) for name, value in law.items() if value is not None}
         self._check_together()
         self.rate: float | np.ndarray | None = None if rate is None else self._checked_rate(rate)
         # What it was made without, a solve cannot give it.
         self._replaceable = (
             *self._given,
             *(() if rate is None else ("rate",)),
-            *self.places,
+            *self._places,
         )
         self._in_time = tuple(name for name in type(self)._in_time if name in self._given)
 
@@ -107,7 +105,7 @@ class Joint(Owner):
             )
         if "lower_limit" in given and not given["lower_limit"] < given.get("upper_limit", np.inf):
             raise ValueError(f"lower_limit of a {kind} must be below its upper_limit")
-        if self.driven:
+        if self._driven:
             (motor,) = (name for name in given if name.startswith("motor_"))
             if idle := [name for name in _UNDER_MOTOR if name in given]:
                 raise ValueError(
@@ -120,24 +118,24 @@ class Joint(Owner):
             )
 
     @property
-    def driven(self) -> bool:
+    def _driven(self) -> bool:
         """Whether a motor prescribes its coordinate."""
         return any(name.startswith("motor_") for name in self._given)
 
     @property
-    def acts(self) -> bool:
+    def _acts(self) -> bool:
         """Whether anything but the constraint itself is in it."""
         return bool(self._given)
 
     @property
-    def resting(self) -> Joint:
+    def _resting(self) -> Joint:
         """Itself without what pulls at rest: torques, springs and servos that want something else, limits beyond it."""
         pulls = {name for name in self._given if name in _PULLS and np.any(self._given[name])}
         beyond = {"lower_limit": -1.0, "upper_limit": 1.0}
         pulls |= {name for name, way in beyond.items() if way * self._given.get(name, way) < 0}
         return self.replaced(**{name: self._defaults[name] for name in pulls}) if pulls else self
 
-    def has(self, name: str) -> bool:
+    def _has(self, name: str) -> bool:
         """Whether it was made with this."""
         return name in self._given
 
@@ -150,28 +148,28 @@ class Joint(Owner):
         return self._again({**own, **values})
 
     @property
-    def has_axis(self) -> bool:
+    def _has_axis(self) -> bool:
         """Whether it was made with one."""
         return bool(self.axis.any())
 
     @property
-    def places(self) -> tuple[str, ...]:
+    def _places(self) -> tuple[str, ...]:
         """What of it says where it is at rest."""
-        return ("origin", "axis") if self.has_axis else ("origin",)
+        return ("origin", "axis") if self._has_axis else ("origin",)
 
     def _again(self, law: dict[Any, Any]) -> Joint:
-        own = {name: getattr(self, name) for name in self.places}
+        own = {name: getattr(self, name) for name in self._places}
         return type(self)(child=self.child, parent=self.parent, **{**own, **law})
 
-    def add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
-        if self.acts:
+    def _add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
+        if self._acts:
             for name, default in self._defaults.items():
                 numbers[label, name] = self._given.get(name, default)
-        for name in self.places:
+        for name in self._places:
             numbers[label, name] = getattr(self, name)
 
-    def gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
-        found = {name: gradient.value(label, name)[0] for name in (*self._given, *self.places)}
+    def _gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
+        found = {name: gradient.value(label, name)[0] for name in (*self._given, *self._places)}
         if self.rate is not None:
             rows = gradient.others.get("own_velocities")
             found["rate"] = np.zeros(np.shape(self.rate))
@@ -180,9 +178,9 @@ class Joint(Owner):
                 found["rate"] = found["rate"] + self._rate_gradient(place.rest, moved)
                 if self._kind != "prismatic":
                     found["origin"] = found["origin"] + np.cross(self._turning, moved).sum(axis=0)
-                if self.has_axis and self._kind != "ball":
+                if self._has_axis and self._kind != "ball":
                     found["axis"] = found["axis"] + self._axis_gradient(place.rest, moved)
-        if self.has_axis:  # of a unit vector along what was given
+        if self._has_axis:  # of a unit vector along what was given
             across = found["axis"] - self.axis * (self.axis @ found["axis"])
             found["axis"] = across / self._axis_length
         return found

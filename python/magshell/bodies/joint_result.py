@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .._machine.frozen import Frozen
 from .joint import Joint
 from .rigid_result import RigidResult, _cross
 from .skeleton_input import motor_rows
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from .._checks.kinds import Computed, SolveResult
 
 
-class JointResult:
+class JointResult(Frozen):
     """A joint of a result. Of tensors in their graph, tensors."""
 
     joint: Joint
@@ -91,7 +92,7 @@ class JointResult:
         return self._motor("prismatic", "motor_displacement")
 
     def _motor(self, kind: str, value: str):
-        if self.joint._kind != kind or not self.joint.driven:
+        if self.joint._kind != kind or not self.joint._driven:
             raise ValueError(f"only a {kind.capitalize()} with a {value} has a motor")
         return self._result._driving[..., motor_rows(self._result.scene._bodies.skeletons, self.joint)]
 

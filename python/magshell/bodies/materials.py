@@ -9,6 +9,7 @@ import numpy as np
 
 from .._checks.quantity import quantity, real_numbers
 from .._machine.entry import grouped
+from .._machine.frozen import Frozen, variant
 
 if TYPE_CHECKING:
     from .._checks.kinds import Numbers
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 NEARLY_INCOMPRESSIBLE = 0.4
 
 
-class SolidMaterial:
+class SolidMaterial(Frozen):
     """What a solid is made of. Every value is a number, or an array with one entry a tetrahedron.
 
     Raises ValueError where a value is out of range.
@@ -69,10 +70,8 @@ class SolidMaterial:
 
     def replaced(self, **values: Any) -> SolidMaterial:
         """The same material with other values."""
-        other = object.__new__(type(self))
-        other.__dict__.update(self.__dict__)
-        other._given = {**self._given, **{name: self._checked(name, value) for name, value in values.items()}}
-        return other
+        given = {**self._given, **{name: self._checked(name, value) for name, value in values.items()}}
+        return variant(self, _given=given)
 
     def rows(self, name: str, n_tetrahedra: int) -> np.ndarray:
         """One value a tetrahedron. Raises ValueError where there are not so many."""
@@ -89,11 +88,11 @@ class SolidMaterial:
         return {}
 
     @property
-    def nearly_incompressible(self) -> bool:
+    def _nearly_incompressible(self) -> bool:
         """Whether it hardly changes its volume anywhere."""
         return bool(np.max(self.poisson_ratio) > NEARLY_INCOMPRESSIBLE)
 
-    def wave_modulus(self, n_tetrahedra: int) -> np.ndarray:
+    def _wave_modulus(self, n_tetrahedra: int) -> np.ndarray:
         """Pa, (n_t,): a modulus that its stiffness for small strains is of the size of."""
         return self.rows("young_modulus", n_tetrahedra)
 
@@ -228,7 +227,7 @@ class Projective(_Isotropic):
     }
 
     @property
-    def nearly_incompressible(self) -> bool:
+    def _nearly_incompressible(self) -> bool:
         return False
 
 
@@ -289,8 +288,8 @@ class Guccione(SolidMaterial):
         return {"fibres": (3,)}
 
     @property
-    def nearly_incompressible(self) -> bool:
+    def _nearly_incompressible(self) -> bool:
         return True
 
-    def wave_modulus(self, n_tetrahedra: int) -> np.ndarray:
+    def _wave_modulus(self, n_tetrahedra: int) -> np.ndarray:
         return self.rows("stiffness", n_tetrahedra) * self.rows("fibre_exponent", n_tetrahedra)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from copy import copy
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from .._checks.quantity import quantity, real_numbers, shape_of
 from .._checks.scalars import positive
+from .._machine.frozen import variant
 from .actuator import Actuator
 from .fibre_tables import checked_force_velocity, checked_table, core_curve
 from .fibres import checked_directions, checked_weights, fibres_of
@@ -72,7 +72,7 @@ class Muscle(Actuator):
     _replaceable = ("activation", "fibres", "weights", "stiffness", "peak_stress", "shortening_rate")
     _in_time = ("activation",)
     _units: ClassVar[dict[str, str]] = {"activation": "1"}
-    is_spring = False  # its stiffness is there at rest, as its solid's
+    _is_spring = False  # its stiffness is there at rest, as its solid's
 
     def __init__(
         self,
@@ -192,7 +192,7 @@ class Muscle(Actuator):
 
     def replaced(self, **values: Any) -> Muscle:
         """The same muscle with other numbers."""
-        other, count = copy(self), len(self.elements)
+        now, count = {}, len(self.elements)
         for name, value in values.items():
             if name not in self._replaceable:
                 raise ValueError(f"the Muscle was made without {name}")
@@ -208,8 +208,8 @@ class Muscle(Actuator):
                 checked = checked_weights(value, count)
             else:
                 checked = positive(name, "1/s" if name == "shortening_rate" else "Pa", value)
-            setattr(other, name, checked)
-        return other
+            now[name] = checked
+        return variant(self, **now)
 
     @property
     def strength(self) -> float:
@@ -234,14 +234,14 @@ class Muscle(Actuator):
             **{name: core_curve(getattr(self, name)) for name in _TABLES},
         }
 
-    def add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
+    def _add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         numbers[label, "fibres"] = self.fibres / np.linalg.norm(self.fibres, axis=1, keepdims=True)
         numbers[label, "strength"] = self.strength * self.weights
         numbers[label, "activation"] = np.atleast_1d(self.activation)
         if self.shortening_rate is not None:
             numbers[label, "shortening_rate"] = self.shortening_rate
 
-    def gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
+    def _gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
         by_strength, by_fibres = gradient.value(label, "strength"), gradient.value(label, "fibres")
         lengths = np.linalg.norm(self.fibres, axis=1, keepdims=True)
         along = self.fibres / lengths

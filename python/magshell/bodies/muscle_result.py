@@ -8,6 +8,7 @@ import numpy as np
 
 from .. import _core
 from .._checks.tensors import detached
+from .._machine.frozen import Frozen, immutable
 from .at_points import mean
 from .muscle import Muscle
 from .solid import Solid
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from ..scene.scene import Scene
 
 
+@immutable
 class FibreStates(NamedTuple):
     """At the points of integration of each tetrahedron with fibres: one of linear ones, p = 4 of quadratic ones.
 
@@ -57,7 +59,7 @@ def muscles_of(result: SolveResult, body: Solid, index: int) -> dict[str, np.nda
     }
 
 
-class MuscleResult:
+class MuscleResult(Frozen):
     """A muscle of a result, with the values that it was found with.
 
     muscle: as it is in the scene.

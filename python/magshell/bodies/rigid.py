@@ -54,7 +54,7 @@ class Rigid(Owner):
     True
     """
 
-    for_all = False
+    _for_all = False
     _replaceable = ("mass", "inertia", "center", "magnetic_moment", "velocity", "angular_velocity")
 
     @grouped()
@@ -140,12 +140,12 @@ class Rigid(Owner):
     def _again(self, values: dict[Any, Any]) -> Rigid:
         return type(self)(self.vertices, body=self.body, shape=self.shape, **values)
 
-    def add_numbers(self, label: str, values: Values, numbers: dict[Any, Any]) -> None:
+    def _add_numbers(self, label: str, values: Values, numbers: dict[Any, Any]) -> None:
         if self.magnetic_moment is not None:
             numbers[label, "magnetic_moment"] = self.magnetic_moment
             numbers[label, "center"] = values.rigid_place(self).center_of(self)
 
-    def gradients(self, label: str, values: Values, gradient: Gradient) -> dict[str, np.ndarray]:
+    def _gradients(self, label: str, values: Values, gradient: Gradient) -> dict[str, np.ndarray]:
         place, found = values.rigid_place(self), {}
         by_center = np.zeros(3)
         if gradient.has(label, "magnetic_moment"):

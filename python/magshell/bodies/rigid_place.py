@@ -146,7 +146,7 @@ def _place(
     if len(rest):  # neither much smaller than what it carries, which it turns
         length = max(length, 0.5 * np.sqrt(((rest - center) ** 2).sum(axis=1).mean()))
     if skeleton is not None:
-        length = max(length, 0.5 * skeleton.reach(part, center)) or skeleton.turning_scale(part)
+        length = max(length, 0.5 * skeleton._reach(part, center)) or skeleton._turning_scale(part)
     if not length > 0:
         raise ValueError(
             "a Link of a point mass needs a joint away from its center, or one that does not let it turn (Prismatic, "
@@ -236,7 +236,7 @@ def check_joints(inputs: Inputs, points: np.ndarray) -> None:
             tilt = float(np.linalg.norm(turn @ joint.axis - along))
         if np.linalg.norm(gap) > _OPEN * size or tilt > _OPEN:
             raise ValueError(
-                f"start had another {'origin or axis' if joint.has_axis else 'origin'} of {own!r:.60}: there links would "
+                f"start had another {'origin or axis' if joint._has_axis else 'origin'} of {own!r:.60}: there links would "
                 f"be {np.linalg.norm(gap):.3g} m and {tilt:.3g} rad off; give it the value of that solve, or start at rest "
                 "positions"
             )

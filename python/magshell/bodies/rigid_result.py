@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .._machine.frozen import Frozen
 from .rigid import Rigid
 
 if TYPE_CHECKING:
     from .._checks.kinds import Computed, SolveResult
 
 
-class RigidResult:
+class RigidResult(Frozen):
     """A rigid part of a result. Of tensors in their graph, tensors.
 
     rotation: (..., 3, 3), from how it was turned at rest. center: (..., 3) m, of its own mass as the scene has it: a point

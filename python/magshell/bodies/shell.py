@@ -154,20 +154,20 @@ class Shell(Owner):
         }
         return Shell(self.mesh, bending=self.bending, **{**properties, **values, **grown})
 
-    def add_numbers(self, label: str, values: Values, numbers: dict[Any, Any]) -> None:
+    def _add_numbers(self, label: str, values: Values, numbers: dict[Any, Any]) -> None:
         for name in self._stiffnesses:
             numbers[label, name] = getattr(self, name)
         if self.remanent_magnetization is not None:  # else a solve brings it
             numbers[label, "remanent_magnetization"] = self.remanent_magnetization
 
-    def gradients(self, label: str, values: Values, gradient: Gradient) -> dict[str, np.ndarray]:
+    def _gradients(self, label: str, values: Values, gradient: Gradient) -> dict[str, np.ndarray]:
         """With what its values do to the masses of the vertices, and to what contacts make of the thickness."""
         found = {name: gradient.value(label, name) for name in self._stiffnesses}
         if gradient.has(label, "remanent_magnetization"):
             found["remanent_magnetization"] = gradient.value(label, "remanent_magnetization")
         for contact, of_contact, sheets in values.contacts:
             if any(self is sheet for sheet in sheets):
-                found["thickness"] = found["thickness"] + contact.by_thickness(of_contact, sheets, gradient)
+                found["thickness"] = found["thickness"] + contact._by_thickness(of_contact, sheets, gradient)
         at = values.part_of(self).vertices
         by_volume_mass = [
             (by[at][self.mesh.elements] * shares).sum(axis=1)
@@ -193,7 +193,7 @@ class Shell(Owner):
         return Growth("n_f" if self.mesh.order == 1 else "n", corner_axes(corners))
 
     @property
-    def has_grown(self) -> bool:
+    def _has_grown(self) -> bool:
         """Whether its rest shape is under stress by itself."""
         without = {"growth": np.eye(2), "rest_curvature": np.zeros((2, 2))}
         return any(
@@ -201,7 +201,7 @@ class Shell(Owner):
         )
 
     @property
-    def grown_by(self) -> np.ndarray:
+    def _grown_by(self) -> np.ndarray:
         """(n_f, 2, 2) in `corner_axes` of the faces; of a SixNodeMesh, each flat face like its element."""
         n = len(self.mesh.faces)
         if self.growth is None:
@@ -220,15 +220,15 @@ class Shell(Owner):
     @cached_property
     def quality(self) -> MeshQuality:
         """The shapes of its faces, their heights also beside the thickness."""
-        return MeshQuality(self.mesh if self.mesh.order == 1 else self.mesh.surface, self.face_thickness)
+        return MeshQuality(self.mesh if self.mesh.order == 1 else self.mesh.surface, self._face_thickness)
 
     @property
-    def face_thickness(self) -> np.ndarray:
+    def _face_thickness(self) -> np.ndarray:
         """(n_f,), m: of a SixNodeMesh, of its flat faces."""
         return self._on_faces(self.thickness)
 
     @property
-    def face_magnetization(self) -> np.ndarray | None:
+    def _face_magnetization(self) -> np.ndarray | None:
         """(n_f, 3) A/m, of its own; of a SixNodeMesh, on its flat faces."""
         own = self.remanent_magnetization
         return None if own is None else self._on_faces(own)
@@ -269,7 +269,7 @@ class Shell(Owner):
         return self._gathered(self._shares[0])
 
     @property
-    def weighed_masses(self) -> np.ndarray:
+    def _weighed_masses(self) -> np.ndarray:
         """What gravity pulls at each vertex by, (n_v,), kg."""
         return self._gathered(self._shares[1])
 

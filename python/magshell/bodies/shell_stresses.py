@@ -7,11 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
+from .._machine.frozen import immutable
 from ..mesh.face_shapes import corner_axes
 from .at_points import mean, von_mises
 from .shell import Shell
 
 
+@immutable
 class ShellStresses(NamedTuple):
     """Of every face; elastic, as the energies have them: also with caps recut, and with a curvature_scale.
 
@@ -102,10 +104,10 @@ def stresses_of(values: Any, body: Shell, state: np.ndarray) -> ShellStresses:
     mesh = body.mesh
     positions = positions[scene._bodies.spans[scene._bodies.number(body)].vertices]
     sheet = values.current(body)
-    rest_axes, axes = _axes(mesh.rest_positions[mesh.faces], sheet.grown_by, positions[mesh.faces])
+    rest_axes, axes = _axes(mesh.rest_positions[mesh.faces], sheet._grown_by, positions[mesh.faces])
     in_plane = [np.einsum("fai,fij,fbj->fab", rest_axes, each, rest_axes) for each in tensors]
-    areas = mesh.face_areas * np.linalg.det(sheet.grown_by)
-    return ShellStresses(*in_plane, rest_axes, axes, sheet.face_thickness, areas)
+    areas = mesh.face_areas * np.linalg.det(sheet._grown_by)
+    return ShellStresses(*in_plane, rest_axes, axes, sheet._face_thickness, areas)
 
 
 def _axes(rest: np.ndarray, grown: np.ndarray, now: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

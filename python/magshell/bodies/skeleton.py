@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .._checks.checked_list import checked_list
+from .._machine.frozen import FixedDict, Frozen, remember, variant
 from .joint import Joint
 from .joints import Closure, Fixed, Prismatic
 from .rigid import Rigid
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from .link import Link
 
 
-class Skeleton:
+class Skeleton(Frozen):
     """Links and the joints between them: one tree, or several. One of the bodies of a scene, and so are its links.
 
     links: Link (or Rigid) objects: vertices of a body that they carry, or numbers alone, or both.
@@ -45,15 +46,20 @@ class Skeleton:
         self.joints: tuple[Joint, ...] = checked_list("joints", joints, (Joint,))
         if not self.links:
             raise ValueError("links must hold at least one Link")
-        for name, items in (("links", self.links), ("joints", self.joints)):
-            if len({id(item) for item in items}) < len(items):
-                raise ValueError(f"{name} must differ, but one is there twice")
-        self.named: dict[str, Rigid | Joint] = {}  # of a file
+        self.named: dict[str, Rigid | Joint] = FixedDict()  # of a file
         self._leading: dict[int, Joint] = {}
         for k, joint in enumerate(self.joints):
             self._check(k, joint)
         self._order = self._in_order()
         self._check_velocities()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy, or another process, makes it from again: it knows links by where they are in memory."""
+        return {"links": self.links, "joints": self.joints, "named": self.named}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(state["links"], state["joints"])
+        remember(self, named=state["named"])
 
     @classmethod
     def from_urdf(
@@ -87,8 +93,7 @@ class Skeleton:
             limit_smoothing=limit_smoothing,
         )
         skeleton = cls(links, joints)
-        skeleton.named = named
-        return skeleton
+        return variant(skeleton, named=FixedDict(named))
 
     def _check(self, k: int, joint: Joint) -> None:
         for role in ("child", "parent"):
@@ -107,14 +112,14 @@ class Skeleton:
         for k, link in enumerate(self.links):
             if link.velocity is None and link.angular_velocity is None:
                 continue
-            if self._root(link) is not link or any(each.vertices is not None for each in self.tree(link)):
+            if self._root(link) is not link or any(each.vertices is not None for each in self._tree(link)):
                 raise ValueError(
                     f"link {k} has a velocity, but only that of a free link, to which no joint leads and whose tree has no "
                     "vertices, can be given: its whole tree starts with it"
                 )
 
         for k, joint in enumerate(self.joints):
-            if joint.rate is not None and any(each.vertices is not None for each in self.tree(joint.child)):
+            if joint.rate is not None and any(each.vertices is not None for each in self._tree(joint.child)):
                 raise ValueError(
                     f"joint {k} has a rate, but its tree has vertices, whose velocities ms.simulate takes"
                 )
@@ -125,7 +130,7 @@ class Skeleton:
         order: list[int] = []
         waiting = list(range(len(self.links)))
         while waiting:
-            now = [k for k in waiting if (p := self.parent_of(k)) is None or number[id(p)] in order]
+            now = [k for k in waiting if (p := self._parent_of(k)) is None or number[id(p)] in order]
             if not now:
                 raise ValueError(
                     f"joints must make trees, but links {waiting} make a loop: close it by a Closure instead"
@@ -134,17 +139,17 @@ class Skeleton:
             waiting = [k for k in waiting if k not in now]
         return order
 
-    def parent_of(self, number: int) -> Rigid | None:
+    def _parent_of(self, number: int) -> Rigid | None:
         """The link that a link, by its number, hangs on; None where that is the world."""
-        joint = self.joint_to(self.links[number])
+        joint = self._joint_to(self.links[number])
         return None if joint is None else joint.parent
 
-    def reach(self, link: Rigid, center: np.ndarray) -> float:
+    def _reach(self, link: Rigid, center: np.ndarray) -> float:
         """How far from a point of a link its joints are, m."""
         places = [joint.origin for joint in self.joints if link is joint.child or link is joint.parent]
         return max((float(np.linalg.norm(place - center)) for place in places), default=0.0)
 
-    def turning_scale(self, link: Rigid) -> float:
+    def _turning_scale(self, link: Rigid) -> float:
         """Return a length, m, for a link that does not turn by itself as one of its joints is a slide or fixed; else 0.
 
         It only sets how rotations of the link are scaled: that of the skeleton, 0.01 m where all of it is at one place.
@@ -156,15 +161,15 @@ class Skeleton:
         places = np.array([*centers, *(joint.origin for joint in self.joints)])
         return float(np.linalg.norm(np.ptp(places, axis=0))) or 0.01
 
-    def held(self, link: Rigid) -> bool:
+    def _held(self, link: Rigid) -> bool:
         """Whether joints lead from a link to the world."""
         return id(self._root(link)) in self._leading
 
-    def drifts(self, link: Rigid) -> bool:
+    def _drifts(self, link: Rigid) -> bool:
         """Whether neither the world nor a vertex of a body is in the tree of a link."""
-        return not self.held(link) and all(each.vertices is None for each in self.tree(link))
+        return not self._held(link) and all(each.vertices is None for each in self._tree(link))
 
-    def moved_by(self, joint: Joint) -> list[Rigid]:
+    def _moved_by(self, joint: Joint) -> list[Rigid]:
         """All links that it carries."""
         return [link for link in self.links if self._on_the_way(joint, link)]
 
@@ -174,7 +179,7 @@ class Skeleton:
             before = None if before.parent is None else self._leading.get(id(before.parent))
         return before is joint
 
-    def tree(self, link: Rigid) -> list[Rigid]:
+    def _tree(self, link: Rigid) -> list[Rigid]:
         """All links that joints lead to from the root of this one."""
         root = self._root(link)
         return [each for each in self.links if self._root(each) is root]
@@ -186,11 +191,11 @@ class Skeleton:
         return link
 
     @property
-    def in_order(self) -> tuple[Rigid, ...]:
+    def _links_in_order(self) -> tuple[Rigid, ...]:
         """The links, parents first."""
         return tuple(self.links[k] for k in self._order)
 
-    def joint_to(self, link: Rigid) -> Joint | None:
+    def _joint_to(self, link: Rigid) -> Joint | None:
         """The joint that leads to a link; None where it is free."""
         return self._leading.get(id(link))
 

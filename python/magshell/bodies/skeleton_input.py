@@ -35,13 +35,13 @@ def skeleton_inputs(bodies: Bodies, labels: list[tuple[object, str]]) -> dict[st
 
 
 def _skeleton(skeleton: Skeleton, part: dict[int, int], label: dict[int, str]) -> dict[Any, Any]:
-    links = skeleton.in_order
+    links = skeleton._links_in_order
     place = {id(link): k for k, link in enumerate(links)}
-    joints = [skeleton.joint_to(link) for link in links]
+    joints = [skeleton._joint_to(link) for link in links]
     return {
         "links": [part[id(link)] for link in links],
         "joints": [_joint(each, place) for each in joints],
-        "owners": [label[id(each)] if each is not None and each.acts else "" for each in joints],
+        "owners": [label[id(each)] if each is not None and each._acts else "" for each in joints],
         "labels": ["" if each is None else label[id(each)] for each in joints],
     }
 
@@ -55,21 +55,21 @@ def _joint(joint: Joint | None, place: dict[int, int]) -> dict[Any, Any]:
         "parent": -1 if joint.parent is None else place[id(joint.parent)],
         "origin": joint.origin,
         "axis": joint.axis,
-        "driven": joint.driven,
-        "damped": joint.has("damping"),
-        "twisted": joint._kind == "ball" and joint.has("torque"),
-        "served": joint._kind == "ball" and joint.has("servo_stiffness"),
-        "coned": joint.has("cone_limit"),
+        "driven": joint._driven,
+        "damped": joint._has("damping"),
+        "twisted": joint._kind == "ball" and joint._has("torque"),
+        "served": joint._kind == "ball" and joint._has("servo_stiffness"),
+        "coned": joint._has("cone_limit"),
     }
 
 
 def motor_rows(skeletons: Sequence[Skeleton], joint: Joint) -> int | slice:
     """Where the numbers of a joint's motor stand among those of all, in the core's order: one, or of a Ball three."""
-    leading = [skeleton.joint_to(link) for skeleton in skeletons for link in skeleton.in_order]
+    leading = [skeleton._joint_to(link) for skeleton in skeletons for link in skeleton._links_in_order]
     first = 0
     for each in leading:
         if each is joint:
             break
-        if each is not None and each.driven:
+        if each is not None and each._driven:
             first += 3 if each._kind == "ball" else 1
     return slice(first, first + 3) if joint._kind == "ball" else first

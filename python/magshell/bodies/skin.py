@@ -9,6 +9,7 @@ import numpy as np
 from .._checks.owner import Owner
 from .._checks.quantity import quantity, real_numbers
 from .._checks.selections import indices, selection
+from .._machine.frozen import variant
 from ..mesh.tet_mesh import TetMesh
 from ..mesh.triangle_mesh import TriangleMesh
 from .shell import magnetization_of
@@ -101,24 +102,21 @@ class Skin(Owner):
                     "the solid of that mesh"
                 )
             faces, parts = np.arange(mesh.n_faces), 1
-        skin = Skin(thickness=np.repeat(np.broadcast_to(self.thickness, len(faces)), parts))
-        skin.faces = (parts * faces[:, None] + np.arange(parts)).ravel()
-        skin._corners, skin._areas = mesh.faces[skin.faces], mesh.face_areas[skin.faces]
+        on = (parts * faces[:, None] + np.arange(parts)).ravel()
+        now: dict[str, Any] = {"thickness": np.repeat(np.broadcast_to(self.thickness, len(faces)), parts)}
         if self.mass_density is not None:
-            skin.mass_density = np.repeat(np.broadcast_to(self.mass_density, len(faces)), parts)
+            now["mass_density"] = np.repeat(np.broadcast_to(self.mass_density, len(faces)), parts)
         if self.remanent_magnetization is not None:
             of_faces = magnetization_of(self.remanent_magnetization, len(faces))
-            skin.remanent_magnetization = np.repeat(of_faces, parts, axis=0)
-        return skin
+            now["remanent_magnetization"] = np.repeat(of_faces, parts, axis=0)
+        return variant(self, faces=on, _corners=mesh.faces[on], _areas=mesh.face_areas[on], **now)
 
     def replaced(self, **values: Any) -> Skin:
         """The same skin with other values."""
         now = {name: getattr(self, name) for name in self._replaceable}
-        other = Skin(faces=self.faces, **(now | values))
-        other._corners, other._areas = self._corners, self._areas
-        return other
+        return variant(Skin(faces=self.faces, **(now | values)), _corners=self._corners, _areas=self._areas)
 
-    def gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
+    def _gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
         """With what its values do to the masses of the vertices."""
         found = {
             "thickness": np.zeros(len(self.faces)),
@@ -141,7 +139,7 @@ class Skin(Owner):
             np.add.at(masses, self._corners, (of_faces / 3.0)[:, None])
         return masses
 
-    def add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
+    def _add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         count = len(self.faces)
         numbers[label, "thickness"] = np.broadcast_to(self.thickness, count)
         given = self.remanent_magnetization

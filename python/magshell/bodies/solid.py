@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import copy
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from .._checks.owner import Owner
 from .._checks.quantity import quantity, real_numbers
 from .._machine.entry import grouped
+from .._machine.frozen import variant
 from ..mesh.tet_integrals import shape_integrals, shape_products
 from ..mesh.tet_mesh import TetMesh
 from .materials import Projective, SolidMaterial
@@ -88,7 +88,7 @@ class Solid(Owner):
             material.rows(name, self.mesh.n_tetrahedra)
         self.material = material
         self.mean_volume: bool = (
-            element == "quadratic" and material.nearly_incompressible if mean_volume is None else mean_volume
+            element == "quadratic" and material._nearly_incompressible if mean_volume is None else mean_volume
         )
         self.mass_density: np.ndarray | None = None if mass_density is None else self._density(mass_density)
         if skin is not None and not isinstance(skin, Skin):
@@ -104,7 +104,7 @@ class Solid(Owner):
         return (*self.material.names, "mass_density", *magnetized)
 
     @property
-    def face_magnetization(self) -> np.ndarray | None:
+    def _face_magnetization(self) -> np.ndarray | None:
         """(n_f, 3) A/m, of its skin: zero on faces without. None where the skin has none of its own."""
         rows = np.zeros((self.mesh.n_faces, 3))
         if self.skin is not None:
@@ -138,16 +138,16 @@ class Solid(Owner):
 
     def replaced(self, **values: Any) -> Solid:
         """The same solid with other values: those of its material, and the mass density."""
-        other = copy(self)  # not made anew, which would warn anew
+        now: dict[str, Any] = {}
         if "mass_density" in values:
             density = values.pop("mass_density")
-            other.mass_density = None if density is None else self._density(density)
+            now["mass_density"] = None if density is None else self._density(density)
         if "remanent_magnetization" in values:
-            other.remanent_magnetization = self._magnetization(values.pop("remanent_magnetization"))
-        other.material = self.material.replaced(**values)
+            now["remanent_magnetization"] = self._magnetization(values.pop("remanent_magnetization"))
+        material = self.material.replaced(**values)
         for name in values:
-            other.material.rows(name, self.mesh.n_tetrahedra)
-        return other
+            material.rows(name, self.mesh.n_tetrahedra)
+        return variant(self, material=material, **now)  # not made anew, which would warn anew
 
     def _core_input(self, owner: str, vertices: np.ndarray) -> dict[Any, Any]:
         """As the core takes it. vertices: the scene's, (n_v,)."""
@@ -163,14 +163,14 @@ class Solid(Owner):
             "magnetic": self.remanent_magnetization is not None,
         }
 
-    def add_numbers(self, label: str, values: Values, numbers: dict[Any, Any]) -> None:
+    def _add_numbers(self, label: str, values: Values, numbers: dict[Any, Any]) -> None:
         for name in self.material.names:
             rows = self.material.rows(name, self.mesh.n_tetrahedra)
             numbers[label, name] = _unit(rows) if name == "fibres" else rows
         if self.remanent_magnetization is not None:
             numbers[label, "remanent_magnetization"] = self.remanent_magnetization
 
-    def gradients(self, label: str, values: Values, gradient: Gradient) -> dict[str, np.ndarray]:
+    def _gradients(self, label: str, values: Values, gradient: Gradient) -> dict[str, np.ndarray]:
         """With what its values do to the masses and the weights of the vertices."""
         names = [*self.material.names, "remanent_magnetization"]
         found = {name: gradient.value(label, name) for name in names if gradient.has(label, name)}
@@ -218,7 +218,7 @@ class Solid(Owner):
         return self._gathered(self._shares[0])
 
     @property
-    def weighed_masses(self) -> np.ndarray:
+    def _weighed_masses(self) -> np.ndarray:
         """What gravity pulls at each vertex by, (n_v,), kg; negative at corners of quadratic elements."""
         return self._gathered(self._shares[1])
 

@@ -37,7 +37,7 @@ class SolidResult(BodyResult):
         positions = np.asarray(detached(self._result.positions), dtype=np.float64)
         at = positions if positions.ndim == 2 else positions[index]
         found = states_at(self._result._values_at(index), self.body, at)
-        return found._replace(muscles=muscles_of(self._result, self.body, index))
+        return SolidStates(*found[:3], muscles=muscles_of(self._result, self.body, index))
 
     def stresses(self, index: int = -1) -> SolidStates:
         """As `strains`, which has both: `green_strains`, `cauchy_stresses`, `von_mises_stresses` and `mean` are those of

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from .. import _core
+from .._machine.frozen import immutable
 from .at_points import mean, von_mises
 from .solid import Solid
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from ..scene.scene import Scene
 
 
+@immutable
 class SolidStates(NamedTuple):
     """At the points of integration of each tetrahedron: one of linear ones, p = 4 of quadratic ones.
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from .._machine.callers import callers_level
+from .._machine.frozen import immutable, remember
 from ..errors import LargeStrainWarning
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ SMALL = 0.2  # the largest strain for which St. Venant-Kirchhoff material is of 
 _MOST_NAMED = 5  # faces in a warning
 
 
+@immutable
 class Strains(NamedTuple):
     """Principal strains of every face, (n_f, 2) each, dimensionless, the larger value first; of one shell after another,
     solids between them have no rows.
@@ -113,7 +115,7 @@ def warn_if_large(result: SolveResult, largest: Largest, where: str, index: tupl
     strains = result.strains(*index)
     warning = LargeStrainWarning(f"{where}: {largest}. {_faces(strains)}. {_ADVICE}", result)
     warnings.warn(warning, stacklevel=callers_level())
-    scene._warned_of_strain = worst if np.isfinite(worst) else np.inf
+    remember(scene, _warned_of_strain=worst if np.isfinite(worst) else np.inf)
 
 
 _ADVICE = (

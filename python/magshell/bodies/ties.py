@@ -9,6 +9,7 @@ import scipy
 
 from .._checks.quantity import quantity
 from .._checks.selections import indices, selection
+from .._machine.frozen import Frozen
 from ..mesh.selection import RELATIVE_TOLERANCE
 from .shell import Shell
 from .solid import Solid
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from .._checks.kinds import Numbers
 
 
-class Tie:
+class Tie(Frozen):
     """Welds two bodies: vertices of both that lie at one place at rest are one vertex of the scene.
 
     Results have it among those of each body, at the same place. Masses, loads and damping of both add up there; what holds

@@ -65,3 +65,8 @@ __all__ = [
     "track_fitting",
     "wave",
 ]
+
+
+def __dir__() -> list[str]:
+    """Returns what is public, for tab completion."""
+    return sorted(__all__)

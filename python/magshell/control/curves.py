@@ -16,6 +16,7 @@ import numpy as np
 from .._checks.checked_list import listed
 from .._checks.quantity import quantity
 from .._checks.tensors import require_torch
+from .._machine.frozen import Frozen
 from ._arguments import tensor
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 _TURN = 2 * np.pi
 
 
-class Curve(ABC):
+class Curve(Frozen, ABC):
     """length: m. start, end: its end points, (3,) m."""
 
     length: float

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from .._checks.arrays import count
 from .._checks.scalars import not_negative
 from .._checks.tensors import detached, require_torch
+from .._machine.frozen import immutable
 from .._machine.log import log
 from .._machine.progress import progress_bar
 from ..design.answer import Answer
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from .._checks.kinds import Numbers
 
 
+@immutable
 @dataclass(frozen=True)
 class Horizon:
     """Rows first ... end of the control are searched, and those up to `settled` are kept and done."""
@@ -33,6 +35,7 @@ class Horizon:
     end: int
 
 
+@immutable
 @dataclass(frozen=True)
 class Receding:
     """What `receding` found.
@@ -42,11 +45,13 @@ class Receding:
     whose search ended early. trials: controls that were tried without gradient.
     """
 
+    _as_given: ClassVar = ("state",)
+
     controls: Any
     reached: int
     state: Any = field(repr=False)
-    searches: list[tuple[Horizon, Minimum]] = field(repr=False)
-    failures: list[tuple[Horizon, str]] = field(default_factory=list)
+    searches: Sequence[tuple[Horizon, Minimum]] = field(repr=False)
+    failures: Sequence[tuple[Horizon, str]] = ()
     trials: int = 0
 
     @property
@@ -142,7 +147,7 @@ def receding(
         raise ValueError("max_iterations and trials are both 0: there is nothing to search with")
     rng = np.random.default_rng(count("seed", seed, least=0))
     steps, planned, state = len(given), given.clamp(low, high), start
-    searches: list[tuple[Horizon, Minimum]] = []
+    searches: Sequence[tuple[Horizon, Minimum]] = []
     failures: list[tuple[Horizon, str]] = []
     reached = known = tried = 0
 

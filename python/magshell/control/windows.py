@@ -13,6 +13,7 @@ from .._checks.arrays import count, index_array
 from .._checks.quantity import quantity
 from .._checks.scalars import flag, not_negative
 from .._checks.tensors import require_torch
+from .._machine.frozen import immutable
 from ..design.minimum import Minimum
 from ..errors import Interrupted
 from ._search import check_functions, given_controls, row_bound, search_rows
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from .._checks.kinds import Numbers
 
 
+@immutable
 @dataclass(frozen=True)
 class Window:
     """steps: how many rows of the control it has. first: before it they are what earlier windows found. smoothing: as
@@ -31,14 +33,15 @@ class Window:
     smoothing: float
 
 
+@immutable
 @dataclass(frozen=True)
 class Windows:
     """What `in_windows` found. controls: (steps, ...), a tensor. searches: [(Window, Minimum)], in their order; failures:
     [(Window, why)], of those whose search ended early, which left what was best until then."""
 
     controls: object
-    searches: list[tuple[Window, Minimum]] = field(repr=False)
-    failures: list[tuple[Window, str]] = field(default_factory=list)
+    searches: Sequence[tuple[Window, Minimum]] = field(repr=False)
+    failures: Sequence[tuple[Window, str]] = ()
 
     @property
     def evaluations(self) -> int:
@@ -97,7 +100,7 @@ def in_windows(
     check_functions(objective=objective, **({} if optimizer is None else {"optimizer": optimizer}))
     count("max_iterations", max_iterations)
     tolerance, hold = not_negative("tolerance", "", tolerance), flag("hold", hold)
-    searches: list[tuple[Window, Minimum]] = []
+    searches: Sequence[tuple[Window, Minimum]] = []
     failures: list[tuple[Window, str]] = []
     reached = windows[0].steps
     for window in windows:

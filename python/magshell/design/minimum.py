@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from .._machine.frozen import immutable
 from .rejections import effort_in_words, in_words, total
 
 
+@immutable
 @dataclass(frozen=True)
 class Record:
     """One iteration.
@@ -31,17 +33,18 @@ class Record:
     rejections: dict[str, int] = field(default_factory=dict)
 
 
-@dataclass
+@immutable
+@dataclass(frozen=True)
 class Minimum:
     """What `minimize` found. parameters: the best design, as tensors in the order given; history: a Record an
     iteration, from the start; reason: why it ended. rejections: why trial designs could not be evaluated, {reason: how
     many}, in all. conflict: what seems to keep the objective from falling, where it is one and the same jump of the
     equilibrium in every one of the last iterations; else empty."""
 
-    parameters: list[Any]
+    parameters: Sequence[Any]
     objective: float
     violation: float
-    history: list[Record] = field(default_factory=list)
+    history: Sequence[Record] = ()
     reason: str = ""
     rejections: dict[str, int] = field(default_factory=dict)
     conflict: str = ""

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from .._machine.frozen import immutable
 from ..ink import Ink
 
 
+@immutable
 @dataclass(frozen=True)
 class PrintableStage:
     """One stage of a search.
@@ -29,7 +32,8 @@ class PrintableStage:
     seconds: float
 
 
-@dataclass
+@immutable
+@dataclass(frozen=True)
 class PrintableMinimum:
     """What `minimize_printable` found.
 
@@ -44,7 +48,7 @@ class PrintableMinimum:
     objective: float
     free_objective: float
     rounded_at_once: float | None
-    history: list[PrintableStage] = field(default_factory=list)
+    history: Sequence[PrintableStage] = ()
     reason: str = ""
 
     @property

@@ -164,7 +164,7 @@ class Run:
             "method": self.method,
             "parameters": self.values(),
             "optimizer": self.optimizer.state_dict(),
-            "history": [asdict(record) for record in self.history],
+            "history": [_plain(record) for record in self.history],
             "best": self.best,
             "terms": self._at.terms,
             "stateful": self.states(),
@@ -286,3 +286,8 @@ def _checked_parameters(parameters) -> list[Any]:
 
 def _name(each) -> str:
     return type(each).__name__
+
+
+def _plain(record: Record) -> dict[str, Any]:
+    """What a checkpoint keeps of a record: torch.load takes dicts of Python's own alone."""
+    return {**asdict(record), "terms": dict(record.terms), "rejections": dict(record.rejections)}

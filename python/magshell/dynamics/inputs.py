@@ -283,7 +283,7 @@ def _checked_state(start: MotionState, size: int, n_strains: int) -> MotionState
     for name in ("strain_rates", "maxwell_strains", "maxwell_strain_rates"):
         values = getattr(start, name)
         quantity(f"start.{name}", "SI", values, (0 if np.size(values) == 0 else n_strains,))
-    if not isinstance(start.turns, list):
+    if not isinstance(start.turns, list | tuple):
         raise ValueError(f"start.turns must be a list of lists of numbers, got {type(start.turns).__name__}")
     for k, each in enumerate(start.turns):
         quantity(f"start.turns[{k}]", "SI", each, ("n",))

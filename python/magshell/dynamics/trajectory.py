@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,13 +13,14 @@ from .._checks.arrays import index_array
 from .._checks.quantity import quantity
 from .._checks.tensors import detached, plain_arrays
 from .._machine.files import replace_file
+from .._machine.frozen import immutable
 from .._machine.npz import open_npz
 from .._machine.offered import Filmed
 from ..bodies.actuator import Actuator
-from ..bodies.of_body import result_of
+from ..bodies.of_body import OfOneBody, result_of
 from ..bodies.shell import Shell
 from ..bodies.solid_result import told_strains
-from ..bodies.strains import StrainHistory, Strains, strains_of
+from ..bodies.strains import StrainHistory, strains_of
 from ..fields.field import AppliedField
 from ..mesh.crossings import told
 from ..methods.clock import Clock, clock_of
@@ -38,6 +40,7 @@ if TYPE_CHECKING:
     from .._checks.kinds import Computed
 
 
+@immutable
 @dataclass(frozen=True)
 class MotionState:
     """Where a sheet is and how fast it moves, exactly: what ms.simulate(..., start=...) goes on from with the same bits,
@@ -62,7 +65,7 @@ class MotionState:
     time: float
     state: np.ndarray = field(repr=False)
     velocity: np.ndarray = field(repr=False)
-    turns: list[Any] = field(repr=False, default_factory=list)
+    turns: Sequence[Any] = field(repr=False, default=())
     acceleration: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
     strain_rates: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
     maxwell_strains: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
@@ -111,8 +114,9 @@ class MotionState:
 _ARRAYS = ("state", "velocity", "acceleration", "strain_rates", "maxwell_strains", "maxwell_strain_rates")
 
 
+@immutable
 @dataclass(frozen=True, repr=False)
-class Trajectory(Filmed):
+class Trajectory(Filmed, OfOneBody):
     """A motion. With several bodies, rows are those of one after another; `trajectory[body]` has those of one.
 
     times: (n,) s, of the recorded states, the start among them. positions: (n, n_v, 3) m; velocities: (n, n_v, 3) m/s;
@@ -180,7 +184,7 @@ class Trajectory(Filmed):
         values = Values.again(kept["scene"], kept["_values"])
         for obstacle, path in kept["_values"]["paths"].items():
             values.move(obstacle, path)
-        vars(self).update(kept, _values=values)
+        Filmed.__setstate__(self, {**kept, "_values": values})
 
     def __getitem__(self, body: Any) -> Any:
         """What it says of one body of the scene."""
@@ -248,8 +252,11 @@ class Trajectory(Filmed):
         positions = self.scene._model.points(self._state_at(index))
         return near_body_kinks(self.scene, self.touching(contact, index), smoothing, positions)
 
-    def strains(self, index: int = -1) -> Strains:
-        """The principal strains of every face in a recorded state, by default the last."""
+    def strains(self, index: int = -1) -> Any:
+        """The principal strains of every face of the sheets, Strains, in a recorded state, by default the last; where a
+        solid is alone, what result[solid] says."""
+        if (solid := self._one_solid()) is not None:
+            return solid.strains(index)
         state = self._state_at(index)
         with self._values_at(index).growth_in_core():
             return strains_of(self.scene, state, self._thickness)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._checks.quantity import quantity
+from .._machine.frozen import Frozen
 from .._machine.keywords import CONTROLS, FLUX_DENSITY, controls_of, nearest_first
 from ..scene.courses import changes_at_once, names_in_time, row_in_time
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from ..scene.scene import Scene
 
 
-class Actuator:
+class Actuator(Frozen):
     """A value that actions set. All its numbers are entries of the action, which run from -1 at `lower` to 1 at `upper`.
 
     owner: the scene, for applied_flux_density [T] and the factors of ms.simulate; or one of its objects, for what may
@@ -80,7 +81,7 @@ class Actuator:
         return int(np.prod(self.shape))
 
     @property
-    def at_start(self) -> np.ndarray:
+    def _at_start(self) -> np.ndarray:
         """Its value in the scene, before any action: of a field, none; of factors, one."""
         if self._of_scene:
             return np.zeros(3) if self.name == FLUX_DENSITY else np.array(1.0)
@@ -91,7 +92,7 @@ class Actuator:
         """As its owner has it, or None."""
         return getattr(getattr(self.owner, "_move", self.owner), self.name, None)
 
-    def check_in(self, scene: Scene) -> None:
+    def _check_in(self, scene: Scene) -> None:
         """Raises ValueError unless its owner is the scene or among its objects."""
         if not any(self.owner is each for each in (scene, *scene.objects)):
             raise ValueError(f"{self!r} is about something that is neither the scene nor one of its objects")
@@ -103,7 +104,7 @@ class Actuator:
         share = 0.5 * (action.reshape(self.shape) + 1.0)
         return self.lower + share * (self.upper - self.lower)
 
-    def courses(self, before: np.ndarray, now: np.ndarray, steps: int) -> list[np.ndarray]:
+    def _courses(self, before: np.ndarray, now: np.ndarray, steps: int) -> list[np.ndarray]:
         """Of each owner, as ms.simulate takes it: (steps, ...) where it changes at once, else (steps + 1, ...) on a
         straight line."""
         return [self._course(before, now, steps)]

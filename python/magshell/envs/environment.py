@@ -109,7 +109,7 @@ class Environment(gymnasium.Env):
         if not self.actuators:
             raise ValueError("actuators must hold at least one ms.envs.Actuator")
         for k, each in enumerate(self.actuators):
-            each.check_in(scene)
+            each._check_in(scene)
             others = [one for other in self.actuators[:k] if other.name == each.name for one in other.owners]
             if len({id(one) for one in (*others, *each.owners)}) < len(others) + len(each.owners):
                 raise ValueError(f"two actuators set one value: {each!r}")
@@ -217,14 +217,14 @@ class Environment(gymnasium.Env):
             if name not in ("start", "velocities"):
                 raise ValueError(f'an episode begins with "start" and "velocities", got {name!r}')
         self._from, self._taken = where, 0
-        self._setting = [each.at_start for each in self.actuators]
+        self._setting = [each._at_start for each in self.actuators]
         motion = self._moved(where, 1, self._setting, self._setting)
         self._now = Snapshot(motion, 0, np.concatenate([value.ravel() for value in self._setting]))
 
     def _moved(self, where: dict[Any, Any], steps: int, before: list[Any], now: list[Any]):
         values: dict[Any, Any] = {}
         for actuator, old, new in zip(self.actuators, before, now, strict=True):
-            courses = actuator.courses(old, new, steps)
+            courses = actuator._courses(old, new, steps)
             for owner, course in zip(actuator.owners, courses, strict=True):
                 values.setdefault(owner, {})[actuator.name] = course
         if self.scene.has_uniform_field and FLUX_DENSITY not in self._options:

@@ -11,8 +11,10 @@ import numpy as np
 
 from .._checks.arrays import count
 from .._checks.quantity import real_numbers
+from .._machine.frozen import immutable
 
 
+@immutable
 @dataclass(frozen=True)
 class Episode:
     """observations: (n + 1, ...), the first that of `reset`. actions: (n, k). rewards: (n,). failure: why its motion failed,

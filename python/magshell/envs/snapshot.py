@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .._machine.frozen import immutable
 from ..bodies.of_body import result_of
 from ..dynamics.trajectory import Trajectory
 from ..scene.scene import Scene
 
 if TYPE_CHECKING:
-    from ..bodies.strains import Strains
+    pass
 
 
+@immutable
 @dataclass(frozen=True)
 class Snapshot:
     """One state of a motion.
@@ -30,6 +32,9 @@ class Snapshot:
     index: int
     action: np.ndarray
     before: Snapshot | None = field(repr=False, default=None)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "action", np.array(self.action))
 
     @property
     def scene(self) -> Scene:
@@ -76,9 +81,13 @@ class Snapshot:
         """(3,) T, the uniform part."""
         return self.motion.applied_flux_density[self.index]
 
-    def strains(self) -> Strains:
-        """The principal strains of every face."""
+    def strains(self) -> Any:
+        """The principal strains of every face of the sheets, Strains; where a solid is alone, what snapshot[solid] says."""
         return self.motion.strains(self.index)
+
+    def stresses(self) -> Any:
+        """Returns the stresses of the scene's one body, as snapshot[body].stresses()."""
+        return self.motion.stresses(self.index)
 
     def __getitem__(self, item: Any) -> Any:
         """What it says of one body, link or joint."""

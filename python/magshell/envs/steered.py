@@ -62,23 +62,23 @@ class Steered(Actuator):
         return (self.owner, *(each.owner for each in self._further))
 
     @property
-    def at_start(self) -> np.ndarray:
+    def _at_start(self) -> np.ndarray:
         """Its value in the scene, before any action; with several owners one row each."""
-        first = super().at_start
-        return np.stack([first, *(each.at_start for each in self._further)]) if self._several else first
+        first = super()._at_start
+        return np.stack([first, *(each._at_start for each in self._further)]) if self._several else first
 
-    def check_in(self, scene: Scene) -> None:
-        super().check_in(scene)
+    def _check_in(self, scene: Scene) -> None:
+        super()._check_in(scene)
         for each in self._further:
-            each.check_in(scene)
+            each._check_in(scene)
 
     def value(self, action: np.ndarray, time: float, before: np.ndarray) -> np.ndarray:
         shape = (len(self.owners), *self.shape) if self._several else self.shape
         return quantity(f"what steers {self.name}", "", self._function(action, time, before), shape)
 
-    def courses(self, before: np.ndarray, now: np.ndarray, steps: int) -> list[np.ndarray]:
+    def _courses(self, before: np.ndarray, now: np.ndarray, steps: int) -> list[np.ndarray]:
         if not self._several:
-            return super().courses(before, now, steps)
+            return super()._courses(before, now, steps)
         return [self._course(old, new, steps) for old, new in zip(before, now, strict=True)]
 
     def __repr__(self) -> str:

@@ -84,7 +84,7 @@ class MagpylibField(AppliedField):
             return magpylib.getB(copies, points, sumup=True, squeeze=False).reshape(-1, 3)
 
         self._made_from = {"sources": copies, "length_scale": self.length_scale}
-        self.names: list[str] = [type(source).__name__ for source in listed]
+        self.names: tuple[str, ...] = tuple(type(source).__name__ for source in listed)
         self._core = core.PythonField(FluxSampler(flux_density, RELATIVE_STEP * self.length_scale))
 
     def _in_magnets(self, points: np.ndarray) -> np.ndarray:

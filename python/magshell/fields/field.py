@@ -13,6 +13,7 @@ from .. import _core as core
 from .._checks.owner import Owner
 from .._checks.quantity import array_of, quantity
 from .._checks.tensors import detached, is_tensor, real_tensor
+from .._machine.frozen import variant
 from .regridded import as_they_lie, interpolated
 from .table import read_table
 
@@ -55,7 +56,7 @@ class AppliedField(Owner):
     _replaceable: tuple[str, ...] = ()
     _made_from: Mapping[str, object] = MappingProxyType({})
 
-    def add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
+    def _add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         for name in self._replaceable:
             numbers[label, name] = self._made_from[name]
 
@@ -255,8 +256,7 @@ class SampledField(AppliedField):
             corners += [table.points.max(axis=0) if upper is None else quantity("upper", "m", upper, (3,))]
             grid = interpolated(*table, *corners, _checked_counts(counts, *corners))
         field = cls(grid.origin, grid.spacing, grid.values)
-        field.table_error = grid.error
-        return field
+        return variant(field, table_error=grid.error)
 
     def replaced(self, *, flux_density: Numbers) -> SampledField:
         """Other values on the same grid."""

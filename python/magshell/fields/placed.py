@@ -59,8 +59,8 @@ class PlacedField(AppliedField):
     def __setstate__(self, arguments: dict[Any, Any]) -> None:
         self.__init__(arguments["field"], center=arguments["center"], rotation=arguments["rotation"])
 
-    def add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
-        self.field.add_numbers(label, values, numbers)
+    def _add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
+        self.field._add_numbers(label, values, numbers)
         numbers[label, "center"], numbers[label, "rotation"] = self.center, self.rotation
 
     def replaced(self, **values: Any) -> PlacedField:

@@ -11,6 +11,7 @@ import scipy
 
 from .._checks.arrays import count
 from .._machine.entry import solve_entry
+from .._machine.frozen import immutable
 from ..errors import NotConverged
 from ..scene.inputs import Inputs
 from ..scene.scene import Scene
@@ -30,6 +31,7 @@ _PRE_LOAD = 1e-4  # displacement at which the change of the Hessian is measured,
 _LARGEST_DISPLACEMENT = 0.1  # before buckling, over the sheet's size: beyond, linear theory says nothing
 
 
+@immutable
 @dataclass(frozen=True, repr=False)
 class Buckling:
     """The lowest buckling modes of a scene.
@@ -122,7 +124,7 @@ def linear_buckling(
             "the scene has contact of bodies, which holds in one direction only, so that no linear mode buckles: ms.follow "
             "follows it as it opens and closes, or leave it out"
         )
-    driven = [joint for joint in map(inputs.values.current, scene.joints) if joint.driven]
+    driven = [joint for joint in map(inputs.values.current, scene.joints) if joint._driven]
     if equilibrium is None and (acting := [*pulling_joints(inputs), *driven]):
         raise ValueError(
             f"linear buckling multiplies the controls, and {acting[0]!r:.80} acts whatever they are: ms.follow has it"

@@ -10,6 +10,7 @@ import numpy as np
 
 from .._checks.tensors import detached, like
 from .._machine.entry import solve_entry
+from .._machine.frozen import immutable
 from .._machine.offered import Drawn
 from ..scene.scene import Scene
 from ..statics.equilibrium import Equilibrium
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from .._checks.kinds import Computed, Numbers
 
 
+@immutable
 @dataclass(frozen=True, repr=False)
 class LinearResponse(Drawn):
     """What linear theory says of a scene: the deflection in proportion to the controls. Not an equilibrium.

@@ -47,7 +47,7 @@ class RestStiffness(Stiffness):
 
 def refuse_springs(inputs: Inputs) -> None:
     """Raises ValueError where an actuator is a spring of its own."""
-    if springs := [each for each in map(inputs.values.current, inputs.scene.actuators) if each.is_spring]:
+    if springs := [each for each in map(inputs.values.current, inputs.scene.actuators) if each._is_spring]:
         raise ValueError(
             f"linear theory takes the stiffness at rest without what acts there, and {springs[0]!r} is a spring that "
             "acts: ms.equilibrium, ms.follow, ms.vibration_modes and ms.linear_response about an equilibrium have it"
@@ -57,7 +57,7 @@ def refuse_springs(inputs: Inputs) -> None:
 def pulling_joints(inputs: Inputs) -> dict[Any, Any]:
     """{joint of the scene: itself without what pulls at rest} of those in which something does."""
     joints = {own: inputs.values.current(own) for own in inputs.scene.joints}
-    return {own: joint.resting for own, joint in joints.items() if joint.resting is not joint}
+    return {own: joint._resting for own, joint in joints.items() if joint._resting is not joint}
 
 
 def forces_at_rest(inputs: Inputs) -> np.ndarray | None:
@@ -75,7 +75,7 @@ def refuse_what_acts(inputs: Inputs) -> None:
     equilibrium then."""
     model = inputs.scene._model
     for body in map(inputs.values.current, inputs.scene._bodies.sheets):
-        if body.has_grown:
+        if body._has_grown:
             raise ValueError(
                 f"{body!r} has grown or bent at rest, and its rest shape is no equilibrium then: find one with "
                 "ms.equilibrium, and hand it over as `equilibrium`"

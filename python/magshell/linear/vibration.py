@@ -11,6 +11,7 @@ import scipy
 
 from .. import _core
 from .._machine.entry import solve_entry
+from .._machine.frozen import immutable
 from ..bodies.shell import Shell
 from ..bodies.solid import Solid
 from ..errors import NotConverged
@@ -35,6 +36,7 @@ _TOLD_APART = (
 )
 
 
+@immutable
 @dataclass(frozen=True, repr=False)
 class VibrationModes:
     """The slowest small vibrations of a scene about an equilibrium.
@@ -305,7 +307,7 @@ def _slow_square(body: Shell | Solid) -> float:
     if isinstance(body, Solid):
         mesh = body.mesh
         modulus, thickness = (
-            body.material.wave_modulus(mesh.n_tetrahedra),
+            body.material._wave_modulus(mesh.n_tetrahedra),
             2.0 * mesh.volume / mesh.face_areas.sum(),
         )
     else:

@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .._machine.frozen import Frozen
+from .mesh_base import frozen
+
 if TYPE_CHECKING:
     from .six_node_mesh import SixNodeMesh
     from .triangle_mesh import TriangleMesh
 
 
-class MeshQuality:
+class MeshQuality(Frozen):
     """The shapes of a mesh's faces at rest, as arrays (n_f,) that can be plotted; `print` tells the extremes.
 
     A face with an angle near 180 degrees is a *cap*. Where a sheet bends along the long edge of a cap, the cap cannot
@@ -43,36 +46,36 @@ class MeshQuality:
     @cached_property
     def smallest_angles(self) -> np.ndarray:
         """(n_f,), rad."""
-        return self._angles(opposite=0)
+        return frozen(self._angles(opposite=0))
 
     @cached_property
     def largest_angles(self) -> np.ndarray:
         """(n_f,), rad."""
-        return self._angles(opposite=2)
+        return frozen(self._angles(opposite=2))
 
     @cached_property
     def aspects(self) -> np.ndarray:
         """(n_f,): longest edge over inscribed radius, relative to the 2 sqrt(3) of an equilateral triangle."""
         lengths = self._sorted_edges
         inscribed_radius = 2 * self._mesh.face_areas / lengths.sum(axis=0)
-        return lengths[2] / (2 * np.sqrt(3) * inscribed_radius)
+        return frozen(lengths[2] / (2 * np.sqrt(3) * inscribed_radius))
 
     @cached_property
     def heights(self) -> np.ndarray:
         """(n_f,), m: the shortest height of each face, which stands on its longest edge."""
-        return 2 * self._mesh.face_areas / self._sorted_edges[2]
+        return frozen(2 * self._mesh.face_areas / self._sorted_edges[2])
 
     @cached_property
     def heights_over_lengths(self) -> np.ndarray:
         """(n_f,): the shortest height over the longest edge; 0.87 where a face is equilateral, 0 where it is none."""
-        return self.heights / self._sorted_edges[2]
+        return frozen(self.heights / self._sorted_edges[2])
 
     @cached_property
     def heights_over_thickness(self) -> np.ndarray:
         """(n_f,): the shortest height over the thickness of the sheet. ValueError where only the mesh is known."""
         if self.thickness is None:
             raise ValueError("a mesh has no thickness: ask the `quality` of a Shell")
-        return self.heights / self.thickness
+        return frozen(self.heights / self.thickness)
 
     def worst(self, count: int = 3) -> np.ndarray:
         """The faces with the largest angles, the worst first; of equal ones, the lowest number first."""

@@ -10,6 +10,7 @@ import scipy
 
 from .._checks.arrays import index_array
 from .._checks.quantity import quantity
+from .._machine.frozen import immutable
 from .tet_checks import check_range, duplicates, names_twice, plural
 from .tet_jacobian import straight_volumes
 from .tet_selection import checked_parts
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from .tet_mesh import TetMesh
 
 
+@immutable
 @dataclass(frozen=True)
 class MendReport:
     """How many of each: merged, turned and dropped."""
@@ -41,6 +43,7 @@ class MendReport:
         return ", ".join(plural(*each) for each in said if each[0]) or "nothing to mend"
 
 
+@immutable
 class Mended(NamedTuple):
     """mesh: a TetMesh. vertex_map: (n_v,), tetrahedron_map: (n_t,), from old to new numbers, -1 where left out."""
 

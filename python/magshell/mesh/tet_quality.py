@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .._machine.frozen import Frozen
+from .mesh_base import frozen
 from .tet_jacobian import jacobians, least_jacobians
 from .tet_topology import EDGES, FACES
 
@@ -14,7 +16,7 @@ if TYPE_CHECKING:
     from .tet_mesh import TetMesh
 
 
-class TetQuality:
+class TetQuality(Frozen):
     """The shapes of a mesh's tetrahedra at rest, as arrays (n_t,); `print` tells the extremes.
 
     All are of the four corners, but for `jacobian_ratios`, which say how ten nodes bend a tetrahedron. Small dihedral
@@ -59,17 +61,17 @@ class TetQuality:
         opposite = np.array([[k for k in range(4) if k not in edge] for edge in EDGES.tolist()])
         one, other = normals[:, opposite[:, 0]], normals[:, opposite[:, 1]]
         sine = np.linalg.norm(np.cross(one, other), axis=2)
-        return np.arctan2(sine, -np.einsum("tei,tei->te", one, other))
+        return frozen(np.arctan2(sine, -np.einsum("tei,tei->te", one, other)))
 
     @cached_property
     def smallest_angles(self) -> np.ndarray:
         """(n_t,), rad: the smallest dihedral angle of each."""
-        return self.dihedral_angles.min(axis=1)
+        return frozen(self.dihedral_angles.min(axis=1))
 
     @cached_property
     def largest_angles(self) -> np.ndarray:
         """(n_t,), rad: the largest dihedral angle of each."""
-        return self.dihedral_angles.max(axis=1)
+        return frozen(self.dihedral_angles.max(axis=1))
 
     @cached_property
     def radius_ratios(self) -> np.ndarray:
@@ -79,26 +81,26 @@ class TetQuality:
         sides = np.sort(self._lengths[:, [0, 1, 2]] * self._lengths[:, [5, 3, 4]], axis=1).T
         c, b, a = sides
         area = 0.25 * np.sqrt(np.maximum((a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c)), 0))
-        return 18 * inscribed * self._volumes / area
+        return frozen(18 * inscribed * self._volumes / area)
 
     @cached_property
     def aspects(self) -> np.ndarray:
         """(n_t,): longest edge over shortest height, relative to the sqrt(3/2) of a regular tetrahedron."""
         height = 6 * self._volumes / np.linalg.norm(self._face_vectors, axis=2).max(axis=1)
-        return self._lengths.max(axis=1) / (np.sqrt(1.5) * height)
+        return frozen(self._lengths.max(axis=1) / (np.sqrt(1.5) * height))
 
     @cached_property
     def volume_ratios(self) -> np.ndarray:
         """(n_t,): the volume over the mean of all."""
-        return self._mesh.volumes / self._mesh.volumes.mean()
+        return frozen(self._mesh.volumes / self._mesh.volumes.mean())
 
     @cached_property
     def jacobian_ratios(self) -> np.ndarray:
         """(n_t,): the least Jacobian over its mean; 1 where the edges are straight and their nodes in the middle."""
         if self._mesh.order == 1:
-            return np.ones(self._mesh.n_tetrahedra)
+            return frozen(np.ones(self._mesh.n_tetrahedra))
         coefficients = jacobians(self._mesh.rest_positions[self._mesh.tetrahedra])
-        return least_jacobians(coefficients) / coefficients.mean(axis=1)
+        return frozen(least_jacobians(coefficients) / coefficients.mean(axis=1))
 
     def worst(self, count: int = 3) -> np.ndarray:
         """The tetrahedra with the smallest dihedral angles, the worst first; of equal ones, the lowest number first."""

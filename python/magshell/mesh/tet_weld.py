@@ -8,11 +8,13 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
+from .._machine.frozen import immutable
 from .tet_mesh import TetMesh
 from .tet_topology import groups
 from .weld_tolerance import weld_tolerance
 
 
+@immutable
 class TetWeld(NamedTuple):
     """The joined mesh, and where each one went: vertex_maps[k][vertex of mesh k], tetrahedra alike."""
 

@@ -7,12 +7,14 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
+from .._machine.frozen import immutable
 from .tet_mesh import TetMesh
 from .tet_weld import TetWeld, weld_solids
 from .triangle_mesh import TriangleMesh
 from .weld_tolerance import weld_tolerance
 
 
+@immutable
 class Weld(NamedTuple):
     """The joined mesh, and where each part went: vertex_maps[part][vertex of the part], faces alike."""
 

@@ -31,3 +31,8 @@ __all__ = [
     "tetrahedralize",
     "tube",
 ]
+
+
+def __dir__() -> list[str]:
+    """Returns what is public, for tab completion."""
+    return sorted(__all__)

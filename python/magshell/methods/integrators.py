@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from .._machine.frozen import immutable
 from .projective_dynamics import ProjectiveDynamics
 
 
+@immutable
 @dataclass(frozen=True)
 class ImplicitEuler:
     """First order, one solve a step, as in [Chen22] (26)-(28). Damps: a vibration of 40 steps a period keeps a share
@@ -24,6 +26,7 @@ class ImplicitEuler:
     _times = (1.0,)  # of the stages, as shares of the step
 
 
+@immutable
 @dataclass(frozen=True)
 class TRBDF2:
     """Second order, two solves a step, L-stable: the trapezoidal rule, then BDF2. The default.
@@ -45,6 +48,7 @@ class TRBDF2:
     _times = (2.0 - 2.0**0.5, 1.0)
 
 
+@immutable
 @dataclass(frozen=True)
 class SDIRK2:
     """Second order, two solves a step, L-stable: R. Alexander, SIAM J. Numer. Anal. 14 (1977).
@@ -66,6 +70,7 @@ class SDIRK2:
     _times = (1.0 - 0.5**0.5, 1.0)
 
 
+@immutable
 @dataclass(frozen=True)
 class SDIRK3:
     """Third order, three solves a step, L-stable; same source as SDIRK2.

@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from .._checks.scalars import not_negative
+from .._machine.frozen import immutable
 
 KINDS = ("stages", "checkpoints", "factors")
 
 
+@immutable
 @dataclass(frozen=True)
 class Keep:
     """What a motion keeps for its gradients, and how much of it: `keep` of ms.simulate.

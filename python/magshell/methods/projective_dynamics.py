@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING
 
 from .._checks.arrays import count
 from .._checks.quantity import quantity
+from .._machine.frozen import immutable
 
 if TYPE_CHECKING:
     from ..scene.scene import Scene
 
 
+@immutable
 @dataclass(frozen=True)
 class ProjectiveDynamics:
     """Implicit Euler in local and global steps, with a matrix that stays factorized ([Qiao21] 3, Algorithm 1).

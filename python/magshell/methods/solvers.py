@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from .. import _core
 from .._checks.arrays import count
 from .._checks.quantity import quantity
+from .._machine.frozen import immutable
 
 
+@immutable
 @dataclass(frozen=True)
 class Newton:
     """Newton's method with the stresses of the trial state, in adaptive load steps. For comparison.
@@ -61,6 +63,7 @@ class Newton:
         return options
 
 
+@immutable
 @dataclass(frozen=True)
 class MixedNewton(Newton):
     """Newton's method with stresses of their own (mixed integration points), in adaptive load steps. The default.

@@ -11,6 +11,7 @@ import numpy as np
 from .. import _core as core
 from .._checks.owner import Owner
 from .._checks.quantity import quantity
+from .._machine.frozen import variant
 from . import _motion
 
 if TYPE_CHECKING:
@@ -82,9 +83,7 @@ class Obstacle(Owner, ABC):
 
     def _on(self, path: Callable[..., Any]) -> Obstacle:
         """The same body as its path has it: at a time, its center and its rotation."""
-        other = self.replaced(center=np.zeros(3), rotation=np.zeros(3))
-        other.motion = path
-        return other
+        return variant(self, center=np.zeros(3), rotation=np.zeros(3), motion=path)
 
     def pose(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """What the motion adds at a time [s]: displacement (3,) m, rotation vector (3,) rad about the center."""

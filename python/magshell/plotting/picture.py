@@ -12,6 +12,7 @@ import numpy as np
 
 from .._checks.scalars import positive
 from .._machine.files import replace_file
+from .._machine.frozen import Frozen
 from . import colors, legend, polygons, vtk
 from .legend import TEXT
 from .limits import check_pixels
@@ -40,7 +41,7 @@ SPREAD, MOST_SPREAD = (
 _WITHOUT_WINDOWS = {"agg", "cairo", "pdf", "pgf", "ps", "svg", "template"}  # of matplotlib's backends
 
 
-class Picture:
+class Picture(Frozen):
     """A painted drawing. A notebook shows it; `save` writes it, `show` opens a window where there is one.
 
     figure: the matplotlib Figure, to add to. backend: what painted it.

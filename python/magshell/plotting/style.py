@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from .._checks.scalars import flag
+from .._machine.frozen import immutable
 from ..states.state import State
 from ..states.units import LengthUnit
 from .backend import BACKENDS
@@ -13,6 +16,7 @@ from .colors import SCALES, Scalar, scalar_of
 from .limits import arrow_count
 
 
+@immutable
 @dataclass(frozen=True)
 class Style:
     """What is drawn beside the bodies, and by whom: `style` of ms.plot, ms.animate and ms.write_page.
@@ -55,6 +59,7 @@ def style_of(style: Style | None) -> Style:
     return style
 
 
+@immutable
 @dataclass(frozen=True)
 class Color:
     """A quantity that colours bodies, with its own text, ends and scale: `color` of ms.plot, ms.animate and ms.write_page,
@@ -77,6 +82,8 @@ class Color:
     scale: str | None = None
 
     def __post_init__(self) -> None:
+        if isinstance(self.values, np.ndarray):
+            object.__setattr__(self, "values", self.values.copy())
         if not isinstance(self.label, str | None):
             raise ValueError(f"the label of a color must be a string, got {self.label!r:.60}")
         if self.scale is not None and self.scale not in SCALES:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .._checks.quantity import quantity
+from .._machine.frozen import immutable
 from ..states.state import State
 
 NAMED = {
@@ -19,6 +20,7 @@ NAMED = {
 NAMES = ", ".join(map(repr, NAMED))
 
 
+@immutable
 @dataclass(frozen=True)
 class View:
     """From where a picture is seen, and how much it shows: `view` of ms.plot, ms.animate and ms.write_page.

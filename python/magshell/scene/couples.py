@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def couple_edges(bodies: Bodies, loads: Iterable[Load]) -> np.ndarray:
     """The scene's edges that couples turn, ascending, (k,)."""
     places = [(load, bodies.of(load)) for load in loads if isinstance(load, EdgeCouple)]
-    edges = [span.first_edge + load.edge_couples(span.mesh)[0] for load, span in places]
+    edges = [span.first_edge + load._edge_couples(span.mesh)[0] for load, span in places]
     return np.unique(np.concatenate(edges)) if edges else np.zeros(0, dtype=np.int64)
 
 

@@ -44,7 +44,7 @@ class Leaf(NamedTuple):
 class Inputs:
     """The controls, the magnetization and the scene's values of one solve. Raises ValueError where they do not fit.
 
-    given_magnetization: of all bodies, as it was given, a tensor in its graph.
+    given_magnetization: of all bodies, a copy of what was given; a tensor is that tensor, in its graph.
     magnetization: (n_f of all, 3) A/m, where it was an argument.
 
     `replaced`: {object of the scene: {name: value}}. `leaves`: the tensors that a gradient goes back to; without
@@ -92,9 +92,9 @@ class Inputs:
         controls["scene", "applied_flux_density"] = flux_density
         self.controls: np.ndarray = scene._control_layout.packed(controls, scene._control_layout.zeros())
         self.values: Values = self._values(replaced)
-        self.given_magnetization: Numbers = (
-            of_all_bodies(scene, replaced) if remanent_magnetization is None else remanent_magnetization
-        )
+        given = of_all_bodies(scene, replaced) if remanent_magnetization is None else remanent_magnetization
+        own = given is None or is_tensor(given)
+        self.given_magnetization: Numbers = given if own else np.array(given, dtype=np.float64)
 
     @property
     def tensors(self) -> list[Any]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._checks.quantity import quantity
+from .._machine.frozen import immutable
 from ..surroundings.constraints import held_directions
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from .scene import Scene
 
 
+@immutable
 @dataclass(frozen=True)
 class Reaction:
     """What one support does to the bodies in one state. NaN in a state that no time step led to.

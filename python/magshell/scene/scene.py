@@ -14,6 +14,7 @@ from .. import _core
 from .._checks.checked_list import checked_list
 from .._checks.quantity import quantity
 from .._machine.entry import grouped
+from .._machine.frozen import remember
 from .._machine.offered import Drawn
 from ..bodies.actuator import Actuator
 from ..bodies.bodies import Bodies
@@ -120,9 +121,6 @@ class Scene(Drawn):
         self.supports: tuple[Pin | Clamp | SymmetryPlane, ...] = checked_list("supports", supports, _SUPPORTS)
         self.loads: tuple[Any, ...] = checked_list("loads", loads, _LOADS)
         self.actuators: tuple[Actuator, ...] = checked_list("actuators", actuators, (Actuator,), _ACTUATORS)
-        for k, each in enumerate(self.actuators):
-            if any(each is other for other in self.actuators[:k]):
-                raise ValueError(f"actuators must differ, but actuator {k} is there twice")
         self.fields: tuple[AppliedField, ...] = (
             () if field is None else checked_list("field", field, (AppliedField,), FIELDS)
         )
@@ -268,11 +266,11 @@ class Scene(Drawn):
         with self._turn:
             if self._solving:
                 raise RuntimeError("the scene is being solved: what a solve calls cannot solve it again")
-            self._solving = True
+            remember(self, _solving=True)
             try:
                 yield
             finally:
-                self._solving = False
+                remember(self, _solving=False)
 
     @cached_property
     def _caps(self) -> Caps:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _core
+from .._machine.frozen import immutable
 from ..surroundings.body_contact import BodyContact
 from ..surroundings.contact import Contact
 from .touching_obstacles import pairs_with_obstacles
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from .scene import Scene
 
 
+@immutable
 @dataclass(frozen=True)
 class Touching:
     """What of a contact touches in one state.
@@ -103,7 +105,7 @@ def touching_in(
     velocities = np.zeros((scene.mesh.n_vertices, 3)) if velocities is None else velocities
     if isinstance(contact, Contact) and any(each is contact for each in scene._obstacle_contacts):
         found = pairs_with_obstacles(scene, values, contact, scene._model.positions(state), velocities, time)
-        *_, coefficient, sticking_speed = values.current(contact).law(*values.touching(contact))
+        *_, coefficient, sticking_speed = values.current(contact)._law(*values.touching(contact))
         return _gathered(scene, found, coefficient, sticking_speed)
     numbers = [k for k, each in enumerate(scene._body_contacts) if each is contact]
     if not numbers:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from .._machine.frozen import variant
 from ..obstacles import Obstacle
 
 if TYPE_CHECKING:
@@ -31,9 +32,7 @@ def standing(obstacle: Obstacle, time: float | None) -> Standing:
     """As a motion has it at a time, or as an equilibrium has it, which knows none."""
     if time is not None:
         return Standing(obstacle, time, *obstacle.rates(time))
-    still = obstacle.replaced()
-    still.motion = None
-    return Standing(still, 0.0, np.zeros(3), np.zeros(3))
+    return Standing(variant(obstacle, motion=None), 0.0, np.zeros(3), np.zeros(3))
 
 
 def pairs_with_obstacles(
@@ -46,7 +45,7 @@ def pairs_with_obstacles(
 ) -> dict[str, np.ndarray]:
     """What touching_pairs of the core has of bodies; positions and velocities (n_v, 3)."""
     vertices, weights = scene._bodies.contact_points(contact)
-    numbers = values.current(contact).law(*values.touching(contact))
+    numbers = values.current(contact)._law(*values.touching(contact))
     stiffness, smoothing, offset, coefficient, sticking_speed = numbers
     corners = np.where(weights != 0.0, vertices, 0)
     places = np.einsum("pk,pkc->pc", weights, positions[corners])

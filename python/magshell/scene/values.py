@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._checks.quantity import quantity
+from .._machine.frozen import remember, variant
 from ..bodies.bodies import Whole, joined
 from ..bodies.shell import Shell
 from ..surroundings.constraints import Constraints, gather
@@ -51,8 +52,7 @@ class Values:
         }
         for body in scene._bodies.solids:
             if body.skin in self._now:
-                self._now[body] = copy(self.current(body))
-                self._now[body].skin = self._now[body.skin]
+                self._now[body] = variant(self.current(body), skin=self._now[body.skin])
         self.sheets: tuple[Any, ...] = tuple(self.current(body) for body in scene.bodies)
         self.rigid: tuple[Any, ...] = tuple(self.current(span) for span in scene.rigid_parts)
         self.constraints: Constraints = scene._constraints
@@ -62,9 +62,9 @@ class Values:
         self.gravity: Any = own.get("gravity", scene.gravity)
         numbers: dict[tuple[str, str], np.ndarray] = {}
         for owner, label in scene._labels:
-            self.current(owner).add_numbers(label, self, numbers)
+            self.current(owner)._add_numbers(label, self, numbers)
         if ("gravity", "forces") in scene._value_layout:
-            numbers["gravity", "forces"] = self.weighed_masses[:, None] * self.gravity
+            numbers["gravity", "forces"] = self._weighed_masses[:, None] * self.gravity
         if "vertex_loads" in own:
             numbers["loads", "forces"] = own["vertex_loads"]
         if ("loads", "forces") in numbers:
@@ -85,7 +85,7 @@ class Values:
         with scene._exclusive():
             if scene._in_core is not self:
                 scene._model.set_values(self.numbers)
-                scene._in_core = self
+                remember(scene, _in_core=self)
             yield
 
     @contextmanager
@@ -110,12 +110,12 @@ class Values:
     def _gradients(self, owner, gradient: Gradient) -> dict[str, np.ndarray]:
         if owner is not self.scene:
             labels = [label for each, label in self.scene._labels if each is owner]
-            return self.current(owner).gradients(labels[0], self, gradient)
+            return self.current(owner)._gradients(labels[0], self, gradient)
         found = {}
         if ("loads", "forces") in self.scene._value_layout:
             found["vertex_loads"] = gradient.value("loads", "forces")[: self.scene.mesh.n_vertices]
         if (by_weights := self.by_weights(gradient)) is not None:
-            found["gravity"] = self.weighed_masses @ by_weights
+            found["gravity"] = self._weighed_masses @ by_weights
         return found
 
     @property
@@ -163,10 +163,10 @@ class Values:
         return joined([self.vertex_masses, *self._masses_of_rigid()])
 
     @property
-    def weighed_masses(self) -> np.ndarray:
+    def _weighed_masses(self) -> np.ndarray:
         """What gravity pulls at each of them by, kg: of sheets and rigid parts, their masses."""
         self.vertex_masses  # noqa: B018 - says which body has no density
-        return joined([*(body.weighed_masses for body in self.sheets), *self._masses_of_rigid()])
+        return joined([*(body._weighed_masses for body in self.sheets), *self._masses_of_rigid()])
 
     def _masses_of_rigid(self) -> list[np.ndarray]:
         masses = [place.masses(part) for place, part in zip(self.scene._rigid, self.rigid, strict=True)]
@@ -225,7 +225,7 @@ class Values:
         numbers: dict[tuple[str, str], np.ndarray] = {}
         for owner, label in self.scene._labels:
             if owner in now:
-                now[owner].add_numbers(label, self, numbers)
+                now[owner]._add_numbers(label, self, numbers)
         return self.scene._value_layout.packed(numbers, before)
 
     def kept(self) -> dict[Any, Any]:

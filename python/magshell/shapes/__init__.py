@@ -23,3 +23,8 @@ __all__ = [
     "smooth_union",
     "union",
 ]
+
+
+def __dir__() -> list[str]:
+    """Returns what is public, for tab completion."""
+    return sorted(__all__)

@@ -10,6 +10,7 @@ import numpy as np
 from .._checks.checked_list import checked_list
 from .._checks.quantity import quantity
 from .._checks.scalars import positive
+from .._machine.frozen import Frozen
 from ..mesh.transforms import matrix_of
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 Bounds = tuple[np.ndarray, np.ndarray]
 
 
-class Shape:
+class Shape(Frozen):
     """A region of space by its signed distance. Made by the functions of `ms.shapes`; immutable.
 
     Call it with points (n, 3) [m], or one point (3,), for distances [m], negative inside. `bounds` are the lower and
@@ -173,7 +174,7 @@ class Offset(Shape):
 
 
 def several(name: str, shapes: Iterable[Shape]) -> list[Shape]:
-    listed = checked_list("shapes", list(shapes), (Shape,), "shapes of ms.shapes")
+    listed = checked_list("shapes", list(shapes), (Shape,), "shapes of ms.shapes", repeats=True)
     if len(listed) < 2:
         raise ValueError(f"{name} needs at least two shapes, got {len(listed)}")
     return list(listed)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .._checks.tensors import is_tensor, require_torch
+from .._machine.frozen import FixedDict
 from ..design.minimum import Minimum, Record
 from ..dynamics.obstacle_paths import ReadPath
 from ..dynamics.trajectory import MotionState
@@ -27,7 +28,7 @@ def to_plain(value: Any, arrays: list[np.ndarray], label: str) -> Any:
         return value
     if type(value) in (list, tuple):
         return {type(value).__name__: [to_plain(v, arrays, f"{label}[{k}]") for k, v in enumerate(value)]}
-    if type(value) is dict:
+    if type(value) in (dict, FixedDict):
         pairs = [(key, f"{label}[{key!r:.40}]", each) for key, each in value.items()]
         return {"dict": [[to_plain(k, arrays, name), to_plain(v, arrays, name)] for k, name, v in pairs]}
     if type(value) is complex:

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
+
+from .._machine.frozen import immutable
 
 _MOST_SHOWN = 5  # starts in a printed Multistart
 
 
+@immutable
 @dataclass(frozen=True, eq=False)
 class FinishedStart:
     """number: of the start in the list. result: what run returned, its objective and by how much constraints are
     broken. seconds: that it took."""
+
+    _as_given: ClassVar = ("start", "result")
 
     number: int
     start: Any = field(repr=False)
@@ -24,10 +29,13 @@ class FinishedStart:
     seconds: float
 
 
+@immutable
 @dataclass(frozen=True, eq=False)
 class FailedStart:
     """error: in words, with the traceback where there is one. last_good: what the error held, such as the best
     Minimum until then."""
+
+    _as_given: ClassVar = ("start", "last_good")
 
     number: int
     start: Any = field(repr=False)
@@ -37,6 +45,7 @@ class FailedStart:
     seconds: float
 
 
+@immutable
 @dataclass(frozen=True, eq=False, repr=False)
 class Multistart(Sequence[Any]):
     """The finished starts as a sequence, best first. failed: FailedStarts, by number. unfinished: numbers of the starts

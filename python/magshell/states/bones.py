@@ -33,7 +33,7 @@ def surface_of(skeleton: Skeleton, link: Rigid, center: np.ndarray) -> tuple[np.
     middle = np.mean(ends, axis=0)
     rods = [(middle, end) for end in ends] if len(ends) > 2 else [tuple(ends)] if len(ends) == 2 else []
     lengths = [np.linalg.norm(b - a) for a, b in rods]
-    radius = _THICK * (max(lengths, default=0.0) or skeleton.reach(link, center) or 1e-3)
+    radius = _THICK * (max(lengths, default=0.0) or skeleton._reach(link, center) or 1e-3)
     parts = [_knob(end, _KNOB * radius) for end in ends]
     parts += [_rod(a, b, radius) for (a, b), length in zip(rods, lengths, strict=True) if length > 0]
     return joined(parts)

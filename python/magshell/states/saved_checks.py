@@ -48,7 +48,7 @@ def _check_end(end, model) -> None:
 
 
 def _check_turns(turns) -> None:
-    if not isinstance(turns, list):
+    if not isinstance(turns, list | tuple):
         raise ValueError(f"turns must be a list, got {type(turns).__name__}")
     for k, each in enumerate(turns):
         quantity(f"turns[{k}]", "SI", each, ("n",))

@@ -356,7 +356,7 @@ def _with_own(given: dict[str, Any], scene: Scene, obstacles=None) -> dict[str, 
 
 def _magnetized(given: dict[str, Any], bodies) -> dict[str, Any]:
     """With the magnetization that the bodies themselves have, unless another is given."""
-    own = [body.face_magnetization for body in bodies]
+    own = [body._face_magnetization for body in bodies]
     if given["remanent_magnetization"] is not None or all(each is None for each in own):
         return given
     pairs = zip(own, bodies, strict=True)

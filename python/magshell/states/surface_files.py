@@ -129,4 +129,4 @@ def _of_faces(body: Shell | Solid) -> np.ndarray:
     """(n_f,) m, of a shell; of a solid's faces nobody asks."""
     if isinstance(body, Solid):
         return np.zeros(body.mesh.n_faces)
-    return body.face_thickness
+    return body._face_thickness

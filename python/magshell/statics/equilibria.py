@@ -11,8 +11,7 @@ from .._checks.checked_list import listed
 from .._checks.tensors import stacked
 from .._machine.offered import Kept
 from ..bodies.bodies import BODIES
-from ..bodies.of_body import result_of
-from ..bodies.strains import Strains
+from ..bodies.of_body import OfOneBody, result_of
 from .equilibrium import Equilibrium
 
 if TYPE_CHECKING:
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
     from ..scene.scene import Scene
 
 
-class Equilibria(Kept, Sequence[Equilibrium]):
+class Equilibria(Kept, OfOneBody, Sequence[Equilibrium]):
     """A scene at rest in each of k load cases, or in k ways in one; a sequence of Equilibrium.
 
     positions, displacements: (k, n_v, 3) m; edge_rotations: (k, n_e) rad. Tensors where those of the cases are.
@@ -87,8 +86,8 @@ class Equilibria(Kept, Sequence[Equilibrium]):
         """In all."""
         return sum(case.factorizations for case in self._cases)
 
-    def strains(self, index: int = -1) -> Strains:
-        """The principal strains of every face in one of the cases, by default the last."""
+    def strains(self, index: int = -1) -> Any:
+        """The strains that one of the cases, by default the last, says: `Equilibrium.strains`."""
         return self._cases[index].strains()
 
     def _values_at(self, index: int):

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._checks.tensors import detached, plain_arrays
+from .._machine.frozen import immutable
 from .._machine.offered import Kept
-from ..bodies.of_body import result_of
+from ..bodies.of_body import OfOneBody, result_of
 from ..bodies.solid_result import told_strains
-from ..bodies.strains import Largest, Strains, strains_of
+from ..bodies.strains import Largest, strains_of
 from ..mesh.crossings import told
 from ..scene.reactions import Reaction, reaction_in
 from ..scene.scene import Scene
@@ -25,8 +26,9 @@ if TYPE_CHECKING:
     from .._checks.kinds import Computed
 
 
+@immutable
 @dataclass(frozen=True, repr=False)
-class Equilibrium(Kept):
+class Equilibrium(Kept, OfOneBody):
     """A scene at rest. With several bodies, rows are those of one after another; `equilibrium[body]` has those of one.
 
     positions: (n_v, 3) m; edge_rotations: (n_e,) rad, zero where an edge has none.
@@ -78,7 +80,8 @@ class Equilibrium(Kept):
         return {**plain_arrays(vars(self)), "_values": self._values.kept()}
 
     def __setstate__(self, kept: dict[Any, Any]) -> None:
-        vars(self).update(kept, _values=Values.again(kept["scene"], kept["_values"]))
+        values = Values.again(kept["scene"], kept["_values"])
+        Kept.__setstate__(self, {**kept, "_values": values})
 
     def __getitem__(self, body: Any) -> Any:
         """What it says of one body of the scene."""
@@ -108,8 +111,8 @@ class Equilibrium(Kept):
         """The potential energy, J."""
         return sum(self.energies.values())
 
-    def strains(self) -> Strains:
-        """The principal strains of every face.
+    def strains(self) -> Any:
+        """The principal strains of every face of the sheets, Strains; where a solid is alone, what result[solid] says.
 
         >>> import magshell as ms
         >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -119,6 +122,8 @@ class Equilibrium(Kept):
         >>> rest.strains().membrane[0].round(3)  # (1.1^2 - 1)/2 along, nothing across
         array([0.105, 0.   ])
         """
+        if (solid := self._one_solid()) is not None:
+            return solid.strains()
         with self._values.growth_in_core():
             return strains_of(self.scene, self._state, self._values.whole.thickness)
 

@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from .._checks.quantity import real_numbers
 from .._checks.scalars import positive
 from .._checks.tensor_kinds import is_tensor
 from .._checks.tensors import detached
+from .._machine.frozen import immutable
 from ..errors import NotConverged
 from ..mesh.nesting import Nesting, nesting
 from ..mesh.six_node_mesh import SixNodeMesh
@@ -25,6 +26,7 @@ _LEAST_ORDER = 0.5  # of three values that converge at all
 _ROUND_OFF = 1e-12  # of the values: differences below tell no order
 
 
+@immutable
 @dataclass(frozen=True)
 class Extrapolation:
     """What nested meshes say of the exact solution; each a number, an array, or a dict of these, as `solve` returned.
@@ -36,6 +38,8 @@ class Extrapolation:
     order: the power of the mesh width with which errors fall: the one assumed, or found from three meshes.
     values: of each mesh, the coarsest first.
     """
+
+    _as_given: ClassVar = ("values",)
 
     value: Any
     error: Any

@@ -13,13 +13,14 @@ from .. import _core
 from .._checks.arrays import count, number
 from .._checks.scalars import positive
 from .._machine.entry import grouped, solve_entry
+from .._machine.frozen import immutable
 from .._machine.log import log
 from .._machine.offered import Filmed
 from .._machine.progress import SolveBar
 from ..bodies.caps import warn_of_caps
-from ..bodies.of_body import result_of
+from ..bodies.of_body import OfOneBody, result_of
 from ..bodies.solid_result import told_strains
-from ..bodies.strains import StrainHistory, Strains, strains_of, warn_if_large
+from ..bodies.strains import StrainHistory, strains_of, warn_if_large
 from ..errors import Interrupted, NotConverged
 from ..mesh.crossings import told
 from ..methods.solvers import MixedNewton, Newton
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from .._checks.kinds import Numbers
 
 
+@immutable
 @dataclass(frozen=True)
 class CriticalPoint:
     """Where a path gains or loses an unstable direction.
@@ -51,8 +53,9 @@ class CriticalPoint:
     after_point: int
 
 
+@immutable
 @dataclass(frozen=True, repr=False)
-class Path(Filmed):
+class Path(Filmed, OfOneBody):
     """A path of equilibria, stable and unstable. `path[body]` has those of one body.
 
     parameters: (n,), 0 at the controls of the start, 1 at the new ones. positions: (n, n_v, 3) m.
@@ -91,8 +94,11 @@ class Path(Filmed):
         inputs = self._inputs.with_values(self._moving.values(self.parameters[index]))
         return solve(inputs, point.state, point.turns, controls, controls, options).equilibrium
 
-    def strains(self, index: int = -1) -> Strains:
-        """The principal strains of every face at one of the points, by default the last."""
+    def strains(self, index: int = -1) -> Any:
+        """The principal strains of every face of the sheets, Strains, at one of the points, by default the last; where a
+        solid is alone, what result[solid] says."""
+        if (solid := self._one_solid()) is not None:
+            return solid.strains(index)
         with self._values_at(index).growth_in_core():
             return strains_of(self.scene, self._state_at(index), self._inputs.values.whole.thickness)
 

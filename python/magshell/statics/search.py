@@ -89,7 +89,7 @@ def find(
     options.start_at_rest = at_rest
     options.keep_factor = keep_factor
     # A volume is filled by at least as small a share of that at rest as of the way to it.
-    filling = max((each.filling(scene) for each in map(inputs.values.current, scene.actuators)), default=0.0)
+    filling = max((each._filling(scene) for each in map(inputs.values.current, scene.actuators)), default=0.0)
     options.smallest_step /= max(filling, 1.0)
     with inputs.in_core():
         check_apart(scene, state)
@@ -215,7 +215,7 @@ def _result(
 def _outputs(inputs: Inputs, found):
     """Positions, points of rigid parts among them, edge rotations, and what motors do; tensors where an input asks for a
     gradient."""
-    model, driven = inputs.scene._model, any(joint.driven for joint in inputs.scene.joints)
+    model, driven = inputs.scene._model, any(joint._driven for joint in inputs.scene.joints)
     arrays = (
         np.ascontiguousarray(model.points(found.state)),
         model.edge_rotations(found.state),

@@ -10,6 +10,7 @@ import numpy as np
 
 from .. import _core
 from .._checks.tensors import require_torch
+from .._machine.frozen import Frozen, remember
 from .._machine.keywords import CONTROLS, as_keywords
 from ..errors import EquilibriumJumped, Interrupted, NotConverged
 from ..methods.solvers import MixedNewton, Newton
@@ -29,7 +30,7 @@ _NO_JUMP = 1e-3  # of the mesh's size: so little is no jump
 _SHORTEST_STEP = 1.0 / 32.0  # of the way to a new design
 
 
-class WarmStart:
+class WarmStart(Frozen):
     """Finds the equilibria of one design after another, each from those of the design before.
 
     Called like ms.equilibrium, without `scene` and `start`; load cases too. The first call begins at the rest shape,
@@ -89,18 +90,19 @@ class WarmStart:
                 if not isinstance(error, EquilibriumJumped):
                     last_good = Equilibria([*(each.equilibrium for each in solutions), last_good])
                 raise of_case(error, k, len(cases), last_good) from error
-        self._last, self._of_cases = solutions, cases is not None
-        self._design = [numbers_only(arguments) for arguments in cases or [design]]
+        designs = [numbers_only(arguments) for arguments in cases or [design]]
+        remember(self, _last=solutions, _of_cases=cases is not None, _design=designs)
         return self.equilibria
 
     @contextmanager
     def accept_jumps(self) -> Iterator[None]:
         """Designs evaluated in here may jump to another equilibrium."""
-        before, self._accepting = self._accepting, True
+        before = self._accepting
+        remember(self, _accepting=True)
         try:
             yield
         finally:
-            self._accepting = before
+            remember(self, _accepting=before)
 
     def state_dict(self) -> dict[Any, Any]:
         """What a later WarmStart of an equal scene needs to go on with the same bits: tensors and plain values."""
@@ -116,10 +118,10 @@ class WarmStart:
         for arguments, kept in zip(designs, state["states"], strict=True):
             origin = Origin(kept["state"].numpy(), kept["turns"], inputs_of(self.scene, arguments))
             last.append(find(self.scene, arguments, origin, self._search, keep_factor=True))
-        self._last, self._design, self._of_cases = last, designs, state["of_cases"]
+        remember(self, _last=last, _design=designs, _of_cases=state["of_cases"])
 
     def _first(self, start, arguments: dict[Any, Any]) -> Solution:
-        self.solves += 1
+        remember(self, solves=self.solves + 1)
         return find(self.scene, arguments, start, self._search, keep_factor=True)
 
     def _next(self, k: int, arguments: dict[Any, Any]) -> Solution:
@@ -155,7 +157,7 @@ class WarmStart:
         return there if self._continues(last, there) else None
 
     def _step(self, last: Solution, arguments: dict[Any, Any]) -> Solution:
-        self.solves += 1
+        remember(self, solves=self.solves + 1)
         return find(self.scene, arguments, last.equilibrium, self._search, keep_factor=True)
 
     def _continues(self, last: Solution, there: Solution) -> bool:

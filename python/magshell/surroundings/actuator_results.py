@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._checks.tensors import stacked
+from .._machine.frozen import Frozen
 from .closed_surface import of_tetrahedra
 
 if TYPE_CHECKING:
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from ..bodies.actuator import Actuator
 
 
-class ActuatorResult:
+class ActuatorResult(Frozen):
     """One actuator of a result."""
 
     actuator: Actuator
@@ -54,7 +55,7 @@ class CavityResult(ActuatorResult):
         """(...) Pa, over that outside, as it acts under the load factor."""
         rest = float(self._surface.volume(self._result.scene.mesh.rest_positions))
         return self._by_law(
-            lambda cavity, volume, factor: cavity.pressure_at(volume, rest, factor), self.volume
+            lambda cavity, volume, factor: cavity._pressure_at(volume, rest, factor), self.volume
         )
 
     @property
@@ -81,7 +82,7 @@ class CellsResult(ActuatorResult):
     def pressures(self) -> Computed:
         """(..., k) Pa: K (a - J), a as the load factor has it."""
         return self._by_law(
-            lambda cells, ratios, factor: cells.pressure_at(ratios, factor), self.volume_ratios
+            lambda cells, ratios, factor: cells._pressure_at(ratios, factor), self.volume_ratios
         )
 
 
@@ -95,7 +96,7 @@ class TendonResult(ActuatorResult):
         own = np.zeros((0, 3)) if not scene.rigid_parts else self._result._own_points
         vertices = self._result.positions
         n_vertices, points = len(scene._bodies.original), []
-        for at, weights in self.actuator.riding(scene._bodies, scene._rigid):
+        for at, weights in self.actuator._riding(scene._bodies, scene._rigid):
             of_points = at[0] >= n_vertices
             rows = own[..., at - n_vertices, :] if of_points else vertices[..., at, :]
             points.append((rows * _like(weights[:, None], rows)).sum(-2))
@@ -116,7 +117,7 @@ class TendonResult(ActuatorResult):
     def tension(self) -> Computed:
         """(...) N; of a tendon that does not slide, one a segment, (..., segments). Times the load factor."""
         return self._by_law(
-            lambda tendon, length, factor: factor * tendon.tension_at(length),
+            lambda tendon, length, factor: factor * tendon._tension_at(length),
             self.length if self.actuator.sliding else self.lengths,
         )
 

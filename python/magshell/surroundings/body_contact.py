@@ -82,7 +82,7 @@ class BodyContact(Owner):
     lagged_friction: bool
 
     body = None
-    for_all = True
+    _for_all = True
     _replaceable = (
         "contact_stiffness",
         "reach",
@@ -127,12 +127,12 @@ class BodyContact(Owner):
         if law not in LAWS:
             raise ValueError(f'law must be "barrier" or "penalty", got {law!r:.60}')
         self.law, self.lagged_friction = law, flag("lagged_friction", lagged_friction)
-        bodies = [side_of(side) for side in self.sides]
+        bodies = [side_of(side) for side in self._sides]
 
         def number(name, unit, default, check=positive):
             return default if given[name] is None else check(name, unit, given[name])
 
-        self.distance_given: bool = given["minimal_distance"] is not None
+        self._distance_given: bool = given["minimal_distance"] is not None
         self.minimal_distance: float = number("minimal_distance", "m", self._distance(bodies), not_negative)
         self.reach: float = number("reach", "m", self._reach(bodies))
         stiffness = min(map(_modulus, bodies))
@@ -164,7 +164,7 @@ class BodyContact(Owner):
         return min(map(_reach, bodies))
 
     @property
-    def sides(self) -> tuple[Any, ...]:
+    def _sides(self) -> tuple[Any, ...]:
         return self.a, self.b
 
     @property
@@ -190,14 +190,14 @@ class BodyContact(Owner):
     def _one_coefficient(self) -> bool:
         return self.static_friction_coefficient is None
 
-    def add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
+    def _add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         for name in self._replaceable:
             numbers[label, name] = getattr(self, name) or 0.0
         if self._one_coefficient:
             numbers[label, "static_friction_coefficient"] = numbers[label, "friction_coefficient"]
 
-    def gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
-        found = super().gradients(label, values, gradient)
+    def _gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
+        found = super()._gradients(label, values, gradient)
         if self._one_coefficient:
             found["friction_coefficient"] = (
                 found["friction_coefficient"] + found["static_friction_coefficient"]
@@ -207,7 +207,7 @@ class BodyContact(Owner):
     def __repr__(self) -> str:
         friction = "" if self.friction_coefficient is None else f", friction {self.friction_coefficient:g}"
         return (
-            f"{type(self).__name__}({' and '.join(type(side).__name__ for side in self.sides)}; {self.law}, "
+            f"{type(self).__name__}({' and '.join(type(side).__name__ for side in self._sides)}; {self.law}, "
             f"{self.contact_stiffness:g} Pa within {self.reach:g} m beyond {self.minimal_distance:g} m{friction})"
         )
 
@@ -265,7 +265,7 @@ class SelfContact(BodyContact):
         return _thickness(self.a)
 
     @property
-    def sides(self) -> tuple[Any, ...]:
+    def _sides(self) -> tuple[Any, ...]:
         return (self.a,)
 
     def replaced(self, **values: Any) -> SelfContact:
@@ -322,7 +322,7 @@ def _modulus(body) -> float:
     if isinstance(body, RigidShape):
         return np.inf
     if isinstance(body, Solid):
-        return float(np.min(body.material.wave_modulus(body.mesh.n_tetrahedra)))
+        return float(np.min(body.material._wave_modulus(body.mesh.n_tetrahedra)))
     return float(np.min(body.young_modulus))
 
 

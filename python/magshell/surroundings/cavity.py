@@ -113,7 +113,7 @@ class Cavity(Actuator):
         self._replaceable = self._in_time = _LAWS[self.law]
         if self.law == "pressure":
             self.pressure: np.ndarray = number("pressure", "Pa", pressure)
-            self.is_spring = False
+            self._is_spring = False
         elif self.law == "gas":
             self.filling_pressure: np.ndarray = number("filling_pressure", "Pa", filling_pressure, 0.0)
             outside = ATMOSPHERE if outside_pressure is None else outside_pressure
@@ -127,6 +127,7 @@ class Cavity(Actuator):
     _replaceable = _in_time = tuple(name for names in _LAWS.values() for name in names)
 
     def replaced(self, **values: Any) -> Cavity:
+        """Returns the same cavity with other numbers of what is inside."""
         now = {name: getattr(self, name) for name in self._replaceable} | values
         return self._keep_shapes(Cavity(self._parts, cap_rims=self.cap_rims, **now))
 
@@ -138,12 +139,12 @@ class Cavity(Actuator):
         """m3, in a scene that has it."""
         return float(self.surface(scene._bodies).volume(scene.mesh.rest_positions))
 
-    def filling(self, scene: Scene) -> float:
+    def _filling(self, scene: Scene) -> float:
         if self.law != "liquid":
             return 0.0
         return abs(self.volume / self.rest_volume(scene) - 1.0)
 
-    def pressure_at(self, volume: Numbers, rest_volume: float, load_factor: float) -> Computed:
+    def _pressure_at(self, volume: Numbers, rest_volume: float, load_factor: float) -> Computed:
         """Pa, over that outside, at a volume (m3)."""
         if self.law == "pressure":
             return load_factor * self.pressure + 0.0 * volume

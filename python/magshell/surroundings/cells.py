@@ -57,7 +57,7 @@ class Cells(Actuator):
         if not isinstance(body, Solid):
             raise ValueError(f"Cells are of a Solid, got {body!r:.60}")
         self.bodies: tuple[Any, ...] = (body,)
-        self._groups = _groups(groups, body.mesh.n_tetrahedra)
+        self._groups = tuple(_groups(groups, body.mesh.n_tetrahedra))
         self.stiffness: np.ndarray = numbers(
             "stiffness", "Pa", stiffness, self.count, "cell", 0.0, above=True
         )
@@ -66,7 +66,7 @@ class Cells(Actuator):
         )
 
     @property
-    def groups(self) -> list[np.ndarray]:
+    def groups(self) -> tuple[np.ndarray, ...]:
         """The tetrahedra of each cell."""
         return self._groups
 
@@ -76,13 +76,14 @@ class Cells(Actuator):
         return len(self._groups)
 
     def replaced(self, **values: Any) -> Cells:
+        """Returns the same cells with other numbers."""
         now = {name: getattr(self, name) for name in self._replaceable} | values
         return self._keep_shapes(Cells(self.body, self._groups, **now))
 
-    def filling(self, scene: Scene) -> float:
+    def _filling(self, scene: Scene) -> float:
         return float(np.abs(np.asarray(self.volume_ratio) - 1.0).max(initial=0.0))
 
-    def pressure_at(self, ratios: Numbers, load_factor: float) -> Computed:
+    def _pressure_at(self, ratios: Numbers, load_factor: float) -> Computed:
         """(k,) Pa, at volume ratios (k,)."""
         target = 1.0 + load_factor * (self.volume_ratio - 1.0)
         if isinstance(ratios, np.ndarray):

@@ -75,7 +75,7 @@ def held_by(support: Support, span: Span, bodies: Bodies) -> list[Held]:
     """With the scene's vertices."""
     return [
         held._replace(vertices=bodies.original[held.vertices + span.first_vertex])
-        for held in support.held(span.mesh)
+        for held in support._held(span.mesh)
     ]
 
 
@@ -98,7 +98,7 @@ def held_directions(bodies: Bodies, supports: Sequence[Support]) -> list[tuple[o
 
 def _directed(support, span: Span) -> list[DirectedEdges]:
     """With the scene's edges."""
-    return [each._replace(edges=each.edges + span.first_edge) for each in support.directed(span.mesh)]
+    return [each._replace(edges=each.edges + span.first_edge) for each in support._directed(span.mesh)]
 
 
 def free_rigid_motions(

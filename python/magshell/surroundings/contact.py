@@ -95,8 +95,8 @@ class Contact(Owner):
     ):
         self.body: Shell | Solid | None = checked_body(body)
         listed = checked_list("obstacles", obstacles, (Obstacle,), "objects of ms.obstacles")
-        if not listed or len({id(item) for item in listed}) < len(listed):
-            raise ValueError("obstacles must hold at least one obstacle, and each of them once")
+        if not listed:
+            raise ValueError("obstacles must hold at least one obstacle")
         self.obstacles = listed
         self.contact_stiffness: float = positive("contact_stiffness", "N/m", contact_stiffness)
         self.friction_coefficient: float | None = (
@@ -142,7 +142,7 @@ class Contact(Owner):
         )
 
     @property
-    def for_all(self) -> bool:
+    def _for_all(self) -> bool:
         """Whether it is about all bodies where it names none."""
         return self.vertices is None
 
@@ -163,7 +163,7 @@ class Contact(Owner):
             np.concatenate([np.tile([1.0, 0.0, 0.0], (len(alone), 1)), np.tile(weights, (len(faces), 1))]),
         )
 
-    def law(self, *sheets: Shell) -> tuple[float, ...]:
+    def _law(self, *sheets: Shell) -> tuple[float, ...]:
         """The numbers of `_replaceable` for the sheets that touch: N/m, m, m, 1, m/s."""
         extent = max(width_of(sheet.mesh) for sheet in sheets)
         thick = [sheet.thickness for sheet in sheets if isinstance(sheet, Shell)]
@@ -176,11 +176,11 @@ class Contact(Owner):
             _STICKING * extent if self.sticking_speed is None else self.sticking_speed,
         )
 
-    def add_numbers(self, label: str, values: Values, numbers: dict[Any, Any]) -> None:
-        for name, number in zip(self._replaceable, self.law(*values.touching(self)), strict=True):
+    def _add_numbers(self, label: str, values: Values, numbers: dict[Any, Any]) -> None:
+        for name, number in zip(self._replaceable, self._law(*values.touching(self)), strict=True):
             numbers[label, name] = number
 
-    def by_thickness(self, label: str, sheets: Sequence[Shell | Solid], gradient: Gradient) -> float:
+    def _by_thickness(self, label: str, sheets: Sequence[Shell | Solid], gradient: Gradient) -> float:
         """By the thickness of each face of the sheets that touch, which a default in `law` is made from."""
         by_smoothing = gradient.value(label, "smoothing")[0] if self.smoothing is None else 0.0
         return (

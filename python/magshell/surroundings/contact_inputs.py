@@ -42,7 +42,7 @@ def body_contact_inputs(
 ) -> tuple[list[dict[Any, Any]], list[dict[Any, Any]]]:
     """What of the contacts of bodies no solve can change: surfaces, and which of them touch."""
     _check_each_pair_once(contacts)
-    sides = list({id(side): side for contact in contacts for side in contact.sides}.values())
+    sides = list({id(side): side for contact in contacts for side in contact._sides}.values())
     numbers = {id(side): k for k, side in enumerate(sides)}
     return [_surface(side, bodies) for side in sides], [
         {
@@ -58,7 +58,7 @@ def body_contact_inputs(
 
 def _check_each_pair_once(contacts) -> None:
     """Two of the same sides would push, and rub, twice."""
-    sides = [frozenset(map(id, contact.sides)) for contact in contacts]
+    sides = [frozenset(map(id, contact._sides)) for contact in contacts]
     for k, contact in enumerate(contacts):
         if sides[k] in sides[:k]:
             raise ValueError(
@@ -68,7 +68,7 @@ def _check_each_pair_once(contacts) -> None:
 
 def shapes_that_touch(contacts: Sequence[Contact | BodyContact]) -> tuple[Rigid, ...]:
     """Rigid parts that contacts are about with their shapes, each once."""
-    sides = [side for contact in contacts for side in contact.sides if touches_with_shape(side)]
+    sides = [side for contact in contacts for side in contact._sides if touches_with_shape(side)]
     return tuple({id(side): side for side in sides}.values())
 
 
@@ -112,7 +112,7 @@ def check_neighbours(scene: Scene, warns: bool = False) -> None:
             f"the minimal_distance of a {kind}, {wanted:g} m, is larger than what neighbours along a surface have at rest: "
             f"{faces} are {nearest:g} m apart"
         )
-        if contact.distance_given or wanted != contact.minimal_distance:
+        if contact._distance_given or wanted != contact.minimal_distance:
             raise ValueError(f"{told}. Give it at most {nearest:g} m, or a mesh with longer edges")
         if warns:
             kept = 0.5 * nearest * wanted / (wanted + contact.reach)
@@ -196,7 +196,7 @@ def near_kinks(
     """
     vertices, weights = bodies.contact_points(contact)
     places = np.einsum("pk,pkc->pc", weights, positions[vertices])
-    reach = contact.law(*sheets)[1] * np.concatenate([np.eye(3), -np.eye(3)])
+    reach = contact._law(*sheets)[1] * np.concatenate([np.eye(3), -np.eye(3)])
     found = [np.zeros(0, dtype=vertices.dtype)]
     for obstacle in obstacles:
         touching = obstacle.signed_distance(places, time) < contact.offset

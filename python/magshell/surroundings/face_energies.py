@@ -29,7 +29,7 @@ class FaceEnergy(Owner):
 
     _units: tuple[str, ...] = ()
     _energy: type[Any]
-    for_all = False
+    _for_all = False
 
     def __init__(self, values: dict[str, object], faces: Numbers, body: Shell | None):
         self.faces: np.ndarray | None = (
@@ -48,7 +48,7 @@ class FaceEnergy(Owner):
     def _core(self):
         return self._energy()
 
-    def add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
+    def _add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         mesh = values.scene._bodies.of(self).mesh
         chosen = self._chosen(mesh)
         for name in self._replaceable:
@@ -56,11 +56,12 @@ class FaceEnergy(Owner):
             of_faces[chosen] = getattr(self, name)
             numbers[label, name] = of_faces
 
-    def gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
+    def _gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
         chosen = self._chosen(values.scene._bodies.of(self).mesh)
         return {name: gradient.value(label, name)[chosen] for name in self._replaceable}
 
     def replaced(self, **values: Any) -> FaceEnergy:
+        """Returns the same energy with other numbers, on the same faces."""
         now = {name: getattr(self, name) for name in self._replaceable}
         return type(self)(*(now | values).values(), faces=self.faces, body=self.body)
 

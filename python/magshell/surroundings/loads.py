@@ -28,7 +28,7 @@ class DeadLoad(Owner):
 
     body: Shell | Solid | None
 
-    for_all = False  # whether it acts on all bodies where it names none
+    _for_all = False  # whether it acts on all bodies where it names none
 
     def __init__(self, label: str, values: Any, body: Shell | Solid | None):
         """label: the name and unit of the value."""
@@ -41,14 +41,14 @@ class DeadLoad(Owner):
         rows = _rows(self._label, getattr(self, self._replaceable[0]), len(vertices))
         return _spread(mesh, vertices, rows[:, None] * weights[..., None])
 
-    def add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
+    def _add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         key = ("loads", "forces")
         part = values.scene._bodies.of(self)
         forces = np.zeros((values.scene.mesh.n_vertices, 3)) if key not in numbers else numbers[key]
         forces[part.vertices] += self.vertex_forces(part.mesh)
         numbers[key] = forces
 
-    def gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
+    def _gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
         part = values.scene._bodies.of(self)
         vertices, weights = self._shares(part.mesh)
         by_forces = gradient.value("loads", "forces")[part.vertices]
@@ -76,6 +76,7 @@ class PointLoad(DeadLoad):
         super().__init__("force [N]", force, body)
 
     def replaced(self, *, force: Numbers) -> PointLoad:
+        """Returns the same load with another force [N]."""
         return PointLoad(self.vertices, force, self.body)
 
     def _shares(self, mesh: TriangleMesh):
@@ -105,6 +106,7 @@ class EdgeLoad(DeadLoad):
         super().__init__("force_per_length [N/m]", force_per_length, body)
 
     def replaced(self, *, force_per_length: Numbers) -> EdgeLoad:
+        """Returns the same load with another force per length [N/m]."""
         return EdgeLoad(self.edges, force_per_length, self.body)
 
     def _shares(self, mesh: TriangleMesh):
@@ -130,10 +132,11 @@ class AreaLoad(DeadLoad):
         self, force_per_area: Numbers, faces: Numbers | None = None, body: Shell | Solid | None = None
     ):
         self.faces: np.ndarray | None = None if faces is None else selection("AreaLoad faces", faces)
-        self.for_all: bool = faces is None
+        self._for_all: bool = faces is None
         super().__init__("force_per_area [N/m2]", force_per_area, body)
 
     def replaced(self, *, force_per_area: Numbers) -> AreaLoad:
+        """Returns the same load with another force per area [N/m2]."""
         return AreaLoad(force_per_area, self.faces, self.body)
 
     def _shares(self, mesh: TriangleMesh):
@@ -163,7 +166,7 @@ class EdgeCouple(Owner):
     """
 
     _replaceable = ("couple_per_length",)
-    for_all = False
+    _for_all = False
 
     def __init__(self, edges: Numbers, couple_per_length: Numbers, body: Shell | Solid | None = None):
         self.body: Shell | None = checked_body(body)
@@ -173,7 +176,7 @@ class EdgeCouple(Owner):
             raise ValueError(f"couple_per_length [N] must be a number or have shape (3,), got {array.shape}")
         self.couple_per_length: np.ndarray = quantity("couple_per_length", "N", array, array.shape)
 
-    def edge_couples(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
+    def _edge_couples(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
         """The edges (k,) and their couples (k,), N m. Raises ValueError for a solid, whose edges do not turn."""
         if not isinstance(mesh, TriangleMesh | SixNodeMesh):
             raise ValueError(
@@ -182,21 +185,22 @@ class EdgeCouple(Owner):
         edges, along = self._along(mesh)
         return edges, along @ np.atleast_1d(self.couple_per_length)
 
-    def add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
+    def _add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         key, turned = ("couples", "couples"), values.scene._couple_edges
         part = values.scene._bodies.of(self)
-        edges, couples = self.edge_couples(part.mesh)
+        edges, couples = self._edge_couples(part.mesh)
         n_edges = values.scene.mesh.n_edges
         by_edge = np.bincount(part.first_edge + edges, weights=couples, minlength=n_edges)
         numbers[key] = numbers.get(key, 0.0) + by_edge[turned]
 
-    def gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
+    def _gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
         part = values.scene._bodies.of(self)
         edges, along = self._along(part.mesh)
         of_edges = np.searchsorted(values.scene._couple_edges, part.first_edge + edges)
         return {"couple_per_length": gradient.value("couples", "couples")[of_edges] @ along}
 
     def replaced(self, *, couple_per_length: Numbers) -> EdgeCouple:
+        """Returns the same load with another couple per length [N], of the same shape."""
         changed = EdgeCouple(self.edges, couple_per_length, self.body)
         if changed.couple_per_length.shape != self.couple_per_length.shape:
             raise ValueError(

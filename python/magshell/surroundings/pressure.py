@@ -48,7 +48,7 @@ class Pressure(Owner):
 
     _replaceable = ("pressure",)
     _in_time = ("pressure",)
-    for_all = False
+    _for_all = False
 
     def __init__(self, pressure: Numbers, *, faces: Numbers | None = None, body: Shell | Solid | None = None):
         self.faces: np.ndarray | None = None if faces is None else selection("Pressure faces", faces)
@@ -59,6 +59,7 @@ class Pressure(Owner):
         self.pressure: np.ndarray = quantity("pressure", "Pa", array, array.shape)
 
     def replaced(self, *, pressure: Numbers) -> Pressure:
+        """Returns the same load with another pressure [Pa], of the same shape."""
         changed = Pressure(pressure, faces=self.faces, body=self.body)
         if changed.pressure.shape != self.pressure.shape:
             raise ValueError(
@@ -66,7 +67,7 @@ class Pressure(Owner):
             )
         return changed
 
-    def add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
+    def _add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         numbers[label, "pressure"] = np.atleast_1d(self.pressure)
 
     def _core_input(self, label: str, bodies: Bodies) -> dict[Any, Any]:

@@ -65,15 +65,15 @@ class Support(Owner):
     body: the Shell that it holds, or None. Meshes are that body's, and so are indices.
     """
 
-    for_all = False  # whether it holds all bodies where it names none
+    _for_all = False  # whether it holds all bodies where it names none
 
-    def add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
+    def _add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         for owner, move in self._moves(values):
             numbers[owner, "center"] = move.center
             numbers[owner, "rotation"] = move.rotation
             numbers[owner, "displacement"] = move.translation
 
-    def gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
+    def _gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
         owners = [owner for owner, _ in self._moves(values)]
         return {
             name: np.sum([gradient.value(owner, name)[0] for owner in owners], axis=0)
@@ -121,7 +121,7 @@ class Pin(Support):
             if move != 0.0 and axis not in components:
                 raise ValueError(f"displacement [m] moves along {axis}, but the Pin holds only {components}")
 
-    def held(self, mesh: TriangleMesh) -> list[Held]:
+    def _held(self, mesh: TriangleMesh) -> list[Held]:
         vertices = indices("Pin vertices", self.vertices, mesh.n_vertices)
         if isinstance(mesh, SixNodeMesh):
             _refuse_ends_alone(mesh, vertices)
@@ -131,7 +131,7 @@ class Pin(Support):
         move = self._move.about(mesh.rest_positions[vertices], self)
         return [Held(vertices, np.broadcast_to(directions, (len(vertices), *directions.shape)), move)]
 
-    def directed(self, mesh: TriangleMesh) -> list[DirectedEdges]:
+    def _directed(self, mesh: TriangleMesh) -> list[DirectedEdges]:
         return []
 
     def replaced(self, **values: Any) -> Pin:
@@ -170,13 +170,13 @@ class Clamp(Support):
         self.edges: np.ndarray = selection("Clamp edges", edges)
         self._move = _Move(displacement, rotation, center)
 
-    def held(self, mesh: TriangleMesh) -> list[Held]:
+    def _held(self, mesh: TriangleMesh) -> list[Held]:
         if not isinstance(mesh, TriangleMesh | SixNodeMesh):
             raise ValueError("a Clamp holds edges of a shell: a Pin of the vertices of a face clamps a solid")
         vertices = np.unique(mesh.nodes_of_edges[self._checked(mesh)])
         return [Held(vertices, np.broadcast_to(np.eye(3), (len(vertices), 3, 3)), self._move_on(mesh))]
 
-    def directed(self, mesh: TriangleMesh) -> list[DirectedEdges]:
+    def _directed(self, mesh: TriangleMesh) -> list[DirectedEdges]:
         edges = self._checked(mesh)
         # Continues the face in its own plane, so that a clamped flat sheet has no fold at its clamp.
         return [DirectedEdges(edges, continuations(mesh, edges), self._move_on(mesh))]
@@ -213,7 +213,7 @@ class SymmetryPlane(Support):
     True
     """
 
-    for_all = True
+    _for_all = True
 
     def __init__(
         self,
@@ -248,11 +248,11 @@ class SymmetryPlane(Support):
             )
         return vertices
 
-    def held(self, mesh: TriangleMesh) -> list[Held]:
+    def _held(self, mesh: TriangleMesh) -> list[Held]:
         vertices = self._vertices(mesh)
         return [Held(vertices, np.broadcast_to(self.normal, (len(vertices), 1, 3)), None)]
 
-    def directed(self, mesh: TriangleMesh) -> list[DirectedEdges]:
+    def _directed(self, mesh: TriangleMesh) -> list[DirectedEdges]:
         if not isinstance(mesh, TriangleMesh | SixNodeMesh):
             return []  # a solid has no angle across the plane
         on_plane = np.zeros(mesh.n_vertices, dtype=bool)

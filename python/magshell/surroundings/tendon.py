@@ -82,7 +82,7 @@ class Tendon(Actuator):
             raise ValueError(
                 f"points {np.argmin(self._shares)} and {np.argmin(self._shares) + 1} of the Tendon are one"
             )
-        self._shares /= length
+        self._shares = self._shares / length
         self.tension: np.ndarray = number("tension", "N", tension, 0.0)
         self.stiffness: np.ndarray = number("stiffness", "N/m", stiffness, 0.0)
         rest = length if rest_length is None else rest_length
@@ -91,7 +91,7 @@ class Tendon(Actuator):
         self.smoothing: np.ndarray = number("smoothing", "m", smooth, 0.0, above=True)
 
     @property
-    def is_spring(self) -> bool:
+    def _is_spring(self) -> bool:
         """Whether it has a stiffness; else it pulls with a tension that is given."""
         return bool(self.stiffness > 0.0)
 
@@ -106,10 +106,11 @@ class Tendon(Actuator):
         return next((each for each in self.bodies if isinstance(each, BODIES)), None)
 
     def replaced(self, **values: Any) -> Tendon:
+        """Returns the same tendon with other numbers."""
         now = {name: getattr(self, name) for name in self._replaceable} | values
         return self._keep_shapes(Tendon(self._points, sliding=self.sliding, **now))
 
-    def tension_at(self, length: Numbers) -> Computed:
+    def _tension_at(self, length: Numbers) -> Computed:
         """N, at a length, m; of a tendon that does not slide, at those of its segments, (..., segments)."""
         shares = 1.0 if self.sliding else _like(self._shares, length)
         beyond = length - shares * float(self.rest_length)
@@ -120,7 +121,7 @@ class Tendon(Actuator):
         )
         return float(self.tension) + float(self.stiffness) / shares * pull
 
-    def riding(self, scene_bodies: Bodies, places: list[Place]) -> list[tuple[np.ndarray, np.ndarray]]:
+    def _riding(self, scene_bodies: Bodies, places: list[Place]) -> list[tuple[np.ndarray, np.ndarray]]:
         """Of each point the core's vertices that it rides on, and their weights."""
         return riding_points(self._points, scene_bodies, places)
 
@@ -131,7 +132,7 @@ class Tendon(Actuator):
             "shares": self._shares.tolist(),
             "points": [
                 {"vertices": vertices.tolist(), "weights": weights.tolist()}
-                for vertices, weights in self.riding(bodies, places)
+                for vertices, weights in self._riding(bodies, places)
             ],
         }
 

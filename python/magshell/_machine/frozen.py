@@ -1,0 +1,193 @@
+"""Objects that stay as they were made: what a scene, a solve or a result was built from cannot change under it."""
+
+from __future__ import annotations
+
+import functools
+import re
+from dataclasses import FrozenInstanceError, is_dataclass
+from typing import Any, NoReturn, TypeVar
+
+import numpy as np
+
+C = TypeVar("C", bound=type)
+T = TypeVar("T")
+
+# The ids of the objects whose __init__ is running; each is there for that long only, so that it is that of one object.
+_being_made: set[int] = set()
+_HOLDERS = (np.ndarray, tuple, dict)
+
+
+class Frozen:
+    """A base of objects whose attributes are set while `__init__` runs, and never after.
+
+    Setting or deleting one later raises FrozenInstanceError, an AttributeError, which says how to get another value. The
+    arrays that an object holds are read-only as soon as it has them, in copies and in other processes too. Cached
+    properties still work: Python keeps them without setting an attribute. Code of the package makes a changed copy by
+    `variant`, and keeps what it found by `remember`.
+    """
+
+    _way = ""  # how to get another value, where the class knows better than `_way_to_another`
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Wraps the `__init__` that a class has of its own."""
+        super().__init_subclass__(**options)
+        if "__init__" in vars(cls):
+            setattr(cls, "__init__", _closing(vars(cls)["__init__"]))  # noqa: B010 - type checkers see the class's own
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if id(self) not in _being_made:
+            refuse(self, name)
+        if isinstance(value, _HOLDERS):
+            read_only(value)
+        object.__setattr__(self, name, value)
+
+    def __delattr__(self, name: str) -> None:
+        if id(self) not in _being_made:
+            refuse(self, name)
+        object.__delattr__(self, name)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Takes what a copy, another process or a file hands over: arrays arrive writable, dicts plain."""
+        vars(self).update(_of_fixed_parts(self, state))
+
+
+def immutable(cls: C) -> C:
+    """Decorate a frozen dataclass or a named tuple: it refuses changes with the words that `Frozen` has. Its arrays
+    are read-only, lists become tuples, dicts a FixedDict; but for the fields named in `_as_given`, which hold what a
+    function of the caller's returned."""
+    cls.__setattr__, cls.__delattr__ = Frozen.__setattr__, Frozen.__delattr__
+    if is_dataclass(cls):
+        if "__init__" in vars(cls):
+            cls.__init__ = _with_fixed_parts(vars(cls)["__init__"])
+        if not hasattr(cls, "__setstate__"):
+            cls.__setstate__ = Frozen.__setstate__
+    else:
+        cls.__new__ = _new_of_fixed_parts(cls.__new__)
+    return cls
+
+
+def variant(thing: T, **attributes: Any) -> T:
+    """Return a copy of an object with other attributes, without its `__init__`."""
+    other = object.__new__(type(thing))
+    vars(other).update({**vars(thing), **attributes})
+    read_only(attributes)
+    return other
+
+
+def remember(thing: Any, **attributes: Any) -> None:
+    """Sets what an object keeps for itself once it is made: caches, locks, what it has warned of."""
+    vars(thing).update(attributes)
+
+
+def read_only(values: Any) -> None:
+    """Makes an array read-only, or every array in a tuple or a dict."""
+    if isinstance(values, np.ndarray):
+        values.setflags(write=False)
+    elif isinstance(values, tuple):
+        for each in values:
+            read_only(each)
+    elif isinstance(values, dict):
+        for each in values.values():
+            read_only(each)
+
+
+def refuse(thing: Any, name: str) -> NoReturn:
+    """Raises FrozenInstanceError: an attribute cannot be set or deleted."""
+    kind = type(thing).__name__
+    article = "an" if kind[0] in "AEIOU" else "a"
+    way = getattr(type(thing), "_way", "") or _way_to_another(thing, name)
+    raise FrozenInstanceError(f"{article} {kind} stays as it was made: {name} cannot be changed. {way}")
+
+
+class FixedDict(dict[Any, Any]):
+    """A dict of a result, which cannot be edited: dict(...) of it is a copy that can."""
+
+    def _refuse(self, *_: Any, **__: Any) -> NoReturn:
+        raise TypeError("a result stays as it was found: edit a copy, dict(...)")
+
+    __setitem__ = __delitem__ = __ior__ = clear = pop = popitem = setdefault = update = _refuse
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _fixed, (dict(self),)
+
+
+def _closing(init: Any) -> Any:
+    """The `__init__` of a class, in which attributes can be set.
+
+    It leaves `__dict__` alone: once that is asked for, every look at an attribute takes twice as long.
+    """
+
+    @functools.wraps(init)
+    def made(self, *arguments, **named):
+        if id(self) in _being_made:  # a part of a subclass's
+            init(self, *arguments, **named)
+            return
+        _being_made.add(id(self))
+        try:
+            init(self, *arguments, **named)
+        finally:
+            _being_made.discard(id(self))
+
+    return made
+
+
+def _with_fixed_parts(init: Any) -> Any:
+    """The `__init__` of a dataclass, whose arrays, lists and dicts cannot be edited at its end."""
+
+    @functools.wraps(init)
+    def made(self, *arguments, **named):
+        init(self, *arguments, **named)
+        before = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        for name, value in _of_fixed_parts(self, before).items():
+            if value is not before[name]:
+                object.__setattr__(self, name, value)
+
+    return made
+
+
+def _of_fixed_parts(thing: Any, state: dict[str, Any]) -> dict[str, Any]:
+    """The attributes of an object so that they cannot be edited. What is private stays what it is, with read-only arrays."""
+    as_given = getattr(thing, "_as_given", ())
+    read_only({name: value for name, value in state.items() if name not in as_given})
+    return {
+        name: value if name.startswith("_") or name in as_given else _fixed(value)
+        for name, value in state.items()
+    }
+
+
+def _new_of_fixed_parts(new: Any) -> Any:
+    """The `__new__` of a named tuple, likewise."""
+
+    @functools.wraps(new)
+    def made(cls, *arguments, **named):
+        return new(cls, *map(_fixed, arguments), **{name: _fixed(each) for name, each in named.items()})
+
+    return made
+
+
+def _fixed(value: Any) -> Any:
+    if type(value) in (list, tuple):
+        return tuple(map(_fixed, value))
+    if type(value) is dict:
+        return FixedDict({name: _fixed(each) for name, each in value.items()})
+    if isinstance(value, np.ndarray):
+        value.setflags(write=False)
+    return value
+
+
+def _way_to_another(thing, name: str) -> str:
+    kind = type(thing).__name__
+    variable = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", kind).lower()
+    replaceable = tuple(getattr(thing, "_replaceable", ()))
+    another = f"make another, {kind}(...)"
+    if not replaceable:
+        if is_dataclass(thing):
+            another = f"make another, {kind}(...) or dataclasses.replace({variable}, {name}=...)"
+        return another[0].upper() + another[1:]
+    if name in replaceable:
+        if hasattr(thing, "replaced"):
+            another = f"make another, {variable}.replaced({name}=...)"
+        return f'For one solve, give values={{{variable}: {{"{name}": ...}}}}; else {another}'
+    by = f"values={{{variable}: {{...}}}}"
+    by = f"{by} and {variable}.replaced(...)" if hasattr(thing, "replaced") else by
+    return f"{another[0].upper()}{another[1:]}. {by} can change: {', '.join(replaceable)}"
