@@ -143,8 +143,8 @@ class Skin(Owner):
 
     @property
     def element_masses(self) -> tuple[np.ndarray, np.ndarray]:
-        """Consistent masses: the corners of each triangle (n, 3), and the integrals of its mass per area times the products of
-        their shape functions (n, 3, 3), kg; zeros without a mass density."""
+        """Consistent masses: the corners of each triangle (n, 3), and the integrals of its mass per area times the products
+        of their shape functions (n, 3, 3), kg; zeros without a mass density."""
         density = 0.0 if self.mass_density is None else self.mass_density
         products = (np.ones((3, 3)) + np.eye(3)) / 12.0
         return self._corners, (self._areas * self.thickness * density)[:, None, None] * products

@@ -19,6 +19,7 @@ from ..bodies.caps import warn_of_caps
 from ..bodies.strains import Largest, largest_of, warn_if_large
 from ..errors import Interrupted, NotConverged
 from ..methods.solvers import MixedNewton, Newton
+from ..scene.field_sampling import warn_of_sampling
 from ..scene.inputs import Inputs
 from ..scene.replacements import SHELL_NAMES, requested
 from ..scene.scene import Scene
@@ -162,6 +163,10 @@ def solve(
     warn_if_large(
         result, Largest(result.largest_membrane_strain, result.largest_bending_strain), "the equilibrium"
     )
+    layout = scene._control_layout
+    field_factor = float(layout.of(found.controls, "scene", "field_factor")[0])
+    flux_density = layout.of(found.controls, "scene", "applied_flux_density")[0]
+    warn_of_sampling(inputs.values, positions, field_factor, flux_density, "this equilibrium")
     return Solution(result, found, inputs)
 
 
