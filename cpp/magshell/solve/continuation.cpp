@@ -6,6 +6,7 @@
 
 #include "magshell/core/errors.h"
 #include "magshell/solve/modes.h"
+#include "magshell/solve/obstacle_sides.h"
 
 namespace magshell {
 namespace {
@@ -16,7 +17,8 @@ constexpr double smallest_turn_cosine =
 // Of the largest step, while the parameter goes from 0 to 1: below that nothing moves but by rounding, and arc
 // length is that of the parameter.
 constexpr double least_movement = 1e-3;
-constexpr double coincident = 1e-6;  // of a step: critical points closer than that count as one
+constexpr double longest_turn = 0.5;  // [rad] of an obstacle in one step: full circles must be gone through
+constexpr double coincident = 1e-6;   // of a step: critical points closer than that count as one
 
 struct Tangent {
     VectorXd state;
@@ -34,7 +36,8 @@ class Follower {
           rate_(to + (-1.0) * from),
           options_(options),
           until_(until),
-          result_(result) {
+          result_(result),
+          sides_(model_) {
         // The mean over the area: three components of each vertex carry its area in the metric.
         const double area = model_.metric().sum() / 3.0;
         weight_ = model_.metric() / (area * model_.extent() * model_.extent());
@@ -154,15 +157,19 @@ class Follower {
         const PathPoint base = result_.points.back();
         const double shortest = 1e-7 * step_;
         bool at_base = true;  // whether the model was last evaluated there
+        std::string through;  // an obstacle
+        sides_.remember(base.state, controls(base.parameter));
         for (step_ = std::min(step_, options_.largest_step);; step_ *= 0.5, at_base = false) {
-            if (step_ < shortest) return fail("no step along the path converges, however short");
+            if (step_ < shortest)
+                return fail(through.empty() ? "no step along the path converges, however short" : through);
             if (!at_base) model_.evaluate(base.state, controls(base.parameter));
             PathPoint next;
             Tangent there;
             int iterations = 0;
-            if (!correct(base, tangent, step_, next, iterations) || !end_in_range(next) ||
-                !find_tangent(next, there))
-                continue;
+            if (!correct(base, tangent, step_, next, iterations) || !end_in_range(next)) continue;
+            const Controls at = controls(next.parameter);
+            through = sides_.crossed(next.state, at);
+            if (!through.empty() || sides_.turned(at) > longest_turn || !find_tangent(next, there)) continue;
             normalize(there);
             double turn = cosine(tangent, there);
             if (turn < 0.0) {
@@ -272,6 +279,7 @@ class Follower {
     const PathOptions& options_;
     const Until& until_;
     PathResult& result_;
+    ObstacleSides sides_;  // at the last point
     VectorXd weight_;
     double psi_ = 1.0, step_ = 0.0;
 };

@@ -121,7 +121,8 @@ class Descent {
             VectorXd there = here_.q;
             model_.reduction().advance(there, part * step);
             const double energy = model_.energy(there, controls_), change = energy - here_.energy;
-            if (!(change <= falls_enough * part * slope + allowed)) {
+            const bool through = !model_.blocked(here_.q, controls_, there, controls_).empty();
+            if (through || !(change <= falls_enough * part * slope + allowed)) {
                 if (best > 0.0) break;
                 too_far = true;
                 const double bottom =

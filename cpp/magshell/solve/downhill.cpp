@@ -234,7 +234,7 @@ class Downhill : private Relaxing {
             settles = k > 0 && each < has_settled * whole;
         }
         const double energy = settles ? model_.energy(trial, controls_) : 0.0;
-        if (!settles || !lowers(energy)) {
+        if (!settles || !lowers(energy) || crosses(trial)) {
             model_.set_turns(turns);
             newton_.evaluate(q_, controls_, {});
             return false;

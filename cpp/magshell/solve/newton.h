@@ -11,6 +11,7 @@
 
 #include <functional>
 #include <memory>
+#include <stdexcept>
 #include <string>
 
 #include "magshell/linalg/factor.h"
@@ -63,6 +64,11 @@ struct Anchor {
     const VectorXd* weights = nullptr;
     const VectorXd* target = nullptr;
     const StageMotion* motion = nullptr;  // of a time step: forces that no energy has act as well
+};
+
+/// A solve has cost as much as it may.
+struct EffortSpent : std::runtime_error {
+    EffortSpent() : std::runtime_error("the effort is spent") {}
 };
 
 /// A model with its factorization, counting what it costs. Everything that solves goes through here.
@@ -146,6 +152,9 @@ class Newton {
     /// The factorization, for somebody to keep; the next one goes elsewhere.
     std::shared_ptr<Factor> release_factor();
     double linear_time() const { return linear_time_; }  // [s] in factorizations and solves
+    /// Throws EffortSpent from now on where another factorization would be more than so many; 0: never. Iterations without one
+    /// count too, at what they cost.
+    void give_up_after(int factorizations) { most_factorizations_ = factorizations; }
     void count_iteration() { ++iterations_; }
     void count_factorizations(int more) { factorizations_ += more; }
     void watch(double residual) const {
@@ -175,6 +184,7 @@ class Newton {
     /// The norm of the forces [N] by which a step from the last evaluated state differs, for the normal forces of obstacles,
     /// from what the last factorization has of them.
     double obstacles_change(const VectorXd& step) const;
+    void spend() const;
     FactorReport factorize_assembled(const VectorXd& q, const Anchor& anchor);
 
     Model& model_;
@@ -185,6 +195,7 @@ class Newton {
     std::vector<ContactTerm::ActiveContact> touched_;  // what touched obstacles where that was factorized
     bool unsymmetric_ = false;                         // whether what was assembled last is
     int factorizations_ = 0, failed_factorizations_ = 0, iterations_ = 0;
+    int most_factorizations_ = 0;
     mutable double linear_time_ = 0.0;
 };
 

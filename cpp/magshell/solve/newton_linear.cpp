@@ -1,4 +1,5 @@
 // What Newton does with its matrix: factorize it, and solve with it.
+#include <algorithm>
 #include <chrono>
 #include <limits>
 #include <utility>
@@ -27,7 +28,17 @@ class Stopwatch {
 };
 }  // namespace
 
+void Newton::spend() const {
+    // [-] Iterations without a factorization of their own that cost as much as one: a gradient and two triangular solves each.
+    constexpr int iterations_a_factorization = 20;
+    const int without = std::max(0, iterations_ - factorizations_);
+    if (most_factorizations_ > 0 &&
+        factorizations_ + without / iterations_a_factorization >= most_factorizations_)
+        throw EffortSpent();
+}
+
 FactorReport Newton::factorize_assembled(const VectorXd& q, const Anchor& anchor) {
+    spend();
     if (!factor_ || factor_->pattern() != model_.reduction().pattern()) {
         model_.keep_spare(std::exchange(factor_, nullptr));
         factor_ = model_.new_factor([this] { watch(watched_); });

@@ -66,7 +66,7 @@ class Flow : private Relaxing {
         const VectorXd moved = trial - anchor;
         const double energy = report.converged ? model_.energy(trial, controls_) : 0.0;
         const double pull = 0.5 * moved.dot(weights.cwiseProduct(moved));
-        if (!report.converged || !lowers(energy + pull)) {
+        if (!report.converged || !lowers(energy + pull) || crosses(trial)) {
             model_.set_turns(turns);
             return false;
         }

@@ -35,6 +35,11 @@ bool Relaxing::goes_on_without(const FactorReport& factor, bool at_rest) {
     return false;
 }
 
+bool Relaxing::crosses(const VectorXd& trial) {
+    in_the_way_ = model_.blocked(q_, controls_, trial, controls_);
+    return !in_the_way_.empty();
+}
+
 double Relaxing::forced_rate() const {
     const Reduction& reduction = model_.reduction();
     const VectorXd force = reduction.vector(model_.residual().gradient),
@@ -77,6 +82,7 @@ double Relaxing::leave_saddle(const Mode& mode) {
             const VectorXd push = sign * amplitude * mode.shape;
             if (model_.has_body_contact() && model_.largest_share(saddle, push) < 1.0) break;
             model_.reduction().advance(trial, push);
+            if (!model_.blocked(saddle, controls_, trial, controls_).empty()) break;
             const double energy = model_.energy(trial, controls_);
             // The first push may be too small for the energy to tell, but must be made.
             if (amplitude > settled_ && !(energy < side.energy)) break;

@@ -23,6 +23,7 @@ class Relaxing {
             if (!look()) return report_;
             if (step()) continue;
             report_.reason = "no step lowers the energy, however short";
+            if (!in_the_way_.empty()) report_.reason += "; " + in_the_way_;
             return report_;
         }
         report_.reason = "not at rest after " + std::to_string(max_steps) + " steps";
@@ -39,7 +40,7 @@ class Relaxing {
         VectorXd trial = q_;
         const Model::Turns turns = model_.turns();
         const NewtonReport report = solve(trial);
-        if (!report.converged || !good(report, trial)) {
+        if (!report.converged || !good(report, trial) || crosses(trial)) {
             model_.set_turns(turns);
             return false;
         }
@@ -48,6 +49,8 @@ class Relaxing {
         return true;
     }
 
+    /// Whether a point would pass through an obstacle on the way from q to `trial`.
+    bool crosses(const VectorXd& trial);
     /// [N/m3] With this rate the forces move a sheet that only the anchor holds by a twentieth of its extent.
     double forced_rate() const;
     /// [N/m3] Of the last assembled Hessian, per area: a rate like it holds every vertex where it is.
@@ -65,6 +68,7 @@ class Relaxing {
     VectorXd& q_;
     const Controls& controls_;
     RelaxationReport report_;
+    std::string in_the_way_;  // of the last step that an obstacle has not let pass, in words
     double energy_, rate_ = 0.0;
     double last_move_ = std::numeric_limits<double>::infinity();
     const double settled_;  // [m] a step that moves less has come to rest, or to a saddle

@@ -7,14 +7,20 @@
 #include "magshell/solve/deflation.h"
 #include "magshell/solve/load_predictor.h"
 #include "magshell/solve/load_steps.h"
+#include "magshell/solve/obstacle_sides.h"
 #include "magshell/solve/put_in_joints.h"
 #include "magshell/solve/relaxation.h"
 
 namespace magshell {
 namespace {
 
-constexpr double longest_turn =
-    0.5;  // [rad] of a support in one load step: full circles must be gone through
+// [rad] of a support or an obstacle in one load step: full circles must be gone through
+constexpr double longest_turn = 0.5;
+// [-] Of the way: the shortest load step in which obstacles may move; fixed by
+// test_a_ball_that_moves_by_many_diameters_pushes_the_sheet_along.
+constexpr double shortest_clear_step = 1.0 / 4096.0;
+// [-] Halves of a load step that ends beyond an obstacle, before the state relaxes there instead.
+constexpr int most_halves = 6;
 
 class Statics {
   public:
@@ -26,10 +32,21 @@ class Statics {
           options_(options),
           result_(result),
           wary_(goes_warily()),
+          sides_(newton.model()),
           predictor_(newton.model().n_coordinates()) {}
 
     bool run() {
-        const bool found = search();
+        bool found = false;
+        newton_.give_up_after(options_.max_factorizations);
+        try {
+            found = search();
+        } catch (const EffortSpent&) {
+            newton_.give_up_after(0);
+            newton_.model().set_turns(result_.turns);
+            result_.effort_spent = true;
+            result_.reason = "it gave up after " + std::to_string(newton_.factorizations()) +
+                             " factorizations (max_factorizations of the solver)";
+        }
         if (!found) finish();
         return found;
     }
@@ -51,6 +68,7 @@ class Statics {
     bool search() {
         controls_at(0.0);
         put_in_joints(newton_.model(), result_.state);
+        sides_.remember(result_.state, from_);
         result_.reason = newton_.model().refusal(result_.state);
         if (!result_.reason.empty() || !(options_.away_from.empty() ? load() : go_elsewhere())) return false;
         return result_.stable || !options_.require_stable || descend(1.0);
@@ -75,14 +93,18 @@ class Statics {
         if (options_.start_at_rest && from_ == to_ && newton_.still_holds(result_.state, to_))
             accept(result_.state, to_, 1.0, newton_.relative_residual(result_.state, {}));
         const Reduction& reduction = newton_.model().reduction();
+        controls_at(1.0);
         const double turn =
-            std::abs(reduction.progress(to_) - reduction.progress(from_)) * reduction.largest_turn();
+            std::max(std::abs(reduction.progress(to_) - reduction.progress(from_)) * reduction.largest_turn(),
+                     sides_.turned(to_));
         const double longest_step = turn > longest_turn ? longest_turn / turn : 1.0;
         LoadSteps steps(options_.first_step, longest_step, options_.smallest_step, newton_.model().extent(),
                         wary_);
         FactorReport factor;  // at the last load step
+        int halves = 0;       // of a load step that ended beyond an obstacle
         while (result_.progress < 1.0) {
-            const double left = 1.0 - result_.progress, step = steps.next(left);
+            const double left = 1.0 - result_.progress, step = clear_step(steps.next(left));
+            if (step == 0.0) return false;
             const double target = step < left ? result_.progress + step : 1.0;
             const Controls controls = controls_at(target);
             VectorXd trial = result_.state;
@@ -91,7 +113,13 @@ class Statics {
                 report.converged = false;
                 report.reason = "a step ended on another branch, which is not stable";
             }
+            const std::string through = report.converged ? sides_.crossed(trial, controls) : std::string();
+            if (!through.empty()) {
+                report.converged = false;
+                report.reason = through;
+            }
             if (report.converged) {
+                halves = 0;
                 was_stable_ = report.factor.negative_pivots == 0;
                 predictor_.went(result_.state, report.tangent, target - result_.progress);
                 accept(trial, controls, target, report.residual);
@@ -104,20 +132,44 @@ class Statics {
             newton_.model().set_turns(result_.turns);
             result_.reason = report.reason;
             result_.failed.shortest_step = std::min(result_.failed.shortest_step, step);
-            if (steps.failed(step, report) && options_.start_at_rest) continue;
+            if (!through.empty() && ++halves <= most_halves) {
+                steps.again_with(0.5 * step);
+                continue;
+            }
+            if (through.empty() && steps.failed(step, report) && options_.start_at_rest) continue;
             // What a support turns must be gone through; everything else may be relaxed at its end at once.
             factor = {};
-            const double end = longest_step < 1.0 ? std::min(1.0, result_.progress + longest_step) : 1.0;
+            const double relaxed = clear_step(std::min(left, longest_step));
+            if (relaxed == 0.0) return false;
+            const double end = relaxed < left ? result_.progress + relaxed : 1.0;
             if ((wary_ || !plain_steps(end)) && !descend(end)) {
                 if (wary_ && steps.insist()) continue;
                 return false;
             }
+            halves = 0;
             rough_ = false;
             last_ = {};
             predictor_.forget();
             steps.again_with(longest_step);
         }
         return factor.succeeded ? judge(factor) : check_stability();
+    }
+
+    // Of a load step, the part that moves obstacles and supports through no point that stays where it is: the penalty would
+    // push it out on the wrong side. Zero, and the reason, where there is none.
+    double clear_step(double step) {
+        if (!newton_.model().has_contact()) return step;
+        const double wanted = step;
+        for (; step >= shortest_clear_step * std::min(1.0, wanted); step *= 0.5) {
+            const Controls there = controls_at(std::min(1.0, result_.progress + step));
+            VectorXd moved = result_.state;
+            newton_.model().linearize(moved);
+            const VectorXd move = newton_.model().reduction().prescribed_increment(moved, there);
+            newton_.model().reduction().advance(moved, move);
+            result_.reason = sides_.crossed(moved, there);
+            if (result_.reason.empty()) return step;
+        }
+        return 0.0;
     }
 
     // States on the way need not be exact.
@@ -164,11 +216,12 @@ class Statics {
         VectorXd trial = result_.state;
         const Controls controls = controls_at(target);
         const NewtonReport report = newton_.solve_plain(trial, controls);
-        if (report.converged)
+        const bool found = report.converged && sides_.crossed(trial, controls).empty();
+        if (found)
             accept(trial, controls, target, report.residual);
         else
             newton_.model().set_turns(result_.turns);
-        return report.converged;
+        return found;
     }
 
     void accept(const VectorXd& state, const Controls& controls, double progress, double residual) {
@@ -177,6 +230,7 @@ class Statics {
         result_.controls = controls;
         result_.progress = progress;
         result_.residual = residual;
+        sides_.remember(state, controls);
         tell_roundoff();
         ++result_.load_steps;
     }
@@ -204,8 +258,15 @@ class Statics {
         for (int k = 0; k < attempts; ++k) {
             VectorXd trial = result_.state;
             const Controls controls = controls_at(target);
-            const RelaxationReport report =
-                relax(newton_, trial, controls, options_.max_relaxation_steps, options_.start_at_rest);
+            RelaxationReport report;
+            try {
+                report =
+                    relax(newton_, trial, controls, options_.max_relaxation_steps, options_.start_at_rest);
+            } catch (const EffortSpent&) {
+                result_.failed.state = std::move(trial);
+                result_.failed.controls = controls;
+                throw;
+            }
             result_.relaxation_steps += report.steps;
             result_.saddles_left += report.saddles_left;
             if (!report.converged) {
@@ -261,6 +322,7 @@ class Statics {
     bool was_stable_ = true;  // where the last load step ended
     bool rough_ = false;      // whether it ended before it was exact
     LastStep last_;           // of that
+    ObstacleSides sides_;     // at the result's state
     LoadPredictor predictor_;
 };
 

@@ -12,7 +12,8 @@ struct StaticsOptions {
     bool require_stable = true;  // false: hand back what Newton found, a saddle too
     bool start_at_rest = true;   // the start is an equilibrium at the old controls: worth halving load steps
     int max_relaxation_steps = 500;
-    bool keep_factor = false;  // for gradients
+    int max_factorizations = 5000;  // after which it gives up; 20 iterations without one count as one
+    bool keep_factor = false;       // for gradients
     std::vector<VectorXd> away_from =
         {};                    // equilibria at the new controls, where the start is already: another one
     double away_length = 0.0;  // [m] how far their deflection reaches
@@ -31,10 +32,11 @@ struct FailedAttempt {
 
 struct StaticsResult {
     Outcome outcome = Outcome::failed;
-    VectorXd state;         // the equilibrium, or the last good state
-    Model::Turns turns;     // of the terms, at `state`
-    Controls controls;      // at which `state` holds
-    double progress = 0.0;  // how far the controls got, 0 to 1
+    VectorXd state;             // the equilibrium, or the last good state
+    Model::Turns turns;         // of the terms, at `state`
+    Controls controls;          // at which `state` holds
+    double progress = 0.0;      // how far the controls got, 0 to 1
+    bool effort_spent = false;  // whether it gave up for what it had cost
     std::string reason;
     FailedAttempt failed;
     int iterations = 0, factorizations = 0, failed_factorizations = 0, load_steps = 0, relaxation_steps = 0;

@@ -84,8 +84,11 @@ def find(
     inputs = inputs_of(scene, arguments, search.at_rest)
     state, turns, from_, at_rest = starting_point(scene, start, inputs)
     moving = None
-    if isinstance(start, Equilibrium) and not at_rest and all_can_move(inputs, start):
-        moving, at_rest = AlongPath(inputs, start), True
+    if isinstance(start, Equilibrium) and not at_rest:
+        at_rest = all_can_move(inputs, start)
+        # Obstacles and supports push bodies along, and pass through them where they jump.
+        moving = AlongPath(inputs, start, at_once=True) if scene.obstacles and not at_rest else None
+        moving = AlongPath(inputs, start) if at_rest else moving
     options = search.options()
     options.start_at_rest = at_rest
     options.keep_factor = keep_factor
