@@ -110,8 +110,8 @@ def of_all_bodies(scene: Scene, replaced: dict[object, dict[Any, Any]]) -> Any:
     return rows
 
 
-def carriers(scene):
-    """(number of the body, Shell or Skin, its rows among those of all (k,)) of what faces are magnetized with."""
+def carriers(scene: Scene) -> Iterator[tuple[int, Any, np.ndarray]]:
+    """Yields (number of the body, Shell or Skin, its rows among those of all (k,)) of what faces are magnetized with."""
     for k, (body, span) in enumerate(zip(scene.bodies, scene._bodies.spans, strict=True)):
         if not isinstance(body, Solid):
             yield k, body, span.first_row + np.arange(body.mesh.n_elements)
