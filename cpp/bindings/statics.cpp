@@ -86,7 +86,8 @@ void register_statics(py::module_& module) {
         .def_readwrite("away_from", &StaticsOptions::away_from)
         .def_readwrite("away_length", &StaticsOptions::away_length)
         .def_readwrite("start_at_rest", &StaticsOptions::start_at_rest)
-        .def_readwrite("max_relaxation_steps", &StaticsOptions::max_relaxation_steps);
+        .def_readwrite("max_relaxation_steps", &StaticsOptions::max_relaxation_steps)
+        .def_readwrite("max_factorizations", &StaticsOptions::max_factorizations);
 
     py::enum_<Outcome>(module, "Outcome")
         .value("converged", Outcome::converged)
@@ -107,6 +108,7 @@ void register_statics(py::module_& module) {
         .def_readonly("controls", &StaticsResult::controls)
         .def_readonly("progress", &StaticsResult::progress)
         .def_readonly("reason", &StaticsResult::reason)
+        .def_readonly("effort_spent", &StaticsResult::effort_spent)
         .def_readonly("failed", &StaticsResult::failed)
         .def_readonly("iterations", &StaticsResult::iterations)
         .def_readonly("factorizations", &StaticsResult::factorizations)

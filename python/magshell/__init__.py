@@ -32,6 +32,7 @@ from .dynamics.trajectory import MotionState, Trajectory
 from .errors import (
     DesignRejected,
     EquilibriumJumped,
+    FieldSamplingWarning,
     Interrupted,
     LargeStrainWarning,
     MeshQualityWarning,
@@ -118,6 +119,7 @@ __all__ = [
     "EquilibriumJumped",
     "Extrapolation",
     "Fibres",
+    "FieldSamplingWarning",
     "Fixed",
     "Guccione",
     "ImplicitEuler",

@@ -70,6 +70,11 @@ class LargeStrainWarning(UserWarning):
         self.last_good: Any = last_good
 
 
+class FieldSamplingWarning(UserWarning):
+    """The magnetic force on a sheet is off by more than 1 %, as the field of a source near by changes over its faces, which
+    sample it once each. Said once a solve."""
+
+
 class NoGradient(RuntimeError):
     """A gradient was asked for where there is none: at a state that did not converge or is not stable, by an input that
     has none, or of a gradient (second derivatives: take differences of gradients)."""

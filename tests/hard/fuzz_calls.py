@@ -269,6 +269,7 @@ def _solves(s: Sample) -> Iterator[Call]:
         "first_load_step": 1.0,
         "smallest_load_step": 0.1,
         "max_relaxation_steps": 50,
+        "max_factorizations": 1000,
     }
     for kind in (ms.Newton, ms.MixedNewton):
         yield Call(kind.__name__, lambda kind=kind, **a: ms.equilibrium(s.scene, solver=kind(**a)), newton)

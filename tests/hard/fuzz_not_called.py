@@ -29,6 +29,7 @@ NOT_CALLED = {
     "Trajectory": "a result",
     "Strains": "a result",
     "LargeStrainWarning": "a warning",
+    "FieldSamplingWarning": "a warning",
     "MeshQualityWarning": "a warning",
     "UnitWarning": "a warning",
     "VibrationModes": "a result",

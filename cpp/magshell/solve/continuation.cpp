@@ -6,6 +6,7 @@
 
 #include "magshell/core/errors.h"
 #include "magshell/solve/modes.h"
+#include "magshell/solve/obstacle_sides.h"
 
 namespace magshell {
 namespace {
@@ -18,6 +19,8 @@ constexpr double min_tangent_cosine = 0.5;
 // [-] Least movement for which psi is scaled, of the largest step. Below it only round-off moves the bodies, and arc length is
 // that of the parameter. See test_nothing_to_buckle_under.
 constexpr double min_movement = 1e-3;
+// [rad] Largest rotation of an obstacle in one step, so that a full turn is not skipped; see test_obstacles_that_move_far.py.
+constexpr double max_obstacle_rotation = 0.5;
 // [-] Critical points closer than this share of a step count as one; see test_buckling_is_where_the_path_branches.
 constexpr double coincident_step = 1e-6;
 // [-] Distance of supports from their target below which they are in place, over the extent; see test_a_clamp_that_shakes.
@@ -46,7 +49,8 @@ class Follower {
           rate_(to + (-1.0) * from),
           options_(options),
           until_(until),
-          result_(result) {
+          result_(result),
+          sides_(model_) {
         // The metric gives every component of a vertex the area of the vertex, so the area is a third of the sum.
         const double area = model_.metric().sum() / 3.0;
         weight_ = model_.metric() / (area * model_.extent() * model_.extent());
@@ -167,15 +171,19 @@ class Follower {
         const PathPoint base = result_.points.back();
         const double shortest = min_step_ratio * step_;
         bool at_base = true;  // whether the model was last evaluated at the base point
+        std::string through;  // the obstacle that the last trial step would pass through
+        sides_.remember(base.state, controls(base.parameter));
         for (step_ = std::min(step_, options_.largest_step);; step_ *= 0.5, at_base = false) {
-            if (step_ < shortest) return fail("no step along the path converges, however short");
+            if (step_ < shortest)
+                return fail(through.empty() ? "no step along the path converges, however short" : through);
             if (!at_base) model_.evaluate(base.state, controls(base.parameter));
             PathPoint next;
             Tangent there;
             int iterations = 0;
-            if (!correct(base, tangent, step_, next, iterations) || !end_in_range(next) ||
-                !find_tangent(next, there))
-                continue;
+            if (!correct(base, tangent, step_, next, iterations) || !end_in_range(next)) continue;
+            const Controls at = controls(next.parameter);
+            through = sides_.crossed(next.state, at);
+            if (!through.empty() || sides_.turned(at) > max_obstacle_rotation || !find_tangent(next, there)) continue;
             normalize(there);
             double turn = cosine(tangent, there);
             if (turn < 0.0) {
@@ -286,6 +294,7 @@ class Follower {
     const PathOptions& options_;
     const Until& until_;
     PathResult& result_;
+    ObstacleSides sides_;  // at the last accepted point
     VectorXd weight_;
     double psi_ = 1.0, step_ = 0.0;
 };

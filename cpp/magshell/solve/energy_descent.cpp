@@ -264,7 +264,7 @@ class PostBucklingDescent : private EnergyDescent {
             settles = k > 0 && each < flow_tolerance * whole;
         }
         const double energy = settles ? model_.energy(trial, controls_) : 0.0;
-        if (!settles || !lowers(energy)) {
+        if (!settles || !lowers(energy) || crosses_obstacle(trial)) {
             model_.set_angle_branches(angle_branches);
             newton_.evaluate(q_, controls_, {});
             return false;

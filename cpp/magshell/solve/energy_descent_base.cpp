@@ -39,6 +39,11 @@ bool EnergyDescent::continue_without_factor(const FactorReport& factor, bool at_
     return false;
 }
 
+bool EnergyDescent::crosses_obstacle(const VectorXd& trial) {
+    crossing_reason_ = model_.crossing_reason(q_, controls_, trial, controls_);
+    return !crossing_reason_.empty();
+}
+
 double EnergyDescent::forced_rate() const {
     const DofMap& dof_map = model_.dof_map();
     const VectorXd force = dof_map.vector(model_.residual().gradient),
@@ -84,6 +89,7 @@ double EnergyDescent::leave_saddle(const Mode& mode) {
             const VectorXd push = sign * amplitude * mode.shape;
             if (model_.has_body_contact() && model_.max_step_length(saddle, push) < 1.0) break;
             model_.dof_map().retract(trial, push);
+            if (!model_.crossing_reason(saddle, controls_, trial, controls_).empty()) break;
             const double energy = model_.energy(trial, controls_);
             // The first displacement may be too small to change the energy, but must be made.
             if (amplitude > settled_ && !(energy < side.energy)) break;

@@ -21,7 +21,8 @@ class EnergyDescent {
         for (; report_.steps < max_steps; ++report_.steps) {
             if (!assess()) return report_;
             if (advance()) continue;
-            report_.reason = "no advance lowers the energy, however short";
+            report_.reason = "no step lowers the energy, however short";
+            if (!crossing_reason_.empty()) report_.reason += "; " + crossing_reason_;
             return report_;
         }
         report_.reason = "no equilibrium after " + std::to_string(max_steps) + " relaxation steps";
@@ -38,7 +39,7 @@ class EnergyDescent {
         VectorXd trial = q_;
         const Model::AngleBranches angle_branches = model_.angle_branches();
         const NewtonReport report = solve(trial);
-        if (!report.converged || !good(report, trial)) {
+        if (!report.converged || !good(report, trial) || crosses_obstacle(trial)) {
             model_.set_angle_branches(angle_branches);
             return false;
         }
@@ -47,6 +48,8 @@ class EnergyDescent {
         return true;
     }
 
+    /// Returns true if a point would pass through an obstacle on the straight way from q to `trial`.
+    bool crosses_obstacle(const VectorXd& trial);
     /// Returns the rate [N/m3] at which the forces move a body held by the proximal term alone by a twentieth of its extent.
     double forced_rate() const;
     /// Returns the largest diagonal entry of the last assembled Hessian per area [N/m3]; this rate holds every vertex in place.
@@ -67,6 +70,7 @@ class EnergyDescent {
     VectorXd& q_;
     const Controls& controls_;
     RelaxationReport report_;
+    std::string crossing_reason_;  // why an obstacle refused the last step, in words; empty if none did
     double energy_, rate_ = 0.0;
     double last_displacement_ = std::numeric_limits<double>::infinity();
     const double settled_;  // [m] a step shorter than this has reached an equilibrium or a saddle

@@ -103,7 +103,8 @@ class Descent {
             VectorXd there = here_.q;
             model_.dof_map().retract(there, alpha * step);
             const double energy = model_.energy(there, controls_), change = energy - here_.energy;
-            if (!(change <= armijo_c1 * alpha * slope + allowed)) {
+            const bool crosses = !model_.crossing_reason(here_.q, controls_, there, controls_).empty();
+            if (crosses || !(change <= armijo_c1 * alpha * slope + allowed)) {
                 if (accepted_alpha > 0.0) break;
                 too_far = true;
                 const double bottom =

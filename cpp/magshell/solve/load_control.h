@@ -50,8 +50,8 @@ class LoadStepController {
 
 /// Cubic Hermite extrapolation of the path from its last two states and their tangents (Crisfield 9.5).
 class LoadPredictor {
+  public:
     /// coordinates: the number of dofs that are lengths; they come first.
-    /// coordinates: how many of the unknowns are lengths.
     explicit LoadPredictor(Index coordinates) : coordinates_(coordinates) {}
 
     /// Records that a step was taken from a state, along this tangent times the step.

@@ -353,7 +353,18 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Proxim
     }
 }
 
+void Newton::check_effort() const {
+    // [-] Iterations without a factorization that cost as much as one: each takes a gradient and two triangular solves. See
+    // test_bounded_effort.py.
+    constexpr int iterations_per_factorization = 20;
+    const int without = std::max(0, iterations_ - factorizations_);
+    if (max_factorizations_ > 0 &&
+        factorizations_ + without / iterations_per_factorization >= max_factorizations_)
+        throw EffortSpent();
+}
+
 FactorReport Newton::factorize_assembled(const VectorXd& q, const ProximalTerm& proximal) {
+    check_effort();
     if (!factor_ || factor_->pattern() != model_.dof_map().pattern()) {
         model_.store_spare_factor(std::exchange(factor_, nullptr));
         factor_ = model_.new_factor([this] { watch(watched_); });

@@ -12,6 +12,7 @@
 
 #include <functional>
 #include <memory>
+#include <stdexcept>
 #include <string>
 
 #include "magshell/linalg/factor.h"
@@ -66,6 +67,11 @@ struct ProximalTerm {
     const VectorXd* target = nullptr;
     const StageMotion* motion =
         nullptr;  // kinematics of a time stage, in which forces without potential act as well
+};
+
+/// Thrown if a solve would exceed its budget of factorizations.
+struct EffortSpent : std::runtime_error {
+    EffortSpent() : std::runtime_error("the budget of factorizations is spent") {}
 };
 
 /// A model with its factorization, and counters of what solving has cost. All solvers use this class.
@@ -151,6 +157,9 @@ class Newton {
     /// Returns the last factorization and gives it up; the next one is made in new memory.
     std::shared_ptr<Factor> release_factor();
     double linear_time() const { return linear_time_; }  // [s] spent in factorizations and solves
+    /// Sets the number of factorizations after which the next one throws EffortSpent; 0: unlimited. Iterations without a
+    /// factorization count as well, by their cost.
+    void set_max_factorizations(int factorizations) { max_factorizations_ = factorizations; }
     void count_iteration() { ++iterations_; }
     void count_factorizations(int more) { factorizations_ += more; }
     void watch(double residual) const {
@@ -182,6 +191,7 @@ class Newton {
     /// Returns the norm of the change of obstacle contact forces [N] along a step, between the contacts now and those of the last
     /// factorization.
     double contact_matrix_change(const VectorXd& step) const;
+    void check_effort() const;
     FactorReport factorize_assembled(const VectorXd& q, const ProximalTerm& proximal);
 
     Model& model_;
@@ -192,6 +202,7 @@ class Newton {
     std::vector<ContactTerm::ActiveContact> touched_;  // contacts with obstacles at the last factorization
     bool unsymmetric_ = false;                 // whether the matrix assembled last is
     int factorizations_ = 0, failed_factorizations_ = 0, iterations_ = 0;
+    int max_factorizations_ = 0;
     mutable double linear_time_ = 0.0;
 };
 

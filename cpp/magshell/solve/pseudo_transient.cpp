@@ -73,7 +73,7 @@ class PseudoTransient : private EnergyDescent {
         const VectorXd moved = trial - proximal;
         const double energy = report.converged ? model_.energy(trial, controls_) : 0.0;
         const double pull = 0.5 * moved.dot(weights.cwiseProduct(moved));
-        if (!report.converged || !lowers(energy + pull)) {
+        if (!report.converged || !lowers(energy + pull) || crosses_obstacle(trial)) {
             model_.set_angle_branches(angle_branches);
             return false;
         }

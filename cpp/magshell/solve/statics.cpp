@@ -7,13 +7,21 @@
 #include "magshell/core/errors.h"
 #include "magshell/solve/deflation.h"
 #include "magshell/solve/load_control.h"
+#include "magshell/solve/obstacle_sides.h"
 #include "magshell/solve/pseudo_transient.h"
 
 namespace magshell {
 namespace {
 
-// [rad] Largest rotation of a support in one load step, since rotations are known up to full turns; see test_an_end_turned_by_180_degrees_twists_the_strip.
+// [rad] Largest rotation of a support or an obstacle in one load step, since rotations are known up to full turns; see
+// test_an_end_turned_by_180_degrees_twists_the_strip.
 constexpr double max_support_rotation = 0.5;
+// [-] Shortest load step in which obstacles may move, as a fraction of the load path; see
+// test_a_ball_that_moves_by_many_diameters_pushes_the_sheet_along.
+constexpr double min_clear_step = 1.0 / 4096.0;
+// [-] Number of times that a load step which ends beyond an obstacle is halved before the state is relaxed instead; see
+// test_a_ball_that_moves_by_many_diameters_pushes_the_sheet_along.
+constexpr int max_halvings = 6;
 
 // Moves links to where their joints lead them, for example after the origin of a motor has changed. No force would do that, since
 // motors hold in any position.
@@ -36,10 +44,21 @@ class Statics {
           options_(options),
           result_(result),
           stop_on_instability_(can_stop_on_instability()),
+          sides_(newton.model()),
           predictor_(newton.model().n_coordinates()) {}
 
     bool run() {
-        const bool found = search();
+        bool found = false;
+        newton_.set_max_factorizations(options_.max_factorizations);
+        try {
+            found = search();
+        } catch (const EffortSpent&) {
+            newton_.set_max_factorizations(0);
+            newton_.model().set_angle_branches(result_.angle_branches);
+            result_.effort_spent = true;
+            result_.reason = "it gave up after " + std::to_string(newton_.factorizations()) +
+                             " factorizations (max_factorizations of the solver)";
+        }
         if (!found) finish();
         return found;
     }
@@ -61,6 +80,7 @@ class Statics {
     bool search() {
         controls_at(0.0);
         project_onto_joints(newton_.model(), result_.state);
+        sides_.remember(result_.state, from_);
         result_.reason = newton_.model().invalid_state_reason(result_.state);
         if (!result_.reason.empty() || !(options_.away_from.empty() ? load() : find_other_equilibrium()))
             return false;
@@ -87,14 +107,18 @@ class Statics {
         if (options_.start_at_rest && from_ == to_ && newton_.is_equilibrium(result_.state, to_))
             accept(result_.state, to_, 1.0, newton_.relative_residual(result_.state, {}));
         const DofMap& dof_map = newton_.model().dof_map();
-        const double turn = std::abs(dof_map.support_factor(to_) - dof_map.support_factor(from_)) *
-                            dof_map.largest_rotation();
+        controls_at(1.0);
+        const double support_rotation = std::abs(dof_map.support_factor(to_) - dof_map.support_factor(from_)) *
+                                        dof_map.largest_rotation();
+        const double turn = std::max(support_rotation, sides_.turned(to_));
         const double longest_step = turn > max_support_rotation ? max_support_rotation / turn : 1.0;
         LoadStepController steps(options_.first_step, longest_step, options_.smallest_step,
                                  newton_.model().extent(), stop_on_instability_);
         FactorReport factor;  // at the end of the last load step
+        int halvings = 0;     // of a load step that ended beyond an obstacle
         while (result_.progress < 1.0) {
-            const double left = 1.0 - result_.progress, step = steps.propose(left);
+            const double left = 1.0 - result_.progress, step = clear_step(steps.propose(left));
+            if (step == 0.0) return false;
             const double target = step < left ? result_.progress + step : 1.0;
             const Controls controls = controls_at(target);
             VectorXd trial = result_.state;
@@ -103,7 +127,13 @@ class Statics {
                 report.converged = false;
                 report.reason = "a load step converged to another branch, which is unstable";
             }
+            const std::string through = report.converged ? sides_.crossed(trial, controls) : std::string();
+            if (!through.empty()) {
+                report.converged = false;
+                report.reason = through;
+            }
             if (report.converged) {
+                halvings = 0;
                 was_stable_ = report.factor.negative_pivots == 0;
                 predictor_.record(result_.state, report.tangent, target - result_.progress);
                 accept(trial, controls, target, report.residual);
@@ -116,20 +146,44 @@ class Statics {
             newton_.model().set_angle_branches(result_.angle_branches);
             result_.reason = report.reason;
             result_.failed.shortest_step = std::min(result_.failed.shortest_step, step);
-            if (steps.reject(step, report) && options_.start_at_rest) continue;
-            // Rotations of supports must be followed in steps; other loads may be relaxed at their final values at once.
+            if (!through.empty() && ++halvings <= max_halvings) {
+                steps.reset_to(0.5 * step);
+                continue;
+            }
+            if (through.empty() && steps.reject(step, report) && options_.start_at_rest) continue;
+            // Rotations and obstacles must be followed in steps; other loads may be relaxed at their final values at once.
             factor = {};
-            const double end = longest_step < 1.0 ? std::min(1.0, result_.progress + longest_step) : 1.0;
+            const double relaxed = clear_step(std::min(left, longest_step));
+            if (relaxed == 0.0) return false;
+            const double end = relaxed < left ? result_.progress + relaxed : 1.0;
             if ((stop_on_instability_ || !try_standard_newton(end)) && !relax_to_stable(end)) {
                 if (stop_on_instability_ && steps.retry_once()) continue;
                 return false;
             }
+            halvings = 0;
             inexact_ = false;
             last_ = {};
             predictor_.reset();
             steps.reset_to(longest_step);
         }
         return factor.succeeded ? judge(factor) : check_stability();
+    }
+
+    // Shortens a load step until obstacles and supports move through no contact point that stays where it is: beyond it, the
+    // penalty would push the point out on the wrong side. Returns zero, and sets the reason, if no step is short enough.
+    double clear_step(double step) {
+        if (!newton_.model().has_contact()) return step;
+        const double wanted = step;
+        for (; step >= min_clear_step * std::min(1.0, wanted); step *= 0.5) {
+            const Controls there = controls_at(std::min(1.0, result_.progress + step));
+            VectorXd moved = result_.state;
+            newton_.model().linearize(moved);
+            const VectorXd move = newton_.model().dof_map().prescribed_increment(moved, there);
+            newton_.model().dof_map().retract(moved, move);
+            result_.reason = sides_.crossed(moved, there);
+            if (result_.reason.empty()) return step;
+        }
+        return 0.0;
     }
 
     // Solves one load step; intermediate states need not be exact.
@@ -183,11 +237,12 @@ class Statics {
         VectorXd trial = result_.state;
         const Controls controls = controls_at(target);
         const NewtonReport report = newton_.solve_standard(trial, controls);
-        if (report.converged)
+        const bool found = report.converged && sides_.crossed(trial, controls).empty();
+        if (found)
             accept(trial, controls, target, report.residual);
         else
             newton_.model().set_angle_branches(result_.angle_branches);
-        return report.converged;
+        return found;
     }
 
     void accept(const VectorXd& state, const Controls& controls, double progress, double residual) {
@@ -196,6 +251,7 @@ class Statics {
         result_.controls = controls;
         result_.progress = progress;
         result_.residual = residual;
+        sides_.remember(state, controls);
         update_at_roundoff();
         ++result_.load_steps;
     }
@@ -223,8 +279,15 @@ class Statics {
         for (int k = 0; k < attempts; ++k) {
             VectorXd trial = result_.state;
             const Controls controls = controls_at(target);
-            const RelaxationReport report =
-                relax(newton_, trial, controls, options_.max_relaxation_steps, options_.start_at_rest);
+            RelaxationReport report;
+            try {
+                report =
+                    relax(newton_, trial, controls, options_.max_relaxation_steps, options_.start_at_rest);
+            } catch (const EffortSpent&) {
+                result_.failed.state = std::move(trial);
+                result_.failed.controls = controls;
+                throw;
+            }
             result_.relaxation_steps += report.steps;
             result_.saddles_escaped += report.saddles_escaped;
             if (!report.converged) {
@@ -282,6 +345,7 @@ class Statics {
     bool was_stable_ = true;          // at the end of the last load step
     bool inexact_ = false;            // whether the last load step ended before full convergence
     StressPredictor last_;            // of the last load step, if it was inexact
+    ObstacleSides sides_;             // of the contact points in the state of the result
     LoadPredictor predictor_;
 };
 

@@ -13,7 +13,8 @@ struct StaticsOptions {
     bool start_at_rest =
         true;  // the start is an equilibrium at the old load parameters, so load steps may be shortened
     int max_relaxation_steps = 500;
-    bool keep_factor = false;  // for gradients
+    int max_factorizations = 5000;  // after which the solve gives up; 20 iterations without a factorization count as one
+    bool keep_factor = false;       // for gradients
     std::vector<VectorXd> away_from =
         {};  // known equilibria at the new load parameters, which the result must differ from
     double away_length = 0.0;  // [m] rms deflection of these, the length scale of the deflation
@@ -36,6 +37,7 @@ struct StaticsResult {
     Model::AngleBranches angle_branches;  // of the angles of the terms at `state`
     Controls controls;                    // the load parameters at which `state` is an equilibrium
     double progress = 0.0;                // load fraction reached, 0 to 1
+    bool effort_spent = false;            // whether the budget of factorizations ended the solve
     std::string reason;
     FailedAttempt failed;
     int iterations = 0, factorizations = 0, failed_factorizations = 0, load_steps = 0, relaxation_steps = 0;

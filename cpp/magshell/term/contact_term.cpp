@@ -18,23 +18,32 @@ Vec3 weighted(const ContactPoint& point, const double* all) {
     return sum;
 }
 
-// Tells whether a straight path enters an obstacle on one side and leaves it on another. Steps of the length of
-// the current distance cannot miss the surface (sphere tracing).
-bool passes(const Obstacle& shape, const Vec3& from, const Vec3& to) {
-    const double length = (to - from).norm();
-    Distance at = shape.distance(from);
-    if (at.value > 0.0) {
-        if (length <= at.value) return false;
-        constexpr double least_advance = 1e-3;  // [-] smallest advance, as a fraction of the path
-        double travelled = at.value / length;
-        while (at.value > 0.0) {
-            if (travelled >= 1.0) return false;
-            at = shape.distance(from + travelled * (to - from));
-            travelled += std::max(at.value / length, least_advance);
-        }
+// Finds where the straight way from a point to another, `length` long, enters a body: steps of the distance's own length
+// cannot miss a surface. False where it stays outside.
+bool enters(const Obstacle& shape, const Vec3& from, const Vec3& to, double length, Distance& at) {
+    constexpr double least_advance = 1e-3;  // [-] of the way, where it runs along the surface
+    at = shape.distance(from);
+    if (!(at.value > 0.0)) return true;
+    if (length <= at.value) return false;
+    double travelled = at.value / length;
+    while (at.value > 0.0) {
+        if (travelled >= 1.0) return false;
+        at = shape.distance(from + travelled * (to - from));
+        travelled += std::max(at.value / length, least_advance);
     }
-    // opposite sides; two faces next to an edge of a box do not count
-    return at.normal.dot(shape.distance(to).normal) < -1e-6;
+    return true;
+}
+
+// Whether the way leads through the body's middle surface, where the normal jumps from one side to the other. The sides are
+// those where it enters, where it leaves and where it ends: the ends tell of a thin body, the exit of one that is hollow.
+bool passes(const Obstacle& shape, const Vec3& from, const Vec3& to) {
+    constexpr double opposite =
+        -1e-6;  // [-] cosine between normals of opposite faces; an edge of a box is none
+    const double length = (to - from).norm();
+    Distance in, out;
+    if (!enters(shape, from, to, length, in)) return false;
+    if (in.normal.dot(shape.distance(to).normal) < opposite) return true;
+    return enters(shape, to, from, length, out) && in.normal.dot(out.normal) < opposite;
 }
 
 }  // namespace
@@ -151,16 +160,38 @@ std::vector<ContactTerm::ActiveContact> ContactTerm::active_contacts(const doubl
 
 Index ContactTerm::passes_through(const VectorXd& q, const Controls& controls, const VectorXd& end,
                                   const Controls& controls_at_end) const {
+    return passes_between(own_places(q, controls), own_places(end, controls_at_end));
+}
+
+std::vector<Vec3> ContactTerm::own_places(const VectorXd& q, const Controls& controls) const {
+    std::vector<Vec3> places;
     for (const Contact& contact : contacts_)
         for (const Index o : contact.obstacles) {
-            const ObstacleState before = obstacle_state(o, controls),
-                                after = obstacle_state(o, controls_at_end);
+            const ObstacleState obstacle = obstacle_state(o, controls);
             for (const ContactPoint& point : contact.points)
-                if (passes(*obstacles_[o].shape, before.own(weighted(point, q.data())),
-                           after.own(weighted(point, end.data()))))
-                    return point.nodes[0];
+                places.push_back(obstacle.own(weighted(point, q.data())));
         }
+    return places;
+}
+
+Index ContactTerm::passes_between(const std::vector<Vec3>& before, const std::vector<Vec3>& after) const {
+    std::size_t k = 0;
+    for (const Contact& contact : contacts_)
+        for (const Index o : contact.obstacles)
+            for (const ContactPoint& point : contact.points) {
+                if (passes(*obstacles_[o].shape, before[k], after[k])) return point.nodes[0];
+                ++k;
+            }
     return -1;
+}
+
+std::vector<Vec3> ContactTerm::rotation_vectors(const Controls& controls) const {
+    std::vector<Vec3> all;
+    for (std::size_t o = 0; o < obstacles_.size(); ++o) {
+        all.push_back(obstacles_[o].placement.rotation_vector);
+        all.push_back(controls.segment<3>(obstacle_slots_[o].pose.at(1)));
+    }
+    return all;
 }
 
 Vec3 ContactTerm::at_point(const ActiveContact& active, const double* all) const {

@@ -68,6 +68,14 @@ class ContactTerm final : public Term {
     Index passes_through(const VectorXd& q, const Controls& controls, const VectorXd& end,
                          const Controls& controls_at_end) const;
 
+    /// Returns every point of every contact in the own frame of each of its obstacles, where these stand now [m].
+    std::vector<Vec3> own_places(const VectorXd& q, const Controls& controls) const;
+    /// Returns the first vertex of a point that comes out on another side of an obstacle than it went in, on its straight way
+    /// between two such places; -1 where none does.
+    Index passes_between(const std::vector<Vec3>& before, const std::vector<Vec3>& after) const;
+    /// Returns the rotation vectors of each obstacle, by its placement and by its pose [rad].
+    std::vector<Vec3> rotation_vectors(const Controls& controls) const;
+
     const ContactPoint& point(const ActiveContact& active) const {
         return contacts_[active.contact].points[active.point];
     }

@@ -139,6 +139,14 @@ class Skin(Owner):
             np.add.at(masses, self._corners, (of_faces / 3.0)[:, None])
         return masses
 
+    @property
+    def element_masses(self) -> tuple[np.ndarray, np.ndarray]:
+        """Consistent masses: the corners of each triangle (n, 3), and the integrals of its mass per area times the products
+        of their shape functions (n, 3, 3), kg; zeros without a mass density."""
+        density = 0.0 if self.mass_density is None else self.mass_density
+        products = (np.ones((3, 3)) + np.eye(3)) / 12.0
+        return self._corners, (self._areas * self.thickness * density)[:, None, None] * products
+
     def _add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         count = len(self.faces)
         numbers[label, "thickness"] = np.broadcast_to(self.thickness, count)

@@ -23,6 +23,7 @@ from ..methods.integrators import SDIRK2, SDIRK3, TRBDF2, ImplicitEuler, Integra
 from ..methods.keep import Keep, kept
 from ..methods.solvers import MixedNewton, Newton
 from ..scene.courses import over_time
+from ..scene.field_sampling import warn_of_sampling
 from ..scene.inputs import Inputs
 from ..scene.replacements import requested
 from ..scene.scene import Scene
@@ -209,6 +210,7 @@ def simulate(
     where = f"the motion, at {result.times[most]:.4g} s,"
     warn_of_caps(scene, positions, inputs.values.whole, bending[most], where)
     _warn(result)
+    _warn_of_fields(result)
     return result
 
 
@@ -232,6 +234,21 @@ def _warn(result: Trajectory) -> None:
     k = strain.worst
     warn_if_large(
         result, strain.at(k), f"the motion, in recorded state {k}, at {result.times[k]:.6g} s", (k,)
+    )
+
+
+def _warn_of_fields(result: Trajectory) -> None:
+    """Where the magnetic energy is largest, as the magnets are nearest there."""
+    if not result.scene.fields:
+        return
+    k = int(np.argmax(np.abs(result.energies.get("magnetic", np.zeros(len(result))))))
+    flux_density = result.applied_flux_density
+    warn_of_sampling(
+        result._values_at(k),
+        np.asarray(detached(result.positions[k]), dtype=np.float64),
+        float(result._field_factors[k]),
+        None if flux_density is None else np.reshape(detached(flux_density), (-1, 3))[k],
+        f"the motion, in recorded state {k}, at {result.times[k]:.6g} s",
     )
 
 

@@ -17,7 +17,7 @@ def consistent_masses(values: Values) -> scipy.sparse.csc_array:
             'mass="consistent" is for scenes without rigid parts, whose masses are lumped: mass="lumped"'
         )
     values.vertex_masses  # noqa: B018 - says which body has no density
-    of_vertices = _of_vertices(values)
+    of_vertices = masses_of_vertices(values)
     # Each free unknown moves one vertex, along an axis or, where a support turns it, along one of its frame.
     model, n_v = scene._model, scene.mesh.n_vertices
     total = scipy.sparse.csc_array((model.free_size, model.free_size))
@@ -32,17 +32,19 @@ def consistent_masses(values: Values) -> scipy.sparse.csc_array:
     return scipy.sparse.csc_array(total)
 
 
-def _of_vertices(values: Values) -> scipy.sparse.csc_array:
-    """(n_v, n_v), kg; welded vertices are the first of them."""
+def masses_of_vertices(values: Values) -> scipy.sparse.csc_array:
+    """Return the masses between vertices (n_v, n_v), kg; welded vertices are the first of them. Raises ValueError where a
+    body has no density."""
     scene = values.scene
     original, n_v = scene._bodies.original, scene.mesh.n_vertices
     rows, columns, numbers = [], [], []
     for span, body in zip(scene._bodies.spans, values.sheets, strict=True):
-        nodes, masses = body.element_masses
-        at = original[span.vertices][nodes]
-        rows.append(np.broadcast_to(at[:, :, None], masses.shape).ravel())
-        columns.append(np.broadcast_to(at[:, None, :], masses.shape).ravel())
-        numbers.append(masses.ravel())
+        skin = getattr(body, "skin", None)
+        for nodes, masses in (body.element_masses, *(() if skin is None else (skin.element_masses,))):
+            at = original[span.vertices][nodes]
+            rows.append(np.broadcast_to(at[:, :, None], masses.shape).ravel())
+            columns.append(np.broadcast_to(at[:, None, :], masses.shape).ravel())
+            numbers.append(masses.ravel())
     joined = (np.concatenate(each) for each in (rows, columns))
     return scipy.sparse.csc_array(
         scipy.sparse.coo_array((np.concatenate(numbers), tuple(joined)), shape=(n_v, n_v))

@@ -19,7 +19,7 @@ _NAME = "remanent_magnetization"
 
 def check_given_once(scene: Scene, given: Any, replaced: dict[object, dict[Any, Any]]) -> None:
     """Raises ValueError where it is given twice, or without a field, or not for every shell and skin."""
-    replacing = any(_NAME in replaced.get(carrier, {}) for _, carrier, _ in _carriers(scene))
+    replacing = any(_NAME in replaced.get(carrier, {}) for _, carrier, _ in carriers(scene))
     if not scene.fields:
         if given is not None or replacing:
             raise ValueError(
@@ -28,7 +28,7 @@ def check_given_once(scene: Scene, given: Any, replaced: dict[object, dict[Any, 
         return
     if given is not None and replacing:
         raise ValueError("remanent_magnetization was given twice: as an argument and in values")
-    for k, carrier, _ in _carriers(scene):
+    for k, carrier, _ in carriers(scene):
         if (
             given is None
             and _NAME not in replaced.get(carrier, {})
@@ -42,7 +42,7 @@ def check_given_once(scene: Scene, given: Any, replaced: dict[object, dict[Any, 
 def check_on_skins(scene: Scene, given: np.ndarray) -> None:
     """Raises ValueError where one of all faces (3,), or of single ones (n_f of all, 3), is of none that can have one."""
     if given.ndim == 1:
-        if given.any() and scene.bodies and not any(True for _ in _carriers(scene)):
+        if given.any() and scene.bodies and not any(True for _ in carriers(scene)):
             raise ValueError(
                 "remanent_magnetization was given for all faces, but the scene has no Shell, and no Solid with a skin"
                 + _of_solids(scene)
@@ -51,7 +51,7 @@ def check_on_skins(scene: Scene, given: np.ndarray) -> None:
     bare = np.zeros(scene._bodies.n_magnetized, dtype=bool)
     for body, span in zip(scene.bodies, scene._bodies.spans, strict=True):
         bare[span.rows] = isinstance(body, Solid)
-    for _, _, faces in _carriers(scene):
+    for _, _, faces in carriers(scene):
         bare[faces] = False
     idle = bare & given.any(axis=1)
     if idle.any():
@@ -71,7 +71,7 @@ def _of_solids(scene: Scene) -> str:
 def of_carriers(scene: Scene, magnetization: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
     """(core owner, its rows) of shells and skins, of one for all faces (n_f of all, 3)."""
     labels = {id(each): label for each, label in scene._labels}
-    for _, carrier, faces in _carriers(scene):
+    for _, carrier, faces in carriers(scene):
         yield labels[id(carrier)], magnetization[faces]
 
 
@@ -79,7 +79,7 @@ def gradient_by_all(scene: Scene, gradient: Any) -> np.ndarray:
     """(n_f of all, 3): the transpose of `of_carriers`."""
     labels = {id(each): label for each, label in scene._labels}
     found = np.zeros((scene._bodies.n_magnetized, 3))
-    for _, carrier, faces in _carriers(scene):
+    for _, carrier, faces in carriers(scene):
         found[faces] = gradient.value(labels[id(carrier)], _NAME)
     return found
 
@@ -94,7 +94,7 @@ def of_all_bodies(scene: Scene, replaced: dict[object, dict[Any, Any]]) -> Any:
         return None
     parts = [
         (replaced.get(carrier, {}).get(_NAME, carrier.remanent_magnetization), faces)
-        for _, carrier, faces in _carriers(scene)
+        for _, carrier, faces in carriers(scene)
     ]
     n_rows = scene._bodies.n_magnetized
     if not any(is_tensor(given) for given, _ in parts):
@@ -110,8 +110,8 @@ def of_all_bodies(scene: Scene, replaced: dict[object, dict[Any, Any]]) -> Any:
     return rows
 
 
-def _carriers(scene):
-    """(number of the body, Shell or Skin, its rows among those of all (k,)) of what faces are magnetized with."""
+def carriers(scene: Scene) -> Iterator[tuple[int, Any, np.ndarray]]:
+    """Yields (number of the body, Shell or Skin, its rows among those of all (k,)) of what faces are magnetized with."""
     for k, (body, span) in enumerate(zip(scene.bodies, scene._bodies.spans, strict=True)):
         if not isinstance(body, Solid):
             yield k, body, span.first_row + np.arange(body.mesh.n_elements)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..obstacles import Obstacle
 from ..scene.courses import names_in_time, values_between
 from ..scene.inputs import Inputs
 from ..scene.values import Values
@@ -20,23 +21,27 @@ class AlongPath:
     """What of the values at `start` (an Equilibrium, or None: nothing) is elsewhere at the end of the path.
 
     entries: of the core's values, those that vary; before, after: their numbers, which follow the other controls.
-    Raises ValueError where anything differs that cannot move.
+    at_once: what cannot move, or is neither an obstacle nor a support, is at its end from the start on. Without it, raises
+    ValueError where anything differs that cannot move.
     """
 
     after: np.ndarray
     before: np.ndarray
 
-    def __init__(self, inputs: Inputs, start: Origin):
+    def __init__(self, inputs: Inputs, start: Origin, at_once: bool = False):
         self._layout = inputs.scene._value_layout
         self._after = inputs.values
         self._before = inputs.values if start is None else start._values
         differ = _differing(self._layout, self._before, self._after)
         can = _keys_that_move(inputs)
+        if at_once:
+            differ = [key for key in differ if isinstance(can.get(key), Obstacle | Support)]
         if fixed := [name for owner, name in differ if (owner, name) not in can]:
             raise ValueError(
                 f"start has another {fixed[0]} than the path, which cannot change on its way; what can is the place of "
                 "field sources, obstacles and supports, pressures, what acts in joints, activations of muscles and growth"
             )
+        self._keys = differ
         every = list(self._layout)
         self.entries: list[int] = [every.index(key) for key in differ]
         self._owners = {id(can[key]): can[key] for key in differ}
@@ -50,7 +55,14 @@ class AlongPath:
         if not self.entries or parameter == 1.0:
             return self._after
         there = copy.copy(self._after)
-        there.numbers = (1.0 - parameter) * self._before.numbers + parameter * self._after.numbers
+        parts = [[self._part(values, key) for values in (self._before, self._after)] for key in self._keys]
+        there.numbers = self._layout.packed(
+            {
+                key: (1.0 - parameter) * before + parameter * after
+                for key, (before, after) in zip(self._keys, parts, strict=True)
+            },
+            self._after.numbers,
+        )
         there._now, there.replaced = dict(self._after._now), dict(self._after.replaced)
         for owner in self._owners.values():
             ends = [values.current(owner) for values in (self._before, self._after)]

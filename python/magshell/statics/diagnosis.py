@@ -10,6 +10,7 @@ from ..bodies.caps import describe_faces
 from ..bodies.words import called
 from ..fields.inside import told_inside
 from ..surroundings.constraints import free_rigid_motions
+from .load_strain import strain_of_loads
 
 if TYPE_CHECKING:
     from .. import _core
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 SHORTEST_HEIGHT = 1e-4
 NEARLY_FLAT = np.radians(150.0)  # largest angle of a face that counts as almost flat
 _MOST_NAMED = 4  # places in a message
+LARGEST_STRAIN = 1.0  # of what acts at rest: beyond, a unit is likely to be wrong
 _SMALLEST_MOVE = 1e-6  # of the sheet's size, in one step of relaxation
 
 
@@ -39,7 +41,9 @@ def why_not(inputs: Inputs, found: _core.StaticsResult, at_rest: bool) -> str:
     )
     sentences = [f"{head}: {found.reason}."]
     near = np.zeros(0, dtype=int)  # vertices that have to do with it
-    if failed.state.size:
+    if found.effort_spent:
+        sentences += _seen(inputs, found)
+    elif failed.state.size:
         sentences += _attempts(found, at_rest and not whole, scene._bodies)
         told, near = _places(inputs, found)
         sentences += told
@@ -48,6 +52,20 @@ def why_not(inputs: Inputs, found: _core.StaticsResult, at_rest: bool) -> str:
         if inside := told_inside(fields, positions, scene.mesh.edge_lengths):
             return " ".join([*sentences, inside, kept])
     return " ".join([*sentences, _advice(inputs, found, at_rest, near), kept])
+
+
+def _seen(inputs, found) -> list[str]:
+    """What of a search that cost too much."""
+    scene, failed = inputs.scene, found.failed
+    state = failed.state if failed.state.size else found.state
+    controls = failed.controls if failed.state.size else found.controls
+    with inputs.in_core():
+        energy = sum(energy for _, energy in scene._model.term_energies(state, found.turns, controls))
+    moved = np.linalg.norm(scene._model.positions(state) - scene.mesh.rest_positions, axis=1).max(initial=0.0)
+    return [
+        f"Then the energy was {energy:.3g} J, and the largest displacement {moved:.3g} m, "
+        f"{moved / scene._bodies.extent:.2g} of the extent."
+    ]
 
 
 def _attempts(found, in_steps: bool, bodies) -> list[str]:
@@ -146,6 +164,18 @@ def _advice_of_any(inputs, found, at_rest: bool) -> str:
     scene = inputs.scene
     if free := _free(inputs, found):
         return free
+    if (strain := strain_of_loads(inputs)) > LARGEST_STRAIN:
+        return (
+            f"What acts on the bodies at rest would strain them by about {strain:.2g}: is a modulus [Pa], a thickness [m] "
+            "or a load in another unit?"
+        )
+    if "through an obstacle" in found.reason:
+        return (
+            "What presses a body onto an obstacle presses it through: take a larger contact_stiffness [N/m] of the Contact, "
+            "move the obstacle less in a solve, or a thicker obstacle."
+        )
+    if found.effort_spent and at_rest:
+        return "Start from a nearby equilibrium, or allow it more (max_factorizations of the solver)."
     if _still_moves(found.failed, scene._bodies.size):
         return "Allow it more steps (max_relaxation_steps of the solver), or start from a nearby equilibrium."
     if not at_rest:

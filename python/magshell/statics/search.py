@@ -19,6 +19,7 @@ from ..bodies.caps import warn_of_caps
 from ..bodies.strains import Largest, largest_of, warn_if_large
 from ..errors import Interrupted, NotConverged
 from ..methods.solvers import MixedNewton, Newton
+from ..scene.field_sampling import warn_of_sampling
 from ..scene.inputs import Inputs
 from ..scene.replacements import SHELL_NAMES, requested
 from ..scene.scene import Scene
@@ -83,8 +84,11 @@ def find(
     inputs = inputs_of(scene, arguments, search.at_rest)
     state, turns, from_, at_rest = starting_point(scene, start, inputs)
     moving = None
-    if isinstance(start, Equilibrium) and not at_rest and all_can_move(inputs, start):
-        moving, at_rest = AlongPath(inputs, start), True
+    if isinstance(start, Equilibrium) and not at_rest:
+        at_rest = all_can_move(inputs, start)
+        # Obstacles and supports push bodies along, and pass through them where they jump.
+        moving = AlongPath(inputs, start, at_once=True) if scene.obstacles and not at_rest else None
+        moving = AlongPath(inputs, start) if at_rest else moving
     options = search.options()
     options.start_at_rest = at_rest
     options.keep_factor = keep_factor
@@ -162,6 +166,10 @@ def solve(
     warn_if_large(
         result, Largest(result.largest_membrane_strain, result.largest_bending_strain), "the equilibrium"
     )
+    layout = scene._control_layout
+    field_factor = float(layout.of(found.controls, "scene", "field_factor")[0])
+    flux_density = layout.of(found.controls, "scene", "applied_flux_density")[0]
+    warn_of_sampling(inputs.values, positions, field_factor, flux_density, "this equilibrium")
     return Solution(result, found, inputs)
 
 

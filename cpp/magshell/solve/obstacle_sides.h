@@ -1,0 +1,33 @@
+// The sides of obstacles on which contact points are, from one state of a solve to the next.
+//
+// The penalty of an obstacle pushes a point out on the nearest side. A point that has come past the middle of the obstacle
+// between two states would be pushed out on the wrong side, and the equilibrium that is found there is not the one that
+// continuous motion leads to. So load steps, relaxation steps and steps along a path are kept so short that no point passes.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "magshell/scene/model.h"
+
+namespace magshell {
+
+class ObstacleSides {
+  public:
+    /// The model has to outlive it.
+    explicit ObstacleSides(const Model& model) : model_(model) {}
+
+    /// Remembers where the contact points are relative to the obstacles, which stand where the model has them now.
+    void remember(const VectorXd& q, const Controls& controls);
+    /// Returns why a state cannot follow the remembered one, in words: a point would pass through an obstacle on the straight
+    /// way between them, in the frame of the obstacle. Empty where none does.
+    std::string crossed(const VectorXd& q, const Controls& controls) const;
+    /// Returns the largest turn of an obstacle since the remembered state [rad]: an upper bound, full turns count.
+    double turned(const Controls& controls) const;
+
+  private:
+    const Model& model_;
+    std::vector<Vec3> places_, rotation_vectors_;
+};
+
+}  // namespace magshell

@@ -1,0 +1,192 @@
+"""Obstacles that move far between two equilibria push sheets along and do not pass through them: load steps, relaxation and
+paths keep every point on its side of an obstacle, or an error says that they could not."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import magshell as ms
+from magshell import obstacles as ob
+
+RADIUS, CELLS = 0.1, 8
+TOUCHING = 1e-4  # m, above the sheet
+
+
+@cache
+def sheet():
+    mesh = ms.meshes.disk(RADIUS, cells=CELLS)
+    return ms.Shell(mesh, thickness=2e-3, young_modulus=1e6, poisson_ratio=0.45)
+
+
+def over_a_sheet(obstacle, **law):
+    """A round sheet, clamped, with an obstacle above it."""
+    mesh = sheet().mesh
+    middle = np.flatnonzero(np.hypot(*mesh.rest_positions[:, :2].T) < 0.7 * RADIUS)
+    rim = ms.Clamp(np.flatnonzero(mesh.edge_faces[:, 1] < 0))
+    law = {"contact_stiffness": 1e3, "face_samples": 3, "vertices": middle, **law}
+    contact = ms.Contact(obstacle, **law)
+    return ms.Scene(sheet(), supports=[rim], contacts=[contact])
+
+
+SPAN = np.linspace(-0.06, 0.06, 5)[:, None] * (0.0, 1.0, 0.0)
+# Of each shape: one whose lowest point is at the origin of its own frame, less deep than it is to move.
+SHAPES = {
+    "sphere": lambda **place: ob.Sphere(0.02, **raised(place, 0.02)),
+    "box": lambda **place: ob.Box((0.06, 0.08, 0.02), rounding=0.005, **raised(place, 0.01)),
+    "capsule": lambda **place: ob.Capsule(0.06, radius=0.02, **raised(place, 0.02)),
+    "tube": lambda **place: ob.Tube(SPAN, 0.02, inside=False, **raised(place, 0.02)),
+    "mesh": lambda **place: ob.MeshObstacle(
+        ms.meshes.spherical_cap(0.02, 0.0, np.pi, cells=(24, 12)), resolution=16, **raised(place, 0.02)
+    ),
+    "plane": lambda **place: ob.Plane((0.0, 0.0, -1.0), **place),
+}
+
+
+def raised(place, by):
+    return {**place, "center": np.add(place["center"], (0.0, 0.0, by))}
+
+
+def above(shape):
+    return SHAPES[shape](center=(0.0, 0.0, TOUCHING))
+
+
+def moved(obstacle, depth):
+    return {obstacle: {"center": obstacle.center - np.array([0.0, 0.0, depth])}}
+
+
+def in_small_steps(scene, obstacle, depth, steps):
+    found = ms.equilibrium(scene)
+    for each in np.linspace(0.0, depth, steps + 1)[1:]:
+        found = ms.equilibrium(scene, values=moved(obstacle, each), start=found)
+    return found
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_an_obstacle_that_moves_by_more_than_its_height_in_one_solve_pushes_the_sheet_along(shape):
+    obstacle = above(shape)
+    scene = over_a_sheet(obstacle)
+    depth = 0.05
+    at_once = ms.equilibrium(scene, values=moved(obstacle, depth), start=ms.equilibrium(scene))
+    expected = in_small_steps(scene, obstacle, depth, 7)
+    assert at_once.stable
+    assert at_once.positions[:, 2].min() < -0.8 * depth
+    assert at_once.energy == pytest.approx(expected.energy, rel=1e-4)
+
+
+def test_a_ball_that_moves_by_many_diameters_pushes_the_sheet_along():
+    """0.1 m with a radius of 0.05 m, from 0.05 m and from rest: the sheet was on the other side, without a force."""
+    ball = ob.Sphere(0.05, center=(0.0, 0.0, 0.05 + TOUCHING))
+    scene = over_a_sheet(ball)
+    rest = ms.equilibrium(scene)
+    found = rest
+    for depth in (0.02, 0.05, 0.1):
+        found = ms.equilibrium(scene, values=moved(ball, depth), start=found)
+        assert found.stable and found.positions[:, 2].min() == pytest.approx(TOUCHING - depth, abs=5e-3)
+    at_once = ms.equilibrium(scene, values=moved(ball, 0.1), start=rest)
+    assert at_once.energy == pytest.approx(found.energy, rel=1e-6)
+
+
+def test_an_obstacle_that_moves_while_a_modulus_changes_pushes_the_sheet_along():
+    ball = above("sphere")
+    scene = over_a_sheet(ball)
+    stiffer = {sheet(): {"young_modulus": 2e6}}
+    found = ms.equilibrium(scene, values={**moved(ball, 0.05), **stiffer}, start=ms.equilibrium(scene))
+    expected = in_small_steps(scene, ball, 0.05, 7)
+    assert found.positions[:, 2].min() < -0.04
+    again = ms.equilibrium(scene, values={**moved(ball, 0.05), **stiffer}, start=expected)
+    assert found.energy == pytest.approx(again.energy, rel=1e-6)
+
+
+def test_a_warm_start_takes_a_sheet_along_with_an_obstacle_that_moves_far():
+    ball = above("sphere")
+    warm = ms.WarmStart(over_a_sheet(ball))
+    warm(values=moved(ball, 0.0))
+    with warm.accept_jumps():
+        found = warm(values=moved(ball, 0.05))
+    assert found.positions[:, 2].min() < -0.04
+
+
+def test_a_path_with_an_obstacle_that_moves_far_keeps_the_sheet_on_its_side():
+    """Steps of half of the way are shortened to those that lead no point through the ball."""
+    ball = above("sphere")
+    scene = over_a_sheet(ball, contact_stiffness=100.0, smoothing=2e-3)
+    start = ms.equilibrium(scene, values=moved(ball, 5e-3), start=ms.equilibrium(scene))
+    try:
+        path = ms.follow(
+            scene, values=moved(ball, 0.05), start=start, first_step=0.5, largest_step=1.0, max_points=6
+        )
+    except ms.NotConverged as error:
+        path = error.last_good
+    depths = 5e-3 + path.parameters * 0.045
+    assert len(path) > 3
+    assert (path.positions[:, :, 2].min(axis=1) < -0.5 * depths).all()
+
+
+def arm_under_a_strip():
+    """A strip held at one end, and a flat arm under it that turns about an axis beyond the other end."""
+    mesh = ms.meshes.rectangle(0.1, 0.02, cells=(20, 4))
+    strip = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.3)
+    arm = ob.Box((0.2, 0.06, 4e-3), rounding=1e-3, center=(0.15, 0.01, -2e-3 - TOUCHING))
+    contact = ms.Contact(arm, contact_stiffness=1e3)
+    return ms.Scene(strip, supports=[ms.Clamp(mesh.edges_at(x=0.0))], contacts=[contact]), arm
+
+
+def test_an_arm_that_turns_far_in_one_solve_lifts_the_strip():
+    scene, arm = arm_under_a_strip()
+    found = rest = ms.equilibrium(scene)
+    for angle in np.linspace(0.0, 0.6, 13)[1:]:
+        found = ms.equilibrium(scene, values={arm: {"rotation": (0.0, angle, 0.0)}}, start=found)
+    at_once = ms.equilibrium(scene, values={arm: {"rotation": (0.0, 0.6, 0.0)}}, start=rest)
+    assert found.positions[:, 2].max() > 0.02
+    assert at_once.energy == pytest.approx(found.energy, rel=1e-6)
+
+
+def test_a_full_turn_of_an_obstacle_is_gone_through_in_load_steps():
+    scene, _ = arm_under_a_strip()
+    ball = ob.Box((0.02, 0.02, 0.02), center=(0.3, 0.0, 0.0))  # touches nothing anywhere
+    far = ms.Scene(scene.bodies, supports=scene.supports, contacts=[ms.Contact(ball)])
+    found = ms.equilibrium(far, values={ball: {"rotation": (0.0, 2 * np.pi, 0.0)}}, start=ms.equilibrium(far))
+    assert found.load_steps >= 12
+
+
+def test_a_load_that_would_carry_a_sheet_through_a_thin_plate_ends_before_it_or_says_so():
+    """A plate of 2 mm under a strip that a load of a moment bends by many times that."""
+    mesh = ms.meshes.rectangle(0.1, 0.02, cells=(20, 4))
+    strip = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.3)
+    plate = ob.Box((0.3, 0.1, 2e-3), center=(0.0, 0.0, -2e-3))
+    scene = ms.Scene(
+        strip,
+        supports=[ms.Clamp(mesh.edges_at(x=0.0))],
+        contacts=[ms.Contact(plate, contact_stiffness=1e3)],
+        loads=[ms.AreaLoad((0.0, 0.0, -20.0))],
+    )
+    found = ms.equilibrium(scene)
+    assert found.positions[:, 2].min() > -2e-3
+
+
+def test_a_sheet_pressed_through_an_obstacle_that_is_too_soft_is_an_error():
+    ball = above("sphere")
+    scene = over_a_sheet(ball, contact_stiffness=1e-2)
+    with pytest.raises(ms.NotConverged, match=r"through an obstacle.*contact_stiffness \[N/m\]") as caught:
+        ms.equilibrium(scene, values=moved(ball, 0.05), start=ms.equilibrium(scene))
+    assert 0.0 < caught.value.last_good.progress < 1.0
+
+
+def test_gradients_by_the_place_of_an_obstacle_that_moved_far_are_those_of_the_final_state():
+    torch = pytest.importorskip("torch")
+    ball = above("sphere")
+    scene = over_a_sheet(ball)
+    solver = ms.MixedNewton(tolerance=1e-12)
+
+    def height(center, start):
+        values = {ball: {"center": center}}
+        return ms.equilibrium(scene, values=values, start=start, solver=solver).positions[0, 2]
+
+    rest = ms.equilibrium(scene)
+    center = torch.tensor(ball.center - (0.0, 0.0, 0.05), requires_grad=True)
+    height(center, rest).backward()
+    there = ms.equilibrium(scene, values=moved(ball, 0.05), start=rest, solver=solver)
+    step = np.array([0.0, 0.0, 1e-5])
+    ends = [height(center.detach().numpy() + sign * step, there) for sign in (1, -1)]
+    assert center.grad[2].item() == pytest.approx((ends[0] - ends[1]) / 2e-5, rel=1e-4)
