@@ -10,9 +10,9 @@ PIP := $(VENV)/bin/python -m pip --disable-pip-version-check
 # What the installed package is made from; a newer one means another build, an incremental one.
 sources := CMakeLists.txt pyproject.toml README.md LICENSE \
     $(shell find cpp cmake python/magshell -type f ! -name '*.so' ! -name '*.pyc' 2>/dev/null)
-# A file's tests stay together, as they share what is dear to make; what takes longest comes first (tests/parallel.py).
+# A file's tests stay together, as they share what is dear to make; what takes longest comes first (tests/support/parallel.py).
 PYTEST = $(VENV)/bin/python -m pytest -n $(PROCESSES) --dist loadfile --no-loadscope-reorder
-pythons := $(wildcard python tests examples docs scripts)
+pythons := $(wildcard python benchmarks tests examples docs scripts)
 cpps = $(shell find cpp -name '*.h' -o -name '*.cpp')
 
 .DEFAULT_GOAL := help

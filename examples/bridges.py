@@ -29,7 +29,7 @@ What comes out, with L-BFGS:
   tetrahedron at 83 % of what was unknown of it; with a hundredth of the noise the field is known.
 - So soft that it sags 8 cm, the suspension bridge passes through itself: no contact is looked for, in theirs neither.
 
-`python -m magshell.bench experiments` compares with methods that have no gradient: of five runs of 60 simulations on the
+`python -m benchmarks experiments` compares with methods that have no gradient: of five runs of 60 simulations on the
 suspension bridge none of CMA-ES, evolution, BOBYQA or Nelder-Mead comes nearer than 39 % of the sag, from 45 %; L-BFGS,
 MMA and Adam take 4, 14 and 18 to 1 %. It also tells memory: over 200 steps of the arch bridge motion and gradient take
 21 MB, and 377 MB with all factors kept ([Qiao21] Table 1: 0.1 and 15.7 GB).

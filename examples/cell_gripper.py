@@ -37,9 +37,9 @@ from _cell_gripper.report import draw_controls, movie, picture
 from _robots import report
 from _robots.search import searched
 from _run import run
+from robots.cell_gripper import BALL_CELLS, LEVELS, STEPS, TARGET, CellGripper
 
 import magshell as ms
-from magshell.envs.cell_gripper import BALL_CELLS, LEVELS, STEPS, TARGET, CellGripper
 
 EPISODES = 20
 STARTS = (  # cells alike, and the drone, beside the usual one

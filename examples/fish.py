@@ -34,9 +34,9 @@ from _fish.report import VIEW, draw_torques
 from _robots import report
 from _robots.search import EPISODES, searched
 from _run import run
+from robots.fish import STEPS, TARGET, TETRAHEDRA, Fish
 
 import magshell as ms
-from magshell.envs.fish import STEPS, TARGET, TETRAHEDRA, Fish
 
 STARTS = (  # of the wave along the spine, beside the usual one
     {},

@@ -34,9 +34,9 @@ from _muscle_octopus.report import VIEW, draw_activations
 from _robots import report
 from _robots.search import EPISODES, gradient_at, searched
 from _run import run
+from robots.muscle_octopus import CELLS, STEPS, TARGET, MuscleOctopus
 
 import magshell as ms
-from magshell.envs.muscle_octopus import CELLS, STEPS, TARGET, MuscleOctopus
 
 STARTS = (  # of the wave in all legs, beside the usual one
     {},

@@ -3,7 +3,7 @@
 A bar of 30 x 4 x 4 cm and 20 kPa hangs by its upper bone on a hinge; an elbow joins the lower bone to it, and nothing but
 the jelly around it holds that straight. It is turned level and let go, and swings.
 
-What comes out, on 288 tetrahedra (tests/test_example_pendulum_in_jelly.py asserts it on 144):
+What comes out, on 288 tetrahedra (tests/examples/test_example_pendulum_in_jelly.py asserts it on 144):
 
     small swings, from the vibration modes          1.1025 Hz; the second mode, of the elbow, 4.08 Hz
     the same, let go at 0.05 rad, in time           1.1022 Hz

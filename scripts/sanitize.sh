@@ -34,12 +34,22 @@ run=()
 if [ "$sanitizers" = thread ]; then  # it wants its part of the address space where it was compiled to be
     setarch "$(uname -m)" -R true 2>/dev/null && run=(setarch "$(uname -m)" -R)
     [ $# -gt 0 ] || set -- tests/hard/test_concurrency.py \
-        tests/test_{threads,linalg,invariance,adjoint,statics,dynamics,surroundings_invariance,solid_core,skins,ties,rigid_parts}.py \
+        tests/runtime/test_threads.py tests/core/test_linalg.py tests/core/test_invariance.py \
+        tests/gradients/test_adjoint.py tests/solve/statics/test_statics.py \
+        tests/solve/dynamics/test_dynamics.py tests/model/loads/test_surroundings_invariance.py \
+        tests/core/test_solid_core.py tests/model/solids/test_skins.py tests/model/bodies/test_ties.py \
+        tests/model/rigid/test_rigid_parts.py \
         -k "thread or same_time"
 else
-    [ $# -gt 0 ] || set -- tests/test_{linalg,derivatives,field,mesh,bad_input,statics,dynamics}.py \
-        tests/test_{obstacles,contact,friction,water_kernel,water_motion,surroundings_adjoint}.py \
-        tests/test_{lane_functions,solid_kernels,solid_core,solids,skins,skin_cases,ties,rigid_parts,weld}.py
+    [ $# -gt 0 ] || set -- tests/core/test_linalg.py tests/core/test_derivatives.py tests/model/fields/test_field.py \
+        tests/mesh/test_mesh.py tests/input/test_bad_input.py tests/solve/statics/test_statics.py \
+        tests/solve/dynamics/test_dynamics.py \
+        tests/model/contact/test_obstacles.py tests/model/contact/test_contact.py \
+        tests/model/contact/test_friction.py tests/core/test_water_kernel.py \
+        tests/model/loads/test_water_motion.py tests/gradients/test_surroundings_adjoint.py \
+        tests/core/test_lane_functions.py tests/core/test_solid_kernels.py tests/core/test_solid_core.py \
+        tests/model/solids/test_solids.py tests/model/solids/test_skins.py tests/physics/test_skin_cases.py \
+        tests/model/bodies/test_ties.py tests/model/rigid/test_rigid_parts.py tests/mesh/test_weld.py
 fi
 
 # Fresh memory is full of NaN, so that a number read before it is written spoils a result. Leaks are not looked for:

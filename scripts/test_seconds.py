@@ -19,7 +19,7 @@ HEADER = """\
 
 
 def seconds_of(report: Path) -> dict[str, float]:
-    """Return test_file.py::test_name -> seconds, with fixtures, as tests/parallel.py names and measures them."""
+    """Return test_file.py::test_name -> seconds, with fixtures, as tests/support/parallel.py names and measures them."""
     seconds: dict[str, float] = defaultdict(float)
     for case in ElementTree.parse(report).iter("testcase"):
         file = case.attrib["classname"].split(".")[-1]  # tests are functions, in no class

@@ -14,16 +14,18 @@ torch=$(grep -o '"torch==[0-9.]*"' pyproject.toml | tr -d '"')  # the release th
 "$bare/venv/bin/pip" install --quiet "$wheel[plot]" "$torch" pytest
 mkdir "$bare/tests" && cp README.md "$bare/" && cp -r docs "$bare/"  # the README's links lead there
 cp {CONTRIBUTING,SECURITY}.md CITATION.cff LICENSE "$bare/"
-cp tests/conftest.py tests/test_{readme,statics,dynamics}.py "$bare/tests/"
-find tests -maxdepth 1 -name '*.py' ! -name 'test_*' -exec cp {} "$bare/tests/" \;
+cp -r tests/conftest.py tests/support "$bare/tests/"
+mkdir -p "$bare/tests/docs" && cp tests/docs/test_readme.py "$_"
+mkdir -p "$bare/tests/solve/statics" && cp tests/solve/statics/test_statics.py "$_"
+mkdir -p "$bare/tests/solve/dynamics" && cp tests/solve/dynamics/test_dynamics.py "$_"
 cd "$bare"
 in_it() {
     env -i PATH="$bare/venv/bin" HOME="$bare" CXX=none MAGSHELL_NUM_THREADS=1 \
         ${vectors:+MAGSHELL_VECTORS="$vectors"} "$bare/venv/bin/python" "$@"
 }
 in_it -m magshell
-in_it -m pytest -q -p no:cacheprovider tests
+in_it -m pytest -q -p no:cacheprovider -o pythonpath=tests/support tests
 vectors=baseline  # what any processor of the family runs, where this one would take more
 in_it -m magshell >"$bare/plain"
 grep -q "vector instructions: [A-Z0-9]*$" "$bare/plain"
-in_it -m pytest -q -p no:cacheprovider tests/test_statics.py
+in_it -m pytest -q -p no:cacheprovider -o pythonpath=tests/support tests/solve/statics/test_statics.py

@@ -4,7 +4,7 @@
 #include "magshell/contact/pair_friction.h"
 #include "magshell/core/errors.h"
 #include "magshell/scene/model.h"
-#include "magshell/term/body_contact_term.h"
+#include "magshell/terms/contact/body_contact_term.h"
 
 namespace magshell::bindings {
 namespace {

@@ -1,7 +1,7 @@
 // Binds the energies of single faces: one line per energy.
 #include "bindings/bindings.h"
 #include "magshell/energy/surface_tension.h"
-#include "magshell/term/face_energy.h"
+#include "magshell/terms/load/face_energy.h"
 
 namespace magshell::bindings {
 namespace {

@@ -45,7 +45,8 @@ py::dict energies(const Model& model, const VectorXd& q, const Controls& control
 }
 
 // Returns [(name, J)] for each term; terms of the same name, of several bodies, are consecutive.
-py::list term_energies(Model& model, const VectorXd& q, const Model::AngleBranches& turns, const Controls& controls) {
+py::list term_energies(Model& model, const VectorXd& q, const Model::AngleBranches& turns,
+                       const Controls& controls) {
     std::vector<std::pair<std::string_view, double>> of_terms;
     {
         const py::gil_scoped_release unlocked;
@@ -262,7 +263,7 @@ void register_model(py::module_& module) {
                 model.evaluate(q, controls);
                 model.assemble(q, controls, false);
             },
-            "Gradient and Hessian, left in the core: what `python -m magshell.bench kernels` times.",
+            "Gradient and Hessian, left in the core: what `python -m benchmarks kernels` times.",
             py::call_guard<py::gil_scoped_release>())
         .def(
             "low_rank",

@@ -7,7 +7,7 @@
 
 #include "bindings/arrays.h"
 #include "magshell/scene/model.h"
-#include "magshell/term/muscle_term.h"
+#include "magshell/terms/actuator/muscle_term.h"
 
 namespace magshell::bindings {
 namespace {

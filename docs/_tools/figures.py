@@ -3,7 +3,7 @@
 Every figure in a text is in figures.json: what the page says word for word, and the command that makes the number, or the
 source that it was published in, or why it is no measurement. `--measure` runs the commands whose numbers can be read from
 their JSON and compares: counts and errors as exactly as the text gives them, times and memory within a factor of two.
-`tests/test_figures.py` holds that each figure of a page is in the file.
+`tests/docs/test_figures.py` holds that each figure of a page is in the file.
 """
 
 from __future__ import annotations

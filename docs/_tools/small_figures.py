@@ -13,10 +13,10 @@ import numpy as np
 from scipy.optimize import brentq
 
 import magshell as ms
-from magshell.bench.cases import cylinder_roof, shear_strip
-from magshell.bench.cases.solids import SOLID_CASES, bent_beam
-from magshell.bench.statics import CASES, strongly_bent
-from magshell.bench.surrounding_costs import SURROUNDINGS, TIME_STEP, falling
+from benchmarks.cases import cylinder_roof, shear_strip
+from benchmarks.cases.solids import SOLID_CASES, bent_beam
+from benchmarks.statics import CASES, strongly_bent
+from benchmarks.surrounding_costs import SURROUNDINGS, TIME_STEP, falling
 
 STEPS = 100  # of the sheet of 768 faces that falls on a floor
 

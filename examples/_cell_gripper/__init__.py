@@ -1,1 +1,1 @@
-"""Pictures of the example cell_gripper. The gripper itself is magshell.envs.cell_gripper."""
+"""Pictures of the example cell_gripper. The gripper itself is robots.cell_gripper."""

@@ -1,1 +1,1 @@
-"""What examples/fish.py is made of: the search for its torques, pictures. The fish itself is magshell.envs.fish."""
+"""What examples/fish.py is made of: the search for its torques, pictures. The fish itself is robots.fish."""

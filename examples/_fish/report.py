@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from _robots.report import COLORS
 from _robots.search import Found
-
-from magshell.envs.fish import TIME_STEP, TORQUES
+from robots.fish import TIME_STEP, TORQUES
 
 JOINTS = ("neck", "back", "tail", "right fin", "left fin")
 VIEW = (35, -70)

@@ -1,1 +1,1 @@
-"""Pictures of the example muscle_octopus. The octopus itself is magshell.envs.muscle_octopus."""
+"""Pictures of the example muscle_octopus. The octopus itself is robots.muscle_octopus."""

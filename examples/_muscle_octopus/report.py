@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import torch
 from _robots.search import Found
-
-from magshell.envs.muscle_octopus import NUMBERS
+from robots.muscle_octopus import NUMBERS
 
 VIEW = (110, -90)  # from above: y is up
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from robots.robot import Robot
 
 import magshell as ms
-from magshell.envs.robot import Robot
 
 REACHED = 0.01  # of the way asked for
 EPISODES = 40

@@ -1,34 +1,22 @@
 """magshell: thin shells of hard-magnetic soft material, their equilibria and motions."""
 
-from ._machine import instructions as _  # noqa: F401 - first: it says whether the extension can run here
+from ._runtime import instructions as _  # noqa: F401 - first: it says whether the extension can run here
 
 # isort: split
-from . import control, envs, meshes, objectives, obstacles, optim, parametrize, shapes
+import sys
+
+from . import envs
 from ._core import __version__
-from ._machine.threads import num_threads, set_num_threads, show_config
-from .bodies.body_result import BodyResult
-from .bodies.fibres import Fibres, fibres_along
-from .bodies.joint import Joint
-from .bodies.joint_result import JointResult
-from .bodies.joints import Ball, Closure, Fixed, Prismatic, Revolute
-from .bodies.link import Link
-from .bodies.materials import Corotated, Guccione, NeoHookean, Projective, StableNeoHookean, StVenantKirchhoff
-from .bodies.muscle import Muscle
-from .bodies.muscle_result import MuscleResult
-from .bodies.rigid import Rigid
-from .bodies.rigid_result import RigidResult
-from .bodies.shell import Shell
-from .bodies.skeleton import Skeleton
-from .bodies.skin import Skin
-from .bodies.solid import Solid
-from .bodies.strains import Strains
-from .bodies.ties import Tie
+from ._runtime.threads import num_threads, set_num_threads, show_config
+from .design import control, objectives, optim, parametrize
+from .design.ink import Ink
 from .design.minimize import minimize
 from .design.minimum import Minimum
+from .design.multistart.multistart import multistart
+from .design.multistart.sampling import random_starts
+from .design.multistart.starts import Multistart
 from .design.printable_minimum import PrintableMinimum, PrintableStage
 from .design.printing import minimize_printable
-from .dynamics.simulate import simulate
-from .dynamics.trajectory import MotionState, Trajectory
 from .errors import (
     DesignRejected,
     EquilibriumJumped,
@@ -42,52 +30,80 @@ from .errors import (
     ObjectiveFailed,
     UnitWarning,
 )
-from .fields.adapters import CustomField, MagpylibField
-from .fields.field import AppliedField, Dipoles, SampledField, UniformField, residual_to_remanent
-from .fields.magnets import CuboidMagnet, CylinderMagnet
-from .fields.placed import PlacedField
-from .ink import Ink
-from .linear.buckling import Buckling, linear_buckling
-from .linear.response import LinearResponse, linear_response
-from .linear.vibration import VibrationModes, vibration_modes
-from .mesh.io import read_fields, read_mesh, write_mesh
-from .mesh.six_node_mesh import SixNodeMesh
-from .mesh.tet_mesh import TetMesh
-from .mesh.triangle_mesh import TriangleMesh
+from .mesh import generate as meshes
+from .mesh import shapes
+from .mesh.io.read_write import read_fields, read_mesh, write_mesh
+from .mesh.tetrahedra.tet_mesh import TetMesh
+from .mesh.triangles.six_node_mesh import SixNodeMesh
+from .mesh.triangles.triangle_mesh import TriangleMesh
 from .mesh.welding import Weld, weld
-from .methods.integrators import SDIRK2, SDIRK3, TRBDF2, ImplicitEuler
-from .methods.keep import Keep
-from .methods.projective_dynamics import ProjectiveDynamics
-from .methods.solvers import MixedNewton, Newton
-from .plotting import Color, Picture, Style, View, animate, plot, write_page
-from .scene.reactions import Reaction
-from .scene.scene import Scene
-from .scene.touching import Touching
-from .starts.multistart import multistart
-from .starts.sampling import random_starts
-from .starts.starts import Multistart
-from .states.saved import load, save
-from .states.series import write_series
-from .states.surface_files import write_surface
-from .states.tables import to_pandas, to_xarray
-from .statics.energies_at import energies
-from .statics.equilibria import Equilibria
-from .statics.equilibrium import Equilibrium
-from .statics.extrapolation import Extrapolation, extrapolated
-from .statics.multistable import equilibria
-from .statics.path import CriticalPoint, Path, follow
-from .statics.solve import equilibrium
-from .statics.warm_start import WarmStart
-from .surroundings.body_contact import BodyContact, SelfContact
-from .surroundings.cavity import Cavity
-from .surroundings.cells import Cells
-from .surroundings.contact import Contact
-from .surroundings.face_energies import SurfaceTension
-from .surroundings.loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
-from .surroundings.pressure import Pressure
-from .surroundings.supports import Clamp, Pin, SymmetryPlane
-from .surroundings.tendon import Tendon
-from .surroundings.water import Water
+from .model.actuators.cavity import Cavity
+from .model.actuators.cells import Cells
+from .model.actuators.muscle import Muscle, MuscleResult
+from .model.actuators.tendon import Tendon
+from .model.bodies.ties import Tie
+from .model.contact import obstacles
+from .model.contact.body_contact import BodyContact, SelfContact
+from .model.contact.contact import Contact
+from .model.fields.adapters import CustomField, MagpylibField
+from .model.fields.field import AppliedField, Dipoles, SampledField, UniformField, residual_to_remanent
+from .model.fields.magnets import CuboidMagnet, CylinderMagnet
+from .model.fields.placed import PlacedField
+from .model.loads.face_energies import SurfaceTension
+from .model.loads.loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
+from .model.loads.pressure import Pressure
+from .model.loads.water import Water
+from .model.results.body_result import BodyResult
+from .model.results.joint_result import JointResult
+from .model.rigid.joints import Ball, Closure, Fixed, Joint, Prismatic, Revolute
+from .model.rigid.link import Link
+from .model.rigid.rigid import Rigid, RigidResult
+from .model.rigid.skeleton import Skeleton
+from .model.scene.contact_state import Touching
+from .model.scene.reactions import Reaction
+from .model.scene.scene import Scene
+from .model.shells.shell import Shell
+from .model.shells.strains import Strains
+from .model.solids.fibres import Fibres, fibres_along
+from .model.solids.materials import (
+    Corotated,
+    Guccione,
+    NeoHookean,
+    Projective,
+    StableNeoHookean,
+    StVenantKirchhoff,
+)
+from .model.solids.skin import Skin
+from .model.solids.solid import Solid
+from .model.supports.supports import Clamp, Pin, SymmetryPlane
+from .output.plot import Color, Picture, Style, View, animate, plot, write_page
+from .output.results.saved import load, save
+from .output.results.series import write_series
+from .output.results.surface_files import write_surface
+from .output.results.tables import to_pandas, to_xarray
+from .solve.dynamics.simulate import simulate
+from .solve.dynamics.trajectory import MotionState, Trajectory
+from .solve.linear.buckling import Buckling, linear_buckling
+from .solve.linear.response import LinearResponse, linear_response
+from .solve.linear.vibration import VibrationModes, vibration_modes
+from .solve.options import (
+    SDIRK2,
+    SDIRK3,
+    TRBDF2,
+    ImplicitEuler,
+    Keep,
+    MixedNewton,
+    Newton,
+    ProjectiveDynamics,
+)
+from .solve.statics.energies_at import energies
+from .solve.statics.equilibria import Equilibria
+from .solve.statics.equilibrium import Equilibrium
+from .solve.statics.extrapolation import Extrapolation, extrapolated
+from .solve.statics.multistable import equilibria
+from .solve.statics.path import CriticalPoint, Path, follow
+from .solve.statics.solve import equilibrium
+from .solve.statics.warm_start import WarmStart
 
 __all__ = [
     "SDIRK2",
@@ -228,6 +244,12 @@ __all__ = [
     "write_series",
     "write_surface",
 ]
+
+_GROUPS = ("control", "meshes", "objectives", "obstacles", "optim", "parametrize", "shapes")
+
+
+# The groups of functions keep their short names for users: `from magshell.meshes import rectangle` as well as `ms.meshes`.
+sys.modules.update({f"{__name__}.{group}": globals()[group] for group in _GROUPS})
 
 
 def __dir__() -> list[str]:

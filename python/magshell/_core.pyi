@@ -398,7 +398,7 @@ class Model:
         arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     ) -> None:
         """
-        Gradient and Hessian, left in the core: what `python -m magshell.bench kernels` times.
+        Gradient and Hessian, left in the core: what `python -m benchmarks kernels` times.
         """
     def edge_rotations(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]

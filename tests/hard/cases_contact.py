@@ -7,7 +7,7 @@ from answers import Answer, above, below, both, holds, near
 from registry import case
 
 import magshell as ms
-from magshell.surroundings.supports import rotation_matrix
+from magshell.model.supports.supports import rotation_matrix
 
 GRAVITY, SIDE, THICKNESS, DENSITY = 9.81, 0.05, 2e-3, 1e3
 SMOOTHING = 1e-2 * THICKNESS

@@ -8,7 +8,7 @@ from registry import case
 from sheets import LENGTH, MAGNETIZATION, shell, strip
 
 import magshell as ms
-from magshell.surroundings.supports import rotation_matrix
+from magshell.model.supports.supports import rotation_matrix
 
 GRAVITY = 9.81
 INTEGRATORS = (ms.TRBDF2(), ms.SDIRK2(), ms.SDIRK3())

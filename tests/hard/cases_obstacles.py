@@ -7,7 +7,7 @@ from answers import Answer, below, both, holds, near
 from registry import case
 
 import magshell as ms
-from magshell.surroundings.supports import rotation_matrix
+from magshell.model.supports.supports import rotation_matrix
 
 GRAVITY, SIDE, THICKNESS = 9.81, 0.02, 1e-3
 TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) * 0.01

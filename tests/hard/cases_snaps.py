@@ -7,7 +7,7 @@ from answers import at_rest, both, holds, near
 from registry import case
 
 import magshell as ms
-from magshell.bench.cases import cylinder_roof
+from benchmarks.cases import cylinder_roof
 
 HALF_SPAN, RISE, DEPTH, THICKNESS, YOUNG_MODULUS = 1.0, 0.2, 0.5, 1e-3, 1e6
 BAR = float(np.hypot(HALF_SPAN, RISE))

@@ -7,8 +7,8 @@ from answers import above, at_rest, below, both, holds, near, refused
 from registry import case
 
 import magshell as ms
-from magshell.bench.solid_scaling import costs, exponents
-from magshell.bodies.solid_states import states_of
+from benchmarks.solid_scaling import costs, exponents
+from magshell.model.solids.solid_stresses import states_of
 
 TINY = 1e-9
 MODULI = {"young_modulus": 1e5, "poisson_ratio": 0.4}
@@ -225,7 +225,7 @@ def twisted_tube():
 
 @case("time and memory in proportion to the elements, from 648 to 24,000")
 def scaling():
-    """What `python -m magshell.bench scaling` measures up to 500,000: assembly goes by elements, L by their power 4/3."""
+    """What `python -m benchmarks scaling` measures up to 500,000: assembly goes by elements, L by their power 4/3."""
     small, large = (costs(cells, rounds=1) for cells in ((12, 3, 3), (40, 10, 10)))
     grown = exponents([small, large])
     return both(

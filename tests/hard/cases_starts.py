@@ -8,7 +8,7 @@ from registry import case
 from sheets import LENGTH, WIDTH, cantilever, shell, strip
 
 import magshell as ms
-from magshell.surroundings.supports import rotation_matrix
+from magshell.model.supports.supports import rotation_matrix
 
 
 def idle_strip() -> ms.Scene:

@@ -8,8 +8,8 @@ import effort
 import numpy as np
 
 import magshell as ms
-from magshell.bench import motion_costs, projective_motions, surrounding_costs, thrown_bars
-from magshell.bench.statics import strongly_bent
+from benchmarks import motion_costs, projective_motions, surrounding_costs, thrown_bars
+from benchmarks.statics import strongly_bent
 
 Counted = tuple[str, str, Callable[[], object]]  # family, case, what is run
 

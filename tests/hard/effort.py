@@ -14,8 +14,8 @@ import numpy as np
 from registry import all_cases
 
 import magshell as ms
-from magshell.bench.cases import magnetic_strip, rolled_strip
-from magshell.bench.statics import CASES, oblique_field, semi_cylinder
+from benchmarks.cases import magnetic_strip, rolled_strip
+from benchmarks.statics import CASES, oblique_field, semi_cylinder
 
 _SAME = 1e-6  # of an energy
 
@@ -27,7 +27,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--against", type=Path, help="the numbers of an earlier run")
     parser.add_argument("--known", type=Path, help="compare these numbers, run nothing")
     options = parser.parse_args(arguments)
-    sys.path.append(str(Path(__file__).parents[1]))  # what the hard cases share with other tests
+    sys.path.append(str(Path(__file__).parents[1] / "support"))  # what the hard cases share with other tests
     earlier = json.loads(options.against.read_text()) if options.against else {}
     if options.known:
         found = json.loads(options.known.read_text())

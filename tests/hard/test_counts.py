@@ -6,7 +6,7 @@ import pytest
 from counts import compare, count, measure, missing, read, write
 
 import magshell as ms
-from magshell.bench.statics import strongly_bent
+from benchmarks.statics import strongly_bent
 
 OLD = {"folds": {"a": [100, 120], "b": [10, 12], "forks": [40, 50, 60, 70]}}
 

@@ -5,7 +5,7 @@
 #include <functional>
 #include <utility>
 
-#include "magshell/solve/dynamics.h"
+#include "magshell/solve/motion/dynamics.h"
 
 namespace magshell {
 

@@ -5,8 +5,8 @@
 #include "magshell/adjoint/checkpointed_reverse.h"
 #include "magshell/adjoint/viscous.h"
 #include "magshell/core/errors.h"
-#include "magshell/solve/edge_rotations.h"
-#include "magshell/solve/motor_reactions.h"
+#include "magshell/solve/motion/edge_rotations.h"
+#include "magshell/solve/motion/motor_reactions.h"
 
 namespace magshell {
 namespace {
@@ -243,7 +243,7 @@ class Backward {
     }
 
     // Adds the gradients through the motor forces at the end of a substep: by the scene and the load parameters, by the state next to the
-    // last stage at which they are evaluated, and by the velocities that enter its acceleration (solve/motor_reactions.h).
+    // last stage at which they are evaluated, and by the velocities that enter its acceleration (solve/motion/motor_reactions.h).
     void back_through_motors(const StepAlgebra& algebra, const StepRates& at, const SubstepRecord& record,
                              Index step, const Substep& substep, const VectorXd& by_motor_forces,
                              Viscous& viscous, VectorXd& by_v_last, VectorXd& by_w_last, BeforeStage& by) {

@@ -1,17 +1,17 @@
-// The adjoint of a motion, backwards through its stages. In the notation of solve/stepper.h, with primes for gradients of the loss:
+// The adjoint of a motion, backwards through its stages. In the notation of solve/motion/stepper.h, with primes for gradients of the loss:
 //
 //   v_i = (x_i - x^_i)/(a dt),  w_i = (v_i - v^_i)/(a dt):
 //       v'_i += w'_i/(a dt),  v^'_i -= w'_i/(a dt),  x'_i += v'_i/(a dt),  x^'_i -= v'_i/(a dt)
 //   (W + H) lambda_i = - x'_i:
 //       x^'_i -= W lambda_i,  v^'_i -= M/(a dt) lambda_i,  k' += lambda_i . dg/dk
-//   (with viscosity, the strains d and e are treated likewise, see solve/viscosity.h)
+//   (with viscosity, the strains d and e are treated likewise, see solve/motion/viscosity.h)
 //   x^_i = x + dt sum a_ij v_j,  v^_i = v + dt sum a_ij w_j:
 //       x' += x^'_i,  v' += v^'_i,  v'_j += dt a_ij x^'_i,  w'_j += dt a_ij v^'_i
 //
 // For implicit Euler this is [Chen22] (40) with its two equations combined.
 #pragma once
 
-#include "magshell/solve/dynamics.h"
+#include "magshell/solve/motion/dynamics.h"
 
 namespace magshell {
 

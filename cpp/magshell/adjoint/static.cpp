@@ -1,7 +1,7 @@
 #include "magshell/adjoint/static.h"
 
 #include "magshell/core/errors.h"
-#include "magshell/solve/unsymmetric.h"
+#include "magshell/solve/newton/unsymmetric.h"
 
 namespace magshell {
 

@@ -1,7 +1,7 @@
 // The adjoint of the viscous part of a step, stage by stage; it does nothing without viscosity.
 #pragma once
 
-#include "magshell/solve/stepper.h"
+#include "magshell/solve/motion/stepper.h"
 
 namespace magshell {
 

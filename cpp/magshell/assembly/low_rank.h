@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "magshell/assembly/dof_map.h"
+#include "magshell/dofs/dof_map.h"
 
 namespace magshell {
 

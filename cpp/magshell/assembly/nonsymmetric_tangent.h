@@ -3,7 +3,7 @@
 // The system matrix stores and factorizes the symmetric part only. Two kinds of force have a nonsymmetric part:
 //   - friction, drag and muscle rates, which act only within time steps (ForceTerm);
 //   - follower loads without a potential, such as a pressure on an open surface, which act always.
-// The blocks are never assembled: GMRES multiplies by them (solve/unsymmetric.h), preconditioned with the symmetric factorization.
+// The blocks are never assembled: GMRES multiplies by them (solve/newton/unsymmetric.h), preconditioned with the symmetric factorization.
 #pragma once
 
 #include <array>

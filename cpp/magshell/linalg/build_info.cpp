@@ -2,7 +2,7 @@
 
 #include <Eigen/Core>
 
-#include "magshell/linalg/dense_kernels.h"
+#include "magshell/linalg/multifrontal/dense_kernels.h"
 #include "magshell/linalg/single_threaded.h"
 #ifdef MAGSHELL_HAS_CHOLMOD
 #include <cholmod.h>

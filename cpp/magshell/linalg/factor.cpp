@@ -2,8 +2,8 @@
 
 #include "magshell/core/errors.h"
 #include "magshell/linalg/backends.h"
+#include "magshell/linalg/multifrontal/supernodal_ldlt.h"
 #include "magshell/linalg/pattern_checks.h"
-#include "magshell/linalg/supernodal_ldlt.h"
 
 namespace magshell {
 

@@ -4,13 +4,13 @@
 #include <cmath>
 #include <utility>
 
-#include "magshell/assembly/skeleton_coordinates.h"
 #include "magshell/core/errors.h"
+#include "magshell/dofs/skeleton_coordinates.h"
 #include "magshell/linalg/low_rank_factor.h"
 #include "magshell/scene/scene_input.h"
-#include "magshell/term/body_contact_term.h"
-#include "magshell/term/damper_term.h"
-#include "magshell/term/low_rank_term.h"
+#include "magshell/terms/contact/body_contact_term.h"
+#include "magshell/terms/joint/damper_term.h"
+#include "magshell/terms/low_rank_term.h"
 
 namespace magshell {
 namespace {

@@ -11,18 +11,18 @@
 #include <vector>
 
 #include "magshell/assembly/contact_layer.h"
-#include "magshell/assembly/dof_map.h"
 #include "magshell/assembly/element_loop.h"
 #include "magshell/assembly/low_rank.h"
 #include "magshell/body/membrane_faces.h"
-#include "magshell/linalg/factor_store.h"
+#include "magshell/dofs/dof_map.h"
+#include "magshell/linalg/multifrontal/factor_store.h"
 #include "magshell/scene/bodies.h"
 #include "magshell/scene/time_varying.h"
-#include "magshell/term/contact_term.h"
-#include "magshell/term/field_sources.h"
-#include "magshell/term/force_term.h"
-#include "magshell/term/solid_term.h"
-#include "magshell/term/viscous_terms.h"
+#include "magshell/terms/contact/contact_term.h"
+#include "magshell/terms/force_term.h"
+#include "magshell/terms/magnetic/field_sources.h"
+#include "magshell/terms/shell/viscous_terms.h"
+#include "magshell/terms/solid/solid_term.h"
 
 namespace magshell {
 

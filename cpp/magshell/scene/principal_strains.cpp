@@ -4,8 +4,8 @@
 
 #include "magshell/scene/shell_loops.h"
 #include "magshell/scene/six_node_stresses.h"
-#include "magshell/term/bending_term.h"
-#include "magshell/term/membrane_term.h"
+#include "magshell/terms/shell/bending_term.h"
+#include "magshell/terms/shell/membrane_term.h"
 
 namespace magshell {
 namespace {

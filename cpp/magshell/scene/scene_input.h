@@ -5,22 +5,22 @@
 #include <string>
 #include <vector>
 
-#include "magshell/assembly/dof_map.h"
 #include "magshell/body/joint.h"
 #include "magshell/body/shell.h"
 #include "magshell/body/six_node_shell.h"
 #include "magshell/body/solid.h"
+#include "magshell/dofs/dof_map.h"
 #include "magshell/field/applied_field.h"
 #include "magshell/force/drag.h"
-#include "magshell/term/body_contact_input.h"
-#include "magshell/term/contact_term.h"
-#include "magshell/term/face_energy.h"
-#include "magshell/term/muscle_fibres.h"
-#include "magshell/term/pressure_term.h"
-#include "magshell/term/shell_growth.h"
-#include "magshell/term/solid_term.h"
-#include "magshell/term/tendon_term.h"
-#include "magshell/term/volume_term.h"
+#include "magshell/terms/actuator/muscle_fibres.h"
+#include "magshell/terms/actuator/tendon_term.h"
+#include "magshell/terms/actuator/volume_term.h"
+#include "magshell/terms/contact/body_contact_input.h"
+#include "magshell/terms/contact/contact_term.h"
+#include "magshell/terms/load/face_energy.h"
+#include "magshell/terms/load/pressure_term.h"
+#include "magshell/terms/shell/shell_growth.h"
+#include "magshell/terms/solid/solid_term.h"
 
 namespace magshell {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "magshell/strain/six_nodes.h"
-#include "magshell/term/bending_six_term.h"
-#include "magshell/term/membrane_six_term.h"
+#include "magshell/terms/shell6/bending_six_term.h"
+#include "magshell/terms/shell6/membrane_six_term.h"
 
 namespace magshell {
 namespace {
@@ -130,7 +130,7 @@ std::vector<FaceStress> six_node_stresses(const Model& model, Index number, cons
     const Strains moments = terms.bending.stresses(terms.bending.strains_at(q.data()));
     std::vector<FaceStress> out(4 * static_cast<std::size_t>(terms.shell.n_faces()));
     terms.each(terms.membrane.strains_at(q.data()), [&](Index row, Index f, const Tangents& tangents,
-                                                  const std::array<double, 3>& at, const Mat3& green) {
+                                                        const std::array<double, 3>& at, const Mat3& green) {
         const auto& [thickness, modulus, nu] = terms.membrane.material(f);
         const Mat3 plane = tangents.plane(),
                    moment = moment_at(terms.bending.rest(f), tangents, at, numbers_of(moments, f));

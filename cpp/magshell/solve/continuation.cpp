@@ -5,8 +5,8 @@
 #include <optional>
 
 #include "magshell/core/errors.h"
+#include "magshell/solve/globalization/obstacle_sides.h"
 #include "magshell/solve/modes.h"
-#include "magshell/solve/obstacle_sides.h"
 
 namespace magshell {
 namespace {
@@ -183,7 +183,8 @@ class Follower {
             if (!correct(base, tangent, step_, next, iterations) || !end_in_range(next)) continue;
             const Controls at = controls(next.parameter);
             through = sides_.crossed(next.state, at);
-            if (!through.empty() || sides_.turned(at) > max_obstacle_rotation || !find_tangent(next, there)) continue;
+            if (!through.empty() || sides_.turned(at) > max_obstacle_rotation || !find_tangent(next, there))
+                continue;
             normalize(there);
             double turn = cosine(tangent, there);
             if (turn < 0.0) {

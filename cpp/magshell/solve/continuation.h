@@ -13,7 +13,7 @@
 #include <functional>
 #include <vector>
 
-#include "magshell/solve/newton.h"
+#include "magshell/solve/newton/newton.h"
 #include "magshell/solve/statics.h"
 
 namespace magshell {

@@ -3,7 +3,7 @@
 #include "magshell/core/errors.h"
 #include "magshell/linalg/loaded_part.h"
 #include "magshell/linalg/residual.h"
-#include "magshell/solve/unsymmetric.h"
+#include "magshell/solve/newton/unsymmetric.h"
 
 namespace magshell {
 namespace {

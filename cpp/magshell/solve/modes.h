@@ -1,7 +1,7 @@
 // Modes of the Hessian that decide about stability: K v = eigenvalue M v, with the area metric M of the model.
 #pragma once
 
-#include "magshell/solve/newton.h"
+#include "magshell/solve/newton/newton.h"
 
 namespace magshell {
 

@@ -5,10 +5,10 @@
 #include <utility>
 
 #include "magshell/core/errors.h"
-#include "magshell/solve/deflation.h"
-#include "magshell/solve/load_control.h"
-#include "magshell/solve/obstacle_sides.h"
-#include "magshell/solve/pseudo_transient.h"
+#include "magshell/solve/globalization/deflation.h"
+#include "magshell/solve/globalization/obstacle_sides.h"
+#include "magshell/solve/globalization/pseudo_transient.h"
+#include "magshell/solve/newton/load_control.h"
 
 namespace magshell {
 namespace {
@@ -108,8 +108,9 @@ class Statics {
             accept(result_.state, to_, 1.0, newton_.relative_residual(result_.state, {}));
         const DofMap& dof_map = newton_.model().dof_map();
         controls_at(1.0);
-        const double support_rotation = std::abs(dof_map.support_factor(to_) - dof_map.support_factor(from_)) *
-                                        dof_map.largest_rotation();
+        const double support_rotation =
+            std::abs(dof_map.support_factor(to_) - dof_map.support_factor(from_)) *
+            dof_map.largest_rotation();
         const double turn = std::max(support_rotation, sides_.turned(to_));
         const double longest_step = turn > max_support_rotation ? max_support_rotation / turn : 1.0;
         LoadStepController steps(options_.first_step, longest_step, options_.smallest_step,

@@ -1,7 +1,7 @@
 // Finds a stable equilibrium: mixed Newton in adaptive load steps, escape from saddles, and energy descent if it does not converge.
 #pragma once
 
-#include "magshell/solve/newton.h"
+#include "magshell/solve/newton/newton.h"
 
 namespace magshell {
 
@@ -13,8 +13,9 @@ struct StaticsOptions {
     bool start_at_rest =
         true;  // the start is an equilibrium at the old load parameters, so load steps may be shortened
     int max_relaxation_steps = 500;
-    int max_factorizations = 5000;  // after which the solve gives up; 20 iterations without a factorization count as one
-    bool keep_factor = false;       // for gradients
+    int max_factorizations =
+        5000;  // after which the solve gives up; 20 iterations without a factorization count as one
+    bool keep_factor = false;  // for gradients
     std::vector<VectorXd> away_from =
         {};  // known equilibria at the new load parameters, which the result must differ from
     double away_length = 0.0;  // [m] rms deflection of these, the length scale of the deflation

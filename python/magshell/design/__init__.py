@@ -1,1 +1,1 @@
-"""Minimizing over designs."""
+"""Minimizes objectives over designs, with optimizers, controls in time and many starts."""

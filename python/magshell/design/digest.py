@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from .._checks.tensors import is_tensor
+from .._input.tensors import is_tensor
 
 _INSTALLED = tuple(
     str(Path(folder).resolve())

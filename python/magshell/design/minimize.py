@@ -10,16 +10,16 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .._checks.tensors import require_torch
-from .._machine.log import log
-from .._machine.progress import progress_bar
+from .._input.tensors import require_torch
+from .._runtime.log import log
+from .._runtime.progress import progress_bar
 from ..errors import DesignRejected, EquilibriumJumped, Interrupted, ObjectiveFailed
-from .checkpoint import load, save
+from .configuration import load, save
 from .minimum import Minimum, Record
 from .run import PARTS, Run
 
 if TYPE_CHECKING:
-    from .._checks.kinds import Optimizing
+    from .._input.kinds import Optimizing
 
 _TIME_TO_READ = 0.2  # s, between two texts of the progress bar
 

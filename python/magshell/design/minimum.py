@@ -1,13 +1,76 @@
-"""What `ms.minimize` reports: a record an iteration, and the best design."""
+"""Holds what a minimization found, and which designs it could not evaluate."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from .._machine.frozen import immutable
-from .rejections import effort_in_words, in_words, total
+from .._runtime.frozen import immutable
+from ..errors import DesignRejected, EquilibriumJumped, NotConverged
+
+_JUMP = "jump"
+_IN_A_ROW = 3  # iterations that meet the same jump before anything is made of it
+_SLOW = 0.01  # of the objective, an iteration: a fall by less
+
+
+def reason_of(error: DesignRejected) -> str:
+    """Short, and the same for all designs that are rejected for the same reason."""
+    if not isinstance(error, EquilibriumJumped | NotConverged):
+        return f"{str(error).strip().splitlines()[0]:.60}" if str(error).strip() else type(error).__name__
+    case = "" if error.load_case is None else f" in load case {error.load_case}"
+    return f"{_JUMP}{case}" if isinstance(error, EquilibriumJumped) else f"no equilibrium found{case}"
+
+
+def total(rejections: Iterable[Mapping[str, int]]) -> Counter[str]:
+    """Of several iterations: {reason: how often}."""
+    counted: Counter[str] = Counter()
+    for each in rejections:
+        counted.update(each)
+    return counted
+
+
+def in_words(rejections: Mapping[str, int]) -> str:
+    """Such as "7 rejected (5 jump in load case 1, 2 no equilibrium found)"; empty for none."""
+    if not rejections:
+        return ""
+    listed = Counter(rejections).most_common()
+    told = listed[0][0] if len(listed) == 1 else ", ".join(f"{count} {reason}" for reason, count in listed)
+    return f"{sum(rejections.values())} rejected ({told})"
+
+
+def effort_in_words(evaluations: int, rejections: Mapping[str, int]) -> list[str]:
+    """What a search has taken so far, for its bar and the log: ["31 evaluations", "2 rejected (jump)"]."""
+    return [f"{evaluations} evaluations", *filter(None, [in_words(rejections)])]
+
+
+def conflict(history: Sequence[Any], lost: Mapping[str, int], stuck: bool) -> str:
+    """What is to be said where a run met the same jump in every one of its last iterations and gained little, or ended
+    at one; else nothing. That lower designs lie beyond it is likely, and no more than that.
+
+    history: Records. lost: rejections of an iteration that did not end; stuck: because every length was rejected.
+    """
+    iterations = [record.rejections for record in history] + ([lost] if lost else [])
+    jumps = [reason for reason in (iterations[-1] if iterations else ()) if reason.startswith(_JUMP)]
+    for reason in jumps:
+        met = next((k for k, each in enumerate(reversed(iterations)) if reason not in each), len(iterations))
+        ended = met - bool(lost)  # of those, the ones in the history; the objective before them
+        before, after = history[max(-ended - 1, -len(history))].objective, history[-1].objective
+        fall = (before - after) / abs(before) if before else 0.0
+        if stuck:
+            seen = f"The last step was rejected at every length, for a {reason}"
+        elif met >= _IN_A_ROW and fall < _SLOW * met:
+            changed = f"fell by {100 * fall:.2g} %" if fall > 0 else "did not fall"
+            seen = f"In each of the last {met} iterations designs were rejected for a {reason}, and the objective {changed}"
+        else:
+            continue
+        others = "" if reason == _JUMP else ", and what is asked of that load case may conflict with the rest"
+        return (
+            f"{seen}: lower designs seem to lie beyond that jump{others}. Weigh the terms differently, start from a "
+            "design on its other side, or have it crossed (`stateful`, `on_jump`)."
+        )
+    return ""
 
 
 @immutable

@@ -6,9 +6,8 @@ import glob
 from pathlib import Path
 from typing import Any
 
-from ..ink import Ink
-from .checkpoint import decoded, encoded, load, save
-from .configuration import changes, kept
+from .configuration import changes, decoded, encoded, kept, load, save
+from .ink import Ink
 
 _PARTS = ("configuration", "faces", "stateful", "history", "search", "exchanges")
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from .._machine.frozen import immutable
-from ..ink import Ink
+from .._runtime.frozen import immutable
+from .ink import Ink
 
 
 @immutable

@@ -10,17 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from .._checks.tensors import require_torch
-from .._machine.log import log
+from .._input.tensors import require_torch
+from .._runtime.log import log
 from ..errors import DesignRejected, Interrupted, ObjectiveFailed
-from ..objectives import printable
-from .answer import Answer
-from .exchanges import Exchanges
-from .jumps import jumps_accepted, offering
+from .jump_policies import jumps_accepted, offering
 from .minimize import minimize
+from .objective_value import Answer
+from .objectives import printable
 from .printable_checkpoint import PrintableCheckpoint
 from .printable_minimum import PrintableMinimum, PrintableStage
 from .printed_faces import PrintedFaces
+from .tabu_search import Exchanges
 
 _LINE_SEARCH = 8  # evaluations: a stage is to go on, not to end at a kink
 _SAME_OBJECTIVE = 1e-6  # of the objective: another thread count or release may round otherwise
@@ -302,14 +302,14 @@ class PrintableSearch:
         return answer.objective
 
     def value(self) -> float:
-        from ..optim.sample import Trial  # late, as torch is
+        from .optim.sample import Trial  # late, as torch is
 
         torch = require_torch("minimize_printable")
         return Trial(lambda: self.evaluate(torch.from_numpy(self.faces.magnetization)), []).objective
 
     def sample(self) -> tuple[float, np.ndarray]:
         """The objective, and its gradient by shares of the strength in world axes, (n_f, 3)."""
-        from ..optim.sample import Trial
+        from .optim.sample import Trial
 
         torch = require_torch("minimize_printable")
         magnetization = torch.from_numpy(self.faces.magnetization).requires_grad_()
@@ -333,6 +333,6 @@ class PrintableSearch:
 
 
 def _optimizer(shares, lower, upper):
-    from ..optim import LBFGS  # late, as torch is
+    from .optim import LBFGS  # late, as torch is
 
     return LBFGS([shares], lower=lower, upper=upper, max_evaluations=_LINE_SEARCH)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..ink import Ink
+from .ink import Ink
 
 if TYPE_CHECKING:
     import torch

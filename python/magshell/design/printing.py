@@ -6,21 +6,21 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .._checks.arrays import count
-from .._checks.quantity import one_or_more, quantity
-from .._checks.scalars import not_negative
-from .._checks.tensors import detached, require_torch
-from .._machine.progress import progress_bar
+from .._input.arrays import count
+from .._input.quantity import one_or_more, quantity
+from .._input.scalars import not_negative
+from .._input.tensors import detached, require_torch
+from .._runtime.progress import progress_bar
 from ..errors import Interrupted, ObjectiveFailed
-from ..ink import Ink
-from .jumps import checked_stateful
+from .ink import Ink
+from .jump_policies import checked_stateful
 from .printable_checkpoint import PrintableCheckpoint
 from .printable_minimum import PrintableMinimum, PrintableStage
 from .printable_search import PrintableSearch, Stopped
 from .printed_faces import PrintedFaces
 
 if TYPE_CHECKING:
-    from .._checks.kinds import Numbers
+    from .._input.kinds import Numbers
 
 
 def minimize_printable(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from .answer import Answer
 from .configuration import changes
+from .objective_value import Answer
 
 if TYPE_CHECKING:
     from .run import Run
@@ -64,7 +64,7 @@ def check_objective(run: Run, snapshot: dict[Any, Any]) -> None:
 
 def _evaluated(run, best: dict[Any, Any]) -> tuple[float, float]:
     """Objective and violation of the best design."""
-    from ..optim.sample import Trial
+    from .optim.sample import Trial
 
     def closure():
         answer = Answer.of(run.objective(*run.parameters))

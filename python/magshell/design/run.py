@@ -10,23 +10,21 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from .._checks.arrays import number
-from .._checks.tensors import is_tensor, require_torch
-from .._machine.log import log
+from .._input.arrays import number
+from .._input.tensors import is_tensor, require_torch
+from .._runtime.log import log
 from ..errors import DesignRejected, EquilibriumJumped
-from ..optim.standstill import STANDSTILL
-from .answer import Answer
-from .checkpoint import decoded, encoded
-from .configuration import kept
-from .jumps import checked_stateful, jumps_accepted, offering
-from .minimum import Minimum, Record
-from .rejections import conflict, effort_in_words, reason_of, total
+from .configuration import decoded, encoded, kept
+from .jump_policies import checked_stateful, jumps_accepted, offering
+from .minimum import Minimum, Record, conflict, effort_in_words, reason_of, total
+from .objective_value import Answer
+from .optim.stagnation import STANDSTILL
 from .resume import check_objective, check_same
 
 if TYPE_CHECKING:
-    from .._checks.kinds import Optimizing
-    from ..optim.any_torch import AnyTorch
-    from ..optim.base import BoxOptimizer
+    from .._input.kinds import Optimizing
+    from .optim.base import BoxOptimizer
+    from .optim.torch_adapter import AnyTorch
 
 PARTS = (
     "method",
@@ -256,8 +254,8 @@ class Run:
 
 def _driven(optimizer):
     """The optimizer as one that can be asked what is known where it stands."""
-    from ..optim.any_torch import AnyTorch
-    from ..optim.base import BoxOptimizer
+    from .optim.base import BoxOptimizer
+    from .optim.torch_adapter import AnyTorch
 
     if isinstance(optimizer, BoxOptimizer):
         return optimizer

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._checks.quantity import quantity
-from .._machine.frozen import Frozen
-from .._machine.keywords import CONTROLS, FLUX_DENSITY, controls_of, nearest_first
-from ..scene.courses import changes_at_once, names_in_time, row_in_time
+from .._input.quantity import quantity
+from .._runtime.frozen import Frozen
+from .._runtime.keywords import CONTROLS, FLUX_DENSITY, controls_of, nearest_first
+from ..model.scene.time_series import changes_at_once, names_in_time, row_in_time
 
 if TYPE_CHECKING:
-    from .._checks.kinds import Numbers
-    from ..scene.scene import Scene
+    from .._input.kinds import Numbers
+    from ..model.scene.scene import Scene
 
 
 class Actuator(Frozen):

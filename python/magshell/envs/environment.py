@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._checks.arrays import count, named_values
-from .._checks.checked_list import checked_list
-from .._checks.quantity import quantity, real_numbers
-from .._checks.scalars import positive
-from .._machine.entry import grouped
-from .._machine.keywords import FLUX_DENSITY, nearest_first
-from ..dynamics.simulate import simulate as simulate_motion
+from .._input.arrays import count, named_values
+from .._input.checked_list import checked_list
+from .._input.quantity import quantity, real_numbers
+from .._input.scalars import positive
+from .._runtime.keywords import FLUX_DENSITY, nearest_first
+from .._runtime.solver_entry_point import grouped
 from ..errors import NotConverged
-from ..plotting.limits import checked_width
-from ..plotting.style import Style, style_of
-from ..plotting.view import View, view_of
-from ..scene.scene import Scene
-from ..states.state import states_of
+from ..model.scene.scene import Scene
+from ..output.plot.limits import checked_width
+from ..output.plot.style import Style, style_of
+from ..output.plot.view import View, view_of
+from ..output.results.state import states_of
+from ..solve.dynamics.simulate import simulate as simulate_motion
 from .actuator import Actuator
 from .frames import Camera
 from .library import require_gymnasium
@@ -29,7 +29,7 @@ from .snapshot import Snapshot
 if TYPE_CHECKING:
     import gymnasium
 
-    from .._checks.kinds import EnvActuator
+    from .._input.kinds import EnvActuator
 
 if not TYPE_CHECKING:
     gymnasium = require_gymnasium("envs.Environment")

@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..plotting import backend as backends
-from ..plotting.frames import Reel, Scenery
-from ..plotting.limits import checked_width
-from ..plotting.panels import Options, size_of
-from ..plotting.style import Style
-from ..plotting.surfaces import on_surfaces
-from ..plotting.view import view_of
-from ..states.state import State, states_of
-from ..states.units import length_unit
+from ..output.plot import backend as backends
+from ..output.plot.frames import Reel, Scenery
+from ..output.plot.limits import checked_width
+from ..output.plot.panels import Options, size_of
+from ..output.plot.style import Style
+from ..output.plot.surfaces import on_surfaces
+from ..output.plot.view import view_of
+from ..output.results.state import State, states_of
+from ..output.results.units import length_unit
 from .snapshot import Snapshot
 
 if TYPE_CHECKING:
-    from ..plotting.view import View
+    from ..output.plot.view import View
 
 _AROUND = 0.5  # of the rest shape's size: how much room is around it in the window
 

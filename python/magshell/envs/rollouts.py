@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from .._checks.arrays import count
-from .._checks.quantity import real_numbers
-from .._machine.frozen import immutable
+from .._input.arrays import count
+from .._input.quantity import real_numbers
+from .._runtime.frozen import immutable
 
 
 @immutable

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from .._machine.frozen import immutable
-from ..bodies.of_body import result_of
-from ..dynamics.trajectory import Trajectory
-from ..scene.scene import Scene
-
-if TYPE_CHECKING:
-    pass
+from .._runtime.frozen import immutable
+from ..model.results.result_lookup import result_of
+from ..model.scene.scene import Scene
+from ..solve.dynamics.trajectory import Trajectory
 
 
 @immutable

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._checks.arrays import count
-from .._checks.quantity import quantity
+from .._input.arrays import count
+from .._input.quantity import quantity
 from .actuator import Actuator
 
 if TYPE_CHECKING:
-    from ..scene.scene import Scene
+    from ..model.scene.scene import Scene
 
 
 class Steered(Actuator):

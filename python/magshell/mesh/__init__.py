@@ -1,1 +1,1 @@
-"""The triangle mesh: selections, quality, joining, files."""
+"""Defines meshes of triangles and of tetrahedra, makes them, reads and writes them."""

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .six_node_integrals import edge_integrals, shape_integrals
-from .six_node_mesh import SixNodeMesh
-from .tet_mesh import TetMesh
-from .tet_topology import FLAT
+from .tetrahedra.tet_mesh import TetMesh
+from .topology import FLAT
+from .triangles.six_node_checks import edge_integrals, shape_integrals
+from .triangles.six_node_mesh import SixNodeMesh
 
 if TYPE_CHECKING:
-    from .triangle_mesh import TriangleMesh
+    from .triangles.triangle_mesh import TriangleMesh
 
 
 def sides(mesh: TriangleMesh | SixNodeMesh | TetMesh) -> tuple[np.ndarray, int]:

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .._machine.offered import Drawn
+from .._runtime.mixins import Drawn
 from .selection import MeshSelection
 
 

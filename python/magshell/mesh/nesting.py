@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import scipy
 
-from .six_node_mesh import SixNodeMesh
-from .tet_mesh import TetMesh
+from .tetrahedra.tet_mesh import TetMesh
+from .triangles.six_node_mesh import SixNodeMesh
 
 if TYPE_CHECKING:
-    from .triangle_mesh import TriangleMesh
+    from .triangles.triangle_mesh import TriangleMesh
 
 _SAME_PLACE = 1e-6  # of the shortest edge
 _REMEDY = (

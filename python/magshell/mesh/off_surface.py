@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._machine.callers import callers_level
+from .._runtime.warning_stacklevel import callers_level
 from ..errors import MeshQualityWarning
 from .signed_distance import Distance, checked_distance
 

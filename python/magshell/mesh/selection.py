@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._checks.arrays import index_array
-from .._checks.quantity import quantity
-from .._checks.scalars import not_negative
-from .._checks.selections import Indices
+from .._input.arrays import index_array
+from .._input.quantity import quantity
+from .._input.scalars import not_negative
+from .._input.selections import Indices
 
 if TYPE_CHECKING:
-    from .._checks.kinds import Numbers
+    from .._input.kinds import Numbers
 
 
 RELATIVE_TOLERANCE = 1e-6  # of the mesh's size: far above round-off, far below any edge

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._checks.quantity import quantity
+from .._input.quantity import quantity
 
 if TYPE_CHECKING:
-    from .._checks.kinds import Numbers, Rotates
+    from .._input.kinds import Numbers, Rotates
 
 
 def moved(

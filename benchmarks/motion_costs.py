@@ -1,0 +1,204 @@
+"""Time a step, cost of a gradient, memory of what is kept for it, and long runs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import magshell as ms
+
+from .ratios import note
+from .report import print_table
+from .timing import peak_memory, resident_memory
+
+if TYPE_CHECKING:
+    from magshell.solve.options import Integrator
+
+ALLOWED_STEP = 0.015  # s, at 768 faces
+# Of the time of the same motion without gradients.
+ALLOWED_SHARE = {"factors": 0.25, "stages": 0.5, "checkpoints": 1.2}
+STEPS, TIME_STEP = 50, 1e-3
+KEPT_STEPS = (100, 1_000, 10_000)
+MOST_FACTORS = 1_000  # steps whose factorizations fit: some 200 kB each
+SMALL = (6, 2)  # cells of the strip in long runs
+
+
+def strip(cells: tuple[int, int] = (48, 8)) -> ms.Scene:
+    """12 cm x 2 cm, soft; 768 faces by default."""
+    mesh = ms.meshes.rectangle(0.12, 0.02, cells=cells)
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e5, poisson_ratio=0.45, mass_density=1e3)
+    return ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
+
+
+def turning(steps: int) -> np.ndarray:
+    """T, at the ends of the steps: once around in 0.16 s."""
+    angle = 40.0 * TIME_STEP * np.arange(steps + 1)
+    return 3e-3 * np.stack([np.cos(angle), 0.0 * angle, np.sin(angle)], axis=1)
+
+
+def drive(scene: ms.Scene, steps: int, **options: Any) -> ms.Trajectory:
+    given = {"remanent_magnetization": (2e4, 0, 0), "applied_flux_density": turning(steps), "damping": 1e-6}
+    given |= {"time_step": TIME_STEP, "record_every": steps, "progress": False}
+    return ms.simulate(scene, steps=steps, **{**given, **options})
+
+
+def budget(scene: ms.Scene, integrator: Integrator, steps: int) -> float:
+    """Bytes with which checkpoints suffice to take every step again but once."""
+    of_a_state = 4 if isinstance(integrator, ms.TRBDF2) else 2  # vectors, beside one a stage
+    record = 8.0 * scene._model.size * (of_a_state + len(integrator._times))
+    return min(0.6 * record * steps, 4e6)
+
+
+def measure(rounds: int, quick: bool, cells: tuple[int, int], memory: bool = True) -> dict[str, Any]:
+    """Prints the tables, returns their numbers."""
+    steps = 5 if quick else STEPS
+    results = {
+        "step": _steps(strip(cells), steps, rounds),
+        "gradient": _gradients(strip(cells), steps, rounds),
+    }
+    if not memory:
+        return results
+    kept = _memory(["checkpoints"], KEPT_STEPS[:1]) if quick else _memory(ALLOWED_SHARE, KEPT_STEPS)
+    return {**results, "memory": kept}
+
+
+def _steps(scene: ms.Scene, steps: int, rounds: int) -> dict[str, Any]:
+    results, rows = {}, []
+    for integrator in (ms.ImplicitEuler(), ms.TRBDF2(), ms.SDIRK2(), ms.SDIRK3()):
+        times = []
+        for _ in range(rounds):
+            began = time.process_time()
+            move = drive(scene, steps, integrator=integrator)
+            times.append((time.process_time() - began) / steps)
+        name = type(integrator).__name__
+        results[name] = {"step": min(times), "iterations": move.iterations / steps}
+        allowed = None if isinstance(integrator, ms.SDIRK3) else ALLOWED_STEP
+        missed = note("time", f"{name}: a step, s", min(times), at_most=allowed)
+        note("count", f"{name}: iterations of {steps} steps", move.iterations)
+        rows.append([name, "", f"{move.iterations / steps:.2f}", f"{1e3 * min(times):.2f}{missed}"])
+    print_table(
+        f"A time step of {scene.mesh.n_faces} faces in a turning field (at most {1e3 * ALLOWED_STEP:g} ms)",
+        ["integrator", "", "iterations", "ms"],
+        rows,
+    )
+    return results
+
+
+def _gradients(scene: ms.Scene, steps: int, rounds: int) -> dict[str, Any]:
+    """By the field of every step and the magnetization; all of an integrator's runs in turn, as loads change."""
+    results, rows = {}, []
+    for integrator in (ms.ImplicitEuler(), ms.TRBDF2()):
+        name = type(integrator).__name__
+        plain, kept = [], {keep: [] for keep in ALLOWED_SHARE}
+        for _ in range(rounds):
+            began = time.process_time()
+            drive(scene, steps, integrator=integrator)
+            plain.append(time.process_time() - began)
+            for keep, runs in kept.items():
+                runs.append(_forward_and_back(scene, steps, integrator, keep))
+        for keep, allowed in ALLOWED_SHARE.items():
+            runs = kept[keep]
+            forward, back = (min(run[k] for run in runs) for k in (0, 1))
+            share = back / min(plain)
+            results[f"{name}, {keep}"] = {
+                "plain": min(plain),
+                "forward": forward,
+                "back": back,
+                "share": share,
+                "bytes": runs[0][2],
+            }
+            times = (f"{1e3 * seconds:.0f}" for seconds in (min(plain), forward, back))
+            verdict = f"{share:.2f}" + note(
+                "share", f"{name}, {keep}: gradient over motion", share, at_most=allowed
+            )
+            note("memory", f"{name}, {keep}: bytes a step", runs[0][2] / steps)
+            rows.append([name, keep, *times, verdict, f"{allowed:g}", f"{runs[0][2] / 1e6:.3g}"])
+    print_table(
+        f"The gradient of {steps} steps by the field of each and by the magnetization, {scene.mesh.n_faces} faces",
+        ["integrator", "kept", "motion, ms", "kept so, ms", "gradient, ms", "share", "at most", "MB"],
+        rows,
+    )
+    return results
+
+
+def _forward_and_back(scene: ms.Scene, steps: int, integrator, keep: str) -> tuple[float, float, int]:
+    """Time of each, s, and the bytes kept."""
+    import torch
+
+    magnetization = torch.tensor([2e4, 0.0, 0.0], dtype=torch.float64, requires_grad=True)
+    field = torch.tensor(turning(steps), requires_grad=True)
+    began = time.process_time()
+    move = drive(
+        scene,
+        steps,
+        integrator=integrator,
+        remanent_magnetization=magnetization,
+        applied_flux_density=field,
+        keep=ms.Keep(keep, memory_budget=budget(scene, integrator, steps)),
+    )
+    done = time.process_time()
+    (move.positions[-1] ** 2).sum().backward()
+    return done - began, time.process_time() - done, move.bytes
+
+
+def _memory(keeps: Iterable[str], counts: Iterable[int]) -> dict[str, Any]:
+    """Each run in a process of its own, because only the largest size of a process is told."""
+    results, rows = {}, []
+    for keep in keeps:
+        for steps in counts:
+            if keep == "factors" and steps > MOST_FACTORS:
+                continue
+            with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as executor:
+                forward, back, kept, grown = executor.submit(_grown, steps, keep).result()
+            results[f"{keep}, {steps}"] = {"forward": forward, "back": back, "bytes": kept, "grown": grown}
+            times = f"{forward:.2f}", f"{back:.2f}", f"{back / forward:.2f}"
+            rows.append([keep, f"{steps}", *times, f"{kept / 1e6:.3g}", _megabytes(grown)])
+    print_table(
+        f"What is kept for a gradient, {2 * SMALL[0] * SMALL[1]} faces, TRBDF2",
+        ["kept", "steps", "motion, s", "gradient, s", "share", "kept, MB", "process grew by, MB"],
+        rows,
+    )
+    return results
+
+
+def _grown(steps: int, keep: str) -> tuple[float, float, int, int | None]:
+    """Times, bytes kept, and by how much this process grew."""
+    scene = strip(SMALL)
+    _forward_and_back(scene, 10, ms.TRBDF2(), "checkpoints")  # what every run needs
+    before = peak_memory()
+    forward, back, kept = _forward_and_back(scene, steps, ms.TRBDF2(), keep)
+    after = peak_memory()
+    return forward, back, kept, None if before is None or after is None else after - before
+
+
+def long_run(steps: int, parts: int = 10) -> dict[str, Any]:
+    """A small driven strip for so many steps, in parts that go on from one another."""
+    results, rows = {}, []
+    for integrator in (ms.ImplicitEuler(), ms.TRBDF2()):
+        scene, began = strip(SMALL), time.process_time()
+        move, sizes, done, halved = None, [], 0, 0
+        for _ in range(parts):
+            move = drive(scene, steps // parts, integrator=integrator, start=move)
+            sizes.append(resident_memory())
+            done += move.steps_done
+            halved += len(move.halved)
+        grown = None if sizes[0] is None else sizes[-1] - sizes[0]
+        name = type(integrator).__name__
+        seconds = time.process_time() - began
+        results[name] = {"steps": done, "halved": halved, "seconds": seconds, "grown": grown}
+        rows.append([name, "", done, halved, f"{move.times[-1]:.6g}", f"{seconds:.1f}", _megabytes(grown)])
+    print_table(
+        f"A long run of {2 * SMALL[0] * SMALL[1]} faces in a turning field",
+        ["integrator", "", "steps", "in parts", "until, s", "took, s", "process grew by, MB"],
+        rows,
+    )
+    return results
+
+
+def _megabytes(grown: int | None) -> str:
+    return "not told" if grown is None else f"{grown / 1e6:.3g}"

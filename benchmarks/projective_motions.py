@@ -1,0 +1,191 @@
+"""Projective Dynamics beside Newton's method: tables of `python -m benchmarks dynamics`."""
+
+from __future__ import annotations
+
+import time
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from typing import Any
+
+import numpy as np
+
+import magshell as ms
+
+from .ratios import note
+from .report import print_table
+from .timing import peak_memory
+
+ALLOWED_ITERATION = 8e-4  # s of processor time, at 5184 four-node tetrahedra
+CELLS, QUICK_CELLS = (24, 6, 6), (12, 3, 3)
+TIME_STEP, STEPS = 1e-2, 4
+ROUNDS = (1, 2, 5, 10, 20, 50, 100)
+MODULI = {"young_modulus": 1e5, "poisson_ratio": 0.4}
+MATERIALS = {
+    "Projective": ms.Projective(**MODULI),
+    "Corotated": ms.Corotated(**MODULI),
+    "NeoHookean": ms.NeoHookean(**MODULI),
+}
+WAYS = {"as they are": 0, "accelerated": 8}  # ProjectiveDynamics.history
+# Of the arch bridge in [Qiao21] Table 1, which has 821 nodes and 2911 tetrahedra: 820 and 2880 here.
+ARCH_CELLS, ARCH_STEPS = (40, 4, 3), 200
+ALLOWED_ARCH = 0.1e9  # bytes with checkpoints; 15.7e9 there without
+
+
+def measure(rounds: int, quick: bool, memory: bool = True) -> dict[str, Any]:
+    """Prints the tables, returns their numbers."""
+    errors = {"projective errors": _errors(rounds, quick)}
+    return {**errors, "projective memory": _memory(quick)} if memory else errors
+
+
+def beam(material: ms.bodies.materials.SolidMaterial, cells: tuple[int, int, int]) -> ms.Scene:
+    """10 cm x 2.5 cm x 2.5 cm, clamped at one end, that falls."""
+    mesh = ms.meshes.box((0.1, 0.025, 0.025), cells=cells)
+    solid = ms.Solid(mesh, material=material, mass_density=1e3, element="linear")
+    return ms.Scene(solid, supports=[ms.Pin(mesh.vertices_at(x=0.0))], gravity=(0, 0, -9.81))
+
+
+def _drive(scene: ms.Scene, integrator, steps: int, solver=None) -> ms.Trajectory:
+    return ms.simulate(
+        scene, steps=steps, time_step=TIME_STEP, integrator=integrator, solver=solver, progress=False
+    )
+
+
+def _seconds(call, rounds: int) -> float:
+    """Of the processor, the best of some rounds."""
+    best = np.inf
+    for _ in range(rounds):
+        began = time.process_time()
+        call()
+        best = min(best, time.process_time() - began)
+    return best
+
+
+def _errors(rounds: int, quick: bool) -> dict[str, Any]:
+    """Root mean square of the positions of all steps, over the way of the point that moves farthest."""
+    cells, counts = (QUICK_CELLS, ROUNDS[:3]) if quick else (CELLS, ROUNDS)
+    results: dict = {}
+    for name, material in MATERIALS.items():
+        scene, rows = beam(material, cells), []
+        exact = _drive(scene, ms.ImplicitEuler(), STEPS, ms.MixedNewton(tolerance=1e-13)).positions
+        size = np.abs(exact - exact[0]).max()
+
+        def error(move, exact=exact, size=size) -> float:
+            return float(np.sqrt(((move.positions - exact) ** 2).mean()) / size)
+
+        found: dict = {"tetrahedra": scene.bodies[0].mesh.n_tetrahedra}
+        once = _seconds(lambda: _drive(scene, ms.ProjectiveDynamics(1, None), 1), rounds)  # noqa: B023
+        for way, history in WAYS.items():
+            errors, times = [], []
+            for count in counts:
+                method = ms.ProjectiveDynamics(count, None, history)
+                errors.append(error(_drive(scene, method, STEPS)))
+                times.append(_seconds(lambda: _drive(scene, method, 1 + STEPS), rounds) - once)  # noqa: B023
+            found[way] = {"rounds": list(counts), "error": errors, "time": [t / STEPS for t in times]}
+            rows.append([f"rounds {way}", "error", *(f"{each:.1e}" for each in errors)])
+            rows.append(["", "ms a step", *(f"{1e3 * each:.2f}" for each in found[way]["time"])])
+        iteration = (found["accelerated"]["time"][-1] - found["accelerated"]["time"][0]) / (counts[-1] - 1)
+        found["iteration"] = iteration
+        newton: dict = {"tolerance": [], "error": [], "time": []}
+        for tolerance in (3e-2, 1e-4, 1e-8):
+            solver = ms.MixedNewton(tolerance=tolerance)
+            first = _seconds(lambda: _drive(scene, ms.ImplicitEuler(), 1, solver), rounds)  # noqa: B023
+            all_of_them = _seconds(lambda: _drive(scene, ms.ImplicitEuler(), 1 + STEPS, solver), rounds)  # noqa: B023
+            newton["tolerance"].append(tolerance)
+            newton["error"].append(error(_drive(scene, ms.ImplicitEuler(), STEPS, solver)))
+            newton["time"].append((all_of_them - first) / STEPS)
+        found["Newton"] = newton
+        limit = None if quick or name != "Projective" else ALLOWED_ITERATION
+        missed = note("time", f"iteration of Projective Dynamics, {name}, s", iteration, at_most=limit)
+        results[name] = found
+        print_table(
+            f"{name}, {found['tetrahedra']} tetrahedra, steps of {1e3 * TIME_STEP:g} ms: an iteration "
+            f"{1e3 * iteration:.3f} ms{missed}; error against time of Projective Dynamics",
+            ["", "", *(f"{count} rounds" for count in counts)],
+            rows,
+        )
+        print_table(
+            f"{name}: of implicit Euler by Newton's method",
+            ["tolerance", "error", "ms a step"],
+            [
+                [f"{t:g}", f"{e:.1e}", f"{1e3 * s:.2f}"]
+                for t, e, s in zip(newton["tolerance"], newton["error"], newton["time"], strict=True)
+            ],
+        )
+    return results
+
+
+def arch(cells: tuple[int, int, int] = ARCH_CELLS) -> ms.Scene:
+    """A bridge of half a circle, 8 m wide, that stands on its ends and falls under its weight."""
+    flat = ms.meshes.box((1.0, 0.8, 0.4), cells=cells)
+    along, across, up = flat.rest_positions.T
+    angle, radius = np.pi * (1.0 - along / along.max()), 3.6 + up - up.min()
+    bent = np.stack([radius * np.cos(angle), across, radius * np.sin(angle)], axis=1)
+    mesh = ms.TetMesh(bent, flat.tetrahedra)
+    solid = ms.Solid(
+        mesh,
+        material=ms.Projective(young_modulus=3e5, poisson_ratio=0.3),
+        mass_density=1e3,
+        element="linear",
+    )
+    return ms.Scene(solid, supports=[ms.Pin(mesh.vertices_at(z=0.0, tolerance=1e-6))], gravity=(0, 0, -9.81))
+
+
+def _memory(quick: bool) -> list[dict[str, Any]]:
+    """Each run in a process of its own, because only the largest size of a process is told."""
+    cells, steps = ((10, 2, 1), 20) if quick else (ARCH_CELLS, ARCH_STEPS)
+    results, rows = [], []
+    for keep in ("stages", "checkpoints"):
+        with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as executor:
+            found = executor.submit(_grown, cells, steps, keep).result()
+        results.append({"kept": keep, "steps": steps, **found})
+        size, kept, grown = found["nodes"], found["bytes"], found["grown"]
+        limit = None if quick or keep == "stages" else ALLOWED_ARCH
+        missed = note("memory", f"arch, {keep}: bytes kept for the gradient", kept, at_most=limit)
+        shown = "not told" if grown is None else f"{grown / 1e6:.1f}"
+        times = f"{found['forward']:.2f}", f"{found['back']:.2f}"
+        rows.append([keep, f"{size}", f"{steps}", *times, f"{kept / 1e6:.2f}{missed}", shown])
+    print_table(
+        f"Gradient of an arch of {results[0]['tetrahedra']} tetrahedra by its moduli, Projective Dynamics "
+        "([Qiao21] Table 1: 15,700 and 100 MB at 200 steps)",
+        ["kept", "nodes", "steps", "motion, s", "gradient, s", "kept, MB", "process grew by, MB"],
+        rows,
+    )
+    return results
+
+
+def _grown(cells, steps: int, keep: str) -> dict[str, Any]:
+    """Times, bytes kept, and by how much this process grew."""
+    import torch
+
+    scene = arch(cells)
+    solid = scene.bodies[0]
+
+    def run(count: int) -> tuple[float, float, int]:
+        young = torch.full((solid.mesh.n_tetrahedra,), 3e5, dtype=torch.float64, requires_grad=True)
+        began = time.process_time()
+        move = ms.simulate(
+            scene,
+            steps=count,
+            time_step=TIME_STEP,
+            values={solid: {"young_modulus": young}},
+            integrator=ms.ProjectiveDynamics(tolerance=1e-8),
+            record_every=count,
+            keep=ms.Keep(keep, memory_budget=2e6 if keep == "checkpoints" else 2e9),
+            progress=False,
+        )
+        done = time.process_time()
+        (move.positions[-1] ** 2).sum().backward()
+        return done - began, time.process_time() - done, move.bytes
+
+    run(2)  # what every run needs
+    before = peak_memory()
+    forward, back, kept = run(steps)
+    after = peak_memory()
+    return {
+        "nodes": solid.mesh.n_vertices,
+        "tetrahedra": solid.mesh.n_tetrahedra,
+        "forward": forward,
+        "back": back,
+        "bytes": kept,
+        "grown": None if before is None or after is None else after - before,
+    }

@@ -1,0 +1,171 @@
+"""What all parts of the bench share: their common options, tables, and results as JSON."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy
+import scipy
+
+import magshell as ms
+from magshell import _core
+from magshell._runtime.files import check_replaceable, replace_file
+from magshell._runtime.progress import progress_bar
+
+if TYPE_CHECKING:
+    from tqdm import tqdm
+
+
+def add_common_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--json",
+        type=writable_path,
+        metavar="PATH",
+        help="write the numbers there, with machine and versions",
+    )
+    parser.add_argument(
+        "--figure", type=writable_path, metavar="PATH", help="draw them there, a PNG (matplotlib)"
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="small and few: to see what it prints and draws, no more"
+    )
+    parser.add_argument("--threads", type=int, default=1, help="threads of magshell's loops (default 1)")
+
+
+def add_rounds(parser: argparse.ArgumentParser, usual: int) -> None:
+    """Of a part that measures times several times."""
+    parser.add_argument(
+        "--rounds",
+        type=int,
+        help=f"of each measurement of time, the best counts (default {usual}, with --quick 1)",
+    )
+    parser.set_defaults(usual_rounds=usual)
+
+
+def settle_rounds(options: argparse.Namespace) -> None:
+    """Puts the number in place, where the part has one."""
+    if hasattr(options, "rounds"):
+        options.rounds = chosen(options.rounds, options.quick, 1, options.usual_rounds)
+        if options.rounds < 1:
+            raise SystemExit(f"--rounds must be at least 1, got {options.rounds}")
+
+
+def chosen(given: Any, quick: bool, small: Any, usual: Any) -> Any:
+    """What was asked for, or else what `--quick` or its lack says."""
+    return given if given is not None else small if quick else usual
+
+
+def set_threads(count: int) -> None:
+    try:
+        ms.set_num_threads(count)
+    except ValueError as error:
+        raise SystemExit(f"--threads: {error}") from error
+
+
+def writable_path(text: str) -> Path:
+    """A path that can be written, its folder made if need be: refused before hours of work, not after."""
+    path = Path(text)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        check_replaceable(path)
+    except OSError as error:
+        reason = error.strerror if error.filename is None else f"cannot write {path}: {error.strerror}"
+        raise argparse.ArgumentTypeError(reason) from error
+    return path
+
+
+def writable_folder(text: str) -> Path:
+    """A folder in which files can be written, made if need be."""
+    folder = Path(text)
+    writable_path(str(folder / "part.json"))
+    return folder
+
+
+def read_results(text: str) -> dict[str, Any]:
+    """What write_json wrote."""
+    try:
+        content = json.loads(Path(text).read_text())
+    except OSError as error:
+        raise argparse.ArgumentTypeError(f"cannot read {text}: {error.strerror}") from error
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text} is not JSON: {error}") from error
+    if not isinstance(content, dict) or not {"part", "setting", "results"} <= content.keys():
+        raise argparse.ArgumentTypeError(
+            f"{text} was not written by the bench: it has no part, setting and results"
+        )
+    return content
+
+
+def as_json(results: dict[str, Any]) -> dict[str, Any]:
+    """The same as JSON would hold it: figures draw what a run hands over and what a file holds."""
+    return json.loads(json.dumps(results, default=_plain_number))
+
+
+def _plain_number(value):
+    """Of numpy's."""
+    if isinstance(value, numpy.ndarray | numpy.generic):
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} is no JSON")
+
+
+def bar(title: str, total: int) -> tqdm[Any]:
+    """A progress bar, where someone looks on."""
+    return progress_bar(title, total, shown=sys.stderr.isatty(), leave=False, delay=2.0)
+
+
+def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Columns as wide as they need; the first two to the left, the others to the right."""
+    rows = [[str(cell) for cell in row] for row in rows]
+    widths = [max(len(row[c]) for row in [list(headings), *rows]) for c in range(len(headings))]
+
+    def line(cells: Sequence[str]) -> str:
+        padded = [
+            cell.ljust(width) if c < 2 else cell.rjust(width)
+            for c, (cell, width) in enumerate(zip(cells, widths, strict=True))
+        ]
+        return "  ".join(padded).rstrip()
+
+    print(f"\n{title}\n")
+    print(line(headings))
+    print("  ".join("-" * width for width in widths))
+    for row in rows:
+        print(line(row))
+
+
+def write_json(path: Path, part: str, results: dict[str, Any]) -> None:
+    content = {"part": part, "setting": setting(), "results": results}
+    text = json.dumps(content, indent=2, allow_nan=True) + "\n"
+    replace_file(path, lambda file: file.write(text.encode()))
+
+
+def setting() -> dict[str, str | int]:
+    """On what the numbers were made: machine, versions, threads."""
+    return {
+        "machine": platform.machine(),
+        "processor": _processor(),
+        "processors": os.cpu_count() or 1,
+        "system": platform.platform(),
+        "python": platform.python_version(),
+        "numpy": numpy.__version__,
+        "scipy": scipy.__version__,
+        "magshell": ms.__version__,
+        "threads": ms.num_threads(),
+        **dict(_core.build_info()),
+    }
+
+
+def _processor() -> str:
+    """The processor's name, where the system tells it (Linux does in /proc/cpuinfo)."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor() or "unknown"
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or "unknown"

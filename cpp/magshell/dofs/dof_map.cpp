@@ -1,0 +1,327 @@
+#include "magshell/dofs/dof_map.h"
+
+#include <algorithm>
+#include <string>
+
+namespace magshell {
+
+DofMap::DofMap(const SystemMatrix& matrix, std::vector<PrescribedNode> held, const Nodes& nodes, Index moves,
+               Registry& registry, ReducedCoordinatesList reduced)
+    : held_(std::move(held)), nodes_(nodes), moves_(moves), full_size_(matrix.size()) {
+    support_factor_ = registry.controls.add("scene", "motion_factor", "1", 1, 1);
+    for (Index k = 0; k < moves; ++k) {
+        const std::string owner = "move " + std::to_string(k);
+        slots_.push_back({registry.values.add(owner, "center", "m", 1, 3),
+                          registry.values.add(owner, "rotation", "rad", 1, 3),
+                          registry.values.add(owner, "displacement", "m", 1, 3)});
+    }
+    std::vector<char> is_held(matrix.size(), 0);
+    held_at_.assign(matrix.nodes(), -1);
+    for (Index k = 0; k < static_cast<Index>(held_.size()); ++k) {
+        const PrescribedNode& h = held_[k];
+        held_at_[h.node] = k;
+        if (h.n_prescribed == 3 || axis_aligned(h)) {
+            for (int axis = 0; axis < h.n_prescribed; ++axis) {
+                Index component;
+                h.frame.col(axis).cwiseAbs().maxCoeff(&component);
+                is_held[3 * h.node + (h.n_prescribed == 3 ? axis : component)] = 1;
+            }
+            continue;
+        }
+        if (frame_of_.empty()) frame_of_.assign(matrix.nodes(), -1);
+        frame_of_[h.node] = k;
+        for (int axis = 0; axis < h.n_prescribed; ++axis) is_held[3 * h.node + axis] = 1;
+    }
+
+    if (!reduced.empty()) reduced_ = std::make_unique<ReducedAssembly>(std::move(reduced), matrix);
+    for (Index u = 0; u < matrix.size(); ++u)
+        if (!is_held[u] && !(reduced_ && reduced_->is_reduced(u))) free_unknowns_.push_back(u);
+    if (reduced_) reduced_->linearize(rest_state(nodes));
+    set_pattern(matrix, nullptr);
+}
+
+void DofMap::Pieces::add(Index from, Index to) {
+    if (!all.empty() && all.back().from + all.back().count == from && all.back().to + all.back().count == to)
+        ++all.back().count;
+    else
+        all.push_back({from, to, 1});
+}
+
+void DofMap::set_pattern(const SystemMatrix& matrix, const SystemMatrix* layer) {
+    std::vector<Index> reduced(full_size_, -1);
+    const Index free = static_cast<Index>(free_unknowns_.size());
+    for (Index k = 0; k < free; ++k) reduced[free_unknowns_[k]] = k;
+    std::vector<const SystemMatrix*> matrices = {&matrix};
+    if (layer) matrices.push_back(layer);
+    pieces_.all.clear();
+    layer_pieces_.all.clear();
+    SparsePattern pattern;
+    pattern.size = free + (reduced_ ? reduced_->coordinates() : 0);
+    if (reduced_) reduced_->collect_couplings(matrices, reduced, free);
+    pattern.column_starts.reserve(pattern.size + 1);
+    pattern.rows.reserve(matrix.rows().size() + (layer ? layer->rows().size() : 0));
+    pattern.column_starts.push_back(0);
+    for (const Index u : free_unknowns_) {
+        each_entry(matrix, layer, u, [&](Index unknown, Index k, Index l) {
+            const Index row = reduced[unknown], to = static_cast<Index>(pattern.rows.size());
+            if (row < 0) return;
+            if (k >= 0) pieces_.add(k, to);
+            if (l >= 0) layer_pieces_.add(l, to);
+            pattern.rows.push_back(row);
+        });
+        if (reduced_) reduced_->append_rows(reduced[u], pattern.rows);
+        pattern.column_starts.push_back(static_cast<Index>(pattern.rows.size()));
+    }
+    if (reduced_) {
+        reduced_->append_columns(pattern);
+        reduced_->find_entries(matrices, reduced, pattern);
+    }
+    std::shared_ptr<const SparsePattern>& last = layer ? coupled_ : alone_;
+    if (!last || *last != pattern) last = std::make_shared<const SparsePattern>(std::move(pattern));
+    pattern_ = last;
+}
+
+// Returns the reference state, at which reduced coordinates are linearized before anything has been evaluated.
+VectorXd DofMap::rest_state(const Nodes& nodes) {
+    VectorXd q = VectorXd::Zero(nodes.n_dofs());
+    for (Index node = 0; node < nodes.n_nodes(); ++node) q.segment<3>(3 * node) = nodes.rest[node];
+    return q;
+}
+
+bool DofMap::axis_aligned(const PrescribedNode& h) const {
+    for (int axis = 0; axis < h.n_prescribed; ++axis)
+        if (h.frame.col(axis).cwiseAbs().maxCoeff() != 1.0) return false;
+    return true;
+}
+
+void DofMap::set_values(const Values& values) {
+    for (std::size_t k = 0; k < slots_.size(); ++k)
+        moves_[k] = {values.vector(slots_[k].center), values.vector(slots_[k].rotation),
+                     values.vector(slots_[k].displacement)};
+    if (reduced_) reduced_->set_values(values);
+}
+
+VectorXd DofMap::prescribed_increment(const VectorXd& q, const Controls& controls) const {
+    VectorXd increment = VectorXd::Zero(q.size());
+    const double t = support_factor(controls);
+    for (const PrescribedNode& h : held_)
+        increment.segment<3>(3 * h.node) = held_part(
+            h, [&](Index move) -> Vec3 { return position(h.node, move, t) - q.segment<3>(3 * h.node); });
+    if (has_motors()) reduced_->add_motor_increment(q, increment);
+    return increment;
+}
+
+VectorXd DofMap::along_supports(const VectorXd& full) const {
+    VectorXd parts(3 * held_.size());
+    for (std::size_t k = 0; k < held_.size(); ++k)
+        parts.segment<3>(3 * static_cast<Index>(k)) =
+            held_part(held_[k], [&](Index) -> Vec3 { return full.segment<3>(3 * held_[k].node); });
+    return parts;
+}
+
+Mat3 DofMap::free_motions(Index node) const {
+    Mat3 free = Mat3::Identity();
+    if (held_at_[node] < 0) return free;
+    const PrescribedNode& h = held_[held_at_[node]];
+    for (int axis = 0; axis < h.n_prescribed; ++axis)
+        free -= h.frame.col(axis) * h.frame.col(axis).transpose();
+    return h.n_prescribed == 3 ? Mat3(Mat3::Zero()) : free;
+}
+
+// At two nodes of one symmetry plane, the block has no free part but round-off.
+bool DofMap::acts_on_free_motion(Index a, Index b, const Vec3& axis) const {
+    // [-] of the axis; see test_a_quarter_with_symmetry_planes_is_the_whole
+    constexpr double round_off = 1e-10;
+    Mat3 across;
+    across << 0.0, -axis.z(), axis.y(), axis.z(), 0.0, -axis.x(), -axis.y(), axis.x(), 0.0;
+    return (free_motions(a) * across * free_motions(b)).norm() > round_off * axis.norm();
+}
+
+VectorXd DofMap::prescribed_rate(const Controls& controls) const {
+    VectorXd out = VectorXd::Zero(full_size_);
+    const double t = support_factor(controls);
+    for (const PrescribedNode& h : held_)
+        out.segment<3>(3 * h.node) = held_part(h, [&](Index move) { return rate(h.node, move, t); });
+    return out;
+}
+
+Vec3 DofMap::position(Index node, Index move, double support_factor) const {
+    const Vec3& rest = nodes_.rest[node];
+    if (move < 0) return rest;
+    return node < nodes_.n_vertices() ? moves_[move].point(rest, support_factor)
+                                      : moves_[move].direction(rest, support_factor);
+}
+
+Vec3 DofMap::rate(Index node, Index move, double support_factor) const {
+    if (move < 0) return Vec3::Zero();
+    const Vec3& rest = nodes_.rest[node];
+    return node < nodes_.n_vertices() ? moves_[move].point_rate(rest, support_factor)
+                                      : moves_[move].direction_rate(rest, support_factor);
+}
+
+void DofMap::vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
+                 const Controls& controls, Gradient& out, const VectorXd& by_motor_forces) const {
+    if (reduced_) reduced_->vjp(by_state, lambda, gradient, by_motor_forces, out);
+    const double t = support_factor(controls);
+    std::vector<SupportMove> by_move(moves_.size());
+    for (const PrescribedNode& h : held_)
+        for (int axis = 0; axis < h.n_prescribed; ++axis) {
+            const Index move = h.moves[axis];
+            if (move < 0) continue;
+            const Vec3 along = h.frame.col(axis),
+                       by_position = along * along.dot(by_state.segment<3>(3 * h.node));
+            const Vec3& rest = nodes_.rest[h.node];
+            if (h.node < nodes_.n_vertices())
+                moves_[move].point_vjp(rest, t, by_position, by_move[move]);
+            else
+                moves_[move].direction_vjp(rest, t, by_position, by_move[move]);
+            out.controls[support_factor_.first] += by_position.dot(rate(h.node, move, t));
+        }
+    for (std::size_t k = 0; k < slots_.size(); ++k) {
+        out.values.segment<3>(slots_[k].center.first) += by_move[k].center;
+        out.values.segment<3>(slots_[k].rotation.first) += by_move[k].rotation_vector;
+        out.values.segment<3>(slots_[k].displacement.first) += by_move[k].translation;
+    }
+}
+
+double DofMap::largest_rotation() const {
+    double turn = 0.0;
+    for (const SupportMove& move : moves_) turn = std::max(turn, move.rotation_vector.norm());
+    return turn;
+}
+
+// Rotates B_ij -> Q_i^T B_ij Q_j if node i or j is rotated. The rows of a node's three columns are stored as system_matrix.h says.
+void DofMap::rotate_blocks(SystemMatrix& full) const {
+    const Index rotations_from = 3 * full.nodes();
+    const auto frame = [&](Index node) -> const Mat3& { return held_[frame_of_[node]].frame; };
+    for (Index j = 0; j < full.nodes(); ++j) {
+        const Index length = full.column_length(j);
+        const Index start = full.column_starts()[3 * j];
+        const Index starts[3] = {
+            start, start + length - 1,
+            start + 2 * length - 3};  // where column 0 of the row begins, in each of the three columns
+        double* values = full.values().data();
+        if (frame_of_[j] >= 0) {
+            double &a = values[starts[0]], &b = values[starts[0] + 1], &c = values[starts[0] + 2];
+            double &d = values[starts[1] + 1], &e = values[starts[1] + 2], &f = values[starts[2] + 2];
+            Mat3 block;
+            block << a, b, c, b, d, e, c, e, f;
+            const Mat3 turned = frame(j).transpose() * block * frame(j);
+            a = turned(0, 0), b = turned(1, 0), c = turned(2, 0), d = turned(1, 1), e = turned(2, 1),
+            f = turned(2, 2);
+        }
+        for (Index k = 3; k < length; ++k) {
+            const Index row = full.rows()[start + k];
+            if (row >= rotations_from) {
+                if (frame_of_[j] < 0) continue;
+                Vec3 entry(values[starts[0] + k], values[starts[1] + k], values[starts[2] + k]);
+                entry = frame(j).transpose() * entry;
+                for (int c = 0; c < 3; ++c) values[starts[c] + k] = entry[c];
+                continue;
+            }
+            const Index i = row / 3;
+            if (frame_of_[i] >= 0 || frame_of_[j] >= 0) {
+                Mat3 block;
+                for (int c = 0; c < 3; ++c)
+                    for (int r = 0; r < 3; ++r) block(r, c) = values[starts[c] + k + r];
+                if (frame_of_[i] >= 0) block = (frame(i).transpose() * block).eval();
+                if (frame_of_[j] >= 0) block = (block * frame(j)).eval();
+                for (int c = 0; c < 3; ++c)
+                    for (int r = 0; r < 3; ++r) values[starts[c] + k + r] = block(r, c);
+            }
+            k += 2;
+        }
+    }
+}
+
+void DofMap::matrix(SystemMatrix& full, SystemMatrix* layer, LargeVector<double>& values) const {
+    if (!frame_of_.empty()) {
+        rotate_blocks(full);
+        if (layer) rotate_blocks(*layer);
+    }
+    values.resize(pattern_->rows.size());
+    if (reduced_ || layer) std::fill(values.begin(), values.end(), 0.0);
+    for (const Pieces::Piece& piece : pieces_.all)
+        std::copy_n(full.values().data() + piece.from, piece.count, values.data() + piece.to);
+    if (reduced_) reduced_->add_matrix(0, full, values.data());
+    if (!layer) return;
+    for (const Pieces::Piece& piece : layer_pieces_.all)
+        for (Index k = 0; k < piece.count; ++k) values[piece.to + k] += layer->values()[piece.from + k];
+    if (reduced_) reduced_->add_matrix(1, *layer, values.data());
+}
+
+void DofMap::add_weights(const VectorXd& full, LargeVector<double>& values) const {
+    for (std::size_t k = 0; k < free_unknowns_.size(); ++k)
+        values[pattern_->column_starts[k]] += full[free_unknowns_[k]];
+    if (reduced_) reduced_->add_weights(full, values.data());
+}
+
+VectorXd DofMap::vector(const VectorXd& full) const {
+    if (frame_of_.empty()) return gathered(full);
+    VectorXd turned = full;
+    for (Index node = 0; node < static_cast<Index>(frame_of_.size()); ++node)
+        if (frame_of_[node] >= 0)
+            turned.segment<3>(3 * node) =
+                held_[frame_of_[node]].frame.transpose() * full.segment<3>(3 * node);
+    return gathered(turned);
+}
+
+VectorXd DofMap::gathered(const VectorXd& full) const {
+    VectorXd reduced(size());
+    for (std::size_t k = 0; k < free_unknowns_.size(); ++k) reduced[k] = full[free_unknowns_[k]];
+    if (reduced_) reduced_->pull_back(full, reduced);
+    return reduced;
+}
+
+VectorXd DofMap::project(const VectorXd& full) const {
+    VectorXd own = expand(vector(full));
+    if (!reduced_) return own;
+    VectorXd carried = full;
+    reduced_->project(carried);
+    reduced_->replace(carried, own);
+    return own;
+}
+
+void DofMap::retract(VectorXd& q, const VectorXd& p) const {
+    if (reduced_)
+        reduced_->retract(q, p);
+    else
+        q += p;
+}
+
+VectorXd DofMap::weights(const VectorXd& full) const {
+    VectorXd reduced(size());
+    for (std::size_t k = 0; k < free_unknowns_.size(); ++k) reduced[k] = full[free_unknowns_[k]];
+    if (reduced_) reduced_->diagonal(full, reduced);
+    return reduced;
+}
+
+std::vector<Vec3> DofMap::free(const std::vector<Vec3>& full) const {
+    std::vector<Vec3> points;
+    points.reserve(free_unknowns_.size());
+    for (const Index unknown : free_unknowns_) points.push_back(full[unknown]);
+    if (reduced_) reduced_->append_points(full, points);
+    return points;
+}
+
+VectorXd DofMap::expand(const VectorXd& reduced) const {
+    VectorXd full = VectorXd::Zero(full_size_);
+    for (std::size_t k = 0; k < free_unknowns_.size(); ++k) full[free_unknowns_[k]] = reduced[k];
+    if (reduced_) reduced_->push_forward(reduced, full);
+    for (Index node = 0; node < static_cast<Index>(frame_of_.size()); ++node)
+        if (frame_of_[node] >= 0) {
+            const Vec3 local = full.segment<3>(3 * node);
+            full.segment<3>(3 * node) = held_[frame_of_[node]].frame * local;
+        }
+    return full;
+}
+
+std::size_t DofMap::bytes() const {
+    return (pieces_.all.capacity() + layer_pieces_.all.capacity()) * sizeof(Pieces::Piece) +
+           (frame_of_.capacity() + held_at_.capacity() + free_unknowns_.capacity() +
+            pattern_->rows.capacity() + pattern_->column_starts.capacity()) *
+               sizeof(Index) +
+           (reduced_ ? reduced_->bytes() : 0);
+}
+
+}  // namespace magshell

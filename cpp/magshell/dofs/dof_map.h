@@ -1,0 +1,189 @@
+// The map from all dofs to the free ones: supports prescribe nodes along some directions and may move them as rigid bodies, and reduced
+// coordinates replace the nodes of rigid bodies and skeletons; these are the last of the free dofs.
+//
+// A node that is prescribed along directions other than x, y, z is rotated into a frame of its own, in which it is prescribed along the
+// first one or two axes. Nodes without supports cost nothing here.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "magshell/assembly/system_matrix.h"
+#include "magshell/body/nodes.h"
+#include "magshell/core/parameters.h"
+#include "magshell/dofs/reduced_assembly.h"
+#include "magshell/dofs/support_move.h"
+#include "magshell/linalg/factor.h"
+
+namespace magshell {
+
+/// A node and the orthonormal directions along which it is prescribed, the first n_prescribed columns of `frame`; each direction follows the
+/// move of one support, or stays if that is -1.
+struct PrescribedNode {
+    Index node;
+    int n_prescribed;
+    Mat3 frame;
+    std::array<Index, 3> moves = {-1, -1, -1};
+};
+
+class DofMap {
+  public:
+    /// moves: number of support moves that `held` refers to. The nodes must outlive it. No node may be both prescribed and reduced.
+    DofMap(const SystemMatrix& matrix, std::vector<PrescribedNode> prescribed, const Nodes& nodes,
+           Index moves, Registry& registry, ReducedCoordinatesList reduced = {});
+
+    void set_values(const Values& values);
+    bool moves() const { return !moves_.empty() || has_motors(); }
+    /// Returns true if motors prescribe coordinates of skeletons.
+    bool has_motors() const { return reduced_ && reduced_->has_motors(); }
+    /// Returns true if parameters act through it, so that vjp adds gradients by them.
+    bool has_values() const { return moves() || (reduced_ && reduced_->has_joint_parameters()); }
+
+    /// The free dofs that are not reduced coordinates, ascending; they come first in the reduced order. Those of a rotated node count
+    /// along its frame.
+    const std::vector<Index>& free_dofs() const { return free_unknowns_; }
+    bool is_rotated(Index node) const { return !frame_of_.empty() && frame_of_[node] >= 0; }
+
+    /// Returns the amplitude of the prescribed support moves: 0 at rest, 1 at their end.
+    double support_factor(const Controls& controls) const { return controls[support_factor_.first]; }
+
+    Index size() const { return pattern_->size; }
+    const std::shared_ptr<const SparsePattern>& pattern() const { return pattern_; }
+    /// Sets the matrix to the sum of `matrix` and `layer`, which may couple other nodes. The last patterns with and without a layer are
+    /// reused as the same objects if they are unchanged.
+    void set_pattern(const SystemMatrix& matrix, const SystemMatrix* layer);
+
+    /// Returns the increment of all dofs to the targets of supports and motors; zero elsewhere.
+    VectorXd prescribed_increment(const VectorXd& q, const Controls& controls) const;
+
+    /// Returns d(prescribed positions of supports)/d(support factor).
+    VectorXd prescribed_rate(const Controls& controls) const;
+
+    /// Adds the gradients by the support moves, the support factor, motors and joint parameters. by_state: gradient by the prescribed
+    /// positions. lambda: adjoint. gradient: of the energy, with inertia in a motion. by_motor_forces: gradient by the motor forces, empty if
+    /// none; by_state includes its contribution through the state.
+    void vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
+             const Controls& controls, Gradient& out, const VectorXd& by_motor_forces = {}) const;
+    /// Adds to the forces K p of a prescribed increment those due to the curved paths of motor-driven nodes.
+    void add_motor_increment_forces(const VectorXd& gradient, const VectorXd& move, VectorXd& forces) const {
+        if (has_motors()) reduced_->add_motor_increment_forces(gradient, move, forces);
+    }
+    /// Returns the forces [N] and moments [N m] of the motors, one after another, for a gradient of the energy.
+    VectorXd motor_forces(const VectorXd& gradient) const {
+        return has_motors() ? reduced_->motor_forces(gradient) : VectorXd();
+    }
+
+    /// Returns the motion of all nodes whose power under motor_forces is the weighted sum by_motor_forces; and adds the derivative of this
+    /// power as forces on the free dofs. Both at the state linearized last.
+    VectorXd motor_motion(const VectorXd& by_motor_forces) const {
+        return reduced_->motor_motion(by_motor_forces);
+    }
+    void add_motor_force_change(const VectorXd& gradient, const VectorXd& by_motor_forces,
+                                VectorXd& forces) const {
+        reduced_->add_motor_force_change(gradient, by_motor_forces, forces);
+    }
+
+    /// Returns true if there are supports.
+    bool has_supports() const { return !held_.empty(); }
+    /// Returns the part of a vector of all dofs along the prescribed directions, three numbers per prescribed node in the order given.
+    VectorXd along_supports(const VectorXd& full) const;
+
+    /// Returns true if the block [axis]x between two nodes acts on their free motions.
+    bool acts_on_free_motion(Index a, Index b, const Vec3& axis) const;
+
+    /// Returns the largest total rotation of a support [rad].
+    double largest_rotation() const;
+
+    /// Returns true if there are rigid bodies or skeletons. All of the following is linear at the state linearized last.
+    bool has_reduced_coordinates() const { return reduced_ != nullptr; }
+    void linearize(const VectorXd& q) {
+        if (reduced_) reduced_->linearize(q);
+    }
+
+    /// Computes the free rows and columns in the order of pattern(). Rotates the blocks of rotated nodes in place first. `layer`: as in
+    /// set_pattern.
+    void matrix(SystemMatrix& full, SystemMatrix* layer, LargeVector<double>& values) const;
+    /// Adds a diagonal of all dofs that is the same along the three axes of a node, such as masses or areas.
+    void add_weights(const VectorXd& full, LargeVector<double>& values) const;
+    /// Adds the curvature term of reduced coordinates for a gradient of all dofs; computes its product with a reduced vector.
+    void add_curvature(const VectorXd& gradient, LargeVector<double>& values) const {
+        if (reduced_) reduced_->add_curvature(gradient, values.data());
+    }
+    void add_curvature_product(const VectorXd& gradient, const VectorXd& reduced, VectorXd& out) const {
+        if (reduced_) reduced_->add_curvature_product(gradient, reduced, out);
+    }
+    /// Returns the free part of a vector of all dofs, B^T f for reduced coordinates.
+    VectorXd vector(const VectorXd& full) const;
+    /// Returns the diagonal of what add_weights adds.
+    VectorXd weights(const VectorXd& full) const;
+    /// Projects a vector of all dofs onto the motions of the free dofs.
+    VectorXd project(const VectorXd& full) const;
+    /// Moves a state by p, a vector of all dofs; reduced nodes move along their coordinates.
+    void retract(VectorXd& q, const VectorXd& p) const;
+    /// See ReducedCoordinates; empty without reduced coordinates.
+    VectorXd rounding(const VectorXd& q) const { return reduced_ ? reduced_->rounding(q) : VectorXd(); }
+    /// See ReducedCoordinates: make a start consistent, and the adjoint of that.
+    void project_state(VectorXd& q, VectorXd* v) const {
+        if (reduced_) reduced_->project_state(q, v);
+    }
+    void project_state_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v,
+                           Gradient& out) const {
+        if (reduced_) reduced_->project_state_vjp(q, v, by_q, by_v, out);
+    }
+    /// Selects from points of all dofs those of the free ones.
+    std::vector<Vec3> free(const std::vector<Vec3>& full) const;
+    /// Returns a vector of all dofs from a free one: zero where prescribed, B z for reduced coordinates.
+    VectorXd expand(const VectorXd& reduced) const;
+
+    std::size_t bytes() const;
+
+  private:
+    /// Returns the sum over the prescribed directions d of a node of d (d . vector_of(move)).
+    template <class VectorOf>
+    static Vec3 held_part(const PrescribedNode& h, const VectorOf& vector_of) {
+        Vec3 part = Vec3::Zero();
+        for (int axis = 0; axis < h.n_prescribed; ++axis)
+            part += h.frame.col(axis) * h.frame.col(axis).dot(vector_of(h.moves[axis]));
+        return part;
+    }
+    /// Returns the position of a node that follows a move; with -1 its rest position.
+    Vec3 position(Index node, Index move, double support_factor) const;
+    /// Returns the derivative of that position by the support factor.
+    Vec3 rate(Index node, Index move, double support_factor) const;
+    /// Returns the projection of a node's motions onto its free directions.
+    Mat3 free_motions(Index node) const;
+    bool axis_aligned(const PrescribedNode& h) const;
+    void rotate_blocks(SystemMatrix& full) const;
+    VectorXd gathered(const VectorXd& full) const;
+    static VectorXd rest_state(const Nodes& nodes);
+
+    std::vector<PrescribedNode> held_;
+    const Nodes& nodes_;
+    struct MoveSlots {
+        Slot center, rotation, displacement;
+    };
+    std::vector<MoveSlots> slots_;
+    std::vector<SupportMove> moves_;
+    Slot support_factor_;
+    Index full_size_;
+    std::vector<Index>
+        frame_of_;  // per node: its index in held_ if it is rotated, else -1; empty if no node is
+    std::vector<Index> held_at_;        // per node: its index in held_, else -1
+    std::vector<Index> free_unknowns_;  // reduced -> full, ascending
+    std::shared_ptr<const SparsePattern> pattern_, alone_,
+        coupled_;  // current; the last ones without and with a layer
+    // The free entries of the full matrix, as contiguous pieces: supports remove few entries.
+    struct Pieces {
+        struct Piece {
+            Index from, to, count;
+        };
+        std::vector<Piece> all;
+
+        void add(Index from, Index to);
+    };
+    Pieces pieces_, layer_pieces_;
+    std::unique_ptr<ReducedAssembly> reduced_;  // nullptr without rigid bodies and skeletons
+};
+
+}  // namespace magshell

@@ -1,0 +1,542 @@
+#include "magshell/dofs/skeleton_coordinates.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include "magshell/core/rotation_vector.h"
+
+namespace magshell {
+namespace {
+
+using Eigen::MatrixXd;
+
+// Iterations that fit the coordinates to a start, and the relative size of the last one [-]; see test_joints_hold_to_round_off_over_ten_thousand_steps.
+constexpr int max_fit_iterations = 30;  // see test_joints_hold_to_round_off_over_ten_thousand_steps
+// [-] over the lengths involved; see test_a_motor_holds_an_arm_at_its_angle_and_says_its_torque
+constexpr double motor_round_off = 1e-14;
+constexpr double fit_tolerance = 1e-14;  // [-] see test_joints_hold_to_round_off_over_ten_thousand_steps
+// [-] part of epsilon |x|/l that four corners leave; see test_long_chains_of_links_move_at_the_usual_tolerance
+constexpr double rotation_round_off = 0.125;
+
+Vec3 across(const Vec3& axis) {
+    Index smallest;
+    axis.cwiseAbs().minCoeff(&smallest);
+    return axis.cross(Vec3::Unit(smallest)).normalized();
+}
+
+// Returns the angle of the rotation about an axis that is nearest to a given rotation.
+double angle_about(const Vec3& axis, const Mat3& turn) {
+    const Vec3 u = across(axis), v = axis.cross(u);
+    return std::atan2(v.dot(turn * u) - u.dot(turn * v), u.dot(turn * u) + v.dot(turn * v));
+}
+
+std::vector<Index> nodes_of(const std::vector<RigidNodes>& links) {
+    std::vector<Index> all;
+    for (const RigidNodes& link : links) all.insert(all.end(), link.nodes().begin(), link.nodes().end());
+    return all;
+}
+
+// Returns the minimum-norm least-squares solver, as the rows may leave coordinates undetermined.
+auto solver_of(const MatrixXd& rows) {
+    return rows.completeOrthogonalDecomposition();
+}
+
+}  // namespace
+
+SkeletonCoordinates::SkeletonCoordinates(std::vector<RigidNodes> links, std::vector<Joint> joints,
+                                         std::vector<Slots> slots)
+    : ReducedCoordinates(nodes_of(links)), links_(std::move(links)), joints_(std::move(joints)) {
+    slots.resize(links_.size());
+    slots_ = std::move(slots);
+    Index row = 0;
+    bool vertices = false;
+    for (Index k = 0; k < n_links(); ++k) {
+        first_.push_back(coordinates_);
+        coordinates_ += joints_[k].freedom();
+        row_.push_back(row);
+        row += links_[k].size();
+        vertices |= links_[k].has_vertices();
+        if (!joints_[k].has_motor) continue;
+        motors_.push_back({k, slots_[k].motor, n_motor_coordinates_});
+        n_motor_coordinates_ += joints_[k].freedom();
+    }
+    Index free = 0, held = coordinates();
+    for (const Joint& joint : joints_)
+        for (Index j = 0; j < joint.freedom(); ++j) column_of_.push_back(joint.has_motor ? held++ : free++);
+    auto paths = std::make_shared<LinkPaths>();
+    for (Index k = 0; k < n_links(); ++k) {
+        const auto own = column_of_.begin() + first_[k];
+        paths->add_link(joints_[k].parent, {own, own + joints_[k].freedom()}, links_[k].size());
+    }
+    paths_ = std::move(paths);
+    for (Index k = 0; k < n_links(); ++k)
+        for (Index n = vertices ? links_[k].own() : 0; n < (vertices ? links_[k].size() : RigidNodes::points);
+             ++n)
+            leading_.push_back(row_[k] + n);
+}
+
+std::vector<SkeletonCoordinates::Pose> SkeletonCoordinates::poses(const VectorXd& q) const {
+    std::vector<Pose> all;
+    for (const RigidNodes& link : links_) all.push_back(link.pose(q));
+    return all;
+}
+
+Mat3 SkeletonCoordinates::frame(Index link, const std::vector<Pose>& poses) const {
+    const Index parent = joints_[link].parent;
+    return parent < 0 ? Mat3::Identity() : poses[parent].rotation;
+}
+
+Vec3 SkeletonCoordinates::joint_position(Index link, const std::vector<Pose>& poses) const {
+    const Joint& joint = joints_[link];
+    if (joint.parent < 0) return joint.origin;
+    const Pose& parent = poses[joint.parent];
+    return parent.center + parent.rotation * (joint.origin - links_[joint.parent].middle());
+}
+
+std::vector<SkeletonCoordinates::Column> SkeletonCoordinates::columns(const std::vector<Pose>& poses) const {
+    std::vector<Column> all;
+    for (Index k = 0; k < n_links(); ++k) {
+        const Joint& joint = joints_[k];
+        const double radians = 1.0 / links_[k].length();
+        const Mat3 frame = this->frame(k, poses);
+        const Vec3 place = joint.kind == JointKind::free ? poses[k].center : joint_position(k, poses);
+        if (joint.kind == JointKind::free)
+            for (int c = 0; c < 3; ++c) all.push_back({false, Vec3::Unit(c), place, 1.0});
+        if (joint.kind == JointKind::free || joint.kind == JointKind::ball)
+            for (int c = 0; c < 3; ++c) all.push_back({true, Vec3::Unit(c), place, radians});
+        if (joint.has_axis()) {
+            const bool turns = joint.kind == JointKind::revolute;
+            all.push_back({turns, frame * joint.axis, place, turns ? radians : 1.0});
+        }
+    }
+    return all;
+}
+
+LinkTwists SkeletonCoordinates::twists(const VectorXd& q) const {
+    const std::vector<Pose> poses = this->poses(q);
+    const std::vector<Column> columns = this->columns(poses);
+    std::vector<Vec3> points, arms;
+    points.reserve(n_links());
+    arms.reserve(nodes().size());
+    LinkTwists::Twists twists(6, paths_->coordinate.size());
+    std::vector<const Column*> by_column(coordinates_);
+    for (Index j = 0; j < coordinates_; ++j) by_column[column_of_[j]] = &columns[j];
+    for (Index k = 0; k < n_links(); ++k) {
+        points.push_back(poses[k].center);
+        for (const Index node : links_[k].nodes()) arms.push_back(q.segment<3>(3 * node) - points[k]);
+        for (Index at = paths_->start[k]; at < paths_->start[k + 1]; ++at) {
+            const Column& column = *by_column[paths_->coordinate[at]];
+            const Vec3 axis = column.scale * column.axis;
+            const Vec3 velocity = column.turns ? axis.cross(points[k] - column.origin) : axis;
+            twists.col(at).head<3>() = velocity;
+            twists.col(at).tail<3>() = column.turns ? axis : Vec3(Vec3::Zero());
+        }
+    }
+    return {paths_, std::move(points), std::move(arms), std::move(twists)};
+}
+
+// With F = sum g and M = sum (x - o_b) g^T over all nodes that b moves: for rotations about w_a and w_b,
+//   sum g . (w_a x (w_b x (x - o_b))) = w_a . M w_b - (w_a . w_b) tr M,   for a rotation a and a translation b  (w_a x w_b) . F.
+// The entry of two rotations of one joint is that of the rotation about a after the one about b.
+MatrixXd SkeletonCoordinates::second_derivative(const VectorXd& q, const VectorXd& gradient) const {
+    const std::vector<Column> columns = this->columns(poses(q));
+    std::vector<Vec3> forces(n_links(), Vec3::Zero());
+    std::vector<Mat3> products(n_links(),
+                               Mat3::Zero());  // sum (x - place) g^T, about one point per link
+    std::vector<Vec3> place(n_links());
+    MatrixXd out = MatrixXd::Zero(coordinates_, coordinates_);
+    for (Index k = 0; k < n_links(); ++k)
+        place[k] = joints_[k].freedom() > 0 ? columns[first_[k]].origin : links_[k].center(q);
+    for (Index k = n_links() - 1; k >= 0; --k) {
+        const Joint& joint = joints_[k];
+        for (const Index node : links_[k].nodes()) {
+            const Vec3 g = gradient.segment<3>(3 * node);
+            forces[k] += g;
+            products[k] += (q.segment<3>(3 * node) - place[k]) * g.transpose();
+        }
+        // No later link adds to this one.
+        if (const Index parent = joint.parent; parent >= 0) {
+            forces[parent] += forces[k];
+            products[parent] += products[k] + (place[k] - place[parent]) * forces[k].transpose();
+        }
+        for (Index b = first_[k]; b < first_[k] + joint.freedom(); ++b) {
+            const Column& inner = columns[b];
+            const auto turn_and = [&](const Column& outer) {
+                if (!inner.turns) return outer.axis.cross(inner.axis).dot(forces[k]);
+                return outer.axis.dot(products[k] * inner.axis) -
+                       outer.axis.dot(inner.axis) * products[k].trace();
+            };
+            for (Index above = k; above >= 0; above = joints_[above].parent)
+                for (Index a = first_[above]; a < first_[above] + joints_[above].freedom(); ++a) {
+                    const Column& outer = columns[a];
+                    if (!outer.turns || (above == k && !inner.turns)) continue;
+                    const Index i = column_of_[a], j = column_of_[b];
+                    out(i, j) = outer.scale * inner.scale * turn_and(outer);
+                    if (above != k) out(j, i) = out(i, j);
+                }
+        }
+    }
+    return out;
+}
+
+MatrixXd SkeletonCoordinates::curvature(const VectorXd& q, const VectorXd& gradient) const {
+    const MatrixXd second = second_derivative(q, gradient);
+    return 0.5 * (second + second.transpose());
+}
+
+double SkeletonCoordinates::coordinate(Index link, const std::vector<Pose>& poses) const {
+    const Joint& joint = joints_[link];
+    const Mat3 frame = this->frame(link, poses);
+    if (joint.kind == JointKind::revolute)
+        return angle_about(joint.axis, frame.transpose() * poses[link].rotation);
+    const Vec3 own = poses[link].center - poses[link].rotation * (links_[link].middle() - joint.origin);
+    return joint.axis.dot(frame.transpose() * (own - joint_position(link, poses)));
+}
+
+void SkeletonCoordinates::set_values(const Values& values) {
+    for (Motor& motor : motors_)
+        for (Index c = 0; c < motor.slot.size(); ++c) motor.target[c] = values[motor.slot][c];
+    for (Index k = 0; k < n_links(); ++k) {
+        if (slots_[k].origin.size() > 0) joints_[k].origin = values.vector(slots_[k].origin);
+        if (slots_[k].axis.size() > 0) joints_[k].axis = values.vector(slots_[k].axis);
+    }
+}
+
+SkeletonCoordinates::Pose SkeletonCoordinates::moved_pose(Index link, const std::vector<Pose>& from,
+                                                          const std::vector<Pose>& to,
+                                                          const double* z) const {
+    const Joint& joint = joints_[link];
+    const RigidNodes& nodes = links_[link];
+    const auto turn = [&](const double* by) -> Mat3 {
+        return rotation(Vec3(by[0], by[1], by[2]) / nodes.length());
+    };
+    if (joint.kind == JointKind::free)
+        return {from[link].center + Vec3(z[0], z[1], z[2]), turn(z + 3) * from[link].rotation};
+    const bool root = joint.parent < 0;
+    const Mat3 before = root ? Mat3::Identity() : from[joint.parent].rotation,
+               after = root ? Mat3::Identity() : to[joint.parent].rotation;
+    Pose pose{joint_position(link, to), after};
+    switch (joint.kind) {
+        case JointKind::revolute:
+            pose.rotation = after * rotation((coordinate(link, from) + z[0] / nodes.length()) * joint.axis);
+            break;
+        case JointKind::ball:
+            pose.rotation = after * orthonormal(before.transpose() * turn(z) * from[link].rotation);
+            break;
+        case JointKind::prismatic:
+            pose.center += (coordinate(link, from) + z[0]) * (after * joint.axis);
+            break;
+        default:
+            break;
+    }
+    pose.center += pose.rotation * (nodes.middle() - joint.origin);
+    return pose;
+}
+
+void SkeletonCoordinates::move_links(VectorXd& q, std::vector<Pose> from, const VectorXd& z) const {
+    std::vector<Pose> to(n_links());
+    VectorXd by_joint(coordinates_);
+    for (Index j = 0; j < coordinates_; ++j) by_joint[j] = z[column_of_[j]];
+    for (Index k = 0; k < n_links(); ++k) {
+        to[k] = moved_pose(k, from, to, by_joint.data() + first_[k]);
+        links_[k].set_positions(to[k], q);
+    }
+}
+
+void SkeletonCoordinates::retract(VectorXd& q, const VectorXd& z) const {
+    move_links(q, poses(q), z);
+}
+
+// The pose of a link is computed from corners l apart, with coordinates rounded relative to their distance |x| from the origin. Its rotation
+// has an error of about epsilon |x|/l, an eighth of it after averaging over four corners. The rotation of a joint transmits the error
+// to all links after it, by the length of their arms; the errors of several joints add up like random numbers.
+VectorXd SkeletonCoordinates::rounding(const VectorXd& q) const {
+    const std::vector<Pose> poses = this->poses(q);
+    struct Sums {  // of w^2, w^2 o and w^2 |o|^2 over the joints on the way, w the rounding of a turn about o
+        double
+            one = 0.0,
+            square =
+                0.0;  // of w^2, w^2 o and w^2 |o|^2 over the joints on the path, with w the error of a rotation about o
+        Vec3 place = Vec3::Zero();
+    };
+    std::vector<Sums> all(n_links());
+    VectorXd moved_pose(nodes().size());
+    for (Index k = 0; k < n_links(); ++k) {
+        const Joint& joint = joints_[k];
+        Sums& sums = all[k];
+        if (joint.parent >= 0) sums = all[joint.parent];
+        if (joint.kind == JointKind::revolute || joint.kind == JointKind::ball ||
+            joint.kind == JointKind::free) {
+            const double turn =
+                rotation_round_off * poses[k].center.cwiseAbs().maxCoeff() / links_[k].length() + 1.0;
+            const Vec3 at = joint.kind == JointKind::free ? poses[k].center : joint_position(k, poses);
+            sums.one += turn * turn;
+            sums.place += turn * turn * at;
+            sums.square += turn * turn * at.squaredNorm();
+        }
+        for (Index n = 0; n < links_[k].size(); ++n) {
+            const Vec3 x = q.segment<3>(3 * links_[k].nodes()[n]);
+            moved_pose[row_[k] + n] =
+                std::sqrt(std::max(0.0, sums.square - 2.0 * x.dot(sums.place) + x.squaredNorm() * sums.one));
+        }
+    }
+    return moved_pose;
+}
+
+std::vector<SkeletonCoordinates::Pose> SkeletonCoordinates::first_fit(const VectorXd& q) const {
+    std::vector<Pose> fit;
+    for (const RigidNodes& link : links_)
+        fit.push_back(link.has_vertices() ? link.pose_of_vertices(q) : link.pose(q));
+    return fit;
+}
+
+MatrixXd SkeletonCoordinates::leading(const MatrixXd& rows) const {
+    MatrixXd picked(3 * leading_.size(), rows.cols());
+    for (std::size_t k = 0; k < leading_.size(); ++k)
+        picked.middleRows<3>(3 * k) = rows.middleRows<3>(3 * leading_[k]);
+    return picked;
+}
+
+void SkeletonCoordinates::scatter_leading(const VectorXd& leading, VectorXd& rows) const {
+    for (std::size_t k = 0; k < leading_.size(); ++k)
+        rows.segment<3>(3 * leading_[k]) = leading.segment<3>(3 * k);
+}
+
+void SkeletonCoordinates::project_state(VectorXd& q, VectorXd* v) const {
+    const VectorXd given = leading(gather(q));
+    move_links(q, first_fit(q), VectorXd::Zero(coordinates_));
+    double before = std::numeric_limits<double>::infinity();
+    for (int round = 0; round < max_fit_iterations && n_links() > 1; ++round) {
+        const VectorXd off = given - leading(gather(q));
+        if (!(off.norm() < before)) break;
+        before = off.norm();
+        const VectorXd z = solver_of(leading(jacobian(q))).solve(off);
+        if (!(z.norm() > fit_tolerance * links_.front().length())) break;
+        retract(q, z);
+    }
+    if (!v) return;
+    const MatrixXd b = jacobian(q);
+    scatter(b * solver_of(leading(b)).solve(leading(gather(*v))), *v);
+}
+
+// v = B z with z = B_l^+ v_l. If the pose changes by dz, B changes by products of d2x with dz.
+void SkeletonCoordinates::project_state_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q,
+                                            VectorXd& by_v, Gradient& out) const {
+    const MatrixXd b = jacobian(q), led = leading(b);
+    const auto inverse = solver_of(MatrixXd(led.transpose() * led));
+    VectorXd by_pose = b.transpose() * gather(by_q);
+    const VectorXd nothing = VectorXd::Zero(3 * nodes().size());
+    VectorXd rates = VectorXd::Zero(coordinates_), apart = VectorXd::Zero(q.size()), by_state = apart;
+    if (by_v.size() > 0) {
+        const VectorXd by_rates = gather(by_v);
+        const VectorXd by_leading = led * inverse.solve(b.transpose() * by_rates);
+        VectorXd given = nothing;
+        scatter_leading(by_leading, given);
+        rates = inverse.solve(led.transpose() * leading(gather(v)));
+        scatter(given, by_v);
+        scatter(by_rates - given, apart);
+        by_pose += second_derivative(q, apart).transpose() * rates;
+    }
+    if (leading_.size() < nodes().size()) {  // otherwise the pose is the caller's own
+        VectorXd given = nothing;
+        scatter_leading(led * inverse.solve(by_pose), given);
+        scatter(gather(by_q) - given, by_state);
+        scatter(given, by_q);
+    }
+    joint_parameters_vjp(q, by_state, rates, apart, out);
+}
+
+// Motors of joints: the distance of their coordinates from the targets, and the gradients by the targets.
+
+// Rotations take the shorter path.
+VectorXd SkeletonCoordinates::motor_increment(const VectorXd& q) const {
+    if (motors_.empty()) return {};
+    const std::vector<Pose> poses = this->poses(q);
+    VectorXd increment = VectorXd::Zero(n_motor_coordinates());
+    for (const Motor& motor : motors_) {
+        const Index link = motor.link, n = joints_[link].freedom();
+        const double length = links_[link].length(),
+                     reach = poses[link].center.cwiseAbs().maxCoeff() + length;
+        Vec3 off = Vec3::Zero();
+        double rounds = reach + length * motor.target.norm();
+        if (joints_[link].kind == JointKind::ball) {
+            const Eigen::AngleAxisd turn(
+                orthonormal(frame(link, poses) * rotation(motor.target) * poses[link].rotation.transpose()));
+            off = length * turn.angle() * turn.axis();
+        } else {
+            off[0] = motor.target[0] - coordinate(link, poses);
+            if (joints_[link].kind == JointKind::revolute)
+                off[0] = length * std::remainder(off[0], 2.0 * std::numbers::pi);
+            else
+                rounds = reach + std::abs(motor.target[0]);
+        }
+        if (off.norm() > motor_round_off * rounds)
+            for (Index k = 0; k < n; ++k) increment[motor.first + k] = off[k];
+    }
+    return increment;
+}
+
+VectorXd SkeletonCoordinates::motor_units() const {
+    VectorXd units(n_motor_coordinates());
+    for (const Motor& motor : motors_) {
+        const Joint& joint = joints_[motor.link];
+        units.segment(motor.first, joint.freedom())
+            .setConstant(joint.kind == JointKind::prismatic ? 1.0 : links_[motor.link].length());
+    }
+    return units;
+}
+
+void SkeletonCoordinates::motor_vjp(const VectorXd& q, const VectorXd& by_motors, Gradient& out) const {
+    const VectorXd by_units = motor_units().cwiseProduct(by_motors);
+    const std::vector<Pose> poses = this->poses(q);
+    for (const Motor& motor : motors_) {
+        if (joints_[motor.link].kind != JointKind::ball) {
+            out.values[motor.slot.first] += by_units[motor.first];
+            continue;
+        }
+        const Vec3 moment = frame(motor.link, poses).transpose() * by_units.segment<3>(motor.first);
+        out.values.segment<3>(motor.slot.first) += transposed_jacobian_times(motor.target, moment);
+    }
+}
+
+std::vector<Vec3> SkeletonCoordinates::ball_moments(const VectorXd& q, const VectorXd& gradient,
+                                                    const VectorXd& z,
+                                                    const std::vector<Column>& columns) const {
+    const VectorXd pull = twists(q).pull_back(gather(gradient));
+    std::vector<Vec3> moments(n_links(), Vec3::Zero());
+    for (Index k = 0; k < n_links(); ++k) {
+        if (joints_[k].kind != JointKind::ball) continue;
+        Vec3 rate, moment;
+        for (int c = 0; c < 3; ++c) {
+            const Index j = first_[k] + c, at = column_of_[j];
+            rate[c] = columns[j].scale * z[at];
+            moment[c] = pull[at] / columns[j].scale;
+        }
+        moments[k] = rate.cross(moment);
+    }
+    return moments;
+}
+
+VectorXd SkeletonCoordinates::motor_force_change(const VectorXd& q, const VectorXd& gradient,
+                                                 const VectorXd& n_motor_coordinates) const {
+    VectorXd z = VectorXd::Zero(coordinates_);
+    z.tail(n_motor_coordinates_) = n_motor_coordinates;
+    VectorXd change = second_derivative(q, gradient).transpose() * z;
+    const std::vector<Column> columns = this->columns(poses(q));
+    const std::vector<Vec3> moments = ball_moments(q, gradient, z, columns);
+    for (const Motor& motor : motors_) {
+        if (joints_[motor.link].kind != JointKind::ball) continue;
+        for (Index above = joints_[motor.link].parent; above >= 0; above = joints_[above].parent)
+            for (Index a = first_[above]; a < first_[above] + joints_[above].freedom(); ++a)
+                if (columns[a].turns)
+                    change[column_of_[a]] -= columns[a].scale * columns[a].axis.dot(moments[motor.link]);
+    }
+    return change;
+}
+
+// Gradients by the origins and axes of joints. The links keep their rest positions if a joint is moved or its axis is rotated, but at given
+// joint coordinates all links beyond the joint are displaced. With the rotations R of the parent link p and the child link k, their
+// angular velocities w along z, and the current position o of the joint:
+//
+//   origin, rotation            dx/do = R_p - R_k,      d(B z)/do = [w_p]x R_p - [w_k]x R_k;         for a translation they cancel
+//   axis, translation by s      dx = s R_p da,          d(B z) = s w_p x R_p da + s' R_p da
+//   axis, rotation by s         dx = u x (x - o),       d(B z) = u' x (x - o) + u x (B z - B z at o)
+//                               u = R_p (sin s da + (1 - cos s) a x da),   u' = w_p x u + s' R_p (cos s da + sin s a x da)
+//
+// Axes are unit vectors, so da is perpendicular to a. The columns of ball joints beyond keep to the world axes, which subtracts a moment that is
+// zero where B^T g is zero. Springs and dampers in a joint depend on its axis, too, but with u, and with s and its rate fixed, the joint coordinate
+// and its rate do not change.
+
+bool SkeletonCoordinates::has_joint_parameters() const {
+    return std::ranges::any_of(
+        slots_, [](const Slots& slots) { return slots.origin.size() > 0 || slots.axis.size() > 0; });
+}
+
+void SkeletonCoordinates::Beyond::add(const Beyond& later) {
+    slide += later.slide;
+    force += later.force;
+    twist += later.twist + (later.center - center).cross(later.slide) +
+             (later.velocity - velocity).cross(later.force);
+    moment += later.moment + (later.center - center).cross(later.force);
+}
+
+std::vector<SkeletonCoordinates::Beyond> SkeletonCoordinates::beyond(
+    const VectorXd& q, const VectorXd& by_state, const VectorXd& z, const VectorXd& gradient,
+    const std::vector<Pose>& poses, const std::vector<Column>& columns) const {
+    const VectorXd motion = twists(q).motion(z);
+    const std::vector<Vec3> moments = ball_moments(q, gradient, z, columns);
+    std::vector<Beyond> all(n_links());
+    for (Index k = 0; k < n_links(); ++k) {
+        Beyond& own = all[k];
+        own.center = poses[k].center;
+        own.velocity = Vec3::Zero();
+        own.twist = -moments[k];
+        for (Index n = row_[k]; n < row_[k] + RigidNodes::corners; ++n)
+            own.velocity += motion.segment<3>(3 * n) / RigidNodes::corners;
+        if (joints_[k].parent >= 0) own.rate = all[joints_[k].parent].rate;
+        for (Index j = first_[k]; j < first_[k] + joints_[k].freedom(); ++j)
+            if (columns[j].turns) own.rate += columns[j].scale * z[column_of_[j]] * columns[j].axis;
+        for (Index n = 0; n < links_[k].size(); ++n) {
+            const Index node = links_[k].nodes()[n];
+            const Vec3 arm = q.segment<3>(3 * node) - own.center, s = by_state.segment<3>(3 * node),
+                       g = gradient.segment<3>(3 * node);
+            own.slide += s;
+            own.force += g;
+            own.twist += arm.cross(s) + (motion.segment<3>(3 * (row_[k] + n)) - own.velocity).cross(g);
+            own.moment += arm.cross(g);
+        }
+    }
+    for (Index k = n_links() - 1; k >= 0; --k)
+        if (joints_[k].parent >= 0) all[joints_[k].parent].add(all[k]);
+    return all;
+}
+
+Vec3 SkeletonCoordinates::axis_gradient(Index link, const Beyond& of, const Vec3& parent_rate,
+                                        const VectorXd& z, const std::vector<Pose>& poses,
+                                        const std::vector<Column>& columns) const {
+    const Vec3& axis = joints_[link].axis;
+    const Mat3 to_parent = frame(link, poses).transpose();
+    const Column& column = columns[first_[link]];
+    const double s = coordinate(link, poses), rate = column.scale * z[column_of_[first_[link]]];
+    Vec3 by_axis;
+    if (column.turns) {
+        Beyond about;
+        about.center = joint_position(link, poses);
+        about.velocity = of.velocity + of.rate.cross(about.center - of.center);
+        about.add(of);
+        const Vec3 by_turn = to_parent * (about.twist + about.moment.cross(parent_rate)),
+                   by_rate = rate * (to_parent * about.moment);
+        by_axis = std::sin(s) * by_turn + (1.0 - std::cos(s)) * by_turn.cross(axis) + std::cos(s) * by_rate +
+                  std::sin(s) * by_rate.cross(axis);
+    } else
+        by_axis = to_parent * (s * (of.slide + of.force.cross(parent_rate)) + rate * of.force);
+    return by_axis - axis.dot(by_axis) * axis;
+}
+
+void SkeletonCoordinates::joint_parameters_vjp(const VectorXd& q, const VectorXd& by_state, const VectorXd& z,
+                                               const VectorXd& gradient, Gradient& out) const {
+    if (!has_joint_parameters()) return;
+    const std::vector<Pose> poses = this->poses(q);
+    const std::vector<Column> columns = this->columns(poses);
+    const std::vector<Beyond> sums = beyond(q, by_state, z, gradient, poses, columns);
+    for (Index k = 0; k < n_links(); ++k) {
+        const Joint& joint = joints_[k];
+        const Vec3 parent_rate = joint.parent < 0 ? Vec3::Zero().eval() : sums[joint.parent].rate;
+        const auto by_point = [&](const Mat3& turn, const Vec3& rate) -> Vec3 {
+            return turn.transpose() * (sums[k].slide + sums[k].force.cross(rate));
+        };
+        if (slots_[k].origin.size() > 0 &&
+            (joint.kind == JointKind::revolute || joint.kind == JointKind::ball))
+            out.values.segment<3>(slots_[k].origin.first) +=
+                by_point(frame(k, poses), parent_rate) - by_point(poses[k].rotation, sums[k].rate);
+        if (slots_[k].axis.size() > 0 && joint.has_axis())
+            out.values.segment<3>(slots_[k].axis.first) +=
+                axis_gradient(k, sums[k], parent_rate, z, poses, columns);
+    }
+}
+
+}  // namespace magshell

@@ -1,0 +1,152 @@
+#include "magshell/linalg/multifrontal/supernodal_ldlt.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
+#include "magshell/core/errors.h"
+#include "magshell/core/parallel.h"
+#include "magshell/linalg/multifrontal/dense_kernels.h"
+#include "magshell/linalg/multifrontal/equilibration.h"
+#include "magshell/linalg/multifrontal/transfer.h"
+#include "magshell/linalg/ordering/ordering.h"
+
+namespace magshell {
+
+using slabs::Panel;
+using slabs::Triangle;
+using slabs::width;
+
+namespace {
+
+// [-] pivot growth that costs half of the digits: checked before success is reported; fixed by
+// test_pivot_growth_tells_definite_from_hard
+constexpr double doubtful_growth = 1e8;
+
+}  // namespace
+
+SupernodalLdlt::SupernodalLdlt(std::shared_ptr<const SparsePattern> pattern, const FactorOptions& options)
+    : SupernodalLdlt(pattern, analysed(*pattern, options)) {}
+
+std::shared_ptr<SupernodalLdlt::Analysis> SupernodalLdlt::analysed(const SparsePattern& pattern,
+                                                                   const FactorOptions& options) {
+    AssemblyTree tree = ordered_assembly_tree(pattern, options);
+    options.watch();
+    const std::shared_ptr<Analysis> analysis = std::make_shared<Analysis>();
+    analysis->nonzeros = tree.nonzeros();
+    analysis->flops = tree.flops();
+    analysis->plan = assembly_plan(pattern, std::move(tree));
+#ifdef __GLIBC__
+    // [entries] above which the memory that orderings leave behind is returned; plain-words: ok
+    constexpr std::size_t large = 1000000;
+    if (pattern.rows.size() > large) malloc_trim(0);
+#endif
+    return analysis;
+}
+
+std::shared_ptr<SharedWork> SupernodalLdlt::Analysis::shared_work() {
+    const std::lock_guard lock(mutex);
+    std::shared_ptr<SharedWork> shared = work.lock();
+    if (!shared) work = shared = std::make_shared<SharedWork>();
+    return shared;
+}
+
+SupernodalLdlt::SupernodalLdlt(std::shared_ptr<const SparsePattern> pattern,
+                               std::shared_ptr<Analysis> analysis)
+    : Factor(std::move(pattern)), analysis_(std::move(analysis)) {
+    scale_.resize(size());
+    diagonal_.resize(size());
+    coupling_.resize(size());
+    pivot_order_.resize(size());
+}
+
+std::unique_ptr<Factor> SupernodalLdlt::sibling() const {
+    return std::unique_ptr<Factor>(new SupernodalLdlt(pattern_, analysis_));
+}
+
+FactorReport SupernodalLdlt::factorize() {
+    report_ = {};
+    report_.reason = "the last factorize() did not finish";
+    if (factor_.size() == 0) {  // an analysis that only has siblings needs none
+        factor_ = slabs::Buffer(plan_.factor_doubles);
+        work_ = analysis_->shared_work();
+    }
+    largest_scaled_ = equilibrate(*pattern_, values_, scale_);
+    WorkMemory work = work_->take();
+    if (work.shared.size() == 0) work.shared = slabs::Buffer(plan_.shared_doubles);
+    const int subtrees = static_cast<int>(plan_.subtrees.size());
+    const std::ptrdiff_t subtree_doubles = std::min(num_threads(), subtrees) * plan_.subtree_doubles;
+    if (work.subtrees.size() < subtree_doubles) work.subtrees = slabs::Buffer(subtree_doubles);
+    WorkSpaces spaces(work.subtrees, plan_.subtree_doubles);
+
+    double* const shared = work.shared.data();
+    std::vector<PivotTally> tallies(subtrees);
+    parallel_for(subtrees, [&](int task) {
+        const Subtree& subtree = plan_.subtrees[task];
+        const Index root = subtree.end - 1;
+        double* const own = spaces.of_this_thread();
+        for (Index s = subtree.begin; s < root; ++s) tallies[task].add(process(s, own, own));
+        tallies[task].add(process(root, own, shared));
+    });
+    PivotTally tally;
+    for (const PivotTally& each : tallies) tally.add(each);
+    for (const Index s : plan_.top) tally.add(process(s, shared, shared));
+    work_->give_back(std::move(work));
+
+    report_.negative_pivots = tally.negative;
+    report_.perturbed_pivots = tally.perturbed;
+    report_.pivot_growth = largest_scaled_ > 0.0 ? tally.growth / largest_scaled_ : 0.0;
+    report_.succeeded = true;
+    report_.reason.clear();
+    const bool doubtful = tally.perturbed > 0 || !(report_.pivot_growth < doubtful_growth);
+    if (doubtful && !recovers_known_solution()) {
+        report_.succeeded = false;
+        report_.reason =
+            tally.perturbed > 0
+                ? "the matrix is singular to rounding: " + std::to_string(tally.perturbed) +
+                      " of its pivots vanish. Does the model hold every rigid motion and mechanism?"
+                : "the factorization lost its digits to the growth of its entries (see pivot_growth): the "
+                  "matrix is "
+                  "close to singular, or needs pivots from further away";
+    }
+    return report_;
+}
+
+PivotTally SupernodalLdlt::process(Index s, double* from, double* to) {
+    const FrontPlan& front = plan_.fronts[s];
+    const FrontShape& shape = front.shape;
+    double* data = factor_.data() + front.panel;
+    std::fill_n(data, Panel::doubles(shape.pivots, shape.below), 0.0);
+    for (Index k = front.first_entry; k < plan_.fronts[s + 1].first_entry; ++k) {
+        data[plan_.entries[k].place] = values_[plan_.entries[k].entry];
+    }
+    const Panel panel(data, shape.pivots);
+    for (const Index child : front.children) add_to_panel(plan_, child, from, panel);
+
+    const Pivots pivots{diagonal_.data() + shape.first, coupling_.data() + shape.first};
+    const Index below_slabs = slabs::count(shape.below);
+    PivotTally tally;
+    const DenseKernels& kernels = dense_kernels();
+    kernels.eliminate_pivots(panel, shape.pivots, below_slabs, {pivots, pivot_order_.data() + shape.first},
+                             tally);
+
+    const Triangle update{to + front.update};
+    kernels.form_update(panel, shape.pivots, below_slabs, pivots, update);
+    for (const Index child : front.children) add_to_update(plan_, child, from, update);
+    return tally;
+}
+
+std::size_t SupernodalLdlt::bytes() const {
+    return own_bytes() + (work_ ? work_->bytes() : 0) +
+           sizeof(Index) * (pattern_->rows.size() + 3 * plan_.rows.size()) +
+           sizeof(RoutedEntry) * plan_.entries.size() + sizeof(Transfer) * plan_.transfers.size();
+}
+
+std::size_t SupernodalLdlt::own_bytes() const {
+    return sizeof(double) * (factor_.size() + values_.size() + 3 * size()) + sizeof(Index) * size();
+}
+
+}  // namespace magshell

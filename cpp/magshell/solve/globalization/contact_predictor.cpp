@@ -1,0 +1,66 @@
+#include "magshell/solve/globalization/contact_predictor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+namespace magshell {
+namespace {
+
+// [-] Ratio of the penalty force to the balanced force above which a vertex is moved; see test_an_impact_takes_few_factorizations.
+constexpr double overshoot_ratio = 2.0;
+
+/// Returns the depth [m] at which w depth + k S'(depth) equals `pull` [N], for a penalty law with S' = d^2/(2 e) up to d = e and
+/// d - e/2 beyond.
+double equilibrium_depth(double pull, double w, const ContactLaw& law) {
+    const double k = law.stiffness, e = law.smoothing;
+    if (pull >= (w + 0.5 * k) * e) return (pull + 0.5 * k * e) / (w + k);
+    return 2.0 * pull / (w + std::sqrt(w * w + 2.0 * k / e * pull));
+}
+
+}  // namespace
+
+VectorXd predict_contact(const Model& model, const VectorXd& q, const Controls& controls,
+                         const VectorXd& weights, const std::vector<ContactTerm::ActiveContact>& expected) {
+    const ContactTerm& contact = *model.contact();
+    const auto before = [](const ContactTerm::ActiveContact* one, const ContactTerm::ActiveContact* other) {
+        const auto key = [](const ContactTerm::ActiveContact& touch) {
+            return std::tie(touch.contact, touch.obstacle, touch.point);
+        };
+        return key(*one) < key(*other);
+    };
+    std::vector<const ContactTerm::ActiveContact*> sorted;
+    for (const ContactTerm::ActiveContact& touch : expected) sorted.push_back(&touch);
+    if (!std::is_sorted(sorted.begin(), sorted.end(), before))
+        std::sort(sorted.begin(), sorted.end(), before);
+    VectorXd move;
+    for (const ContactTerm::ActiveContact& touch : contact.active_contacts(q.data(), controls)) {
+        const auto same = std::lower_bound(sorted.begin(), sorted.end(), &touch, before);
+        const double force = same != sorted.end() && !before(&touch, *same) ? (*same)->force : 0.0;
+        const ContactPoint& point = contact.point(touch);
+        if (point.nodes[1] >= 0) continue;  // the balance of one vertex does not hold for a point on a face
+        const ContactLaw& law = contact.law(touch);
+        const double w = weights[3 * point.nodes[0]], depth = law.offset - touch.at.value;
+        if (!(w > 0.0)) continue;
+        const double out = depth - equilibrium_depth(w * depth + force, w, law);
+        if (touch.force <= overshoot_ratio * (w * out + force)) continue;
+        if (move.size() == 0) move = VectorXd::Zero(q.size());
+        move.segment<3>(3 * point.nodes[0]) += out * touch.at.normal;
+    }
+    if (move.size() == 0) return move;
+    move = model.dof_map().project(move);
+    // The displacement must not cross another body, nor invert an element.
+    if (const double share = model.admissible_step_length(q, move); share < 1.0) move *= share;
+    return move;
+}
+
+std::vector<ContactTerm::ActiveContact> predicted_contacts(const Model& model, const VectorXd& p) {
+    const ContactTerm& contact = *model.contact();
+    std::vector<ContactTerm::ActiveContact> all = contact.evaluated_contacts();
+    for (ContactTerm::ActiveContact& touch : all)
+        touch.force = std::max(
+            0.0, touch.force - touch.stiffness * touch.at.normal.dot(contact.at_point(touch, p.data())));
+    return all;
+}
+
+}  // namespace magshell

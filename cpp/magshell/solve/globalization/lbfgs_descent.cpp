@@ -1,0 +1,152 @@
+#include "magshell/solve/globalization/lbfgs_descent.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "magshell/solve/globalization/lbfgs_history.h"
+
+namespace magshell {
+namespace {
+
+// [-] Number of steps whose curvature is stored; see test_both_sides_of_a_saddle_cost_the_same.
+constexpr std::size_t descent_history = 12;
+// [-] Longest step, over the extent, and largest multiple of an L-BFGS step; see test_a_semi_cylinder_pulled_and_pushed.
+constexpr double max_step_extent = 0.1, max_step_factor_lbfgs = 4.0;
+// [-] Constants of the Armijo and of the curvature condition (N&W 3.1); see test_a_semi_cylinder_pulled_and_pushed.
+constexpr double armijo_c1 = 1e-4, wolfe_c2 = 0.5;
+// Evaluations of the energy in one line search, at most; see test_a_semi_cylinder_pulled_and_pushed.
+constexpr int max_search_trials = 8;
+// [-] Round-off of an energy, over its size; see test_small_load_on_a_shallow_roof.
+constexpr double energy_round_off = 1e-13;
+// [-] Predicted decrease that ends the descent, over that of the first step; see test_a_flat_strip_far_beyond_where_it_buckles.
+constexpr double min_relative_decrease = 1e-6;
+// [-] Smallest cosine between a stored step and its change of the gradient; see test_a_semi_cylinder_pulled_and_pushed.
+constexpr double min_curvature_cosine = 1e-10;
+// [-] Smallest fraction of a rejected step that is tried next; see test_a_semi_cylinder_pulled_and_pushed.
+constexpr double min_backtrack = 0.05;
+
+/// A state with its energy, its reduced gradient, and the branches of its angles.
+struct DescentState {
+    VectorXd q, gradient;
+    double energy;
+    Model::AngleBranches angle_branches;
+};
+
+class Descent {
+  public:
+    Descent(Newton& newton, const Controls& controls, const VectorXd& q, double energy)
+        : newton_(newton),
+          model_(newton.model()),
+          controls_(controls),
+          history_(descent_history, min_curvature_cosine) {
+        model_.evaluate(q, controls_);
+        here_ = at(q, energy);
+    }
+
+    const DescentState& run(int most_steps) {
+        double first = 0.0;  // twice the decrease of the energy that the first step predicts
+        for (int k = 0; k < most_steps; ++k, newton_.count_iteration()) {
+            newton_.watch(newton_.relative_residual(here_.q, {}));
+            VectorXd d = direction();
+            double slope = here_.gradient.dot(d);
+            if (!(slope < 0.0) && !history_.empty()) {
+                history_.clear();
+                d = direction();
+                slope = here_.gradient.dot(d);
+            }
+            if (k == 0) first = -slope;
+            if (!(slope < 0.0) || -slope < min_relative_decrease * first) break;
+            const double before = here_.energy;
+            if (!line_search_along(d, slope)) {
+                model_.set_angle_branches(here_.angle_branches);
+                model_.evaluate(here_.q, controls_);
+                if (history_.empty()) break;
+                history_.clear();
+            } else if (before - here_.energy <= energy_round_off * std::abs(before)) {
+                break;
+            }
+        }
+        model_.set_angle_branches(here_.angle_branches);
+        return here_;
+    }
+
+  private:
+    // Returns the L-BFGS direction at the current state.
+    VectorXd direction() const {
+        VectorXd d = -here_.gradient;
+        history_.solve(d, [&](VectorXd& g) { newton_.factor()->solve(g); });
+        return d;
+    }
+
+    // Returns the state at which the model was evaluated last.
+    DescentState at(const VectorXd& q, double energy) const {
+        return {q, model_.dof_map().vector(model_.residual().gradient), energy, model_.angle_branches()};
+    }
+
+    // Searches along d for a state at which the energy no longer falls fast. Returns false if the energy does not fall.
+    bool line_search_along(const VectorXd& d, double slope) {
+        const VectorXd step = model_.dof_map().expand(d);
+        const double length = step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
+        if (!std::isfinite(length)) return false;
+        double max_alpha = std::min(max_step_factor_lbfgs, max_step_extent * model_.extent() / length);
+        if (model_.has_infeasible_states()) {
+            const double asked = std::max(1.0, max_alpha);
+            max_alpha = std::min(max_alpha, asked * model_.admissible_step_length(here_.q, asked * step));
+        }
+        const double allowed = energy_round_off * std::abs(here_.energy);
+        double alpha = std::min(1.0, max_alpha), last = 0.0, last_slope = slope, accepted_alpha = 0.0;
+        bool too_far = false;
+        DescentState end;
+        for (int trial = 0; trial < max_search_trials; ++trial) {
+            VectorXd there = here_.q;
+            model_.dof_map().retract(there, alpha * step);
+            const double energy = model_.energy(there, controls_), change = energy - here_.energy;
+            const bool crosses = !model_.crossing_reason(here_.q, controls_, there, controls_).empty();
+            if (crosses || !(change <= armijo_c1 * alpha * slope + allowed)) {
+                if (accepted_alpha > 0.0) break;
+                too_far = true;
+                const double bottom =
+                    std::isfinite(change) ? -0.5 * slope * alpha * alpha / (change - slope * alpha) : 0.0;
+                alpha = std::clamp(bottom, min_backtrack * alpha, 0.5 * alpha);
+                continue;
+            }
+            if (accepted_alpha > 0.0 && !(energy < end.energy)) break;
+            model_.evaluate(there, controls_);
+            end = at(there, energy);
+            accepted_alpha = alpha;
+            const double slope_there = end.gradient.dot(d);
+            if (slope_there > wolfe_c2 * slope || alpha >= max_alpha || too_far) break;
+            // The energy still falls fast: extrapolates its slope linearly to find a longer step.
+            const double flatter = slope_there - last_slope;
+            const double secant = flatter > 0.0 ? alpha - slope_there * (alpha - last) / flatter : max_alpha;
+            last = alpha;
+            last_slope = slope_there;
+            alpha = std::min(max_alpha, std::clamp(secant, 1.5 * alpha, 4.0 * alpha));
+        }
+        if (accepted_alpha == 0.0) return false;
+        history_.add(accepted_alpha * d, end.gradient - here_.gradient);
+        here_ = std::move(end);
+        return true;
+    }
+
+    Newton& newton_;
+    Model& model_;
+    const Controls& controls_;
+    LbfgsHistory history_;
+    DescentState here_;
+};
+
+}  // namespace
+
+double lbfgs_descent(Newton& newton, VectorXd& q, double& energy, const Controls& controls, int most_steps) {
+    Descent descent(newton, controls, q, energy);
+    const DescentState& end = descent.run(most_steps);
+    const double moved = (end.q - q).head(newton.model().n_coordinates()).lpNorm<Eigen::Infinity>();
+    q = end.q;
+    energy = end.energy;
+    return moved;
+}
+
+}  // namespace magshell

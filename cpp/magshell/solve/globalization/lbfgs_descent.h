@@ -1,0 +1,16 @@
+// Energy descent by L-BFGS, preconditioned with one fixed factorization of the Hessian (N&W 7.2).
+//
+// A Newton step of a thin shell is short, since a displacement that bends the shell also stretches it to second order. From its
+// end, L-BFGS steps with the same factorization remove that stretch for the cost of a gradient each, so the next Hessian is one
+// without such stresses.
+#pragma once
+
+#include "magshell/solve/newton/newton.h"
+
+namespace magshell {
+
+/// Descends from q, whose energy is given, with Newton's last factorization, which must be positive definite. Updates q and its energy.
+/// Returns the largest displacement [m], or 0 if no step lowers the energy.
+double lbfgs_descent(Newton& newton, VectorXd& q, double& energy, const Controls& controls, int most_steps);
+
+}  // namespace magshell

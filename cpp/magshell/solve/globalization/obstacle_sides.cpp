@@ -1,0 +1,31 @@
+#include "magshell/solve/globalization/obstacle_sides.h"
+
+#include <algorithm>
+
+namespace magshell {
+
+void ObstacleSides::remember(const VectorXd& q, const Controls& controls) {
+    if (!model_.has_contact()) return;
+    places_ = model_.contact()->own_places(q, controls);
+    rotation_vectors_ = model_.contact()->rotation_vectors(controls);
+}
+
+std::string ObstacleSides::crossed(const VectorXd& q, const Controls& controls) const {
+    if (!model_.has_contact()) return {};
+    const Index node = model_.contact()->passes_between(places_, model_.contact()->own_places(q, controls));
+    if (node < 0) return {};
+    return "vertex " + std::to_string(model_.nodes().user_vertex(node)) +
+           " passes through an obstacle, however short the step";
+}
+
+double ObstacleSides::turned(const Controls& controls) const {
+    double largest = 0.0;
+    if (!model_.has_contact()) return largest;
+    const std::vector<Vec3> now = model_.contact()->rotation_vectors(controls);
+    for (std::size_t k = 0; k + 1 < now.size(); k += 2)
+        largest = std::max(
+            largest, (now[k] - rotation_vectors_[k]).norm() + (now[k + 1] - rotation_vectors_[k + 1]).norm());
+    return largest;
+}
+
+}  // namespace magshell

@@ -1,0 +1,273 @@
+#include "magshell/solve/motion/dynamics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "magshell/core/errors.h"
+#include "magshell/solve/motion/edge_rotations.h"
+#include "magshell/solve/motion/energy_balance.h"
+#include "magshell/terms/contact/body_contact_term.h"
+
+namespace magshell {
+namespace {
+
+constexpr double smallest_part = 1.0 / 64.0;  // [-] of a step; see test_a_step_that_fails_is_taken_in_parts
+
+std::size_t bytes_of(const MotionState& state) {
+    return sizeof(double) * (state.q.size() + state.v.size() + state.rates.v.size() + state.rates.w.size()) +
+           state.e.bytes() + state.rates.elastic.d.bytes() + state.rates.elastic.e.bytes();
+}
+
+std::size_t bytes_of(const SubstepRecord& substep) {
+    std::size_t bytes = bytes_of(substep.begin);
+    for (const StageState& stage : substep.stages)
+        bytes += sizeof(double) * stage.q.size() + (stage.factor ? stage.factor->own_bytes() : 0);
+    return bytes;
+}
+
+// Returns the start, with edge rotations in equilibrium if none were given, and a new Maxwell branch without stress.
+MotionState beginning(Model& model, const MotionInput& input) {
+    MotionState start = input.start;
+    model.set_angle_branches(start.angle_branches);
+    model.set_time_varying(input.controls_at(0, 0.0));
+    if (!input.rotations_given)
+        start.q += EdgeRotationEquilibrium(model, start.q, input.controls_at(0, 0.0)).correction();
+    if (input.viscosity.maxwell() && start.e.empty()) start.e = model.elastic().strains(start.q);
+    return start;
+}
+
+// Appends the last state to the recorded ones; its energies are filled in later.
+void record_state(const Model& model, const MotionInput& input, MotionResult& result) {
+    const MotionState& state = result.last;
+    result.recorded.push_back(
+        {state.q, state.v, state.angle_branches, {}, {}, state.motor_forces, state.held});
+    result.kinetic_energy.push_back(0.5 * state.v.dot(input.inertia.mass.cwiseProduct(state.v)));
+    result.energies.emplace_back(model.term_names().size(), std::numeric_limits<double>::quiet_NaN());
+}
+
+class Run {
+  public:
+    Run(Newton& newton, const MotionInput& input, const AdjointStorageOptions& keep, MotionResult& result)
+        : newton_(newton),
+          model_(newton.model()),
+          input_(input),
+          result_(result),
+          stepper_(newton, input.tableau, input.inertia, input.viscosity, input.projective),
+          balance_(model_, input.inertia) {
+        result_.start = result_.last = beginning(newton.model(), input);
+        result_.begun = true;
+        if (keep.gradients) plan(keep);
+    }
+
+    bool run() {
+        record();
+        if (result_.keep == AdjointStorage::checkpoints) result_.checkpoints[0] = result_.start;
+        while (result_.steps_done < input_.steps) {
+            const Index step = result_.steps_done;
+            if (step == next_checkpoint_) keep_checkpoint(step);
+            MotionState state = result_.last;
+            if (!take(step, state)) return false;
+            result_.last = std::move(state);
+            if (++result_.steps_done % input_.record_every == 0) record();
+        }
+        return true;
+    }
+
+  private:
+    // Decides what is stored: all stages, if the budget allows it. Otherwise a third of the budget is for the stages of the last
+    // steps, a third for checkpoints, and a third for the steps that are repeated. Factorizations are stored on demand only:
+    // allocating memory for each costs more than the adjoint saves.
+    void plan(const AdjointStorageOptions& keep) {
+        const bool explicit_first = input_.tableau.begins_explicitly;
+        const std::size_t vector = sizeof(double) * model_.size();
+        const std::size_t strains = sizeof(double) * model_.elastic().size();
+        std::size_t state = (explicit_first ? 4 : 2) * vector;
+        if (input_.viscosity.maxwell()) state += strains;
+        if (explicit_first && input_.viscosity.any()) state += (input_.viscosity.maxwell() ? 2 : 1) * strains;
+        const std::size_t step = state + input_.tableau.stages * vector;
+        const bool fits = step * static_cast<std::size_t>(input_.steps) <= keep.budget;
+        result_.keep = keep.wanted != AdjointStorage::nothing ? keep.wanted
+                       : fits                                 ? AdjointStorage::stages
+                                                              : AdjointStorage::checkpoints;
+        if (result_.keep != AdjointStorage::checkpoints) return;
+        result_.leaf = std::max<Index>(1, static_cast<Index>(keep.budget / 3 / step));
+        result_.slots = std::max<Index>(1, static_cast<Index>(keep.budget / 3 / state));
+        slots_left_ = result_.slots;
+        aim(0);
+    }
+
+    void aim(Index step) {
+        const Index ahead = next_checkpoint(input_.steps - result_.leaf - step, result_.leaf, slots_left_);
+        next_checkpoint_ = ahead > 0 ? step + ahead : -1;
+    }
+
+    void keep_checkpoint(Index step) {
+        result_.checkpoints[step] = result_.last;
+        result_.bytes += bytes_of(result_.last);
+        --slots_left_;
+        aim(step);
+    }
+
+    // Returns true if a step starts without the rates of a previous one and has rigid bodies or skeletons: their first
+    // SDIRK2 stage is of first order. A short first substep makes this error small; each further substep is as long as all before it.
+    bool needs_short_start(const MotionState& state) const {
+        return input_.tableau.begins_explicitly && state.rates.empty() &&
+               model_.dof_map().has_reduced_coordinates();
+    }
+
+    // Returns the substeps of such a step, the last one first.
+    static Substeps short_start_substeps() {
+        Substeps ahead;
+        for (double end = 1.0; end > smallest_part; end *= 0.5) ahead.push_back({0.5 * end, end});
+        ahead.push_back({0.0, smallest_part});
+        return ahead;
+    }
+
+    // Takes a step, in substeps if the whole step fails. Returns false if the shortest substep fails.
+    bool take(Index step, MotionState& state) {
+        const bool last = step >= input_.steps - result_.leaf;
+        const bool keep = result_.keep == AdjointStorage::stages || result_.keep == AdjointStorage::factors ||
+                          (result_.keep == AdjointStorage::checkpoints && last);
+        std::vector<SubstepRecord> records;
+        Substeps done, ahead = needs_short_start(state) ? short_start_substeps() : Substeps{Substep{}};
+        while (!ahead.empty()) {
+            const Substep substep = ahead.back();
+            ahead.pop_back();
+            SubstepRecord record;
+            const Tableau& tableau = stepper_.tableau_from(state, substep.dissipative);
+            const std::vector<Controls> controls = stage_controls(input_, tableau, step, substep);
+            const double dt = substep.fraction() * input_.time_step;
+            const bool recorded = keep || balance_.applies(), shortest = substep.fraction() <= smallest_part;
+            const bool taken =
+                stepper_.step(state, dt, substep.dissipative, controls, recorded ? &record : nullptr,
+                              result_.keep == AdjointStorage::factors, result_.reason);
+            const bool calm = substep.dissipative || input_.tableau.stages == 1;  // implicit Euler already
+            const bool gains_energy =
+                taken && balance_.applies() && !(calm && shortest) &&
+                balance_.gains_energy(stepper_.algebra(dt, tableau), record, state, controls);
+            if (taken && !gains_energy) {
+                done.push_back(substep);
+                if (keep) records.push_back(std::move(record));
+                continue;
+            }
+            if (gains_energy) state = std::move(record.begin);
+            if (gains_energy && !calm) {
+                ahead.push_back({substep.begin, substep.end, true});
+                continue;
+            }
+            if (shortest) return false;
+            const double middle = 0.5 * (substep.begin + substep.end);
+            ahead.push_back({middle, substep.end, substep.dissipative});
+            ahead.push_back({substep.begin, middle, substep.dissipative});
+        }
+        if (done.size() > 1 || done.front().dissipative) result_.substeps[step] = done;
+        if (keep) {
+            for (const SubstepRecord& substep : records) result_.bytes += bytes_of(substep);
+            result_.steps.push_back(std::move(records));
+        }
+        return true;
+    }
+
+    void record() {
+        record_state(model_, input_, result_);
+        const Index done = result_.steps_done;
+        const Controls now = done == 0 ? input_.controls_at(0, 0.0) : input_.controls_at(done - 1, 1.0);
+        const MotionState& state = result_.last;
+        model_.set_angle_branches(state.angle_branches);
+        model_.set_time_varying(now);
+        std::vector<double>& of_terms = result_.energies.back();
+        std::size_t term = 0;
+        for (const auto& [name, energy] : model_.energies(state.q, now)) of_terms[term++] = energy;
+    }
+
+    Newton& newton_;
+    Model& model_;
+    const MotionInput& input_;
+    MotionResult& result_;
+    Stepper stepper_;
+    EnergyBalance balance_;
+    Index next_checkpoint_ = -1, slots_left_ = 0;
+};
+
+// Returns how many steps a number of checkpoints covers if each step is repeated so often: leaf (slots + repetitions choose slots).
+double covered(Index leaf, Index slots, Index repetitions) {
+    double steps = static_cast<double>(leaf);
+    for (Index k = 1; k <= slots; ++k) steps *= static_cast<double>(repetitions + k) / static_cast<double>(k);
+    return steps;
+}
+
+}  // namespace
+
+std::pair<Index, double> MotionInput::between(Index step, double fraction) const {
+    const Index first = step * (tableau.stages + 1);
+    int i = 0;
+    while (i + 1 < tableau.stages && fraction > tableau.time(i)) ++i;
+    const double begin = i == 0 ? 0.0 : tableau.time(i - 1), end = tableau.time(i);
+    return {first + i, (fraction - begin) / (end - begin)};
+}
+
+std::vector<Controls> stage_controls(const MotionInput& input, const Tableau& tableau, Index step,
+                                     const Substep& substep) {
+    std::vector<Controls> controls = {input.controls_at(step, substep.begin)};
+    for (int i = 0; i < tableau.stages; ++i)
+        controls.push_back(input.controls_at(step, substep.begin + tableau.time(i) * substep.fraction()));
+    return controls;
+}
+
+Controls MotionInput::controls_at(Index step, double fraction) const {
+    const auto [first, weight] = between(step, fraction);
+    return interpolate(controls[first], controls[first + 1], weight);
+}
+
+Substeps substeps_of(const std::map<Index, Substeps>& substeps, Index step) {
+    const auto found = substeps.find(step);
+    return found == substeps.end() ? Substeps{Substep{}} : found->second;
+}
+
+void repeat_step(Stepper& stepper, const MotionInput& input, Index step, const Substeps& substeps,
+                 MotionState& state, std::vector<SubstepRecord>* kept) {
+    for (const Substep& substep : substeps) {
+        SubstepRecord record;
+        std::string reason;
+        const std::vector<Controls> controls =
+            stage_controls(input, stepper.tableau_from(state, substep.dissipative), step, substep);
+        if (!stepper.step(state, substep.fraction() * input.time_step, substep.dissipative, controls,
+                          kept ? &record : nullptr, false, reason))
+            throw InvalidInput("a step that was taken before cannot be repeated: " + reason);
+        if (kept) kept->push_back(std::move(record));
+    }
+}
+
+Index next_checkpoint(Index steps, Index leaf, Index slots) {
+    if (steps <= leaf || slots == 0) return 0;
+    Index repetitions = 1;
+    while (covered(leaf, slots, repetitions) < static_cast<double>(steps)) ++repetitions;
+    const double before = covered(leaf, slots, repetitions - 1);
+    return std::clamp<Index>(static_cast<Index>(before), 1, steps - 1);
+}
+
+MotionResult simulate(Model& model, const MotionInput& input, const AdjointStorageOptions& keep,
+                      const MotionWatch& watch) {
+    MotionResult result;
+    result.last = input.start;
+    if (model.has_body_contact()) model.body_contact()->forget();
+    const ScopedTimeVarying varying(model, input.varying);
+    Newton newton(model, input.newton, [&](double residual) {
+        if (watch) watch(static_cast<double>(result.steps_done) / static_cast<double>(input.steps), residual);
+    });
+    try {
+        Run run(newton, input, keep, result);
+        result.outcome = run.run() ? Outcome::converged : Outcome::failed;
+    } catch (const Interrupted&) {
+        result.outcome = Outcome::interrupted;
+        result.reason = "interrupted";
+        if (!result.begun) record_state(model, input, result);
+    }
+    result.iterations = newton.iterations();
+    result.factorizations = newton.factorizations();
+    result.linear_time = newton.linear_time();
+    return result;
+}
+
+}  // namespace magshell

@@ -1,0 +1,37 @@
+#include "magshell/solve/motion/edge_rotations.h"
+
+#include "magshell/core/errors.h"
+
+namespace magshell {
+
+EdgeRotationEquilibrium::EdgeRotationEquilibrium(Model& model, const VectorXd& q, const Controls& controls)
+    : model_(model), first_(model.nodes().first_scalar()) {
+    model.evaluate(q, controls);
+    model.assemble(q, controls, false);
+    const SystemMatrix& matrix = model.matrix();
+    std::vector<Eigen::Triplet<double>> entries;
+    for (Index column = first_; column < matrix.size(); ++column)
+        for (Index k = matrix.column_starts()[column]; k < matrix.column_starts()[column + 1]; ++k)
+            entries.emplace_back(matrix.rows()[k] - first_, column - first_, matrix.values()[k]);
+    const Index n = matrix.size() - first_;
+    Eigen::SparseMatrix<double> lower(n, n);
+    lower.setFromTriplets(entries.begin(), entries.end());
+    factor_.compute(lower);
+    if (n > 0 && factor_.info() != Eigen::Success)
+        throw InvalidInput(
+            "the edge rotations of the start have no bending stiffness, so they cannot be computed: give "
+            "them");
+}
+
+VectorXd EdgeRotationEquilibrium::correction() const {
+    return adjoint(model_.residual().gradient);
+}
+
+VectorXd EdgeRotationEquilibrium::adjoint(const VectorXd& by_state) const {
+    VectorXd solution = VectorXd::Zero(model_.size());
+    const Index n = model_.size() - first_;
+    if (n > 0) solution.tail(n) = -factor_.solve(by_state.tail(n));
+    return solution;
+}
+
+}  // namespace magshell

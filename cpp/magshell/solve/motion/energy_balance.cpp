@@ -1,0 +1,85 @@
+#include "magshell/solve/motion/energy_balance.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "magshell/terms/contact/body_contact_term.h"
+
+namespace magshell {
+namespace {
+
+// [-] Gain that counts as none, over the energy that an impact can convert; see test_an_impact_gains_no_energy.
+constexpr double tolerated_gain = 1e-3;
+// [-] Error of the work put in, over the work, due to the quadrature between stages; see test_bodies_exchange_momentum_and_gain_no_energy.
+constexpr double work_error = 0.1;
+// [-] Round-off of the energies of a state, over their size; see test_an_impact_gains_no_energy.
+constexpr double balance_round_off = 1e-11;
+
+}  // namespace
+
+double EnergyBalance::energy(const VectorXd& q, const Model::AngleBranches& angle_branches,
+                             const Controls& controls) {
+    model_.set_angle_branches(angle_branches);
+    model_.set_time_varying(controls);
+    return model_.energy(q, controls);
+}
+
+EnergyBalance::StateEnergy EnergyBalance::state_energy(const MotionState& state, const Controls& controls) {
+    if (end_.q.size() == state.q.size() && end_.q == state.q && end_.angle_branches == state.angle_branches &&
+        end_.controls == controls)
+        return end_;
+    const double all = energy(state.q, state.angle_branches, controls);
+    return {state.q, state.angle_branches, controls, all,
+            model_.body_contact()->energy(state.q.data(), controls)};
+}
+
+bool EnergyBalance::has_contact(const StepAlgebra& step, const SubstepRecord& record) const {
+    const BodyContactTerm& contact = *model_.body_contact();
+    for (const StageState& stage : record.stages)
+        if (contact.acts(stage.q.data())) return true;
+    return step.tableau().begins_explicitly && contact.acts(record.begin.q.data());
+}
+
+bool EnergyBalance::gains_energy(const StepAlgebra& step, const SubstepRecord& record, const MotionState& end,
+                                 std::span<const Controls> controls) {
+    if (!has_contact(step, record)) return false;
+    const MotionState& begin = record.begin;
+    const Controls &first = controls.front(), &last = controls.back();
+    const StateEnergy at_first = state_energy(begin, first);
+    end_ = state_energy(end, last);
+    const double at_begin = at_first.energy, at_end = end_.energy;
+    const double moving = kinetic(begin), kept = at_first.of_contact;
+    const double gain = at_end + kinetic(end) - at_begin - moving - tolerated_gain * (moving + kept) -
+                        balance_round_off * (std::abs(at_begin) + std::abs(at_end));
+    if (!(gain > 0.0)) return false;
+    double put_in = std::max(work(step, record, controls), 0.0);
+    if (first != last) {
+        const double changed = 0.5 * (energy(begin.q, begin.angle_branches, last) - at_begin + at_end -
+                                      energy(end.q, end.angle_branches, first));
+        put_in += std::max(changed, 0.0);
+    }
+    return gain > (1.0 + work_error) * put_in;
+}
+
+double EnergyBalance::work(const StepAlgebra& step, const SubstepRecord& record,
+                           std::span<const Controls> controls) {
+    const Tableau& tableau = step.tableau();
+    const int first = tableau.begins_explicitly ? 1 : 0;
+    const StepRates at(model_, step, record);
+    double sum = 0.0;
+    for (int j = 0; j < first + tableau.stages; ++j) {
+        const bool begins = j < first;
+        const VectorXd& q = begins ? record.begin.q : record.stages[j - first].q;
+        model_.set_angle_branches(begins ? record.begin.angle_branches
+                                         : record.stages[j - first].angle_branches);
+        const Controls& now = controls[begins ? 0 : j - first + 1];
+        model_.set_time_varying(now);
+        model_.evaluate(q, now);
+        const StageRates& rates = at.all[j];
+        sum += tableau.a[tableau.stages - 1][j] *
+               rates.v.dot(mass_.cwiseProduct(rates.w) + model_.residual().gradient);
+    }
+    return step.dt() * sum;
+}
+
+}  // namespace magshell

@@ -1,0 +1,50 @@
+// Detects whether a step with bodies in contact has gained energy that no force put in.
+//
+// Methods of higher order than implicit Euler can gain energy in an impact that the time step does not resolve, since contact forces
+// that have ended or only begun act over most of the step. The energy that forces without potential and supports put in is
+// evaluated with the quadrature of the method itself:
+//
+//   W = dt sum_j b_j v_j . (M w_j + dE/dx_j)  +  change of the energy with the load parameters
+//
+// It comprises supports, friction, drag and viscosity. With follower loads the test does not apply: their work cannot be told from
+// a gain.
+#pragma once
+
+#include <span>
+
+#include "magshell/solve/motion/stepper.h"
+
+namespace magshell {
+
+class EnergyBalance {
+  public:
+    EnergyBalance(Model& model, const Inertia& inertia) : model_(model), mass_(inertia.mass) {}
+
+    /// Returns true if the test applies: there is contact between bodies, and no load without potential.
+    bool applies() const { return model_.has_body_contact() && !model_.has_follower_loads(); }
+    /// Returns true if a step to `end` gained energy; controls: load parameters at its beginning and at its stages. Leaves the model
+    /// evaluated at another state.
+    bool gains_energy(const StepAlgebra& step, const SubstepRecord& record, const MotionState& end,
+                      std::span<const Controls> controls);
+
+  private:
+    double kinetic(const MotionState& state) const { return 0.5 * state.v.dot(mass_.cwiseProduct(state.v)); }
+    double energy(const VectorXd& q, const Model::AngleBranches& angle_branches, const Controls& controls);
+    /// A state with its load parameters and its potential energies.
+    struct StateEnergy {
+        VectorXd q;
+        Model::AngleBranches angle_branches;
+        Controls controls;
+        double energy, of_contact;  // [J] of all terms, and of the contact between bodies
+    };
+    StateEnergy state_energy(const MotionState& state, const Controls& controls);
+    bool has_contact(const StepAlgebra& step, const SubstepRecord& record) const;
+    /// Returns the work of supports and of forces without potential over the step [J].
+    double work(const StepAlgebra& step, const SubstepRecord& record, std::span<const Controls> controls);
+
+    Model& model_;
+    const VectorXd& mass_;
+    StateEnergy end_;  // of the last step
+};
+
+}  // namespace magshell

@@ -1,0 +1,45 @@
+// Constraint forces of joint motors at the end of a time step, to second order.
+//
+// The acceleration w of the last stage is first-order accurate along a prescribed motion. An acceleration w_e that is second-order accurate
+// follows from the velocities at the ends of three steps. Stiff terms have been solved for with w, so they are first-order
+// accurate as well; the state is therefore solved for once more with the inertial force M (w_e - w) added, and the motor forces are
+// taken there. In a first step there are only two velocities, and the forces of the last stage are returned.
+#pragma once
+
+#include "magshell/solve/motion/stepper.h"
+
+namespace magshell {
+
+/// The state next to the end of a step, just solved for, at which the motor forces are evaluated.
+class MotorReactions {
+  public:
+    /// q, proximal, last: state, inertia and rates of the last stage. Leaves the model evaluated at q(), with the angle branches
+    /// that it had.
+    MotorReactions(Newton& newton, const Inertia& inertia, const MotionState& begin, double dt,
+                   const VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
+                   const StageRates& last);
+
+    const VectorXd& q() const { return q_; }
+    /// Returns the inertial term of this state; it refers to this object.
+    ProximalTerm proximal() const { return {proximal_.weights, &target_, proximal_.motion}; }
+    /// Returns true if the state was found.
+    bool converged() const { return converged_; }
+    /// Returns w_e - w, empty in a first step: w_e = weight_last v_last + weight_begin v_begin + weight_before v_before [1/s].
+    const VectorXd& acceleration_change() const { return change_; }
+    double weight_last() const { return weight_last_; }
+    double weight_begin() const { return weight_begin_; }
+    double weight_before() const { return weight_before_; }
+    /// Returns the forces [N] and moments [N m] of the motors; NaN if the state was not found.
+    VectorXd motor_forces(const Controls& controls);
+
+  private:
+    bool solve(const Controls& controls);
+
+    Newton& newton_;
+    ProximalTerm proximal_;
+    VectorXd q_, target_, change_;
+    double weight_last_ = 0.0, weight_begin_ = 0.0, weight_before_ = 0.0;
+    bool converged_ = true;
+};
+
+}  // namespace magshell

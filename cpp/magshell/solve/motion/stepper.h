@@ -1,0 +1,111 @@
+// One time step, as a few implicit stages. Each stage is a static solve with the inertia as a proximal term,
+//
+//   W (x_i - z_i) + g(x_i) = 0,   W = M/(a dt)^2 + Gamma/(a dt),   W z_i = M (x^_i + a dt v^_i)/(a dt)^2
+//                                                                          + Gamma x^_i/(a dt)
+//
+// where x^_i and v^_i are the contributions of the start of the step and of the stages before it.       [Chen22] (26)-(28)
+#pragma once
+
+#include <span>
+
+#include "magshell/solve/motion/tableau.h"
+#include "magshell/solve/motion/viscosity.h"
+#include "magshell/solve/newton/newton.h"
+#include "magshell/solve/projective/projective.h"
+
+namespace magshell {
+
+/// The state of a motion; v and the rates are zero for dofs that are not of a vertex.
+struct MotionState {
+    VectorXd q, v;
+    Model::AngleBranches angle_branches;
+    StrainSet e;            // of the Maxwell branch; empty without one
+    StageRates rates;       // at the end of the step that led here, for a method that needs them; else empty
+    VectorXd motor_forces;  // of the motors [N, N m]; empty without motors and before the first step
+    VectorXd held =
+        {};  // [N] of the supports at the end of that step, as DofMap::along_supports orders them; else empty
+    VectorXd v_before = {};  // with motors: the velocity at the beginning of the step that led here
+    double dt_before = 0.0;  // [s] of that step; 0: there was none
+};
+
+/// Masses [kg] and viscous damping [N s/m] of all dofs, zero for those that are not of a vertex.
+struct Inertia {
+    VectorXd mass, damping;
+};
+
+/// The solution of one stage.
+struct StageState {
+    VectorXd q;
+    Model::AngleBranches angle_branches;
+    std::shared_ptr<const Factor> factor;  // of the last Newton iteration, if it was to be stored
+};
+
+/// A step or substep, with all that its adjoint needs.
+struct SubstepRecord {
+    MotionState begin;
+    std::vector<StageState> stages;
+};
+
+/// The linear algebra of a stage, which the step and its adjoint share.
+class StepAlgebra {
+  public:
+    StepAlgebra(const Tableau& tableau, const Inertia& inertia, double dt);
+
+    /// Computes x^ and v^ of stage i from all rates before it.
+    void start_of_stage(int i, const MotionState& begin, const std::vector<StageRates>& rates,
+                        VectorXd& x_hat, VectorXd& v_hat) const;
+    /// Computes v and w of a stage from its solution.
+    void finish_stage(const VectorXd& q, const VectorXd& x_hat, const VectorXd& v_hat, Index coordinates,
+                      StageRates& rates) const;
+    VectorXd target(const VectorXd& x_hat, const VectorXd& v_hat) const;
+    const VectorXd& weights() const { return weights_; }
+    /// a dt [s]
+    double stage_time() const { return stage_time_; }
+    double dt() const { return dt_; }
+    const Tableau& tableau() const { return tableau_; }
+
+  private:
+    Tableau tableau_;
+    double dt_, stage_time_;
+    VectorXd weights_, velocity_share_;
+};
+
+class Stepper {
+  public:
+    Stepper(Newton& newton, const Tableau& tableau, Inertia inertia, const Viscosity& viscosity,
+            const ProjectiveOptions& projective);
+
+    /// Advances the state by a step, with the load parameters at its beginning and at the stages of tableau_from(). On failure the state
+    /// is unchanged, and `reason` says why. `kept` receives the step if it is not null, and with_factors the last factorization
+    /// of each stage.
+    bool step(MotionState& state, double dt, bool dissipative, std::span<const Controls> controls,
+              SubstepRecord* kept, bool with_factors, std::string& reason);
+
+    /// Returns the method of a step from this state: SDIRK2 if it needs rates that the state lacks; implicit Euler if dissipative.
+    const Tableau& tableau_from(const MotionState& state, bool dissipative) const;
+    const StepAlgebra& algebra(double dt, const Tableau& tableau);
+
+  private:
+    /// Solves a stage, by damped or standard Newton steps if the usual ones fail.
+    NewtonReport solve(VectorXd& q, const Controls& controls, const ProximalTerm& proximal);
+
+    Newton& newton_;
+    std::unique_ptr<ProjectiveSolver> projective_;  // nullptr: stages are solved by Newton
+    Tableau tableau_, starter_ = sdirk2(), dissipative_ = implicit_euler();
+    Inertia inertia_;
+    Viscosity viscosity_;
+    std::unique_ptr<StepAlgebra> algebra_;  // of the last step
+};
+
+/// Returns the rates with which a step begins: those of the state, if the method uses them; else none.
+std::vector<StageRates> first_rates(const Model& model, const Tableau& tableau, const MotionState& state);
+
+/// The rates of a step, recomputed from its stored states: those it began with, and those of its stages.
+struct StepRates {
+    std::vector<VectorXd> x_hat, v_hat;
+    std::vector<StageRates> all;
+
+    StepRates(const Model& model, const StepAlgebra& step, const SubstepRecord& substep);
+};
+
+}  // namespace magshell

@@ -1,0 +1,96 @@
+#include "magshell/solve/newton/load_control.h"
+
+#include <algorithm>
+
+namespace magshell {
+namespace {
+
+// [-] Displacement of the first iteration that a step aims at, over the extent; see test_a_thin_strip_rolled_up.
+constexpr double good_length = 0.25;
+// [-] Length that counts as zero, over the extent; see test_a_thin_strip_rolled_up.
+constexpr double negligible_length = 1e-9;
+
+}  // namespace
+
+double LoadStepController::propose(double left) {
+    // [-] Stretch of a step that ends the path rather than leaving a short rest; see test_a_thin_strip_rolled_up.
+    constexpr double max_stretch = 1.3;
+    step_ = std::min(step_, longest_);
+    return max_stretch * step_ >= left && left <= longest_ ? left : std::min(step_, left);
+}
+
+void LoadStepController::accept(double step, const NewtonReport& report) {
+    // Newton iterations up to which a step counts as easy and the next one grows; see test_a_thin_strip_rolled_up.
+    constexpr int quick_iterations = 8;
+    // [-] Growth of the failed step with every success, so that it is forgotten; see test_a_field_from_behind.
+    constexpr double failed_step_growth = 1.2;
+    // [-] Largest step, over the one that failed; see test_a_field_from_behind.
+    constexpr double below_failed_step = 0.75;
+    // [-] Growth of the step after an easy one, at most and as a rule; see test_a_thin_strip_rolled_up.
+    constexpr double max_growth = 4.0, usual_growth = 2.0;
+    const double length = length_of(report);
+    if (report.iterations <= quick_iterations) {
+        const double times =
+            stop_on_instability_
+                ? std::clamp(good_length / std::max(length, negligible_length), usual_growth, max_growth)
+                : usual_growth;
+        // The step that failed bounds the next one, or if the scene now moves less per unit of load, the length that failed.
+        const double failed = length > negligible_length
+                                  ? std::max(failed_step_, failed_length_ / length * step)
+                                  : failed_step_;
+        step_ = std::min(times * step, below_failed_step * failed);
+    }
+    failures_ = 0;
+    failed_step_ *= failed_step_growth;
+    failed_length_ *= failed_step_growth;
+}
+
+bool LoadStepController::reject(double step, const NewtonReport& report) {
+    // [-] Shortening after a diverged iteration, after another failure, and at most; see test_a_flat_strip_far_beyond_where_it_buckles.
+    constexpr double diverged_factor = 0.25, usual_factor = 0.5, least_factor = 0.125;
+    // [-] Ratio of first lengths above which a shorter step has not moved less; see test_a_strip_buckles_to_the_side_that_its_load_pushes.
+    constexpr double not_shorter = 0.9;
+    // [-] Smallest step in any case, of the load path; see test_a_thin_strip_rolled_up.
+    constexpr double shortest_step = 1e-6;
+    // [-] Length and size of steps whose repeated failure marks the end of a branch; see test_a_semi_cylinder_pulled_and_pushed.
+    constexpr double short_length = 0.05, short_step = 0.25;
+    constexpr int enough = 2;  // failures in a row; see test_a_semi_cylinder_pulled_and_pushed
+    failed_step_ = step;
+    step_ = (report.diverged ? diverged_factor : usual_factor) * step;
+    ++failures_;
+    if (stop_on_instability_) {
+        const double before = failed_length_, length = failed_length_ = length_of(report);
+        if (!retried_ && failures_ >= enough && length < short_length && step <= short_step) return false;
+        // A shorter step that moves as far is not driven by the load: the branch has ended.
+        if (failures_ >= enough && length > not_shorter * before) return false;
+        const double good_step = good_length / std::max(length, negligible_length) * step;
+        // On a load path that moves the scene by many extents, even a small fraction may be a long step.
+        if (!fixed_) smallest_ = std::max(std::min(smallest_, least_factor * good_step), shortest_step);
+        if (length > 0.5 * good_length && step > smallest_)
+            step_ = std::max(std::min(step_, good_step), smallest_);
+    }
+    return step_ >= smallest_;
+}
+
+void LoadPredictor::record(const VectorXd& from, const VectorXd& tangent, double step) {
+    if (tangent.size() == 0) return reset();
+    before_ = from;
+    rate_ = tangent / step;
+    step_ = step;
+}
+
+// The cubic through `here` at s = 0 is here + rate s + b s^2 + c s^3; its value and slope at s = -h are those of the state before.
+VectorXd LoadPredictor::correction(const VectorXd& here, const VectorXd& tangent, double step) const {
+    // [-] Largest correction, over the tangent: beyond it the series does not converge. See test_a_thin_strip_rolled_up.
+    constexpr double max_correction = 0.5;
+    if (before_.size() == 0) return {};
+    const double h = step_;
+    const VectorXd rate = tangent / step, value = (before_ - here + h * rate) / (h * h),
+                   slope = (rate_ - rate) / h, c_h = slope + 2.0 * value;
+    VectorXd more = step * step * (value + (1.0 + step / h) * c_h);
+    const auto length = [&](const VectorXd& p) { return p.head(coordinates_).lpNorm<Eigen::Infinity>(); };
+    if (!(length(more) <= max_correction * length(tangent))) more.resize(0);
+    return more;
+}
+
+}  // namespace magshell

@@ -1,0 +1,41 @@
+#include "magshell/solve/newton/unsymmetric.h"
+
+#include <string>
+
+#include "magshell/core/errors.h"
+
+namespace magshell {
+
+GmresReport solve_unsymmetric(const Model& model, const Factor& factor, bool transposed,
+                              const GmresOptions& options, VectorXd& reduced) {
+    const DofMap& dof_map = model.dof_map();
+    // Multiplying a preconditioned vector by the symmetric part returns it up to the round-off of the factorization. The product is
+    // therefore computed only for tight tolerances. [-] See test_methods_of_second_order_stick.
+    constexpr double coarse = 1e-10;  // [-] see test_methods_of_second_order_stick
+    const bool known = options.tolerance > coarse;
+    VectorXd before;
+    const auto assembled = [&](const VectorXd& x) {
+        VectorXd rest = VectorXd::Zero(model.size());
+        model.nonsymmetric_tangent().add_product(dof_map.expand(x), transposed, rest);
+        return VectorXd((known ? before : factor.image(x)) + dof_map.vector(rest));
+    };
+    const auto precondition = [&](VectorXd& x) {
+        if (known) before = x;
+        factor.solve(x);
+    };
+    return gmres(assembled, precondition, reduced, options);
+}
+
+void solve_at_equilibrium(const Model& model, const Factor& factor, bool transposed, VectorXd& reduced) {
+    if (!model.unsymmetric()) {
+        factor.solve(reduced);
+        return;
+    }
+    const GmresReport report = solve_unsymmetric(model, factor, transposed, to_round_off, reduced);
+    if (!report.converged)
+        throw InvalidInput(
+            "a linear solve with a pressure without potential did not converge: its relative residual is " +
+            std::to_string(report.residual));
+}
+
+}  // namespace magshell

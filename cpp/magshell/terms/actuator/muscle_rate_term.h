@@ -1,0 +1,199 @@
+// MuscleRateTerm: the part of a muscle's tension that depends on the rate of its length by Hill's
+// force-velocity curve. The isometric tension has an energy and is in muscle_term.cpp.
+//
+//   f_k = - V_p alpha_k T n,   T = w a f_L(l) (f_V(l'/v) - 1),   l' = n . y',   y' = F' m
+//
+// At a stage of a time step, where velocities follow positions by 1/tau, and with P = I - n n^T and the
+// derivatives T_l, T_r of T by l and l',
+//
+//   - df_k/dx_l = V_p alpha_k alpha_l ((T_l + T_r/tau) n n^T + T/l P + T_r/l n (P y')^T)
+//
+// The last part is not symmetric: n u^T = (n u^T + u n^T)/2 + [u x n]/2.
+#pragma once
+
+#include <memory>
+#include <utility>
+
+#include "magshell/assembly/element_blocks.h"
+#include "magshell/terms/actuator/muscle_fibres.h"
+#include "magshell/terms/force_term.h"
+
+namespace magshell {
+
+template <class Element>
+class MuscleRateTerm final : public ForceTerm {
+    using Shared = MuscleFibres<Element>;
+    using Pieces = typename Shared::Pieces;
+    static constexpr int N = Element::nodes, points = Element::points;
+
+  public:
+    MuscleRateTerm(std::shared_ptr<Shared> fibres, const Slot& shortening_rate)
+        : fibres_(std::move(fibres)), loop_(fibres_->loop), shortening_rate_(shortening_rate) {}
+
+    std::string_view name() const override { return "muscle"; }
+    void set_values(const Values& values) override { largest_rate_ = values.number(shortening_rate_); }
+
+    void evaluate(const Kinematics& at, const Controls&, Residual& out) override {
+        loop_.scatter_packs([&](Index pack) {
+            const Pieces& each = fibres_->at(pack);
+            Pack3 x[N], v[N], g[N];
+            loop_.gather(pack, at.q.data(), x);
+            loop_.gather(pack, at.v.data(), v);
+            for (int p = 0; p < points; ++p) {
+                const Point point(*this, pack, p, x, v);
+                const Pack3 pull = (each.volume[p] * point.tension) * point.place.n;
+                add_pulls<N>(each.m[p], pull, p == 0, g);
+            }
+            loop_.scatter(pack, g, out);
+        });
+    }
+
+    void assemble(const Kinematics& at, const Controls&, bool convexified, SystemMatrix& out,
+                  NonsymmetricTangent& rest) const override {
+        std::vector<std::array<Vec3, N*(N + 1) / 2>> axes(fibres_->fibres.n_elements());
+        const Pack rate(at.rate), half(0.5);
+        loop_.scatter_packs([&](Index pack) {
+            const Pieces& each = fibres_->at(pack);
+            Pack3 x[N], v[N], angle_branches[N * (N + 1) / 2];
+            loop_.gather(pack, at.q.data(), x);
+            loop_.gather(pack, at.v.data(), v);
+            Pack33 h[N * (N + 1) / 2];
+            for (int p = 0; p < points; ++p) {
+                const Point point(*this, pack, p, x, v);
+                const DeformedFibre& place = point.place;
+                const Pack3 u = (point.by_rate * place.inverse) * place.across(point.moves);
+                Pack along = point.by_length + rate * point.by_rate, across = point.tension * place.inverse;
+                if (convexified) {
+                    along = max(along, Pack(0.0));
+                    across = max(across, Pack(0.0));
+                }
+                Pack33 stiffness = place.stiffness(along, across);
+                if (!convexified) stiffness += half * symmetric_outer(place.n, u);
+                add_blocks<N>(FibreTangent<N>{each.m[p], each.volume[p] * stiffness}, p == 0, h);
+                const Pack3 axis = (half * each.volume[p]) * cross(u, place.n);
+                for (int k = 0; k < N; ++k)
+                    for (int l = 0; l <= k; ++l) {
+                        const Pack3 share = (each.m[p].alpha[k] * each.m[p].alpha[l]) * axis;
+                        Pack3& into = angle_branches[lower_index(k, l)];
+                        into = p == 0 ? share : into + share;
+                    }
+            }
+            complete_blocks<N>(h);
+            loop_.scatter(pack, h, out);
+            for (int lane = 0; lane < loop_.lanes_in(pack); ++lane)
+                for (int pair = 0; pair < N * (N + 1) / 2; ++pair)
+                    axes[loop_.element(pack, lane)][pair] = lane_of(angle_branches[pair], lane);
+        });
+        if (convexified) return;
+        for (Index t = 0; t < fibres_->fibres.n_elements(); ++t) {
+            const std::span<const Index> nodes = fibres_->fibres.nodes_of(t);
+            for (int k = 0; k < N; ++k)
+                for (int l = 0; l <= k; ++l) {
+                    const double twice = k != l && nodes[k] == nodes[l] ? 2.0 : 1.0;
+                    const Vec3 axis = twice * axes[t][lower_index(k, l)];
+                    if (!axis.isZero(0.0))
+                        rest.add(NonsymmetricTangent::SkewBlock{{nodes[k], nodes[l]}, axis});
+                }
+        }
+    }
+
+    void vjp(const Kinematics& at, const Controls&, const VectorXd& lambda, KinematicsGradient& by,
+             Gradient& out) const override {
+        typename Shared::Gatherer gathered(*fibres_);
+        std::vector<double> by_rates(fibres_->fibres.n_elements(), 0.0);
+        Residual by_velocity;
+        by_velocity.reset(lambda.size());
+        loop_.scatter_packs([&](Index pack) {
+            const Pieces& each = fibres_->at(pack);
+            Pack3 x[N], v[N], adjoint[N], g[N];
+            loop_.gather(pack, at.q.data(), x);
+            loop_.gather(pack, at.v.data(), v);
+            loop_.gather(pack, lambda.data(), adjoint);
+            typename Shared::Found found;
+            for (int p = 0; p < points; ++p) {
+                const Point point(*this, pack, p, x, v);
+                const DeformedFibre& place = point.place;
+                const Pack3 turned = each.m[p].at(adjoint);
+                const Pack along = each.volume[p] * dot(place.n, turned);
+                found.strength += along * point.by_strength;
+                found.activation += along * point.by_activation;
+                const Pack3 to_rate = (along * point.by_rate) * place.n;
+                found.add(p, x,
+                          (along * point.by_length) * place.n +
+                              (each.volume[p] * point.tension * place.inverse) * place.across(turned) +
+                              (along * point.by_rate * place.inverse) * place.across(point.moves));
+                found.add(p, v, to_rate);
+                found.add(p, adjoint, (each.volume[p] * point.tension) * place.n);
+                add_pulls<N>(each.m[p], -to_rate, p == 0, g);
+                const Pack by_rate = along * point.by_rate * point.rate;
+                for (int lane = 0; lane < loop_.lanes_in(pack); ++lane)
+                    by_rates[loop_.element(pack, lane)] -= by_rate[lane] / largest_rate_;
+            }
+            gathered.take(pack, found);
+            loop_.scatter(pack, g, by_velocity);
+        });
+        by.velocity += by_velocity.gradient;
+        gathered.hand_over(out);
+        for (const double each : by_rates) out.values[shortening_rate_.first] += each;
+    }
+
+    void add_cancelling_forces(const Kinematics& at, VectorXd& out) const override {
+        for (Index t = 0; t < fibres_->fibres.n_elements(); ++t) {
+            const Index pack = t / Pack::width;
+            const int lane = t % Pack::width;
+            const Pieces& each = fibres_->at(pack);
+            const std::span<const Index> nodes = fibres_->fibres.nodes_of(t);
+            Pack3 x[N], v[N];
+            loop_.gather(pack, at.q.data(), x);
+            loop_.gather(pack, at.v.data(), v);
+            for (int p = 0; p < points; ++p) {
+                const double by_rate = std::abs(Point(*this, pack, p, x, v).by_rate[lane]);
+                double reach = 0.0;
+                for (int k = 0; k < N; ++k)
+                    reach += std::abs(each.m[p].alpha[k][lane]) * lane_of(x[k], lane).norm();
+                for (int k = 0; k < N; ++k)
+                    out.segment<3>(3 * nodes[k]).array() +=
+                        each.volume[p][lane] * std::abs(each.m[p].alpha[k][lane]) * by_rate * at.rate * reach;
+            }
+        }
+    }
+
+  private:
+    /// The tension T and its derivatives by l, l', w and a.
+    struct Point {
+        DeformedFibre place;
+        Pack3 moves;  // y'
+        Pack rate;    // l'
+        Pack tension, by_length, by_rate, by_strength, by_activation;
+
+        Point(const MuscleRateTerm& term, Index pack, int p, const Pack3 x[N], const Pack3 v[N])
+            : place(term.fibres_->at(pack).m[p].at(x)), moves(term.fibres_->at(pack).m[p].at(v)) {
+            const Pieces& each = term.fibres_->at(pack);
+            const FibreLaw& law = term.fibres_->law;
+            // The slope of the active part alone: the total at activation 1 minus the total at 0.
+            const FibreLaw::Response with = law.at(place.length, Pack(1.0)),
+                                     without = law.at(place.length, Pack(0.0));
+            const Pack active = with.by_activation, slope = with.slope - without.slope;
+            rate = dot(place.n, moves);
+            Pack more, steep;
+            for (int lane = 0; lane < Pack::width; ++lane) {
+                const FibreCurve::Sample at = law.excess_over_isometric(rate[lane] / term.largest_rate_);
+                more.set(lane, at.value);
+                steep.set(lane, at.slope / term.largest_rate_);
+            }
+            const Pack pulls = each.strength * each.activation;
+            tension = pulls * active * more;
+            by_length = pulls * slope * more;
+            by_rate = pulls * active * steep;
+            by_strength = each.activation * active * more;
+            by_activation = each.strength * active * more;
+        }
+    };
+
+    const std::shared_ptr<Shared> fibres_;
+    const ElementLoop<N>& loop_;
+    const Slot shortening_rate_;
+    double largest_rate_ = 1.0;
+};
+
+}  // namespace magshell

@@ -1,0 +1,301 @@
+#include "magshell/terms/contact/contact_term.h"
+
+#include <algorithm>
+#include <string>
+
+#include "magshell/core/errors.h"
+#include "magshell/core/parallel.h"
+
+namespace magshell {
+namespace {
+
+constexpr Index block_length = 512;  // [points] size of a parallel task
+
+Vec3 weighted(const ContactPoint& point, const double* all) {
+    Vec3 sum = Vec3::Zero();
+    for (int k = 0; k < 3; ++k)
+        if (point.nodes[k] >= 0) sum += point.weights[k] * Eigen::Map<const Vec3>(all + 3 * point.nodes[k]);
+    return sum;
+}
+
+// Finds where the straight way from a point to another, `length` long, enters a body: steps of the distance's own length
+// cannot miss a surface. False where it stays outside.
+bool enters(const Obstacle& shape, const Vec3& from, const Vec3& to, double length, Distance& at) {
+    constexpr double least_advance = 1e-3;  // [-] of the way, where it runs along the surface
+    at = shape.distance(from);
+    if (!(at.value > 0.0)) return true;
+    if (length <= at.value) return false;
+    double travelled = at.value / length;
+    while (at.value > 0.0) {
+        if (travelled >= 1.0) return false;
+        at = shape.distance(from + travelled * (to - from));
+        travelled += std::max(at.value / length, least_advance);
+    }
+    return true;
+}
+
+// Whether the way leads through the body's middle surface, where the normal jumps from one side to the other. The sides are
+// those where it enters, where it leaves and where it ends: the ends tell of a thin body, the exit of one that is hollow.
+bool passes(const Obstacle& shape, const Vec3& from, const Vec3& to) {
+    constexpr double opposite =
+        -1e-6;  // [-] cosine between normals of opposite faces; an edge of a box is none
+    const double length = (to - from).norm();
+    Distance in, out;
+    if (!enters(shape, from, to, length, in)) return false;
+    if (in.normal.dot(shape.distance(to).normal) < opposite) return true;
+    return enters(shape, to, from, length, out) && in.normal.dot(out.normal) < opposite;
+}
+
+}  // namespace
+
+Pack33 to_pack(const Mat3& block) {
+    Pack33 pack;
+    for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c) pack.at[3 * r + c] = Pack(block(r, c));
+    return pack;
+}
+
+ContactTerm::ContactTerm(const Nodes& nodes, const SystemMatrix& matrix,
+                         const std::vector<ContactInput>& contacts,
+                         const std::vector<std::shared_ptr<const Obstacle>>& obstacles, Registry& registry)
+    : laws_(contacts.size()) {
+    for (const ContactInput& given : contacts) {
+        const std::string owner = "contact " + std::to_string(contacts_.size());
+        const auto number = [&](const char* name, const char* unit) {
+            return registry.values.add(owner, name, unit, 1, 1);
+        };
+        Contact& contact = contacts_.emplace_back();
+        contact.stiffness = number("contact_stiffness", "N/m");
+        contact.smoothing = number("smoothing", "m");
+        contact.offset = number("offset", "m");
+        contact.friction = number("friction_coefficient", "1");
+        contact.sticking_speed = number("sticking_speed", "m/s");
+        contact.obstacles = given.obstacles;
+        contact.points = given.points;
+        for (ContactPoint& point : contact.points) {
+            for (Index& node : point.nodes)
+                if (node >= 0) node = nodes.vertices.core[node];
+            if (point.nodes[1] < 0)
+                ++contact.first_on_face;
+            else
+                contact.slots.push_back(pair_slots<3>(matrix, point.nodes));
+        }
+    }
+    for (const std::shared_ptr<const Obstacle>& shape : obstacles) {
+        const std::string owner = "obstacle " + std::to_string(obstacles_.size());
+        obstacles_.push_back({shape, {}});
+        obstacle_slots_.push_back({registry.values.add(owner, "center", "m", 1, 3),
+                                   registry.values.add(owner, "rotation", "rad", 1, 3),
+                                   registry.controls.add(owner, "pose", "SI", 4, 3)});
+    }
+}
+
+bool ContactTerm::set_values(const Values& values) {
+    for (std::size_t c = 0; c < contacts_.size(); ++c) {
+        const Contact& contact = contacts_[c];
+        laws_[c] = {values.number(contact.stiffness), values.number(contact.smoothing),
+                    values.number(contact.offset), values.number(contact.friction),
+                    values.number(contact.sticking_speed)};
+    }
+    for (std::size_t o = 0; o < obstacles_.size(); ++o)
+        obstacles_[o].placement = {values.vector(obstacle_slots_[o].center),
+                                   values.vector(obstacle_slots_[o].rotation)};
+    return false;  // none of its forces cancel in add_cancelling_forces
+}
+
+ObstacleState ContactTerm::obstacle_state(Index obstacle, const Controls& controls) const {
+    const Slot& pose = obstacle_slots_[obstacle].pose;
+    const auto row = [&](Index k) -> Vec3 { return controls.segment<3>(pose.at(k)); };
+    return {obstacles_[obstacle], ObstaclePose{row(0), row(1), row(2), row(3)}};
+}
+
+void ContactTerm::add_vjp(const ActiveContact& active, double by_force, const ContactLaw& by_friction,
+                          const ObstacleGradient& by_obstacle, VectorXd& by_values,
+                          Controls& by_controls) const {
+    const Contact& contact = contacts_[active.contact];
+    by_values[contact.stiffness.first] += by_force * active.force / law(active).stiffness;
+    by_values[contact.smoothing.first] += by_force * active.by_smoothing;
+    by_values[contact.offset.first] += by_force * active.stiffness;
+    by_values[contact.friction.first] += by_friction.friction;
+    by_values[contact.sticking_speed.first] += by_friction.sticking_speed;
+    const ObstacleSlots& obstacle = obstacle_slots_[active.obstacle];
+    by_values.segment<3>(obstacle.center.first) += by_obstacle.placement.center;
+    by_values.segment<3>(obstacle.rotation.first) += by_obstacle.placement.rotation_vector;
+    const auto by_row = [&](Index k) { return by_controls.segment<3>(obstacle.pose.at(k)); };
+    by_row(0) += by_obstacle.pose.displacement;
+    by_row(1) += by_obstacle.pose.rotation_vector;
+    by_row(2) += by_obstacle.pose.velocity;
+    by_row(3) += by_obstacle.pose.spin;
+}
+
+std::vector<ContactTerm::ActiveContact> ContactTerm::active_contacts(const double* q,
+                                                                     const Controls& controls) const {
+    std::vector<ActiveContact> all;
+    for (std::size_t c = 0; c < contacts_.size(); ++c) {
+        const Contact& contact = contacts_[c];
+        const ContactLaw& law = laws_[c];
+        const Index count = static_cast<Index>(contact.points.size());
+        for (const Index o : contact.obstacles) {
+            const ObstacleState obstacle = obstacle_state(o, controls);
+            std::vector<std::vector<ActiveContact>> found((count + block_length - 1) / block_length);
+            parallel_for(static_cast<int>(found.size()), [&](int block) {
+                const Index first = block * block_length, last = std::min(count, first + block_length);
+                for (Index p = first; p < last; ++p) {
+                    const Vec3 x = weighted(contact.points[p], q);
+                    const Distance at = obstacle.distance(x);
+                    const double depth = law.offset - at.value;
+                    if (!(depth > 0.0)) continue;
+                    const Penalty penalty(depth, law.smoothing);
+                    found[block].push_back({static_cast<Index>(c), o, p, x, at, law.stiffness * penalty.force,
+                                            law.stiffness * penalty.stiffness,
+                                            law.stiffness * penalty.force_by_smoothing});
+                }
+            });
+            for (const std::vector<ActiveContact>& part : found)
+                all.insert(all.end(), part.begin(), part.end());
+        }
+    }
+    return all;
+}
+
+Index ContactTerm::passes_through(const VectorXd& q, const Controls& controls, const VectorXd& end,
+                                  const Controls& controls_at_end) const {
+    return passes_between(own_places(q, controls), own_places(end, controls_at_end));
+}
+
+std::vector<Vec3> ContactTerm::own_places(const VectorXd& q, const Controls& controls) const {
+    std::vector<Vec3> places;
+    for (const Contact& contact : contacts_)
+        for (const Index o : contact.obstacles) {
+            const ObstacleState obstacle = obstacle_state(o, controls);
+            for (const ContactPoint& point : contact.points)
+                places.push_back(obstacle.own(weighted(point, q.data())));
+        }
+    return places;
+}
+
+Index ContactTerm::passes_between(const std::vector<Vec3>& before, const std::vector<Vec3>& after) const {
+    std::size_t k = 0;
+    for (const Contact& contact : contacts_)
+        for (const Index o : contact.obstacles)
+            for (const ContactPoint& point : contact.points) {
+                if (passes(*obstacles_[o].shape, before[k], after[k])) return point.nodes[0];
+                ++k;
+            }
+    return -1;
+}
+
+std::vector<Vec3> ContactTerm::rotation_vectors(const Controls& controls) const {
+    std::vector<Vec3> all;
+    for (std::size_t o = 0; o < obstacles_.size(); ++o) {
+        all.push_back(obstacles_[o].placement.rotation_vector);
+        all.push_back(controls.segment<3>(obstacle_slots_[o].pose.at(1)));
+    }
+    return all;
+}
+
+Vec3 ContactTerm::at_point(const ActiveContact& active, const double* all) const {
+    return weighted(point(active), all);
+}
+
+void ContactTerm::distribute(const ActiveContact& active, const Vec3& vector, VectorXd& out) const {
+    const ContactPoint& p = point(active);
+    for (int k = 0; k < 3; ++k)
+        if (p.nodes[k] >= 0) out.segment<3>(3 * p.nodes[k]) += p.weights[k] * vector;
+}
+
+void ContactTerm::distribute(const ActiveContact& active, const Vec3& force, Residual& out) const {
+    const ContactPoint& p = point(active);
+    for (int k = 0; k < 3; ++k)
+        if (p.nodes[k] >= 0)
+            for (int axis = 0; axis < 3; ++axis) out.add(3 * p.nodes[k] + axis, p.weights[k] * force[axis]);
+}
+
+void ContactTerm::add_cancelling_force(const ActiveContact& active, double stiffness, VectorXd& out) const {
+    const ContactPoint& p = point(active);
+    for (int k = 0; k < 3; ++k)
+        if (p.nodes[k] >= 0)
+            out.segment<3>(3 * p.nodes[k]).array() += p.weights[k] * stiffness * active.position.norm();
+}
+
+void ContactTerm::add_cancelling_normal_forces(VectorXd& out) const {
+    for (const ActiveContact& active : evaluated_contacts_)
+        add_cancelling_force(active, active.stiffness, out);
+}
+
+void ContactTerm::add_block(const ActiveContact& active, const Mat3& block, SystemMatrix& out) const {
+    const Contact& contact = contacts_[active.contact];
+    const ContactPoint& p = point(active);
+    if (active.point < contact.first_on_face) {
+        out.add_diagonal_block(p.nodes[0], to_pack(block), 0);
+        return;
+    }
+    Pack33 blocks[6];
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j <= i; ++j) blocks[lower_index(i, j)] = to_pack(p.weights[i] * p.weights[j] * block);
+    scatter_blocks<3>(out, p.nodes, contact.slots[active.point - contact.first_on_face], blocks, 0);
+}
+
+double ContactTerm::energy(const double* q, const Controls& controls) const {
+    double total = 0.0;
+    for (const ActiveContact& active : active_contacts(q, controls)) {
+        const ContactLaw& of = law(active);
+        total += of.stiffness * Penalty(of.offset - active.at.value, of.smoothing).energy;
+    }
+    return total;
+}
+
+std::vector<ContactTerm::HardContact> ContactTerm::hard_contacts() const {
+    std::vector<HardContact> all;
+    for (std::size_t c = 0; c < contacts_.size(); ++c)
+        for (const Index obstacle : contacts_[c].obstacles)
+            for (const ContactPoint& p : contacts_[c].points) {
+                if (p.nodes[1] >= 0)
+                    throw InvalidInput("Coulomb's law node by node is for vertices: take face_samples=0");
+                all.push_back({p.nodes[0], obstacle, laws_[c].offset, laws_[c].friction});
+            }
+    return all;
+}
+
+void ContactTerm::add_contact_stiffness(VectorXd& of_nodes) const {
+    for (const ActiveContact& active : evaluated_contacts_) {
+        const ContactPoint& p = point(active);
+        for (int k = 0; k < 3; ++k)  // row sums of stiffness w w^T
+            if (p.nodes[k] >= 0) of_nodes[p.nodes[k]] += p.weights[k] * active.stiffness;
+    }
+}
+
+void ContactTerm::evaluate(const double* q, const Controls& controls, Residual& out) {
+    evaluated_contacts_ = switched_off_ ? std::vector<ActiveContact>() : active_contacts(q, controls);
+    for (const ActiveContact& active : evaluated_contacts_)
+        distribute(active, -active.force * active.at.normal, out);
+}
+
+void ContactTerm::finish_assembly(const double*, const Controls&, SystemMatrix& out) const {
+    for (const ActiveContact& active : evaluated_contacts_) {
+        const Distance& at = active.at;
+        add_block(active, active.stiffness * at.normal * at.normal.transpose() - active.force * at.curvature,
+                  out);
+    }
+}
+
+// The gradient of the energy is g = - N n.
+void ContactTerm::vjp(const double*, const Controls& controls, const double* lambda, Gradient& out) {
+    for (const ActiveContact& active : evaluated_contacts_) {
+        const Vec3 along = at_point(active, lambda);
+        const double by_force = -along.dot(active.at.normal);
+        ObstacleGradient by_obstacle;
+        obstacle_state(active.obstacle, controls)
+            .vjp(active.position, active.at, -active.stiffness * by_force, -active.force * along,
+                 Vec3::Zero(), by_obstacle);
+        add_vjp(active, by_force, {}, by_obstacle, out.values, out.controls);
+    }
+}
+
+std::size_t ContactTerm::bytes() const {
+    std::size_t total = bytes_of(evaluated_contacts_);
+    for (const Contact& contact : contacts_) total += bytes_of(contact.points) + bytes_of(contact.slots);
+    return total;
+}
+
+}  // namespace magshell

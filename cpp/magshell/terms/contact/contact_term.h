@@ -1,0 +1,132 @@
+// ContactTerm: contact of bodies with obstacles by penalty energies at points: the vertices and, optionally,
+// sample points on faces.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "magshell/assembly/lanes.h"
+#include "magshell/body/nodes.h"
+#include "magshell/energy/contact.h"
+#include "magshell/obstacle/obstacle_state.h"
+#include "magshell/terms/term.h"
+
+namespace magshell {
+
+/// A point that contact acts on: a vertex, or a weighted sum of the corners of a face.
+struct ContactPoint {
+    std::array<Index, 3> nodes{-1, -1, -1};
+    Vec3 weights = Vec3::UnitX();
+};
+
+/// One contact: the obstacles and the points that they act on. Points on faces come after vertices.
+struct ContactInput {
+    std::vector<Index> obstacles;
+    std::vector<ContactPoint> points;  // in the caller's numbering of vertices
+    bool has_friction = false,
+         lagged = false;  // lagged: friction uses the normal forces of the beginning of the step
+};
+
+/// Returns a pack that holds the same 3x3 block in every lane.
+Pack33 to_pack(const Mat3& block);
+
+class ContactTerm final : public Term {
+  public:
+    /// A point in contact with an obstacle.
+    struct ActiveContact {
+        Index contact, obstacle, point;
+        Vec3 position;
+        Distance at;
+        double force, stiffness;  // N [N] and dN/d(depth) [N/m]
+        double by_smoothing;      // dN/d(smoothing) [N/m]
+    };
+
+    ContactTerm(const Nodes& nodes, const SystemMatrix& matrix, const std::vector<ContactInput>& contacts,
+                const std::vector<std::shared_ptr<const Obstacle>>& obstacles, Registry& registry);
+
+    bool set_values(const Values& values) override;
+    void add_contact_stiffness(VectorXd& of_nodes) const override;
+
+    /// A vertex that hard contact keeps at a distance from an obstacle.
+    struct HardContact {
+        Index node, obstacle;
+        double offset, friction;
+    };
+    /// Returns all vertices under hard contact. Throws InvalidInput if points on faces are in contact as well.
+    std::vector<HardContact> hard_contacts() const;
+    /// Switches the penalty law off while another method enforces contact.
+    void set_switched_off(bool off) { switched_off_ = off; }
+
+    /// Returns the points in contact at q, in the order of contacts, obstacles and points.
+    std::vector<ActiveContact> active_contacts(const double* q, const Controls& controls) const;
+    /// Returns the points in contact at the last evaluated state.
+    const std::vector<ActiveContact>& evaluated_contacts() const { return evaluated_contacts_; }
+
+    /// Returns the first vertex of a point that passes through an obstacle: on its straight path from q to
+    /// `end`, in the frame of the obstacle, it enters on one side and leaves on another. Returns -1 if there is
+    /// none.
+    Index passes_through(const VectorXd& q, const Controls& controls, const VectorXd& end,
+                         const Controls& controls_at_end) const;
+
+    /// Returns every point of every contact in the own frame of each of its obstacles, where these stand now [m].
+    std::vector<Vec3> own_places(const VectorXd& q, const Controls& controls) const;
+    /// Returns the first vertex of a point that comes out on another side of an obstacle than it went in, on its straight way
+    /// between two such places; -1 where none does.
+    Index passes_between(const std::vector<Vec3>& before, const std::vector<Vec3>& after) const;
+    /// Returns the rotation vectors of each obstacle, by its placement and by its pose [rad].
+    std::vector<Vec3> rotation_vectors(const Controls& controls) const;
+
+    const ContactPoint& point(const ActiveContact& active) const {
+        return contacts_[active.contact].points[active.point];
+    }
+    const ContactLaw& law(const ActiveContact& active) const { return laws_[active.contact]; }
+    ObstacleState obstacle_state(Index obstacle, const Controls& controls) const;
+    /// Adds the gradient of a function of a point's normal force and friction, given its derivatives by the
+    /// normal force, by the friction law and by the obstacle. Gradients by the obstacle's pose go to
+    /// `by_controls`, which belong to the time at which the obstacle had that pose.
+    void add_vjp(const ActiveContact& active, double by_force, const ContactLaw& by_friction,
+                 const ObstacleGradient& by_obstacle, VectorXd& by_values, Controls& by_controls) const;
+
+    /// Adds a symmetric block between the nodes of a point, weighted by their shape functions.
+    void add_block(const ActiveContact& active, const Mat3& block, SystemMatrix& out) const;
+    /// Returns the value at a point of a vector of all degrees of freedom.
+    Vec3 at_point(const ActiveContact& active, const double* all) const;
+    /// Distributes a vector at a point to the point's nodes, by their weights.
+    void distribute(const ActiveContact& active, const Vec3& vector, VectorXd& out) const;
+    void distribute(const ActiveContact& active, const Vec3& force, Residual& out) const;
+    /// Adds the magnitude [N] of the forces that cancel within a force that depends on the point's position by
+    /// a stiffness [N/m].
+    void add_cancelling_force(const ActiveContact& active, double stiffness, VectorXd& out) const;
+    /// Adds those within the normal forces at the last evaluated state.
+    void add_cancelling_normal_forces(VectorXd& out) const;
+
+    std::string_view name() const override { return "contact"; }
+    bool depends_on_loads() const override { return false; }
+    double energy(const double* q, const Controls& controls) const override;
+    void evaluate(const double* q, const Controls& controls, Residual& out) override;
+    void finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const override;
+    void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
+    std::size_t bytes() const override;
+
+  private:
+    struct Contact {
+        std::vector<Index> obstacles;
+        std::vector<ContactPoint> points;  // in the core's numbering of nodes
+        std::vector<PairSlots<3>> slots;   // for points on faces, which come last
+        Index first_on_face = 0;
+        Slot stiffness, smoothing, offset, friction, sticking_speed;
+    };
+    struct ObstacleSlots {
+        Slot center, rotation;
+        Slot pose;  // a load parameter
+    };
+
+    std::vector<Contact> contacts_;
+    std::vector<ContactLaw> laws_;
+    std::vector<PositionedObstacle> obstacles_;
+    std::vector<ObstacleSlots> obstacle_slots_;
+    std::vector<ActiveContact> evaluated_contacts_;
+    bool switched_off_ = false;
+};
+
+}  // namespace magshell

@@ -1,0 +1,108 @@
+#include "magshell/terms/contact/friction_term.h"
+
+#include <algorithm>
+
+namespace magshell {
+namespace {
+
+Mat3 cross_matrix(const Vec3& v) {
+    Mat3 m;
+    m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
+    return m;
+}
+
+// Returns df/dx for a coefficient of one: the total dependence on the position through N, n and the obstacle's
+// velocity.
+Mat3 by_position(const Friction& friction, const ContactTerm::ActiveContact& active, const Vec3& spin) {
+    return -active.stiffness * friction.by_normal_force * active.at.normal.transpose() +
+           friction.by_normal * active.at.curvature - friction.by_velocity * cross_matrix(spin);
+}
+
+}  // namespace
+
+void FrictionTerm::begin_step(const VectorXd& q, const Controls& controls) {
+    before_.clear();
+    controls_before_ = controls;
+    if (std::none_of(lagged_.begin(), lagged_.end(), [](bool lagged) { return lagged; })) return;
+    for (const ContactTerm::ActiveContact& active : contact_.active_contacts(q.data(), controls))
+        if (lagged_[active.contact]) before_.push_back(active);
+}
+
+void FrictionTerm::evaluate(const Kinematics& at, const Controls& controls, Residual& out) {
+    friction_contacts_.clear();
+    const auto add_friction = [&](const ContactTerm::ActiveContact& active, bool lagged) {
+        const ObstacleState obstacle =
+            contact_.obstacle_state(active.obstacle, lagged ? controls_before_ : controls);
+        const Vec3 velocity = contact_.at_point(active, at.v.data()) - obstacle.velocity(active.position);
+        const ContactLaw& law = contact_.law(active);
+        friction_contacts_.push_back(
+            {active, lagged, obstacle,
+             Friction(active.force, active.at.normal, velocity, law.sticking_speed)});
+        contact_.distribute(active, -law.friction * friction_contacts_.back().friction.force, out);
+    };
+    for (const ContactTerm::ActiveContact& active :
+         frozen_ ? frozen_contacts_ : contact_.evaluated_contacts())
+        if (has_friction_[active.contact] && !lagged_[active.contact]) add_friction(active, false);
+    for (const ContactTerm::ActiveContact& active : before_)
+        if (has_friction_[active.contact]) add_friction(active, true);
+}
+
+void FrictionTerm::set_frozen(bool frozen) {
+    if (frozen) frozen_contacts_ = contact_.evaluated_contacts();
+    frozen_ = frozen;
+}
+
+void FrictionTerm::assemble(const Kinematics& at, const Controls&, bool convexified, SystemMatrix& out,
+                            NonsymmetricTangent& rest) const {
+    for (const FrictionContact& each : friction_contacts_) {
+        const double coefficient = contact_.law(each.active).friction;
+        const Mat3& by_velocity = convexified ? each.friction.secant : each.friction.by_velocity;
+        contact_.add_block(each.active, -coefficient * at.rate * by_velocity, out);
+        if (each.lagged || frozen_) continue;
+        const Mat3 block = -coefficient * by_position(each.friction, each.active, each.obstacle.spin());
+        const ContactPoint& point = contact_.point(each.active);
+        if (point.nodes[1] < 0) {
+            rest.add(point.nodes[0], block);
+            continue;
+        }
+        NonsymmetricTangent::FaceBlock shared{point.nodes, point.weights, {}};
+        for (int k = 0; k < 3; ++k) shared.block.middleCols<3>(3 * k) = point.weights[k] * block;
+        rest.add(shared);
+    }
+}
+
+void FrictionTerm::vjp(const Kinematics&, const Controls&, const VectorXd& lambda, KinematicsGradient& by,
+                       Gradient& out) const {
+    for (const FrictionContact& each : friction_contacts_) {
+        const ContactTerm::ActiveContact& active = each.active;
+        const Friction& friction = each.friction;
+        const ContactLaw& law = contact_.law(active);
+        const Vec3 along = contact_.at_point(active, lambda.data());
+        const Vec3 by_velocity = law.friction * (friction.by_velocity * along);
+        contact_.distribute(active, by_velocity, by.velocity);
+        if (each.lagged) {
+            const Mat3 by_begin = law.friction * by_position(friction, active, each.obstacle.spin());
+            contact_.distribute(active, by_begin.transpose() * along, by.begin);
+        }
+        const double by_force = -law.friction * along.dot(friction.by_normal_force);
+        ObstacleGradient by_obstacle;
+        each.obstacle.vjp(active.position, active.at, -active.stiffness * by_force,
+                          -law.friction * (friction.by_normal.transpose() * along), -by_velocity,
+                          by_obstacle);
+        contact_.add_vjp(active, by_force,
+                         {.friction = -along.dot(friction.force),
+                          .sticking_speed = -law.friction * along.dot(friction.by_sticking_speed)},
+                         by_obstacle, out.values, each.lagged ? by.begin_controls : out.controls);
+    }
+}
+
+// Bounds round-off: a velocity is the difference of two positions over a stage, and in a sticking contact a
+// small velocity causes a large force.
+void FrictionTerm::add_cancelling_forces(const Kinematics& at, VectorXd& out) const {
+    for (const FrictionContact& each : friction_contacts_) {
+        const double stiffness = at.rate * each.friction.by_velocity.norm();
+        contact_.add_cancelling_force(each.active, contact_.law(each.active).friction * stiffness, out);
+    }
+}
+
+}  // namespace magshell

@@ -1,0 +1,74 @@
+// ForceTerm: the base class of forces without an energy, such as friction and drag. They depend on velocities,
+// so only time steps include them.
+//
+// At an implicit stage of duration tau that ends at q, velocities and accelerations follow from q,
+//
+//   v = (q - x^)/tau,   w = (v - v^)/tau,   K = - df/dq - df/dv/tau - df/dw/tau^2
+//
+// where x^ and v^ are predicted by the integrator. The force contributes the matrix K to the stage's tangent; K
+// is not symmetric in general. Its main symmetric part is added to the system matrix, the rest to the
+// nonsymmetric tangent, which only GMRES multiplies by.
+#pragma once
+
+#include "magshell/assembly/nonsymmetric_tangent.h"
+#include "magshell/terms/contact/pair_stiffness.h"
+#include "magshell/terms/term.h"
+
+namespace magshell {
+
+/// The prediction of a stage for all degrees of freedom, and the stage's duration.
+struct StageMotion {
+    const VectorXd *x_hat, *v_hat;
+    double time;  // tau [s]
+};
+
+/// The state of a stage for all degrees of freedom. v and w are zero for those that do not belong to a vertex.
+struct Kinematics {
+    VectorXd q, v, w;
+    double rate = 0.0;  // 1/tau
+};
+
+/// Gradients by the arguments of a force other than the end of the stage.
+struct KinematicsGradient {
+    VectorXd velocity, acceleration, begin;
+    Controls begin_controls;  // load parameters at the beginning of the step
+};
+
+class ForceTerm {
+  public:
+    virtual ~ForceTerm() = default;
+
+    virtual std::string_view name() const = 0;
+
+    virtual void set_values(const Values& values) = 0;
+
+    /// Begins a step at q. Lagged friction takes its normal forces from this state.
+    virtual void begin_step(const VectorXd& /*q*/, const Controls&) {}
+
+    /// Subtracts the force from `out`, after all energies were evaluated at the same state.
+    virtual void evaluate(const Kinematics& at, const Controls& controls, Residual& out) = 0;
+
+    /// Adds K at the last evaluated state. convexified: adds a majorant of the force's dissipation potential
+    /// instead of the exact derivatives where there is one, which keeps Newton's iteration from overshooting.
+    virtual void assemble(const Kinematics& at, const Controls& controls, bool convexified, SystemMatrix& out,
+                          NonsymmetricTangent& rest) const = 0;
+
+    /// Adds, for each frictional pair at the last evaluated state, a positive semidefinite stiffness that
+    /// bounds its exact one from above.
+    virtual void add_stiffness(const Kinematics& /*at*/, std::vector<PairStiffness>& /*out*/) const {}
+
+    /// Adds, at the last evaluated state, lambda . df/dv, lambda . df/dw and lambda . df/d(begin) to `by`, and
+    /// - lambda . df/dk to the gradient by parameters.
+    virtual void vjp(const Kinematics& at, const Controls& controls, const VectorXd& lambda,
+                     KinematicsGradient& by, Gradient& out) const = 0;
+
+    /// Freezes the quantities that make the force nonsymmetric (normal forces and normals) at their values of
+    /// the last evaluated state, or releases them.
+    virtual void set_frozen(bool /*frozen*/) {}
+
+    /// Adds the magnitude [N] of the forces that cancel within velocities at the last evaluated state, a bound
+    /// of their round-off.
+    virtual void add_cancelling_forces(const Kinematics& /*at*/, VectorXd& /*out*/) const {}
+};
+
+}  // namespace magshell

@@ -1,0 +1,70 @@
+#include "magshell/terms/joint/ball_torque_term.h"
+
+#include <algorithm>
+
+namespace magshell {
+
+BallTorqueTerm::BallTorqueTerm(const std::vector<Input>& joints, const std::vector<Vec3>& rest,
+                               Registry& registry) {
+    for (const Input& input : joints) {
+        const Slot slot = registry.values.add(input.owner, "torque", "N m", 1, 3);
+        for (const Index* corners : {input.child, input.parent}) {
+            if (!corners) continue;
+            Side& side = sides_.emplace_back();
+            std::copy_n(corners, 4, side.corners.begin());
+            side.sign = corners == input.child ? 1.0 : -1.0;
+            side.slot = slot;
+            double squares = 0.0;  // sum over six edges, 8 l^2 each
+            for (int i = 0; i < 4; ++i)
+                for (int j = 0; j < i; ++j) squares += (rest[corners[i]] - rest[corners[j]]).squaredNorm();
+            side.share = 6.0 / squares;
+        }
+    }
+}
+
+bool BallTorqueTerm::set_values(const Values& values) {
+    for (Side& side : sides_) side.moment = side.sign * side.share * values.vector(side.slot);
+    return false;
+}
+
+std::array<Vec3, 4> BallTorqueTerm::Side::arms(const double* q) const {
+    std::array<Vec3, 4> at;
+    Vec3 center = Vec3::Zero();
+    for (int k = 0; k < 4; ++k) {
+        at[k] = Eigen::Map<const Vec3>(q + 3 * corners[k]);
+        center += 0.25 * at[k];
+    }
+    for (Vec3& each : at) each -= center;
+    return at;
+}
+
+void BallTorqueTerm::evaluate(const double* q, const Controls&, Residual& out) {
+    for (const Side& side : sides_) {
+        const std::array<Vec3, 4> arms = side.arms(q);
+        for (int k = 0; k < 4; ++k) {
+            const Vec3 force = side.moment.cross(arms[k]);
+            for (int c = 0; c < 3; ++c) out.add(3 * side.corners[k] + c, -force[c]);
+        }
+    }
+}
+
+void BallTorqueTerm::add_nonsymmetric_tangent(const double*, const Controls&,
+                                              NonsymmetricTangent& out) const {
+    for (const Side& side : sides_)
+        for (int i = 0; i < 4; ++i)
+            for (int j = 0; j <= i; ++j)
+                out.add(NonsymmetricTangent::SkewBlock{{side.corners[i], side.corners[j]},
+                                                       ((i == j ? 0.75 : -0.25) * -side.moment).eval()});
+}
+
+void BallTorqueTerm::vjp(const double* q, const Controls&, const double* lambda, Gradient& out) {
+    for (const Side& side : sides_) {
+        const std::array<Vec3, 4> arms = side.arms(q);
+        for (int k = 0; k < 4; ++k)
+            out.values.segment<3>(side.slot.first) -=
+                side.sign * side.share *
+                arms[k].cross(Vec3(Eigen::Map<const Vec3>(lambda + 3 * side.corners[k])));
+    }
+}
+
+}  // namespace magshell

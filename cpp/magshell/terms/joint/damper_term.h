@@ -1,0 +1,90 @@
+// DamperTerm: viscous dampers in joints. They apply a torque against the rate of the joint coordinate; in a
+// ball joint, against the relative angular velocity of the links.
+//
+// A damper is an ElasticTerm without elastic energy: its strains are the joint coordinates s, and within a
+// stage of a time step, with the history of set_history,
+//
+//   sigma = d (s - s^)/(a dt)
+//
+// which approximates d s' with the order of the time integrator and a symmetric matrix. The strains of a ball
+// joint are the nine products between the axes of both links: sum s'^2 = 2 omega^2.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "magshell/terms/joint/joint_form.h"
+#include "magshell/terms/shell/elastic_term.h"
+
+namespace magshell {
+
+class DamperTerm final : public ElasticTerm {
+  public:
+    struct Input {
+        std::string owner;
+        Joint joint;
+        const Index* parent;  // four corners; nullptr for the world
+        const Index* child;
+    };
+
+    DamperTerm(const std::vector<Input>& joints, const std::vector<Vec3>& rest, const SystemMatrix& matrix,
+               Registry& registry);
+
+    std::string_view name() const override { return "joints"; }
+    bool set_values(const Values& values) override;
+    double energy(const double*, const Controls&) const override { return 0.0; }
+    void evaluate(const double* q, const Controls& controls, Residual& out) override;
+    void finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const override;
+    void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
+    std::vector<double> angle_branches() const override { return last_turn_; }
+    void set_angle_branches(const std::vector<double>& angle_branches) override {
+        last_turn_ = angle_branches;
+    }
+    std::size_t bytes() const override { return each_.capacity() * sizeof(Each); }
+
+    Index elements() const override { return static_cast<Index>(each_.size()); }
+    int strains_per_element() const override { return 1; }
+    Strains strains(const double* q) override;
+    Strains strain_rates(const double* p) override;
+    Strains stresses(const Strains& strains) const override;
+    void add_forces(const Strains& stresses, Residual& out) override;
+
+    /// rates() returns ds/dt at q for node velocities v. rates_vjp() adds the gradients by q, v and parameters
+    /// of a function of these rates, given its gradient by them.
+    Strains rates(const double* q, const double* v) const;
+    void rates_vjp(const double* q, const double* v, const Strains& by_rates, VectorXd& by_q, VectorXd& by_v,
+                   Gradient& out) const;
+
+    /// Adds the magnitude [N] of the forces that cancel in a stage. `beyond` [m] is how much larger the
+    /// coordinates are than in the reference shape.
+    void add_cancelling_stage_forces(double beyond, VectorXd& out) const;
+
+  private:
+    using Corners = JointForm::Corners;
+    struct Each {  // one scalar strain
+        LinkPair links;
+        JointForm form;
+        double share;  // fraction of the joint's damping
+        Slot slot;
+        Slot axis;  // if the joint has an axis
+        Joint joint;
+        bool length;
+        JointForm::Corners at_rest;  // |ds/dx|
+        double reach, damping = 0.0;
+    };
+    double strain(std::size_t k, const JointForm::Corners& at) const {
+        return each_[k].form.value(at, last_turn_[k]);
+    }
+    double stress_by_damping(std::size_t k, double strain) const;
+    /// Returns the derivative of ds/dt by the joint's axis.
+    Vec3 rate_by_axis(const Each& each, const double* q, const Corners& v) const;
+    JointForm::Local local(const Each& each, const double* q) const {
+        return each.form.at(each.links.positions(q));
+    }
+
+    std::vector<Each> each_;
+    std::vector<JointForm::Local> now_;  // at the last evaluated state
+    std::vector<double> last_turn_;
+};
+
+}  // namespace magshell

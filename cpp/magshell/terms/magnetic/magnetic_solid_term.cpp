@@ -1,0 +1,206 @@
+#include "magshell/terms/magnetic/magnetic_solid_term.h"
+
+#include "magshell/assembly/element_loop.h"
+#include "magshell/energy/magnetic_solid.h"
+#include "magshell/strain/tetrahedron.h"
+#include "magshell/terms/magnetic/field_packs.h"
+#include "magshell/terms/magnetic/total_applied_field.h"
+
+namespace magshell {
+namespace {
+
+template <class Element>
+class MagneticSolidTerm final : public Term {
+    static constexpr int N = Element::nodes, points = Element::points;
+    using Nodes = std::array<Index, N>;
+    using Point = MagneticSolid<N>;
+    struct Points {
+        Point at[points];
+    };
+    using Fields = PointFields<points>;
+
+  public:
+    MagneticSolidTerm(const Solid& solid, const std::vector<Nodes>& nodes, Index body,
+                      const ChunkLoop& chunks, const SystemMatrix& matrix, const FieldSources& sources,
+                      Registry& registry)
+        : solid_(solid),
+          body_(body),
+          loop_(nodes, chunks, matrix),
+          field_(sources, registry),
+          magnetization_(registry.values.add(solid.owner, "remanent_magnetization", "A/m", solid.n_elements(),
+                                             3, &solid.elements)),
+          elements_(loop_.packs()) {
+        for (int p = 0; p < points; ++p) shapes_[p] = shapes_at(Element(), p);
+    }
+
+    std::string_view name() const override { return Magnetic::name; }
+    Index body() const override { return body_; }
+
+    bool set_values(const Values& values) override {
+        if (!values.changed(magnetization_)) return false;
+        for (Index pack = 0; pack < loop_.packs(); ++pack)
+            for (int lane = 0; lane < Pack::width; ++lane) {
+                const Index t = loop_.element(pack, lane);
+                const RestElement<Element> rest = rest_of(t);
+                const Vec3 m = values.vector(magnetization_, t);
+                for (int p = 0; p < points; ++p) {
+                    const Eigen::Matrix<double, N, 1> alpha = gradients(rest, p) * m;
+                    elements_[pack].at[p].volume.set(lane, rest.volume[p]);
+                    for (int k = 0; k < N; ++k) elements_[pack].at[p].alpha[k].set(lane, alpha[k]);
+                }
+            }
+        return true;
+    }
+
+    double energy(const double* q, const Controls& controls) const override {
+        const std::vector<Fields> fields = sample(q, controls, 0);
+        const Pack3 everywhere = broadcast(field_.uniform(controls));
+        return loop_.sum([&](Index pack) {
+            Pack3 x[N];
+            loop_.gather(pack, q, x);
+            Pack total(0.0);
+            for (int p = 0; p < points; ++p)
+                total +=
+                    elements_[pack].at[p].energy(x, fields.empty() ? everywhere : fields[pack].at[p].flux);
+            return total;
+        });
+    }
+
+    void evaluate(const double* q, const Controls& controls, Residual& out) override {
+        const std::vector<Fields> fields = sample(q, controls, 1);
+        const Pack3 everywhere = broadcast(field_.uniform(controls)), none = broadcast(Vec3::Zero());
+        loop_.scatter_packs([&](Index pack) {
+            Pack3 x[N], g[N];
+            loop_.gather(pack, q, x);
+            std::fill_n(g, N, none);
+            for (int p = 0; p < points; ++p) {
+                const Point& point = elements_[pack].at[p];
+                point.add_gradient(fields.empty() ? everywhere : fields[pack].at[p].flux, g);
+                if (!fields.empty()) point.add_gradient_by_position(shapes_[p], x, fields[pack].at[p], g);
+            }
+            loop_.scatter(pack, g, out);
+        });
+    }
+
+    void prepare_assembly(const double* q, const Controls& controls) override {
+        fields_ = sample(q, controls, 2);
+    }
+
+    void assemble(const Chunk& chunk, const double*, const Controls&, bool,
+                  SystemMatrix& out) const override {
+        if (fields_.empty()) return;
+        ElementLoop<N>::over_packs(chunk, [&](Index pack) {
+            Pack33 h[N * (N + 1) / 2];
+            for (Pack33& block : h) std::fill_n(block.at, 9, Pack(0.0));
+            for (int p = 0; p < points; ++p)
+                elements_[pack].at[p].add_hessian(shapes_[p], fields_[pack].at[p], h);
+            loop_.scatter(pack, h, out);
+        });
+    }
+
+    // The rate of the energy along lambda, with F' and v the rates of F and of x_p,
+    //
+    //   D = - V_p (F' M . B + F M . G v),
+    //
+    // is linear in the magnetization and in the field.
+    void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override {
+        const Vec3 everywhere = field_.uniform(controls);
+        const double factor = field_.factor(controls);
+        std::vector<Vec3> places, magnetizations, rates, angle_branches;
+        at_points(q, places, magnetizations);
+        at_points(lambda, rates, angle_branches);
+        const FieldSamples samples = field_.at_factor_one(places, magnetizations);
+        FieldProbe probe;  // - V_p (F' M, F M, v)
+        probe.direction = rates;
+        for (Index t = 0; t < solid_.n_elements(); ++t) {
+            const RestElement<Element> rest = rest_of(t);
+            const Eigen::Matrix<double, 3, N> x = nodes_of(t, q), along = nodes_of(t, lambda);
+            Vec3 by_magnetization = Vec3::Zero();
+            for (int p = 0; p < points; ++p) {
+                const Index n = t * points + p;
+                const Eigen::Matrix<double, N, 3> g = gradients(rest, p);
+                const Vec3 flux = everywhere + factor * samples.flux[n],
+                           flux_rate = factor * (samples.gradient[n] * rates[n]);
+                by_magnetization -=
+                    rest.volume[p] * (g.transpose() * (along.transpose() * flux + x.transpose() * flux_rate));
+                probe.flux.push_back(-rest.volume[p] * angle_branches[n]);
+                probe.moment.push_back(-rest.volume[p] * magnetizations[n]);
+            }
+            out.values.segment<3>(magnetization_.at(t)) += by_magnetization;
+        }
+        field_.add_vjp(places, probe, samples, controls, out);
+    }
+
+    std::size_t bytes() const override { return loop_.bytes() + bytes_of(elements_) + bytes_of(fields_); }
+
+  private:
+    RestElement<Element> rest_of(Index element) const {
+        Vec3 x[N];
+        for (int k = 0; k < N; ++k) x[k] = solid_.rest(element, k);
+        return RestElement<Element>(x);
+    }
+
+    // Returns the gradients g_k of a point's shape functions, one per row.
+    static Eigen::Matrix<double, N, 3> gradients(const RestElement<Element>& rest, int p) {
+        return Element::shape_derivatives(p) * rest.gradients[p];
+    }
+
+    Eigen::Matrix<double, 3, N> nodes_of(Index element, const double* from) const {
+        Eigen::Matrix<double, 3, N> at;
+        const std::span<const Index> nodes = solid_.nodes_of(element);
+        for (int k = 0; k < N; ++k) at.col(k) = Eigen::Map<const Vec3>(from + 3 * nodes[k]);
+        return at;
+    }
+
+    // Computes x_p and F M at every point, element by element. Applied to rates it computes their rates.
+    void at_points(const double* q, std::vector<Vec3>& places, std::vector<Vec3>& magnetizations) const {
+        places.resize(static_cast<std::size_t>(solid_.n_elements()) * points);
+        magnetizations.resize(places.size());
+        loop_.each_pack([&](Index pack) {
+            Pack3 x[N];
+            loop_.gather(pack, q, x);
+            for (int p = 0; p < points; ++p) {
+                const Pack3 place = Point::position(shapes_[p], x),
+                            m = elements_[pack].at[p].magnetization(x);
+                for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+                    const Index n = loop_.element(pack, lane) * points + p;
+                    places[n] = lane_of(place, lane);
+                    magnetizations[n] = lane_of(m, lane);
+                }
+            }
+        });
+    }
+
+    // Returns the applied field at every point in packs; empty in a uniform field. Order as in
+    // AppliedField::add_samples.
+    std::vector<Fields> sample(const double* q, const Controls& controls, int order) const {
+        if (!field_.varies(controls)) return {};
+        std::vector<Vec3> places, moments;
+        at_points(q, places, moments);
+        return in_packs<points>(loop_, field_.sample(places, moments, order, controls), order,
+                                field_.uniform(controls));
+    }
+
+    const Solid& solid_;
+    const Index body_;
+    const ElementLoop<N> loop_;
+    const TotalAppliedField field_;
+    Slot magnetization_;
+    std::array<double, N> shapes_[points];
+    std::vector<Points> elements_;
+    std::vector<Fields> fields_;  // sampled for the current assembly; empty in a uniform field
+};
+
+}  // namespace
+
+std::unique_ptr<Term> make_magnetic_solid_term(const Solid& solid, Index body, const ChunkLoop& chunks,
+                                               const SystemMatrix& matrix, const FieldSources& sources,
+                                               Registry& registry) {
+    if (solid.quadratic())
+        return std::make_unique<MagneticSolidTerm<QuadraticTetrahedron>>(solid, solid.quadratic_nodes, body,
+                                                                         chunks, matrix, sources, registry);
+    return std::make_unique<MagneticSolidTerm<LinearTetrahedron>>(solid, solid.linear_nodes, body, chunks,
+                                                                  matrix, sources, registry);
+}
+
+}  // namespace magshell

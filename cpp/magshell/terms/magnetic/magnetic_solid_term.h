@@ -1,0 +1,19 @@
+// Creates the term of a magnetized solid's Zeeman energy.
+// energy/magnetic_solid.h
+#pragma once
+
+#include <memory>
+
+#include "magshell/body/solid.h"
+#include "magshell/terms/magnetic/field_sources.h"
+#include "magshell/terms/term.h"
+
+namespace magshell {
+
+/// Creates the term and registers "remanent_magnetization" [A/m], one vector per element. The sources must
+/// outlive it.
+std::unique_ptr<Term> make_magnetic_solid_term(const Solid& solid, Index body, const ChunkLoop& chunks,
+                                               const SystemMatrix& matrix, const FieldSources& sources,
+                                               Registry& registry);
+
+}  // namespace magshell

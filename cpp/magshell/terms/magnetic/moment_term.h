@@ -1,0 +1,61 @@
+// MomentTerm: rigid bodies with a magnetic moment of their own in the applied field.
+//
+//   E = - mu . B(p),   mu = R m = sum alpha_k x_k,   p = c + R (center - c~) = sum b_k x_k                      [J]
+//
+// x_k are the four corners of the body's tetrahedron (assembly/, rigid bodies), rho_k their reference positions
+// relative to its middle. With sum rho_k rho_k^T = 4 l^2 I:  alpha_k = rho_k . m / 4 l^2,  b_k = 1/4 + rho_k .
+// (center - c~) / 4 l^2.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "magshell/body/nodes.h"
+#include "magshell/terms/magnetic/total_applied_field.h"
+#include "magshell/terms/term.h"
+
+namespace magshell {
+
+class MomentTerm final : public Term {
+  public:
+    struct Magnet {
+        std::string owner;
+        std::array<Index, 4> corners;
+    };
+
+    /// Registers "magnetic_moment" and "center" of every owner. The sources must outlive the term.
+    MomentTerm(const std::vector<Magnet>& magnets, const Nodes& nodes, const FieldSources& sources,
+               const SystemMatrix& matrix, Registry& registry);
+
+    std::string_view name() const override { return "moments"; }
+    bool set_values(const Values& values) override;
+    double energy(const double* q, const Controls& controls) const override;
+    void evaluate(const double* q, const Controls& controls, Residual& out) override;
+    void finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const override;
+    void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
+    std::size_t bytes() const override { return chunks_.size() * sizeof(Chunk); }
+
+  private:
+    using Each = std::array<Vec3, 4>;
+    struct Chunk {
+        std::array<Index, 4> corners;
+        Vec3 middle;   // in the reference configuration
+        Each offsets;  // rho_k / 4 l^2
+        Slot moment, center;
+        std::array<double, 4> alpha{}, b{};
+        std::array<std::array<SystemMatrix::Slot, 4>, 4> slots;  // lower triangle
+    };
+
+    static Each at_corners(const Chunk& chunk, const double* from);
+    static Vec3 sum(const std::array<double, 4>& weights, const Each& of);
+    /// Returns the total field at the magnets, the uniform part included in `flux`, and computes the magnets'
+    /// points and moments at q.
+    FieldSamples sample(const double* q, const Controls& controls, int order, std::vector<Vec3>& points,
+                        std::vector<Vec3>& moments) const;
+
+    const TotalAppliedField field_;
+    std::vector<Chunk> chunks_;
+};
+
+}  // namespace magshell

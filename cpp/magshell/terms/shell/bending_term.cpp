@@ -1,0 +1,387 @@
+#include "magshell/terms/shell/bending_term.h"
+
+#include <cmath>
+
+#include "magshell/assembly/dihedral_angles.h"
+
+namespace magshell {
+namespace {
+
+// Prefetches entries of an array that a loop will read soon.
+template <class Array>
+void fetch(const Array& array, Index first, Index count) {
+    const Index last = std::min(first + count, static_cast<Index>(array.size()));
+    if (first >= last) return;
+    const char *at = reinterpret_cast<const char*>(&array[first]),
+               *end = reinterpret_cast<const char*>(&array[last - 1] + 1);
+    for (; at < end; at += 64) __builtin_prefetch(at);
+}
+
+}  // namespace
+
+BendingTerm::BendingTerm(const Shell& sheet, Index body, const ChunkLoop& chunks, const GrowthForm& growth,
+                         const Nodes& nodes, const SystemMatrix& matrix, Registry& registry)
+    : StrainScaffold(sheet.n_faces()),
+      sheet_(sheet),
+      body_(body),
+      chunks_(chunks),
+      nodes_(nodes),
+      first_scalar_(nodes.first_scalar()),
+      materials_(sheet, registry),
+      growth_(sheet.owner, sheet.faces, growth, registry),
+      curvature_scale_(registry.values.add(sheet.owner, "curvature_scale", "1", sheet.n_edges(), 1)),
+      stiffness_(face_packs()),
+      angle_changes_(sheet.dihedrals.size()),
+      rates_(sheet.dihedrals.size()),
+      gradients_(sheet.dihedrals.size()) {
+    face_slots_.reserve(sheet.n_faces());
+    fold_slots_.reserve(sheet.dihedrals.size());
+    for (const Stencil& s : sheet.stencils) {
+        FaceSlots& slots = face_slots_.emplace_back();
+        slots.nodes = pair_slots<6>(matrix, s.nodes);
+        for (int i = 0; i < 3; ++i) {
+            const Index r = s.rotations[i];
+            for (int k = 0; k < 6; ++k)
+                slots.rotation_nodes[6 * i + k] =
+                    r < 0 || s.nodes[k] < 0 ? -1 : matrix.rotation_slot(r, s.nodes[k]);
+            for (int j = 0; j <= i; ++j)
+                slots.rotations[lower_index(i, j)] =
+                    r < 0 || s.rotations[j] < 0 ? -1 : matrix.rotations_slot(r, s.rotations[j]);
+        }
+    }
+    for (const DihedralStencil& fold : sheet.dihedrals) {
+        fold_slots_.push_back(pair_slots<4>(matrix, fold.nodes));
+        fold_slots_.back()[lower_index(2, 2)] = -1;  // (3, 2): the two half-planes do not meet in d2theta
+    }
+}
+
+bool BendingTerm::set_values(const Values& values) {
+    const bool material_changed = materials_.set_values(values), grew = growth_.set_values(values);
+    if (!material_changed && !grew && !values.changed(curvature_scale_)) return false;
+    curvature_scales_ = Eigen::Map<const VectorXd>(values[curvature_scale_], curvature_scale_.size());
+    for (Index pack = 0; pack < face_packs(); ++pack)
+        for (int lane = 0; lane < Pack::width; ++lane) {
+            const Index f = element_of(pack, lane, sheet_.n_faces());
+            const Vec3 scale = scales_of(f);
+            const Mat3 stiffness = rest_face(f).bending_stiffness(materials_[f]);
+            const Mat3 scaled = scale.asDiagonal() * stiffness * scale.asDiagonal();
+            set_lane(stiffness_[pack], lane, scaled);
+        }
+    if (grew) find_natural_angles();
+    return true;
+}
+
+RestFace BendingTerm::rest_face(Index face) const {
+    return growth_.any() ? grown(face).face() : RestFace(sheet_.rest_corners(face).data());
+}
+
+Vec3 BendingTerm::rest_angles(Index face) const {
+    Vec3 angles = Vec3::Zero();
+    for (int i = 0; i < 3; ++i) {
+        const FaceSide& side = sheet_.sides[face][i];
+        if (side.dihedral >= 0) angles[i] = side.weight * sheet_.dihedrals[side.dihedral].rest_angle;
+    }
+    return angles;
+}
+
+void BendingTerm::find_natural_angles() {
+    std::vector<Vec3> changes(sheet_.n_faces());
+    for (Index f = 0; f < sheet_.n_faces(); ++f) changes[f] = grown(f).natural_angle_changes(rest_angles(f));
+    natural_angles_.resize(face_packs());
+    for (Index pack = 0; pack < face_packs(); ++pack)
+        for (int lane = 0; lane < Pack::width; ++lane) {
+            const Vec3 of_face = shared(changes, element_of(pack, lane, sheet_.n_faces()));
+            for (int i = 0; i < 3; ++i) natural_angles_[pack][i].set(lane, of_face[i]);
+        }
+}
+
+// With directors, each side of an edge has a natural angle of its own, also at a free edge. A hinge has one
+// angle per edge, so it takes the mean of both sides; at a free edge it has none.
+Vec3 BendingTerm::shared(const std::vector<Vec3>& of_faces, Index face) const {
+    Vec3 numbers = of_faces[face];
+    for (int i = 0; i < 3; ++i) {
+        const FaceSide& side = sheet_.sides[face][i];
+        if (side.rotation >= 0) continue;
+        if (side.dihedral < 0) {
+            numbers[i] = 0.0;
+            continue;
+        }
+        const DihedralStencil& fold = sheet_.dihedrals[side.dihedral];
+        if (!fold.right_is_point) continue;
+        numbers[i] =
+            0.5 * (of_faces[fold.left.face][fold.left.corner] + of_faces[fold.right.face][fold.right.corner]);
+    }
+    return numbers;
+}
+
+Vec3 BendingTerm::natural_angle_changes(Index face) const {
+    if (natural_angles_.empty()) return Vec3::Zero();
+    return lane_of(natural_angles_[face / Pack::width].data(), face % Pack::width);
+}
+
+void BendingTerm::add_natural_angles_vjp(const std::vector<Vec3>& by_angles, Gradient& out) const {
+    for (Index f = 0; f < sheet_.n_faces(); ++f) {
+        const GrownFace face = grown(f);
+        const GrownFace::ByNatural by = face.natural_angle_changes_vjp(rest_angles(f), shared(by_angles, f));
+        growth_.add_vjp(f, face.in_world(by.growth), face.in_world(by.curvature), out);
+    }
+}
+
+void BendingTerm::strains_vjp(const Strains& stresses, Gradient& out) const {
+    if (!growth_.any()) return;
+    std::vector<Vec3> by_angles(sheet_.n_faces());
+    for (Index f = 0; f < sheet_.n_faces(); ++f)
+        by_angles[f] = {-stresses.number(f, 0), -stresses.number(f, 1), -stresses.number(f, 2)};
+    add_natural_angles_vjp(by_angles, out);
+}
+
+Vec3 BendingTerm::scales_of(Index face) const {
+    const std::array<Index, 3>& e = sheet_.edges[face];
+    return {curvature_scales_[e[0]], curvature_scales_[e[1]], curvature_scales_[e[2]]};
+}
+
+void BendingTerm::store_dihedrals(const double* q) {
+    chunks_.each([&](const Chunk& chunk) {
+        for (Index first = chunk.first_dihedral; first < chunk.last_dihedral; first += Pack::width) {
+            const Index last = std::min(first + Pack::width, chunk.last_dihedral);
+            const DihedralAngle fold = dihedral_angles_at(sheet_, first, last, q);
+            const Pack angle = fold.angle();
+            Pack3 g[4];
+            fold.gradient(g);
+            for (int lane = 0; lane < last - first; ++lane) {
+                angle_changes_[first + lane] = angle_change(sheet_.dihedrals[first + lane], angle[lane]);
+                double* const gradient = gradients_[first + lane].data();
+                for (int k = 0; k < 4; ++k) {
+                    gradient[3 * k] = g[k].x[lane];
+                    gradient[3 * k + 1] = g[k].y[lane];
+                    gradient[3 * k + 2] = g[k].z[lane];
+                }
+            }
+        }
+    });
+}
+
+/// Computes the strains delta of a pack of faces from a number per dihedral stencil and the rotations in q. It
+/// is linear, so it serves rates as well.
+void BendingTerm::measure(Index pack, const double* q, const std::vector<double>& changes,
+                          Pack delta[3]) const {
+    const auto turn_of = [&](Index fold) { return changes[fold]; };
+    const double* rotation = q + first_scalar_;
+    const SidesOfPack sides = sides_of(pack);
+    for (int i = 0; i < 3; ++i)
+        delta[i] = pack_of([&](int lane) { return bending_strain((*sides[lane])[i], turn_of, rotation); });
+}
+
+double BendingTerm::energy(const double* q, const Controls&) const {
+    std::vector<double> changes(sheet_.dihedrals.size());
+    chunks_.each([&](const Chunk& chunk) {
+        for (Index first = chunk.first_dihedral; first < chunk.last_dihedral; first += Pack::width) {
+            const Index last = std::min(first + Pack::width, chunk.last_dihedral);
+            const Pack angle = dihedral_angles_at(sheet_, first, last, q).angle();
+            for (Index h = first; h < last; ++h)
+                changes[h] = angle_change(sheet_.dihedrals[h], angle[h - first]);
+        }
+    });
+    const auto turn_of = [&](Index fold) { return changes[fold]; };
+    const double* rotation = q + first_scalar_;
+    return chunks_.sum([&](const Chunk& chunk) {
+        double total = 0.0;
+        for (Index f = chunk.first; f < chunk.last; ++f) {
+            const Vec3 turned = natural_angle_changes(f);
+            double delta[3];
+            for (int i = 0; i < 3; ++i)
+                delta[i] = bending_strain(sheet_.sides[f][i], turn_of, rotation) - turned[i];
+            const Symmetric3& stiffness = stiffness_[f / Pack::width];
+            const int lane = f % Pack::width;
+            for (int i = 0; i < 3; ++i)
+                for (int j = 0; j < 3; ++j) total += 0.5 * delta[i] * stiffness(i, j)[lane] * delta[j];
+        }
+        return total;
+    });
+}
+
+void BendingTerm::evaluate(const double* q, const Controls&, Residual& out) {
+    store_dihedrals(q);
+    each_pack([&](Index pack) {
+        Pack delta[3];
+        strain(pack, q, delta);
+        store_stress(pack, delta);
+    });
+    add_forces(stress_, out);
+}
+
+/// Returns dE/dtheta of a dihedral angle: the sum of the stresses whose strains depend on it.
+double BendingTerm::moment(const DihedralStencil& fold, const Strains& stress) const {
+    double sum = 0.0;
+    for (const DihedralStencil::Side& side : {fold.left, fold.right})
+        if (side.face >= 0) sum += stress.number(side.face, side.corner);
+    return fold.weight() * sum;
+}
+
+void BendingTerm::add_forces(const Strains& stresses, Residual& out) {
+    // Faces that share a rotation share an edge and hence a node, so chunks of one colour do not share
+    // rotations either.
+    constexpr Index ahead = 24;  // prefetch distance [dihedral stencils]
+    chunks_.scatter([&](const Chunk& chunk) {
+        for (Index h = chunk.first_dihedral; h < chunk.last_dihedral; ++h) {
+            fetch(sheet_.dihedrals, h + ahead, 1);
+            fetch(gradients_, h + ahead, 1);
+            const double m = moment(sheet_.dihedrals[h], stresses);
+            for (int k = 0; k < 4; ++k)
+                for (int c = 0; c < 3; ++c)
+                    out.add(3 * sheet_.dihedrals[h].nodes[k] + c, m * gradients_[h][3 * k + c]);
+        }
+        for (Index f = chunk.first; f < chunk.last; ++f)
+            for (int i = 0; i < 3; ++i) {
+                const FaceSide& side = sheet_.sides[f][i];
+                if (side.rotation >= 0)
+                    out.add(first_scalar_ + side.rotation, side.sign * stresses.number(f, i));
+            }
+    });
+}
+
+void BendingTerm::assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
+                           SystemMatrix& out) const {
+    FaceLoop::over_packs(chunk, [&](Index pack) { assemble_faces(pack, out); });
+    const Strains& stress = extrapolated_stress ? extrapolated_ : stress_;
+    for (Index first = chunk.first_dihedral; first < chunk.last_dihedral; first += Pack::width)
+        assemble_dihedrals(first, std::min(first + Pack::width, chunk.last_dihedral), q, stress, out);
+}
+
+void BendingTerm::assemble_faces(Index pack, SystemMatrix& out) const {
+    const Index next = Pack::width * (pack + 1);
+    fetch(face_slots_, next, Pack::width);
+    fetch(sheet_.sides, next, Pack::width);
+    fetch(sheet_.stencils, next, Pack::width);
+    fetch(stiffness_, pack + 1, 1);
+    BendingFace face;
+    const SidesOfPack sides = sides_of(pack);
+    for (int i = 0; i < 3; ++i) {
+        static constexpr std::array<double, 12> nothing = {};
+        // For the right face of an edge, the first two nodes of the stencil are swapped, and so are its last
+        // two.
+        const double* gradient[Pack::width];
+        int swap[Pack::width];
+        for (int lane = 0; lane < Pack::width; ++lane) {
+            const FaceSide& side = (*sides[lane])[i];
+            gradient[lane] = (side.dihedral < 0 ? nothing : gradients_[side.dihedral]).data();
+            swap[lane] = side.on_left ? 0 : 3;
+        }
+        face.sign[i] = pack_of([&](int lane) { return (*sides[lane])[i].sign; });
+        const Pack weight = pack_of([&](int lane) { return (*sides[lane])[i].weight; });
+        face.corner[i][(i + 1) % 3] =
+            weight * vectors_of([&](int lane) { return gradient[lane] + swap[lane]; });
+        face.corner[i][(i + 2) % 3] =
+            weight * vectors_of([&](int lane) { return gradient[lane] + 3 - swap[lane]; });
+        face.corner[i][i] = weight * vectors_of([&](int lane) { return gradient[lane] + 6 + swap[lane]; });
+        face.beyond[i] = weight * vectors_of([&](int lane) { return gradient[lane] + 9 - swap[lane]; });
+    }
+    Pack33 blocks[21];
+    Pack3 stiff_corner[3][3], rows[3][6];
+    const Symmetric3 stiffness = history_.scaled(stiffness_[pack]);
+    face.node_blocks(stiffness, blocks, stiff_corner);
+    const bool directors = sheet_.n_rotations() > 0;
+    if (directors) face.rotation_rows(stiffness, stiff_corner, rows);
+
+    const int lanes = std::min(Pack::width, sheet_.n_faces() - pack * Pack::width);
+    for (int lane = 0; lane < lanes; ++lane) {
+        const Index f = pack * Pack::width + lane;
+        const Stencil& stencil = sheet_.stencils[f];
+        const FaceSlots& slots = face_slots_[f];
+        scatter_blocks<6>(out, stencil.nodes, slots.nodes, blocks, lane);
+        if (!directors) continue;
+        for (int i = 0; i < 3; ++i) {
+            if (stencil.rotations[i] < 0) continue;
+            for (int k = 0; k < 6; ++k)
+                if (stencil.nodes[k] >= 0)
+                    out.add_rotation_row(slots.rotation_nodes[6 * i + k], out.column_length(stencil.nodes[k]),
+                                         rows[i][k], lane);
+            for (int j = 0; j <= i; ++j)
+                if (stencil.rotations[j] >= 0)
+                    out.add(slots.rotations[lower_index(i, j)],
+                            face.sign[i][lane] * face.sign[j][lane] * stiffness(i, j)[lane]);
+        }
+    }
+}
+
+void BendingTerm::assemble_dihedrals(Index first, Index last, const double* q, const Strains& stress,
+                                     SystemMatrix& out) const {
+    const Pack moments =
+        pack_of([&](int lane) { return moment(sheet_.dihedrals[std::min(first + lane, last - 1)], stress); });
+    const DihedralHessian curvature(dihedral_angles_at(sheet_, first, last, q), moments);
+    for (Index h = first; h < last; ++h)
+        scatter_blocks<4>(out, sheet_.dihedrals[h].nodes, fold_slots_[h], curvature.block, h - first);
+}
+
+void BendingTerm::store_rates(const double* p) {
+    chunks_.each([&](const Chunk& chunk) {
+        for (Index h = chunk.first_dihedral; h < chunk.last_dihedral; ++h) {
+            rates_[h] = 0.0;
+            for (int k = 0; k < 4; ++k)
+                for (int c = 0; c < 3; ++c)
+                    rates_[h] += gradients_[h][3 * k + c] * p[3 * sheet_.dihedrals[h].nodes[k] + c];
+        }
+    });
+}
+
+// Gradient by the parameters. With C = S C~ S and S the curvature scales of the edges, dC/ds_i s_i = e_i e_i^T
+// C + C e_i e_i^T.
+void BendingTerm::vjp(const double* q, const Controls&, const double* lambda, Gradient& out) {
+    store_rates(lambda);
+    std::vector<Vec3> by_scale(sheet_.n_faces()), by_angles(growth_.any() ? sheet_.n_faces() : 0);
+    std::vector<Mat3> by_stiffness(by_angles.size());
+    each_pack([&](Index pack) {
+        Pack delta[3], along[3], stress_rate[3];
+        strain(pack, q, delta);
+        history_.apply(pack, delta);
+        rate(pack, lambda, along);
+        stiffness_[pack].times(along, stress_rate);
+        for (Index f = pack * Pack::width; f < std::min((pack + 1) * Pack::width, sheet_.n_faces()); ++f) {
+            const int lane = f % Pack::width;
+            const Vec3 d = lane_of(delta, lane), rates = lane_of(along, lane), scale = scales_of(f);
+            const Vec3 stress = lane_of(stress_.at(pack), lane);
+            const Mat3 by_poisson_ratio = rest_face(f).bending_by_poisson_ratio(materials_[f]);
+            materials_.add_vjp(f, 3, rates.dot(stress),
+                               rates.cwiseProduct(scale).dot(by_poisson_ratio * scale.cwiseProduct(d)), out);
+            by_scale[f] = (rates.cwiseProduct(stress) + d.cwiseProduct(lane_of(stress_rate, lane)))
+                              .cwiseQuotient(scale);
+            if (by_angles.empty()) continue;
+            by_angles[f] = -history_.factor() * lane_of(stress_rate, lane);
+            const GrownFace face = grown(f);
+            by_stiffness[f] = face.in_world(face.triangle().bending_by_growth(
+                materials_[f], scale.cwiseProduct(rates), scale.cwiseProduct(d)));
+        }
+    });
+    for (Index f = 0; f < static_cast<Index>(by_stiffness.size()); ++f)
+        growth_.add_vjp(f, by_stiffness[f], Mat3::Zero(), out);
+    if (growth_.any()) add_natural_angles_vjp(by_angles, out);
+    for (Index f = 0; f < sheet_.n_faces(); ++f)
+        for (int i = 0; i < 3; ++i) out.values[curvature_scale_.at(sheet_.edges[f][i])] += by_scale[f][i];
+}
+
+// Bounds round-off. A dihedral angle is exact to about one unit of round-off of a radian, or to that of the
+// positions divided by the heights of its faces. Its moments are forces at the corners, divided by the same
+// heights.
+void BendingTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
+    for (Index f = 0; f < sheet_.n_faces(); ++f) {
+        const double height = sheet_.smallest_height(f);
+        const double angle = 1.0 + 0.25 * (sheet_.largest_coordinate(f) + beyond) / height;
+        for (int i = 0; i < 3; ++i) {
+            const FaceSide& side = sheet_.sides[f][i];
+            double moment = 0.0;
+            for (int j = 0; j < 3; ++j)
+                moment += std::abs(stiffness_[f / Pack::width](i, j)[f % Pack::width]) * angle;
+            if (side.rotation >= 0) out[first_scalar_ + side.rotation] += moment;
+            for (const Index corner : sheet_.corners[f])
+                out.segment<3>(3 * corner).array() += moment / height;
+        }
+    }
+}
+
+std::size_t BendingTerm::bytes() const {
+    return bytes_of(face_slots_) + bytes_of(fold_slots_) + materials_.bytes() + growth_.bytes() +
+           bytes_of(stiffness_) + bytes_of(natural_angles_) + bytes_of_stresses() + bytes_of(angle_changes_) +
+           bytes_of(rates_) + bytes_of(gradients_);
+}
+
+}  // namespace magshell

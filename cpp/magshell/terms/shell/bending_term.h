@@ -1,0 +1,117 @@
+// BendingTerm: the bending energy of a shell of linear triangles, for both `hinge` and `midedge` bending
+// (energy/bending.h, strain/dihedral_angle.h).
+//
+// Dihedral angles and their gradients are computed once per edge; each face combines those of its three edges.
+// The Hessian is J^T C J of each face, plus the second derivative of each dihedral angle times the moment at
+// its edge.
+#pragma once
+
+#include "magshell/assembly/element_loop.h"
+#include "magshell/body/shell.h"
+#include "magshell/energy/bending.h"
+#include "magshell/energy/grown_face.h"
+#include "magshell/strain/dihedral_angle.h"
+#include "magshell/terms/shell/elastic_term.h"
+#include "magshell/terms/shell/shell_growth.h"
+#include "magshell/terms/shell/shell_materials.h"
+
+namespace magshell {
+
+class BendingTerm final : public StrainScaffold<BendingTerm> {
+  public:
+    BendingTerm(const Shell& sheet, Index body, const ChunkLoop& chunks, const GrowthForm& growth,
+                const Nodes& nodes, const SystemMatrix& matrix, Registry& registry);
+
+    std::string_view name() const override { return "bending"; }
+    Index body() const override { return body_; }
+    bool set_values(const Values& values) override;
+    bool varies() const override { return growth_.any(); }
+    double length_scale() const override { return materials_.thinnest(); }
+    double energy(const double* q, const Controls&) const override;
+    void evaluate(const double* q, const Controls&, Residual& out) override;
+    void assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
+                  SystemMatrix& out) const override;
+    void vjp(const double* q, const Controls&, const double* lambda, Gradient& out) override;
+    bool add_projective_stiffness(NodeMatrix& out) const override;
+    void add_cancelling_forces(double beyond, VectorXd& out) const override;
+    void add_forces(const Strains& stresses, Residual& out) override;
+    void strains_vjp(const Strains& stresses, Gradient& out) const override;
+    std::size_t bytes() const override;
+
+    bool grows() const { return growth_.any(); }
+    /// grown() returns the natural (stress-free) configuration of a face; natural_angle_changes() returns the
+    /// angles [rad] of its edges there, relative to the reference shape.
+    GrownFace grown(Index face) const {
+        return {sheet_.rest_corners(face), growth_.growth(face), growth_.curvature(face)};
+    }
+    Vec3 natural_angle_changes(Index face) const;
+
+  private:
+    friend class StrainScaffold<BendingTerm>;
+    struct FaceSlots {
+        PairSlots<6> nodes;
+        std::array<Index, 18> rotation_nodes;  // entry of rotation i and node k, at 6 i + k
+        std::array<Index, 6> rotations;        // entry of rotations i and j, at lower_index(i, j)
+    };
+
+    using SidesOfPack = std::array<const std::array<FaceSide, 3>*, Pack::width>;
+    SidesOfPack sides_of(Index pack) const {
+        SidesOfPack sides;
+        for (int lane = 0; lane < Pack::width; ++lane)
+            sides[lane] = &sheet_.sides[element_of(pack, lane, sheet_.n_faces())];
+        return sides;
+    }
+    Index face_packs() const { return packs_for(sheet_.n_faces()); }
+    template <class Body>
+    void each_pack(const Body& body) const {
+        chunks_.each([&](const Chunk& chunk) { FaceLoop::over_packs(chunk, body); });
+    }
+    void measure(Index pack, const double* q, const std::vector<double>& changes, Pack delta[3]) const;
+    void begin_strains(const double* q) { store_dihedrals(q); }
+    void begin_rates(const double* p) { store_rates(p); }
+    void strain(Index pack, const double* q, Pack d[3]) const {
+        measure(pack, q, angle_changes_, d);
+        if (natural_angles_.empty()) return;
+        for (int i = 0; i < 3; ++i) d[i] -= natural_angles_[pack][i];
+    }
+    void rate(Index pack, const double* p, Pack d[3]) const { measure(pack, p, rates_, d); }
+    const Symmetric3& stiffness(Index pack) const { return stiffness_[pack]; }
+    /// Returns the derivative of each reference dihedral angle with respect to its nodes along the mean normal
+    /// of the two adjacent faces.
+    std::vector<std::array<double, 4>> slopes_at_rest() const;
+    double moment(const DihedralStencil& fold, const Strains& stress) const;
+    void store_dihedrals(const double* q);
+    void store_rates(const double* p);
+    Vec3 scales_of(Index face) const;
+    RestFace rest_face(Index face) const;
+    Vec3 rest_angles(Index face) const;
+    /// Averages a number per face and edge as the two adjacent faces share it. The operation is its own
+    /// transpose.
+    Vec3 shared(const std::vector<Vec3>& of_faces, Index face) const;
+    void find_natural_angles();
+    void add_natural_angles_vjp(const std::vector<Vec3>& by_angles, Gradient& out) const;
+    void assemble_faces(Index pack, SystemMatrix& out) const;
+    void assemble_dihedrals(Index first, Index last, const double* q, const Strains& stress,
+                            SystemMatrix& out) const;
+
+    const Shell& sheet_;
+    const Index body_;
+    const ChunkLoop& chunks_;
+    const Nodes& nodes_;
+    const Index first_scalar_;
+    ShellMaterials materials_;
+    ShellGrowth growth_;
+    Slot curvature_scale_;
+    LargeVector<FaceSlots> face_slots_;
+    LargeVector<PairSlots<4>> fold_slots_;
+    VectorXd curvature_scales_;  // one per edge, [Chen22] k_cur
+    LargeVector<Symmetric3> stiffness_;
+    // natural_angle_changes() of each pack, where anything grows
+    std::vector<std::array<Pack, 3>> natural_angles_;
+    // For each dihedral stencil at the last evaluated state: theta - theta~, the rate of theta along the last
+    // extrapolated step, and its gradient by the four nodes.
+    std::vector<double> angle_changes_, rates_;
+    LargeVector<std::array<double, 12>> gradients_;
+};
+
+}  // namespace magshell

@@ -1,0 +1,234 @@
+#include "magshell/terms/shell/membrane_term.h"
+
+namespace magshell {
+
+MembraneTerm::MembraneTerm(const Surface& surface, Index body, const MembraneFaces& faces,
+                           const FaceLoop& loop, const GrowthForm& growth, const Nodes& nodes,
+                           Registry& registry)
+    : StrainScaffold(surface.n_faces()),
+      surface_(surface),
+      body_(body),
+      faces_(faces),
+      loop_(loop),
+      nodes_(nodes.n_nodes()),
+      materials_(surface, registry),
+      growth_(surface.owner, surface.faces, growth, registry),
+      elements_(loop.packs()) {
+    for (Index pack = 0; pack < loop.packs(); ++pack)
+        for (int lane = 0; lane < Pack::width; ++lane) {
+            const std::array<Vec3, 3> x = faces.rest_corners(loop.face(pack, lane));
+            for (int i = 0; i < 3; ++i)
+                elements_[pack].rest_squared_length[i].set(lane,
+                                                           (x[(i + 2) % 3] - x[(i + 1) % 3]).squaredNorm());
+        }
+}
+
+// Returns the natural configuration of a face. A face that combines parts of two faces takes their mean growth.
+GrownFace MembraneTerm::grown(Index face) const {
+    Mat3 growth = Mat3::Zero();
+    for (const MembraneFaces::FacePart& share : faces_.parts(face))
+        growth += share.part * growth_.growth(share.face);
+    return {faces_.rest_corners(face), growth, Mat3::Zero()};
+}
+
+RestFace MembraneTerm::rest_face(Index face) const {
+    if (growth_.any()) return grown(face).face();
+    const std::array<Vec3, 3> corners = faces_.rest_corners(face);
+    return RestFace(corners.data());
+}
+
+bool MembraneTerm::set_values(const Values& values) {
+    const bool material_changed = materials_.set_values(values), grew = growth_.set_values(values);
+    if (!material_changed && !grew) return false;
+    for (Index pack = 0; pack < loop_.packs(); ++pack)
+        for (int lane = 0; lane < Pack::width; ++lane) {
+            const Index f = loop_.face(pack, lane);
+            const RestFace rest = rest_face(f);
+            Mat3 stiffness = Mat3::Zero();
+            for (const MembraneFaces::FacePart& share : faces_.parts(f))
+                if (share.part > 0.0)
+                    stiffness += share.part * rest.membrane_stiffness(materials_[share.face]);
+            set_lane(elements_[pack].stiffness, lane, stiffness);
+            if (!grew) continue;
+            for (int i = 0; i < 3; ++i)
+                elements_[pack].rest_squared_length[i].set(lane, rest.edge_length[i] * rest.edge_length[i]);
+        }
+    return true;
+}
+
+// Adds A h w g_k . g_l, with the plane-stress wave modulus w = E/(1 - nu^2). With e_k the edge opposite node k,
+// g_k . g_l = e_k . e_l / 4 A^2.
+bool MembraneTerm::add_projective_stiffness(NodeMatrix& out) const {
+    for (Index f = 0; f < surface_.n_faces(); ++f) {
+        double modulus = 0.0;
+        for (const MembraneFaces::FacePart& share : faces_.parts(f)) {
+            const ShellMaterial& material = materials_[share.face];
+            modulus += share.part * material.thickness * material.young_modulus /
+                       (1.0 - material.poisson_ratio * material.poisson_ratio);
+        }
+        const std::array<Vec3, 3> x = faces_.rest_corners(f);
+        const std::array<Vec3, 3> edge{x[2] - x[1], x[0] - x[2], x[1] - x[0]};
+        const double factor = modulus / (2.0 * edge[0].cross(edge[1]).norm());
+        const std::array<Index, 3>& nodes = faces_.corners()[f];
+        for (int k = 0; k < 3; ++k) {
+            out.add_diagonal(nodes[k], factor * edge[k].squaredNorm());
+            for (int l = 0; l < k; ++l) out.add_pair(nodes[k], nodes[l], factor * edge[k].dot(edge[l]));
+        }
+    }
+    return true;
+}
+
+double MembraneTerm::energy(const double* q, const Controls&) const {
+    return loop_.sum([&](Index pack) {
+        Pack3 x[3];
+        loop_.gather(pack, q, x);
+        Pack strain[3], stress[3];
+        Membrane(x).strain(elements_[pack], strain);
+        elements_[pack].stiffness.times(strain, stress);
+        return Pack(0.5) * (strain[0] * stress[0] + strain[1] * stress[1] + strain[2] * stress[2]);
+    });
+}
+
+void MembraneTerm::evaluate(const double* q, const Controls&, Residual& out) {
+    state_.assign(q, q + 3 * nodes_);
+    loop_.scatter_packs([&](Index pack) {
+        Pack3 x[3], g[3];
+        loop_.gather(pack, q, x);
+        const Membrane membrane(x);
+        Pack strain[3];
+        membrane.strain(elements_[pack], strain);
+        store_stress(pack, strain);
+        membrane.gradient(stress_.at(pack), g);
+        loop_.scatter(pack, g, out);
+    });
+}
+
+void MembraneTerm::assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
+                            SystemMatrix& out) const {
+    const Strains& stress = extrapolated_stress ? extrapolated_ : stress_;
+    FaceLoop::over_packs(chunk, [&](Index pack) {
+        Pack3 x[3];
+        Pack33 h[6];
+        loop_.gather(pack, q, x);
+        Membrane(x).hessian(history_.scaled(elements_[pack].stiffness), stress.at(pack), h);
+        loop_.scatter(pack, h, out);
+    });
+}
+
+void MembraneTerm::strain(Index pack, const double* q, Pack d[3]) const {
+    Pack3 x[3];
+    loop_.gather(pack, q, x);
+    Membrane(x).strain(elements_[pack], d);
+}
+
+void MembraneTerm::rate(Index pack, const double* p, Pack d[3]) const {
+    Pack3 x[3], along[3];
+    loop_.gather(pack, state_.data(), x);
+    loop_.gather(pack, p, along);
+    Membrane(x).strain_rate(along, d);
+}
+
+void MembraneTerm::vjp(const double* q, const Controls&, const double* lambda, Gradient& out) {
+    // Work of each part of a face, and its derivative by the Poisson ratio. A part may belong to a face of
+    // another chunk.
+    using OfShares = std::array<Eigen::Vector2d, 2>;
+    std::vector<OfShares> by_shares(surface_.n_faces(),
+                                    OfShares{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()});
+    loop_.each_pack([&](Index pack) {
+        Pack strains[3], rates[3];
+        strain(pack, q, strains);
+        history_.apply(pack, strains);
+        rate(pack, lambda, rates);
+        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+            const Index f = loop_.face(pack, lane);
+            const Vec3 d = lane_of(strains, lane), along = lane_of(rates, lane);
+            const RestFace rest = rest_face(f);
+            for (int k = 0; k < 2; ++k) {
+                const MembraneFaces::FacePart share = faces_.parts(f)[k];
+                if (share.part == 0.0) continue;
+                const ShellMaterial& m = materials_[share.face];
+                by_shares[f][k] =
+                    share.part * Eigen::Vector2d(along.dot(rest.membrane_stiffness(m) * d),
+                                                 along.dot(rest.membrane_by_poisson_ratio(m) * d));
+            }
+        }
+    });
+    for (Index f = 0; f < surface_.n_faces(); ++f)
+        for (int k = 0; k < 2; ++k)
+            materials_.add_vjp(faces_.parts(f)[k].face, 1, by_shares[f][k][0], by_shares[f][k][1], out);
+    if (!growth_.any()) return;
+    std::vector<Mat3> by_faces(surface_.n_faces());
+    each_pack([&](Index pack) {
+        Pack strains[3], rates[3], stresses[3];
+        strain(pack, q, strains);
+        history_.apply(pack, strains);
+        rate(pack, lambda, rates);
+        elements_[pack].stiffness.times(rates, stresses);
+        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+            const Index f = loop_.face(pack, lane);
+            const GrownFace own = grown(f);
+            const Vec3 d = lane_of(strains, lane), along = lane_of(rates, lane);
+            Mat2 by_growth = own.lengths_by_growth(-history_.factor() * lane_of(stresses, lane));
+            for (const MembraneFaces::FacePart& share : faces_.parts(f))
+                if (share.part > 0.0)
+                    by_growth +=
+                        share.part * own.triangle().membrane_by_growth(materials_[share.face], along, d);
+            by_faces[f] = own.in_world(by_growth);
+        }
+    });
+    add_growth_vjp(by_faces, out);
+}
+
+void MembraneTerm::strains_vjp(const Strains& stresses, Gradient& out) const {
+    if (!growth_.any()) return;
+    std::vector<Mat3> by_faces(surface_.n_faces());
+    for (Index f = 0; f < surface_.n_faces(); ++f) {
+        const GrownFace own = grown(f);
+        by_faces[f] = own.in_world(
+            own.lengths_by_growth({-stresses.number(f, 0), -stresses.number(f, 1), -stresses.number(f, 2)}));
+    }
+    add_growth_vjp(by_faces, out);
+}
+
+void MembraneTerm::add_growth_vjp(const std::vector<Mat3>& by_faces, Gradient& out) const {
+    for (Index f = 0; f < surface_.n_faces(); ++f)
+        for (const MembraneFaces::FacePart& share : faces_.parts(f))
+            if (share.part > 0.0) growth_.add_vjp(share.face, share.part * by_faces[f], Mat3::Zero(), out);
+}
+
+void MembraneTerm::add_forces(const Strains& stresses, Residual& out) {
+    loop_.scatter_packs([&](Index pack) {
+        Pack3 x[3], g[3];
+        loop_.gather(pack, state_.data(), x);
+        Membrane(x).gradient(stresses.at(pack), g);
+        loop_.scatter(pack, g, out);
+    });
+}
+
+// Bounds round-off: |a|^2 has its own, and that of the positions whose difference a is. Far from the origin, or
+// in slender faces, the latter is larger.
+void MembraneTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
+    for (Index f = 0; f < surface_.n_faces(); ++f) {
+        const Membrane::Element& element = elements_[f / Pack::width];
+        const int lane = f % Pack::width;
+        const double coordinate = surface_.largest_coordinate(f) + beyond;
+        for (int i = 0; i < 3; ++i) {
+            double stress = 0.0;
+            for (int j = 0; j < 3; ++j) {
+                const double squared_length = element.rest_squared_length[j][lane];
+                stress += std::abs(element.stiffness(i, j)[lane]) *
+                          (squared_length + 0.25 * std::sqrt(squared_length) * coordinate);
+            }
+            const double force = 2.0 * stress * std::sqrt(element.rest_squared_length[i][lane]);
+            for (const int k : {(i + 1) % 3, (i + 2) % 3})
+                out.segment<3>(3 * faces_.corners()[f][k]).array() += force;
+        }
+    }
+}
+
+std::size_t MembraneTerm::bytes() const {
+    return materials_.bytes() + growth_.bytes() + bytes_of(elements_) + bytes_of_stresses() +
+           bytes_of(state_);
+}
+
+}  // namespace magshell

@@ -1,0 +1,65 @@
+// MembraneTerm: the membrane energy of a shell of linear triangles, energy/membrane.h on every face.
+#pragma once
+
+#include "magshell/assembly/element_loop.h"
+#include "magshell/body/membrane_faces.h"
+#include "magshell/energy/grown_face.h"
+#include "magshell/energy/membrane.h"
+#include "magshell/terms/shell/elastic_term.h"
+#include "magshell/terms/shell/shell_growth.h"
+#include "magshell/terms/shell/shell_materials.h"
+
+namespace magshell {
+
+class MembraneTerm final : public StrainScaffold<MembraneTerm> {
+  public:
+    /// Creates the term. `loop` iterates over the corners of `faces`.
+    MembraneTerm(const Surface& surface, Index body, const MembraneFaces& faces, const FaceLoop& loop,
+                 const GrowthForm& growth, const Nodes& nodes, Registry& registry);
+
+    std::string_view name() const override { return Membrane::name; }
+    Index body() const override { return body_; }
+    bool set_values(const Values& values) override;
+    bool varies() const override { return growth_.any(); }
+    double length_scale() const override { return materials_.thinnest(); }
+    double energy(const double* q, const Controls&) const override;
+    void evaluate(const double* q, const Controls&, Residual& out) override;
+    void assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
+                  SystemMatrix& out) const override;
+    void vjp(const double* q, const Controls&, const double* lambda, Gradient& out) override;
+    bool add_projective_stiffness(NodeMatrix& out) const override;
+    void add_cancelling_forces(double beyond, VectorXd& out) const override;
+    void add_forces(const Strains& stresses, Residual& out) override;
+    void strains_vjp(const Strains& stresses, Gradient& out) const override;
+    std::size_t bytes() const override;
+
+    bool grows() const { return growth_.any(); }
+    /// Returns the natural (stress-free) configuration of a face, from which strains are measured.
+    GrownFace grown(Index face) const;
+
+  private:
+    friend class StrainScaffold<MembraneTerm>;
+    template <class Body>
+    void each_pack(const Body& body) const {
+        loop_.each_pack(body);
+    }
+    void begin_strains(const double*) {}
+    void begin_rates(const double*) {}
+    void strain(Index pack, const double* q, Pack d[3]) const;
+    void rate(Index pack, const double* p, Pack d[3]) const;
+    RestFace rest_face(Index face) const;
+    void add_growth_vjp(const std::vector<Mat3>& by_faces, Gradient& out) const;
+    const Symmetric3& stiffness(Index pack) const { return elements_[pack].stiffness; }
+
+    const Surface& surface_;
+    const Index body_;
+    const MembraneFaces& faces_;
+    const FaceLoop& loop_;
+    const Index nodes_;
+    ShellMaterials materials_;
+    ShellGrowth growth_;
+    LargeVector<Membrane::Element> elements_;
+    std::vector<double> state_;  // positions of the last evaluated state
+};
+
+}  // namespace magshell

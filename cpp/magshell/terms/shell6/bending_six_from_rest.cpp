@@ -1,0 +1,167 @@
+// The Hessian of the reference shape with edge rotations measured from the reference orientation of the edge:
+// they are then the rotation of the shell's normal there.
+//
+// Between two faces, a face measures w (theta_left + theta_right) +- phi at an edge, with theta_left and
+// theta_right the rotations of the faces about the edge, phi the rotation relative to their mean, and w = 1/2.
+// With psi = phi + (theta_right - theta_left) / 2 this is theta_left + psi on one side and theta_right - psi on
+// the other, so each face depends on its own nodes only.
+#include "magshell/terms/shell6/bending_six_term.h"
+#include "magshell/terms/side_nodes.h"
+
+namespace magshell {
+
+void BendingSixTerm::count_rotations_from_rest(bool from_rest) {
+    from_rest_ = from_rest;
+    if (!from_rest) side_rotations_ = {};
+}
+
+void BendingSixTerm::prepare_assembly(const double* q, const Controls&) {
+    if (!from_rest_) return;
+    side_rotations_.resize(sheet_.dihedrals.size());
+    chunks_.each([&](const Chunk& chunk) {
+        for (Index first = chunk.first_dihedral; first < chunk.last_dihedral; first += Pack::width) {
+            const Index last = std::min(first + Pack::width, chunk.last_dihedral);
+            for (int g = 0; g < 2; ++g) {
+                const std::array<DihedralAngleSix::Side, 2> sides = dihedrals_at(first, last, g, q).sides();
+                for (int lane = 0; lane < last - first; ++lane)
+                    for (int side = 0; side < 2; ++side)
+                        side_rotations_[first + lane][g][side] = {lane_of(sides[side].along, lane),
+                                                                  sides[side].foot[lane]};
+            }
+        }
+    });
+}
+
+/// Calls visit(dof of the rotation, node, weight of the node in (theta_right - theta_left) / 2) for all
+/// rotations.
+template <class Visit>
+void BendingSixTerm::each_half_rotation(const Visit& visit) const {
+    for (std::size_t h = 0; h < sheet_.dihedrals.size(); ++h) {
+        const DihedralSixStencil& fold = sheet_.dihedrals[h];
+        if (!fold.right_is_face) continue;
+        const FaceSideSix& left = sheet_.sides[fold.left.face][fold.left.corner];
+        for (int g = 0; g < 2; ++g)
+            for (const bool on_left : {true, false}) {
+                const SideRotation& turn = side_rotations_[h][g][on_left ? 0 : 1];
+                const Vec3 half = (on_left ? -0.5 : 0.5) * turn.along;
+                for (int index = 0; index < 6; ++index)
+                    visit(first_scalar_ + left.rotation[g], fold.nodes[node_on_side(index, on_left)],
+                          DihedralAngleSix::side_weight(g, index, turn.foot) * half);
+            }
+    }
+}
+
+void BendingSixTerm::rotations_from_sides(VectorXd& motion) const {
+    each_half_rotation([&](Index rotation, Index node, const Vec3& by_node) {
+        motion[rotation] -= by_node.dot(motion.segment<3>(3 * node));
+    });
+}
+
+void BendingSixTerm::forces_from_rest(VectorXd& forces) const {
+    if (forces.tail(forces.size() - first_scalar_).isZero(0.0)) return;
+    each_half_rotation([&](Index rotation, Index node, const Vec3& by_node) {
+        forces.segment<3>(3 * node) -= forces[rotation] * by_node;
+    });
+}
+
+void BendingSixTerm::assemble_from_rest(Index pack, const double* q, SystemMatrix& out) const {
+    Pack3 x[6];
+    SixNodeRows rows;
+    loop_.gather(pack, q, x);
+    BendingSix(x).rows(elements_[pack], rows);
+    // The only nodes outside a face are the directors of clamped edges.
+    Pack3 held[3][2] = {};
+    Pack sign[3] = {};
+    std::array<bool, 3> any_held{};
+    for (int lane = 0; lane < Pack::width; ++lane)
+        for (int i = 0; i < 3; ++i) {
+            const FaceSideSix& side = sheet_.sides[loop_.element(pack, lane)][i];
+            sign[i].set(lane, side.sign);
+            if (side.dihedral < 0) continue;
+            const bool is_held = !sheet_.dihedrals[side.dihedral].right_is_face;
+            any_held[i] |= is_held;
+            const SideNodes& at = side.on_left ? left_side : right_side;
+            const std::array<int, 6> own = face_order(i);
+            for (int g = 0; g < 2; ++g) {
+                const int point = side.point(g);
+                const std::array<double, 27>& by_node = dihedrals_[side.dihedral][point].gradient;
+                const SideRotation& turn = side_rotations_[side.dihedral][point][side.on_left ? 0 : 1];
+                const auto part = [&](int a) -> Vec3 {
+                    if (is_held) return Vec3(by_node.data() + 3 * a);
+                    return DihedralAngleSix::side_weight(point, index_on_side(a), turn.foot) * turn.along;
+                };
+                for (int k = 0; k < 6; ++k) {
+                    Pack3& row = rows.at[3 * i + g][own[k]];
+                    set_lane(row, lane, lane_of(row, lane) + part(at.own[k]));
+                }
+                if (is_held) set_lane(held[i][g], lane, part(at.beyond));
+            }
+        }
+    const Symmetric9 stiffness = history_.scaled(stiffness_[pack]);
+    const SixNodeRows stiff = rows.times(stiffness);
+    Pack33 h[21];
+    rows.blocks(stiff, h);
+    loop_.scatter(pack, h, out);
+    Pack3 beside[6][6];
+    for (int a = 0; a < 6; ++a)
+        for (int k = 0; k < 6; ++k) beside[a][k] = sign[a / 2] * stiff.at[3 * (a / 2) + a % 2][k];
+    for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+        const Index f = loop_.element(pack, lane);
+        const std::array<Index, 6>& nodes = sheet_.own_nodes[f];
+        Index length[6];
+        for (int k = 0; k < 6; ++k) length[k] = out.column_length(nodes[k]);
+        for (int a = 0; a < 6; ++a)
+            if (sheet_.stencils[f].rotations[a] >= 0)
+                for (int k = 0; k < 6; ++k)
+                    out.add_rotation_row(face_slots_[f].rotation_nodes[a][k], length[k], beside[a][k], lane);
+        add_rotations(pack, lane, sign, stiffness, out);
+    }
+    if (any_held[0] || any_held[1] || any_held[2]) add_held(pack, held, sign, stiffness, stiff, out);
+}
+
+/// Adds the blocks between the fixed directors of clamped edges and the nodes and rotations of their faces, and
+/// among directors.
+void BendingSixTerm::add_held(Index pack, const Pack3 (&held)[3][2], const Pack sign[3],
+                              const Symmetric9& stiffness, const SixNodeRows& stiff,
+                              SystemMatrix& out) const {
+    for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+        const Index f = loop_.element(pack, lane);
+        const std::array<Index, 15>& nodes = sheet_.stencils[f].nodes;
+        const auto is_held = [&](int i) {
+            const Index fold = sheet_.sides[f][i].dihedral;
+            return fold >= 0 && !sheet_.dihedrals[fold].right_is_face;
+        };
+        const auto add = [&](int row, int column, const Pack33& block) {
+            const SystemMatrix::Slot slot = face_slots_[f].nodes[lower_index(row - 1, column)];
+            if (slot == same_node) out.add_block_and_transpose(nodes[row], block, lane);
+            if (slot >= 0)
+                out.add_block(slot, out.column_length(nodes[slot & 1 ? row : column]), block, lane);
+        };
+        for (int i = 0; i < 3; ++i) {
+            if (!is_held(i)) continue;
+            const int row = 6 + 3 * i;
+            for (int k = 0; k < 6; ++k)
+                add(row, k,
+                    outer(held[i][0], stiff.at[3 * i][k]) + outer(held[i][1], stiff.at[3 * i + 1][k]));
+            for (int j = 0; j < 3; ++j) {
+                Pack3 felt[2];  // coupling with the strains of edge j
+                for (int g = 0; g < 2; ++g)
+                    felt[g] = stiffness(3 * i, 3 * j + g) * held[i][0] +
+                              stiffness(3 * i + 1, 3 * j + g) * held[i][1];
+                if (is_held(j) && j <= i) {
+                    const Pack33 block = outer(felt[0], held[j][0]) + outer(felt[1], held[j][1]);
+                    if (j == i)
+                        out.add_diagonal_block(nodes[row], block, lane);
+                    else
+                        add(row, 6 + 3 * j, block);
+                }
+                for (int g = 0; g < 2; ++g)
+                    if (sheet_.stencils[f].rotations[2 * j + g] >= 0)
+                        out.add_rotation_row(face_slots_[f].rotation_nodes[2 * j + g][row],
+                                             out.column_length(nodes[row]), sign[j] * felt[g], lane);
+            }
+        }
+    }
+}
+
+}  // namespace magshell

@@ -1,0 +1,137 @@
+// BendingSixTerm: the bending energy of a shell of quadratic triangles. Its strains combine the curvature
+// inside each face (energy/bending_six.h) with the dihedral angle and the director rotation at two Gauss points
+// of each edge (strain/dihedral_angle_six.h).
+//
+// The structure is that of BendingTerm: dihedral angles are computed once per edge and combined by the faces;
+// the Hessian is J^T C J of each face plus the second derivatives of its curvature and of each dihedral angle,
+// scaled by the moments.
+#pragma once
+
+#include "magshell/assembly/element_loop.h"
+#include "magshell/body/six_node_shell.h"
+#include "magshell/energy/bending_six.h"
+#include "magshell/energy/grown_six.h"
+#include "magshell/energy/six_node_face.h"
+#include "magshell/strain/dihedral_angle_six.h"
+#include "magshell/terms/shell/elastic_term.h"
+#include "magshell/terms/shell/shell_growth.h"
+#include "magshell/terms/shell/shell_materials.h"
+
+namespace magshell {
+
+class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
+  public:
+    BendingSixTerm(const SixNodeShell& sheet, Index body, const ChunkLoop& chunks, const Nodes& nodes,
+                   const GrowthForm& growth, const SystemMatrix& matrix, Registry& registry);
+
+    std::string_view name() const override { return "bending"; }
+    Index body() const override { return body_; }
+    bool set_values(const Values& values) override;
+    bool varies() const override { return growth_.any(); }
+    double length_scale() const override { return materials_.thinnest(); }
+    double energy(const double* q, const Controls&) const override;
+    void evaluate(const double* q, const Controls&, Residual& out) override;
+    void prepare_assembly(const double* q, const Controls&) override;
+    void assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
+                  SystemMatrix& out) const override;
+    void vjp(const double* q, const Controls&, const double* lambda, Gradient& out) override;
+    bool add_projective_stiffness(NodeMatrix& out) const override;
+    void add_cancelling_forces(double beyond, VectorXd& out) const override;
+    void add_forces(const Strains& stresses, Residual& out) override;
+    void strains_vjp(const Strains& stresses, Gradient& out) const override;
+    void count_rotations_from_rest(bool from_rest) override;
+    void rotations_from_sides(VectorXd& motion) const override;
+    void forces_from_rest(VectorXd& forces) const override;
+    std::size_t bytes() const override;
+
+    /// Returns the strains d at q without changing the term.
+    Strains strains_at(const double* q) const;
+    const SixNodeFace& rest(Index face) const { return rest_[face]; }
+    bool grows() const { return growth_.any(); }
+    /// Returns the natural (stress-free) configuration of a face, from which strains are measured.
+    GrownSix grown(Index face) const {
+        return {sheet_.rest[face], growth_.growth(face), growth_.curvature(face)};
+    }
+
+  private:
+    friend class StrainScaffold<BendingSixTerm, 9>;
+    // The dihedral angle at one Gauss point of an edge, at the last evaluated state.
+    struct DihedralState {
+        double angle_change;              // change of the dihedral angle, theta - theta~ [rad]
+        std::array<double, 27> gradient;  // by the nine nodes of the stencil
+        double rate;                      // of theta, along the last step of store_rates()
+    };
+    using DihedralStates = std::array<DihedralState, 2>;
+    // The rotation of one adjacent face about the edge: see DihedralAngleSix::sides.
+    struct SideRotation {
+        Vec3 along;
+        double foot;
+    };
+    using SideRotations = std::array<std::array<SideRotation, 2>, 2>;  // [point][0: left, 1: right]
+    struct FaceSlots {
+        PairSlots<15> nodes;
+        std::array<std::array<Index, 15>, 6> rotation_nodes;
+        std::array<Index, 21> rotations;  // at lower_index(a, b)
+    };
+
+    template <class Body>
+    void each_pack(const Body& body) const {
+        loop_.each_pack(body);
+    }
+    /// Returns theta - theta~ [rad] at both points of every dihedral stencil.
+    std::vector<std::array<double, 2>> angle_changes_at(const double* q) const;
+    DihedralAngleSix dihedrals_at(Index first, Index last, int point, const double* q) const;
+    double angle_change(Index fold, int point, double angle) const;
+    template <class Turn>
+    void measure(Index pack, const double* q, const Turn& turn, Pack d[9]) const;
+    void interior(Index pack, const double* q, Pack f[9]) const;
+    Vec9 rest_angles(Index face) const;
+    void grow();
+    void add_growth_vjp(const double* q, const double* lambda, Gradient& out) const;
+    GrownFace::ByNatural strains_by_growth(const GrownSix& face, Index number, const Vec9& by,
+                                           const Vec9& interior) const;
+    void begin_strains(const double* q) { store_dihedrals(q); }
+    void begin_rates(const double* p) { store_rates(p); }
+    void strain(Index pack, const double* q, Pack d[9]) const;
+    void rate(Index pack, const double* p, Pack d[9]) const;
+    const Symmetric9& stiffness(Index pack) const { return stiffness_[pack]; }
+    /// Returns the derivative of each reference dihedral angle, at both points, with respect to its nodes along
+    /// the mean normal of the two sides.
+    std::vector<std::array<std::array<double, 9>, 2>> slopes_at_rest() const;
+    void store_dihedrals(const double* q);
+    void store_rates(const double* p);
+    double moment(const DihedralSixStencil& fold, int point, const Strains& stress) const;
+    void assemble_faces(Index pack, const double* q, const Strains& stress, SystemMatrix& out) const;
+    void assemble_from_rest(Index pack, const double* q, SystemMatrix& out) const;
+    void add_held(Index pack, const Pack3 (&held)[3][2], const Pack sign[3], const Symmetric9& stiffness,
+                  const SixNodeRows& stiff, SystemMatrix& out) const;
+    void add_rotations(Index pack, int lane, const Pack sign[3], const Symmetric9& stiffness,
+                       SystemMatrix& out) const;
+    template <class Visit>
+    void each_half_rotation(const Visit& visit) const;
+    void assemble_dihedrals(Index first, Index last, const double* q, const Strains& stress,
+                            SystemMatrix& out) const;
+
+    const SixNodeShell& sheet_;
+    const Index body_;
+    const Nodes& nodes_;
+    const Index first_scalar_;
+    const ChunkLoop& chunks_;
+    ElementLoop<6> loop_;
+    ShellMaterials materials_;
+    ShellGrowth growth_;
+    std::vector<SixNodeFace> rest_;
+    std::vector<BendingSix::Element> elements_;
+    std::vector<std::array<Pack, 9>> rest_measures_;
+    std::vector<Vec9> rest_inside_;  // curvature measures of the reference shape, where anything grows
+    std::vector<FaceSlots> face_slots_;
+    std::vector<PairSlots<9>> dihedral_slots_;
+    std::vector<Symmetric9> stiffness_;
+    std::vector<DihedralStates> dihedrals_;
+    std::vector<double> state_;  // the positions of the last evaluated state
+    bool from_rest_ = false;
+    // for each edge, while rotations are measured from the reference orientation
+    std::vector<SideRotations> side_rotations_;
+};
+
+}  // namespace magshell

@@ -1,0 +1,16 @@
+#include "magshell/energy/neo_hookean.h"
+#include "magshell/terms/solid/solid_materials.h"
+#include "magshell/terms/solid/tetrahedra_term.h"
+
+namespace magshell {
+
+std::unique_ptr<SolidTerm> make_isochoric_term(const SolidResponse& response, const Solid& solid, Index body,
+                                               const ChunkLoop& chunks, const SystemMatrix& matrix,
+                                               const Nodes& nodes, Registry& registry) {
+    if (response.material == "NeoHookean isochoric")
+        return make_tetrahedra_term<InvariantSolid<NeoHookeanIsochoric>, LameModuli>(
+            response.mean_volume, solid, body, chunks, matrix, nodes, registry);
+    return nullptr;
+}
+
+}  // namespace magshell

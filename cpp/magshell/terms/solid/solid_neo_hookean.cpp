@@ -1,0 +1,20 @@
+#include "magshell/energy/neo_hookean.h"
+#include "magshell/terms/solid/solid_materials.h"
+#include "magshell/terms/solid/tetrahedra_term.h"
+
+namespace magshell {
+
+std::unique_ptr<SolidTerm> make_neo_hookean_term(const SolidResponse& response, const Solid& solid,
+                                                 Index body, const ChunkLoop& chunks,
+                                                 const SystemMatrix& matrix, const Nodes& nodes,
+                                                 Registry& registry) {
+    if (response.material == "NeoHookean ln J")
+        return make_tetrahedra_term<InvariantSolid<NeoHookeanLogarithm>, LameModuli>(
+            response.mean_volume, solid, body, chunks, matrix, nodes, registry);
+    if (response.material == "NeoHookean J")
+        return make_tetrahedra_term<InvariantSolid<NeoHookeanVolume>, LameModuli>(
+            response.mean_volume, solid, body, chunks, matrix, nodes, registry);
+    return nullptr;
+}
+
+}  // namespace magshell

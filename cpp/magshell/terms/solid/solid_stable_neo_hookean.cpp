@@ -1,0 +1,20 @@
+#include "magshell/energy/stable_neo_hookean.h"
+#include "magshell/terms/solid/solid_materials.h"
+#include "magshell/terms/solid/tetrahedra_term.h"
+
+namespace magshell {
+
+std::unique_ptr<SolidTerm> make_stable_neo_hookean_term(const SolidResponse& response, const Solid& solid,
+                                                        Index body, const ChunkLoop& chunks,
+                                                        const SystemMatrix& matrix, const Nodes& nodes,
+                                                        Registry& registry) {
+    if (response.material == "StableNeoHookean")
+        return make_tetrahedra_term<InvariantSolid<StableNeoHookean>, LameModuli>(
+            response.mean_volume, solid, body, chunks, matrix, nodes, registry);
+    if (response.material == "StableNeoHookean barrier")
+        return make_tetrahedra_term<InvariantSolid<StableNeoHookeanBarrier>, LameModuli>(
+            response.mean_volume, solid, body, chunks, matrix, nodes, registry);
+    return nullptr;
+}
+
+}  // namespace magshell

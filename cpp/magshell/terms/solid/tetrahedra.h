@@ -1,0 +1,299 @@
+// Tetrahedra: the elements of a solid, all of one kind and one material: their reference shapes, constants,
+// energies and admissible steps.
+//
+//   E = sum over elements  sum_p V_p W(F_p)           W = w + U(v), v the material's measure of volume
+//   mean:                  sum_p V_p w(F_p) + V U(v^), v^ = sum_p V_p v_p / V
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "magshell/assembly/element_loop.h"
+#include "magshell/energy/st_venant_kirchhoff.h"
+#include "magshell/strain/cubic_root.h"
+#include "magshell/strain/tetrahedron.h"
+#include "magshell/terms/solid/solid_moduli.h"
+#include "magshell/terms/solid/solid_term.h"
+
+namespace magshell {
+
+template <class Element, class Material, class Moduli, bool mean>
+class Tetrahedra : public SolidTerm {
+  public:
+    Tetrahedra(const Solid& solid, const std::vector<std::array<Index, Element::nodes>>& element_nodes,
+               Index body, const ChunkLoop& chunks, const SystemMatrix& matrix, Registry& registry)
+        : solid_(solid),
+          body_(body),
+          loop_(element_nodes, chunks, matrix),
+          element_nodes_(element_nodes),
+          moduli_(solid, registry),
+          rest_(loop_.packs()),
+          constants_(loop_.packs()),
+          height_(solid.smallest_height()) {
+        for (Index pack = 0; pack < loop_.packs(); ++pack)
+            for (int lane = 0; lane < Pack::width; ++lane) {
+                Vec3 x[N];
+                for (int k = 0; k < N; ++k) x[k] = solid.rest(loop_.element(pack, lane), k);
+                const RestElement<Element> at(x);
+                for (int p = 0; p < points; ++p) {
+                    rest_[pack].volume[p].set(lane, at.volume[p]);
+                    for (int k = 0; k < 3; ++k)
+                        set_lane(rest_[pack].gradients[p][k], lane, Vec3(at.gradients[p].row(k)));
+                }
+            }
+    }
+
+    Index body() const override { return body_; }
+    Index elements() const override { return solid_.n_elements(); }
+    /// Returns the smallest height of an element [m]: a displacement of that size changes strains by about one.
+    double length_scale() const override { return height_; }
+
+    bool set_values(const Values& values) override {
+        if (!moduli_.set_values(values)) return false;
+        double c[n_constants];
+        for (Index pack = 0; pack < loop_.packs(); ++pack)
+            for (int lane = 0; lane < Pack::width; ++lane) {
+                moduli_.constants(loop_.element(pack, lane), c);
+                for (int k = 0; k < n_constants; ++k) constants_[pack].at[k].set(lane, c[k]);
+            }
+        return true;
+    }
+
+    double energy(const double* q, const Controls&) const override {
+        return loop_.sum([&](Index pack) {
+            const State state(*this, pack, q);
+            Pack total = mean ? rest_[pack].total() * state.volumetric[0].energy : Pack(0.0);
+            for (int p = 0; p < points; ++p) {
+                Pack density = state.at[p].energy(constants_[pack].at);
+                if constexpr (!mean) density += state.volumetric[p].energy;
+                total += rest_[pack].volume[p] * density;
+            }
+            return total;
+        });
+    }
+
+    /// Adds w sum_p V_p g_k . g_l. The weight w is the material's own, or the P-wave modulus of the reference
+    /// configuration, 2 mu + lambda.
+    bool add_projective_stiffness(NodeMatrix& out) const override {
+        for (Index pack = 0; pack < loop_.packs(); ++pack) {
+            const RestModuli moduli = Material::rest_moduli(constants_[pack].at);
+            Pack weight = Pack(2.0) * moduli.mu + moduli.lambda;
+            if constexpr (requires { Material::projective_weight(constants_[pack].at); })
+                weight = Material::projective_weight(constants_[pack].at);
+            Pack sum[N][N];
+            for (int p = 0; p < points; ++p) {
+                Pack3 g[N];
+                Element::gradients(rest_[pack].gradients[p], p, g);
+                for (int k = 0; k < N; ++k)
+                    for (int l = 0; l <= k; ++l) {
+                        const Pack share = weight * rest_[pack].volume[p] * dot(g[k], g[l]);
+                        sum[k][l] = p == 0 ? share : sum[k][l] + share;
+                    }
+            }
+            for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+                const std::array<Index, N>& nodes = element_nodes_[loop_.element(pack, lane)];
+                for (int k = 0; k < N; ++k) {
+                    out.add_diagonal(nodes[k], sum[k][k][lane]);
+                    for (int l = 0; l < k; ++l) out.add_pair(nodes[k], nodes[l], sum[k][l][lane]);
+                }
+            }
+        }
+        return true;
+    }
+
+    bool has_infeasible_states() const override { return Material::refuses_inversion; }
+
+    double max_step_length(const double* q, const double* step) const override {
+        std::vector<double> of_packs(loop_.packs(), 1.0);
+        loop_.each_pack([&](Index pack) {
+            Pack3 x[N], d[N];
+            loop_.gather(pack, q, x);
+            loop_.gather(pack, step, d);
+            for (int p = 0; p < points; ++p) {
+                Pack c[4];
+                determinant_along(gradient_of(pack, p, x), gradient_of(pack, p, d), c);
+                for (int lane = 0; lane < Pack::width; ++lane) {
+                    const double cubic[4] = {c[0][lane], c[1][lane], c[2][lane], c[3][lane]};
+                    if (cubic[0] > std::abs(cubic[1]) + std::abs(cubic[2]) + std::abs(cubic[3])) continue;
+                    of_packs[pack] = std::min(of_packs[pack], first_root(cubic, 1.0));
+                }
+            }
+        });
+        return *std::min_element(of_packs.begin(), of_packs.end());
+    }
+
+    std::string invalid_state_reason(const double* q) const override {
+        Index first = std::numeric_limits<Index>::max();
+        double least = 0.0;
+        for (Index pack = 0; pack < loop_.packs(); ++pack) {
+            Pack3 x[N];
+            loop_.gather(pack, q, x);
+            for (int p = 0; p < points; ++p) {
+                const Pack33 f = gradient_of(pack, p, x);
+                const Pack j = determinant(f, cofactor(f));
+                for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+                    const Index user = solid_.elements.user[loop_.element(pack, lane)];
+                    if (j[lane] > 0.0 || user >= first) continue;
+                    first = user;
+                    least = j[lane];
+                }
+            }
+        }
+        if (first == std::numeric_limits<Index>::max()) return {};
+        return "element " + std::to_string(first) + " of " + solid_.owner +
+               " is turned inside out (J = " + std::to_string(least) +
+               "), for which its material has no energy";
+    }
+
+    void add_cancelling_forces(double beyond, VectorXd& out) const override {
+        for (Index t = 0; t < solid_.n_elements(); ++t) {
+            const Rest& rest = rest_[t / Pack::width];
+            const int lane = t % Pack::width;
+            const double stiffness = moduli_.size(t);
+            double coordinate = beyond;
+            for (int k = 0; k < N; ++k)
+                coordinate =
+                    std::max(coordinate, beyond + solid_.rest(t, k).template lpNorm<Eigen::Infinity>());
+            for (int p = 0; p < points; ++p) {
+                Pack3 g[N];
+                Element::gradients(rest.gradients[p], p, g);
+                double steepest = 0.0;
+                for (int k = 0; k < N; ++k) steepest = std::max(steepest, lane_of(g[k], lane).norm());
+                const double stress = stiffness * (1.0 + 0.25 * coordinate * steepest) * rest.volume[p][lane];
+                for (int k = 0; k < N; ++k)
+                    out.segment<3>(3 * element_nodes_[t][k]).array() += stress * lane_of(g[k], lane).norm();
+            }
+        }
+    }
+
+    PointStates point_states(const double* q) const override {
+        const std::size_t count = static_cast<std::size_t>(elements()) * points;
+        PointStates out{points, std::vector<Mat3>(count), std::vector<Mat3>(count),
+                        std::vector<double>(count)};
+        loop_.each_pack([&](Index pack) {
+            const State state(*this, pack, q);
+            for (int p = 0; p < points; ++p) {
+                Pack s[Material::stresses];
+                state.at[p].stress(constants_[pack].at, state.of(p).pressure, s);
+                const Pack33& f = state.f[p];
+                const Pack33 cauchy = Pack(1.0) / determinant(f, cofactor(f)) *
+                                      multiply(state.at[p].piola(constants_[pack].at, s), transpose(f));
+                for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+                    const std::size_t at =
+                        static_cast<std::size_t>(solid_.elements.user[loop_.element(pack, lane)]) * points +
+                        p;
+                    for (int k = 0; k < 9; ++k) {
+                        out.deformation_gradients[at](k / 3, k % 3) = f.at[k][lane];
+                        out.cauchy_stresses[at](k / 3, k % 3) = cauchy.at[k][lane];
+                    }
+                    out.volumes[at] = rest_[pack].volume[p][lane];
+                }
+            }
+        });
+        return out;
+    }
+
+  protected:
+    static constexpr int N = Element::nodes, points = Element::points, n_constants = Material::constants;
+
+    struct Rest {
+        Pack3 gradients[points][3];
+        Pack volume[points];
+
+        Pack total() const {
+            Pack sum = volume[0];
+            for (int p = 1; p < points; ++p) sum += volume[p];
+            return sum;
+        }
+    };
+    struct Constants {
+        Pack at[n_constants];
+    };
+    // The kinematics and the volumetric response of a pack of elements at q.
+    struct State {
+        Pack33 f[points];
+        Material at[points];
+        Volumetric volumetric[mean ? 1 : points];
+        Pack mean_measure;
+
+        State(const Tetrahedra& term, Index pack, const double* q)
+            : State(term, pack, Gradients(term, pack, q), std::make_index_sequence<points>()) {}
+
+        /// Evaluates the law at other measures, two per point.
+        void take_measures(const Tetrahedra& term, Index pack, const Pack* measures) {
+            Pack before[mean ? 1 : points];
+            for (int k = 0; k < (mean ? 1 : points); ++k) before[k] = measure(k);
+            for (int p = 0; p < points; ++p) at[p].take_measures(measures + 2 * p);
+            respond(term, pack);
+            for (int k = 0; k < (mean ? 1 : points); ++k)
+                volumetric[k].bulk = Material::bulk_between(term.constants_[pack].at, measure(k), before[k]);
+        }
+
+        /// Returns the volumetric response at a point.
+        const Volumetric& of(int p) const { return volumetric[mean ? 0 : p]; }
+
+      private:
+        Pack measure(int k) const { return mean ? mean_measure : at[k].volume_measure(); }
+
+        void respond(const Tetrahedra& term, Index pack) {
+            const Pack* c = term.constants_[pack].at;
+            if constexpr (mean) {
+                Pack sum(0.0);
+                for (int k = 0; k < points; ++k) sum += term.rest_[pack].volume[k] * at[k].volume_measure();
+                mean_measure = sum / term.rest_[pack].total();
+                volumetric[0] = Material::volumetric(c, mean_measure);
+            } else {
+                for (int k = 0; k < points; ++k)
+                    volumetric[k] = Material::volumetric(c, at[k].volume_measure());
+            }
+        }
+
+        struct Gradients {
+            Pack33 f[points];
+            Gradients(const Tetrahedra& term, Index pack, const double* q) {
+                Pack3 x[N];
+                term.loop_.gather(pack, q, x);
+                for (int p = 0; p < points; ++p) f[p] = term.gradient_of(pack, p, x);
+            }
+        };
+
+        template <std::size_t... p>
+        State(const Tetrahedra& term, Index pack, const Gradients& given, std::index_sequence<p...>)
+            : f{given.f[p]...}, at{Material(given.f[p])...} {
+            respond(term, pack);
+        }
+    };
+
+    Pack33 gradient_of(Index pack, int p, const Pack3 x[N]) const {
+        Pack3 g[N];
+        Element::gradients(rest_[pack].gradients[p], p, g);
+        return deformation_gradient<N>(x, g);
+    }
+
+    // Computes force_k += stress g_k.
+    void add_pull(Index pack, int p, const Pack33& stress, Pack3 g[N], Pack3 force[N]) const {
+        Element::gradients(rest_[pack].gradients[p], p, g);
+        Pack3 sum{Pack(0.0), Pack(0.0), Pack(0.0)};
+        for (int k = 1; k < N; ++k) {
+            const Pack3 pull = multiply(stress, g[k]);
+            force[k] = p == 0 ? pull : force[k] + pull;
+            sum += pull;
+        }
+        force[0] = p == 0 ? -sum : force[0] - sum;
+    }
+
+    std::size_t bytes_of_elements() const { return loop_.bytes() + bytes_of(rest_) + bytes_of(constants_); }
+
+    const Solid& solid_;
+    const Index body_;
+    const ElementLoop<N> loop_;
+    const std::vector<std::array<Index, N>>& element_nodes_;
+    Moduli moduli_;
+    std::vector<Rest> rest_;
+    std::vector<Constants> constants_;
+    const double height_;
+};
+
+}  // namespace magshell

@@ -1,0 +1,1 @@
+"""Robots of [Qiao21] that swim or carry to a target: `robots.environments` makes environments of them."""

@@ -1,1 +1,0 @@
-"""What callers hand in, checked and converted in one place: numbers with units, indices, tensors."""

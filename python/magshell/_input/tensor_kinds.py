@@ -1,0 +1,70 @@
+"""Which of torch's tensors hold numbers that can be had, and what to do about the others. Needs no torch."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+
+_NO_TRANSFORM = (
+    "is inside a transform (vmap, torch.func, dual numbers, is_grads_batched), which cannot look into a solve: take "
+    "gradients with backward() or torch.autograd.grad, one at a time, and loop over designs"
+)
+_DEEPEST = 5  # axes of any input, and one more
+
+
+def is_tensor(value) -> bool:
+    torch = sys.modules.get("torch")
+    return torch is not None and isinstance(value, torch.Tensor)
+
+
+def numbers_of(tensor) -> np.ndarray:
+    """Those of a tensor that has them, without their history. numpy has no bfloat16, whose numbers float32 holds."""
+    plain = tensor.detach().cpu().resolve_conj().resolve_neg()
+    return (plain.float() if plain.dtype == sys.modules["torch"].bfloat16 else plain).numpy()
+
+
+def why_not(values) -> str:
+    """Why the numbers of a tensor, or of a list of them, cannot be had, and the way out. Empty where they can, and of
+    anything else."""
+    if is_tensor(values):
+        return _why_not(sys.modules["torch"], values)
+    return _why_not_all(values, _DEEPEST) if "torch" in sys.modules else ""
+
+
+def _why_not(torch, tensor) -> str:
+    from ..solve.adjoint.autograd import is_transformed
+
+    if is_transformed(tensor):
+        return _NO_TRANSFORM
+    if tensor.is_nested:
+        return "is a nested tensor: hand over its parts one by one"
+    if tensor.layout != torch.strided:
+        return f"is sparse ({tensor.layout}): hand over .to_dense()"
+    if tensor.device.type == "meta" or type(tensor).__name__ == "FakeTensor":
+        return "has a shape but no numbers (a meta or fake tensor): hand over one on a device that computes"
+    if tensor.is_quantized:
+        return f"is quantized ({tensor.dtype}): hand over .dequantize()"
+    taken = torch.float64, torch.float32, torch.float16, torch.bfloat16
+    if tensor.is_floating_point() and tensor.dtype not in taken:
+        return f"has dtype {tensor.dtype}, which is too coarse: hand over .to(torch.float64)"
+    return ""
+
+
+def _why_not_all(values, depth: int) -> str:
+    if not isinstance(values, list | tuple) or depth == 0:
+        return ""
+    for part in values:
+        if not is_tensor(part):
+            why = _why_not_all(part, depth - 1)
+        elif part.requires_grad:
+            why = (
+                "is a list of tensors, of which some require a gradient that would be lost: torch.stack them"
+            )
+        elif part.dtype == sys.modules["torch"].bfloat16:
+            why = "is a list of tensors, of which some are bfloat16: torch.stack them"
+        else:
+            why = (why := why_not(part)) and f"is a list, and a tensor in it {why}"
+        if why:
+            return why
+    return ""

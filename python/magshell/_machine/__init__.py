@@ -1,1 +1,0 @@
-"""What of the computer and of this process the library uses: threads, files, memory, progress, interrupts."""

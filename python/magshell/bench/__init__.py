@@ -1,1 +1,0 @@
-"""How accurate and how fast magshell is: python -m magshell.bench PART."""

@@ -1,1 +1,0 @@
-"""Sheets with thickness and material, and what results say of each."""

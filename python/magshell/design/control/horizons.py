@@ -1,0 +1,205 @@
+"""A long control found along a horizon that recedes: what was found is done, and the search goes on from where it led."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from ..._input.arrays import count
+from ..._input.scalars import not_negative
+from ..._input.tensors import detached, require_torch
+from ..._runtime.frozen import immutable
+from ..._runtime.log import log
+from ..._runtime.progress import progress_bar
+from ...errors import DesignRejected, Interrupted, ObjectiveFailed
+from ..minimum import Minimum, effort
+from ..objective_value import Answer
+from ._search import Trials, check_functions, given_controls, row_bound, search_rows
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Numbers
+
+
+@immutable
+@dataclass(frozen=True)
+class Horizon:
+    """Rows first ... end of the control are searched, and those up to `settled` are kept and done."""
+
+    first: int
+    settled: int
+    end: int
+
+
+@immutable
+@dataclass(frozen=True)
+class Receding:
+    """What `receding` found.
+
+    controls: (steps, ...), a tensor. reached: how many rows are settled; those behind are as planned last, or as given.
+    state: what `advance` returned last. searches: [(Horizon, Minimum)], in their order; failures: [(Horizon, why)], of those
+    whose search ended early. trials: controls that were tried without gradient.
+    """
+
+    _as_given: ClassVar = ("state",)
+
+    controls: Any
+    reached: int
+    state: Any = field(repr=False)
+    searches: Sequence[tuple[Horizon, Minimum]] = field(repr=False)
+    failures: Sequence[tuple[Horizon, str]] = ()
+    trials: int = 0
+
+    @property
+    def evaluations(self) -> int:
+        """Of the objective with its gradient, in all searches."""
+        return sum(found.history[-1].evaluations for _, found in self.searches)
+
+
+def receding(
+    objective: Callable[..., Any],
+    advance: Callable[..., Any],
+    controls: Numbers,
+    *,
+    horizon: int,
+    stride: int,
+    start: Any = None,
+    lower: Numbers = -np.inf,
+    upper: Numbers = np.inf,
+    trials: int = 0,
+    spread: Numbers | None = None,
+    periods: Numbers | None = None,
+    seed: int = 0,
+    optimizer: Callable[..., Any] | None = None,
+    max_iterations: int = 5,
+    tolerance: float = 1e-3,
+    until: Callable[..., Any] | None = None,
+    progress: bool = True,
+) -> Receding:
+    """Minimizes over a control in time, `horizon` rows at once, of which the first `stride` are then done for good.
+
+    For motions that are unstable: what a little noise in the start becomes grows with time, until gradients of the whole
+    motion say nothing that a search can use, and the motion found depends on rounding. Over a horizon in which noise grows
+    little, gradients are good; and as every search begins where the motion really is, it also corrects what has gone astray
+    until there: this is feedback, computed beforehand. Stable motions are better searched at once, to their end. Done
+    again from the same start, the control found moves everything with the same bits, if `advance` does (ms.simulate, from
+    a MotionState, does).
+
+    objective: function of rows (end - first, ...) of the control, a tensor; of the Horizon; and of the state in which row
+        `first` begins. It returns what an objective of ms.minimize does.
+    advance: function of the rows (settled - first, ...), a tensor; of the Horizon; and of that state. It returns the state
+        in which row `settled` begins, Trajectory.end say.
+    controls: (steps, ...), where every row starts until it is planned.
+    horizon, stride: rows. The last horizons end with the control, and are shorter.
+    start: the state in which row 0 begins, handed to the first calls as it is.
+    lower, upper: bounds, numbers or of the shape of a row.
+    trials: before every search, so many other plans are tried, by the objective without its gradient, and the search
+        begins with the lowest. Half are as planned until a random row and from there swing about `controls`, with a random
+        period, phase and amplitude; half do from there on what was done a random period before. Where a control does
+        nothing to first order, as from rest in water, there is no beginning without.
+    spread: largest amplitude of the trials' swings, a number or of the shape of a row; entries with zero are as planned.
+    periods: (shortest, longest) of the trials' periods, rows. seed: of their random numbers.
+    optimizer: function (parameters, lower, upper) -> optimizer; ms.optim.LBFGS by default, with first_step=0.1 and at most 5
+        evaluations in a line search.
+    max_iterations, tolerance: of every search, as in ms.minimize. No iterations: no search, the best of the trials is done;
+        no gradient is asked for then.
+    until: function of the state; ends where it returns True.
+    progress: show a bar of the rows settled.
+
+    A search that meets a control that cannot be evaluated, and cannot go around it, ends with the best that it had, and that
+    is done: `failures` says so. Once a first stretch is settled, Ctrl-C raises Interrupted and any other error
+    ObjectiveFailed, with the Receding until then as `last_good`; before, the error itself comes through.
+
+    >>> import torch, magshell as ms
+    >>> def fallen(push, state):  # a stick that balances: angle and rate, 50 times a second
+    ...     angle, rate = state
+    ...     for each in push:
+    ...         rate = rate + 0.02 * (10 * torch.sin(angle) + each)
+    ...         angle = angle + 0.02 * rate
+    ...         yield angle, rate
+    >>> def lean(push, horizon, state):
+    ...     return sum(angle**2 for angle, _ in fallen(push, state)) + 1e-6 * (push**2).sum()
+    >>> def fall(push, horizon, state):
+    ...     return list(fallen(push, state))[-1]
+    >>> begin = torch.tensor([0.1, 0.0], dtype=torch.float64)
+    >>> found = ms.control.receding(lean, fall, torch.zeros(60).double(), horizon=20, stride=10, start=begin, progress=False)
+    >>> bool(abs(found.state[0]) < 0.01)
+    True
+    """
+    torch, given = require_torch("control.receding"), given_controls(controls)
+    low, high = row_bound("lower", lower, given), row_bound("upper", upper, given)
+    named = {"optimizer": optimizer, "until": until}
+    check_functions(objective=objective, advance=advance, **{k: v for k, v in named.items() if v is not None})
+    horizon, stride = count("horizon", horizon), count("stride", stride)
+    if stride > horizon:
+        raise ValueError(f"stride must be no more than the horizon, got {stride} of {horizon} rows")
+    to_try = Trials.of(count("trials", trials, least=0), spread, periods, given)
+    options = {
+        "max_iterations": count("max_iterations", max_iterations, least=0),
+        "tolerance": not_negative("tolerance", "", tolerance),
+        "progress": False,
+    }
+    if not (to_try.number or max_iterations):
+        raise ValueError("max_iterations and trials are both 0: there is nothing to search with")
+    rng = np.random.default_rng(count("seed", seed, least=0))
+    steps, planned, state = len(given), given.clamp(low, high), start
+    searches: Sequence[tuple[Horizon, Minimum]] = []
+    failures: list[tuple[Horizon, str]] = []
+    reached = known = tried = 0
+
+    def until_now() -> Receding:
+        return Receding(planned, reached, state, searches, failures, tried)
+
+    def value(rows, part: Horizon, state) -> float:
+        with torch.no_grad():
+            try:
+                return float(detached(Answer.of(objective(rows, part, state)).objective))
+            except DesignRejected:
+                return math.inf
+
+    with progress_bar("receding", steps, shown=progress) as bar:
+        while reached < steps:
+            part = Horizon(reached, min(reached + stride, steps), min(reached + horizon, steps))
+            rows = slice(part.first, part.end)
+            try:
+                if to_try.number:
+                    others = to_try.drawn(planned, given, part.first, known, part.end, low, high, rng)
+                    plans = [planned[rows].clone(), *others]
+                    values = [value(each, part, state) for each in plans]
+                    tried += len(plans)
+                    planned[rows] = plans[int(np.argmin(values))]
+
+                def of_part(changed, part=part, state=state):
+                    return objective(changed, part, state)
+
+                found, failure = None, None
+                if max_iterations:
+                    found, failure = search_rows(
+                        of_part, planned[rows], low[rows], high[rows], optimizer, **options
+                    )
+                if found is not None:
+                    planned[rows] = found.parameters[0].detach()
+                    searches.append((part, found))
+                if failure is not None:
+                    failures.append((part, str(failure)))
+                next_state = advance(planned[part.first : part.settled].clone(), part, state)
+                bar.update(part.settled - reached)
+                done = effort(each for _, each in searches)
+                bar.set_postfix_str(done)
+                log.info("receding: %d of %d rows settled, %s", part.settled, steps, done)
+                state, reached, known = next_state, part.settled, part.end
+                if until is not None and until(state):
+                    break
+            except KeyboardInterrupt as error:
+                if not reached:
+                    raise
+                raise Interrupted(f"interrupted after {reached} of {steps} rows", until_now()) from error
+            except Exception as error:
+                if not reached:
+                    raise
+                told = f"the control failed after {reached} of {steps} rows: {error}"
+                raise ObjectiveFailed(told, until_now()) from error
+    return until_now()

@@ -1,0 +1,153 @@
+"""A long control found in windows, each begun from what the one before found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..._input.arrays import count, index_array
+from ..._input.quantity import quantity
+from ..._input.scalars import flag, not_negative
+from ..._input.tensors import require_torch
+from ..._runtime.frozen import immutable
+from ...errors import Interrupted
+from ..minimum import Minimum
+from ._search import check_functions, given_controls, row_bound, search_rows
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Numbers
+
+
+@immutable
+@dataclass(frozen=True)
+class Window:
+    """steps: how many rows of the control it has. first: before it they are what earlier windows found. smoothing: as
+    given, of the objective's contact, say."""
+
+    steps: int
+    first: int
+    smoothing: float
+
+
+@immutable
+@dataclass(frozen=True)
+class Windows:
+    """What `in_windows` found. controls: (steps, ...), a tensor. searches: [(Window, Minimum)], in their order; failures:
+    [(Window, why)], of those whose search ended early, which left what was best until then."""
+
+    controls: object
+    searches: Sequence[tuple[Window, Minimum]] = field(repr=False)
+    failures: Sequence[tuple[Window, str]] = ()
+
+    @property
+    def evaluations(self) -> int:
+        """Of the objective, in all windows."""
+        return sum(found.history[-1].evaluations for _, found in self.searches)
+
+
+def in_windows(
+    objective: Callable[..., Any],
+    controls: Numbers,
+    *,
+    lengths: Sequence[int],
+    lower: Numbers = -np.inf,
+    upper: Numbers = np.inf,
+    smoothings: Sequence[float] = (1.0,),
+    depth: int | None = None,
+    hold: bool = True,
+    optimizer: Callable[..., Any] | None = None,
+    max_iterations: int = 20,
+    tolerance: float = 1e-3,
+    progress: bool = True,
+) -> Windows:
+    """Minimizes over a control in time, window by window, so that what comes first is settled before what it leads to.
+
+    The gradient of a long motion with contact points where it falls only within a distance that shrinks with every
+    impact; that of a short one reaches far. So first the first rows are searched, then more of them, from what was found.
+    A magnetised strip that walks 80 steps by the friction of its ends comes 1.56 lengths far with windows of 20, 40, 60 and
+    80 steps and contact smoothed fourfold first, where one search of as many simulated steps and more ends at 1.04.
+
+    objective: function of controls (k, ...), a tensor with the first k rows, and of the Window; a motion of so many steps,
+        say, whose contact has this smoothing. It returns what an objective of ms.minimize does.
+    controls: (steps, ...), where the search starts.
+    lengths: rows of each window, rising; the last one is `steps`.
+    lower, upper: bounds, numbers or of the shape of a row.
+    smoothings: positive numbers, falling; each window is searched with each of them in turn.
+    depth: how many rows back from its end a window changes, a horizon that recedes; None: all, windows that grow.
+    hold: a window's new rows start from the last one of the window before; False: from `controls`.
+    optimizer: function (parameters, lower, upper) -> optimizer; ms.optim.LBFGS by default, with first_step=0.1 and at most 5
+        evaluations in a line search.
+    max_iterations, tolerance, progress: of every search, as in ms.minimize.
+
+    A search that meets a design that cannot be evaluated, and cannot go around it, ends with the best that it had, and the
+    next one goes on from there: `failures` says so. Raises DesignRejected where the very first design cannot be; Interrupted
+    with what was found until then as `last_good`; ObjectiveFailed as ms.minimize does.
+
+    >>> import torch, magshell as ms
+    >>> def miss(push, window):  # a mass on ice is to be a meter away at the end of every window
+    ...     return (push.cumsum(0).sum() / window.steps - 1) ** 2
+    >>> found = ms.control.in_windows(miss, torch.zeros(8, dtype=torch.float64), lengths=(2, 4, 8), progress=False)
+    >>> len(found.searches), bool(found.searches[-1][1].objective < 1e-6)
+    (3, True)
+    """
+    torch, now = require_torch("control.in_windows"), given_controls(controls)
+    windows = _windows(len(now), lengths, smoothings, depth)
+    low, high = row_bound("lower", lower, now), row_bound("upper", upper, now)
+    check_functions(objective=objective, **({} if optimizer is None else {"optimizer": optimizer}))
+    count("max_iterations", max_iterations)
+    tolerance, hold = not_negative("tolerance", "", tolerance), flag("hold", hold)
+    searches: Sequence[tuple[Window, Minimum]] = []
+    failures: list[tuple[Window, str]] = []
+    reached = windows[0].steps
+    for window in windows:
+        if hold and window.steps > reached:
+            now[reached : window.steps] = now[reached - 1]
+        reached = max(reached, window.steps)
+        kept = now[: window.first].clone()
+        rows = slice(window.first, window.steps)
+
+        def of_window(changed, kept=kept, window=window):
+            return objective(torch.cat([kept, changed]), window)
+
+        try:
+            found, failure = search_rows(
+                of_window,
+                now[rows],
+                low[rows],
+                high[rows],
+                optimizer,
+                max_iterations=max_iterations,
+                tolerance=tolerance,
+                progress=progress,
+            )
+        except Interrupted as error:
+            if error.last_good is not None:
+                now[rows] = error.last_good.parameters[0].detach()
+            told = f"interrupted in window {len(searches) + 1} of {len(windows)}"
+            raise Interrupted(told, Windows(now, searches, failures)) from error
+        if failure is not None:
+            if found is None and not searches:
+                raise failure
+            failures.append((window, str(failure)))
+        if found is None:
+            continue
+        now[rows] = found.parameters[0].detach()
+        searches.append((window, found))
+    return Windows(now, searches, failures)
+
+
+def _windows(steps: int, lengths, smoothings, depth) -> list[Window]:
+    ends = index_array("lengths", lengths).ravel().tolist()
+    if not ends or ends[0] < 1 or ends[-1] != steps or any(b <= a for a, b in pairwise(ends)):
+        raise ValueError(f"lengths must rise to the {steps} rows of the controls, got {lengths!r:.60}")
+    levels = quantity("smoothings", "", smoothings, ("n",)).tolist()
+    if not levels or levels[-1] <= 0 or any(b >= a for a, b in pairwise(levels)):
+        raise ValueError(f"smoothings must be positive and fall, got {smoothings!r:.60}")
+    back = steps if depth is None else count("depth", depth)
+    if any(b - a > back for a, b in pairwise([0, *ends])):
+        raise ValueError(f"depth must be no less than what a window adds, got {depth} for {lengths!r:.60}")
+    return [Window(end, max(0, end - back), level) for end in ends for level in levels]

@@ -1,0 +1,176 @@
+"""What a printer or a magnetizer can make: ms.Ink."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .._input.quantity import one_or_more, quantity
+from .._input.scalars import positive
+from .._input.tensors import detached, is_tensor, like, real_tensor, require_torch
+from .._runtime.frozen import Frozen
+
+if TYPE_CHECKING:
+    import torch
+
+    from .._input.kinds import Computed, Numbers
+
+_UNIT = 1e-6  # how far frames may be from orthonormal
+
+
+class Ink(Frozen):
+    """The magnetizations that can be printed: a few directions, one strength, and any share of it or a few.
+
+    strength: A/m, of a face that is magnetized fully.
+    directions: (k, 3), or (3,) for one, of any length but zero; in world axes at rest, or in those of `frames`.
+    levels: shares of the strength that can be printed, one or several, each from 0 to 1: 1 where every face is magnetized
+        fully, (0, 1) where it may have no magnetization, (0, 0.5, 1) in three steps. None: any share.
+    frames: (n_f, 3, 3), for directions that are others on every face: rows are three orthogonal unit vectors, in which
+        `directions` are given, see `ms.parametrize.radial_frames` and `ms.parametrize.frames_along`. None: world axes.
+
+    Raises ValueError on bad input.
+
+    >>> import magshell as ms
+    >>> ink = ms.Ink(5e4, [(1, 0, 0), (-1, 0, 0)], levels=(0, 1))
+    >>> ink.nearest([(4e4, 1e4, 0), (2e4, 1e4, 0)]).tolist()
+    [[50000.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
+    """
+
+    def __init__(
+        self,
+        strength: float,
+        directions: Numbers,
+        *,
+        levels: Numbers | None = None,
+        frames: Numbers | None = None,
+    ):
+        self.strength: float = positive("strength", "A/m", detached(strength))
+        rays = one_or_more("directions", "1", detached(directions), ("k", 3))
+        lengths = np.linalg.norm(rays, axis=1, keepdims=True)
+        if len(rays) == 0:
+            raise ValueError("directions must hold at least one")
+        if not (lengths > 0).all():
+            raise ValueError("directions must not be zero")
+        self.directions: np.ndarray = _constant(rays / lengths)
+        self.levels: tuple[float, ...] | None = None if levels is None else _checked_levels(levels)
+        self.frames: np.ndarray | None = None if frames is None else _checked_frames(frames)
+
+    @property
+    def rays(self) -> np.ndarray:
+        """Unit vectors in world axes at rest: (k, 3), or with frames (n_f, k, 3)."""
+        return self.directions if self.frames is None else self.directions @ self.frames
+
+    def choices(self, remanent_magnetization: Numbers) -> tuple[np.ndarray, np.ndarray]:
+        """What comes nearest to the magnetization of each face: (n_f,) which direction, and (n_f,) which share of the
+        strength.
+
+        remanent_magnetization: as in `nearest`. Where none of the directions leads there, the one that is least opposed.
+        """
+        share = self._shares(remanent_magnetization)
+        amounts, rays, squares = self._choices(share, self.rays)
+        along = (
+            (share[:, None, :] * rays).sum(-1).repeat(1 if self.levels is None else len(self.levels), axis=1)
+        )
+        nearest = squares <= squares.min(axis=1, keepdims=True)
+        choice = np.where(nearest, along, -np.inf).argmax(axis=1)
+        return self._ray_of(choice), amounts[np.arange(len(share)), choice]
+
+    def nearest(self, remanent_magnetization: Numbers) -> Computed:
+        """(n_f, 3) A/m: what of this ink comes nearest to the magnetization of each face.
+
+        remanent_magnetization: (n_f, 3) A/m, an array or a tensor; the result is the same, without a gradient.
+        """
+        direction, amount = self.choices(remanent_magnetization)
+        rays = self.rays_of(np.arange(len(direction)), direction)
+        return like(self.strength * amount[:, None] * rays, remanent_magnetization)
+
+    def rays_of(self, faces: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """(n, 3) unit vectors in world axes: of each of these faces the direction with this number. faces, directions:
+        (n,) indices."""
+        return self.rays[directions] if self.frames is None else self.rays[faces, directions]
+
+    def distances(self, remanent_magnetization: Numbers) -> Computed:
+        """(n_f,) shares of the strength: how far the magnetization of each face is from what can be printed there.
+
+        remanent_magnetization: as in `nearest`.
+        """
+        _, _, squares = self._choices(self._shares(remanent_magnetization), self.rays)
+        return like(np.sqrt(squares.min(axis=1)), remanent_magnetization)
+
+    def squares(self, remanent_magnetization: Numbers) -> torch.Tensor:
+        """(n_f, choices) tensor, differentiable: the squared distances from all that might be printed on each face, in
+        squares of the strength. A choice is a direction with a level, or a direction with its best share.
+
+        remanent_magnetization: (n_f, 3) A/m.
+        """
+        torch = require_torch("Ink.squares")
+        magnetization = real_tensor("remanent_magnetization", remanent_magnetization, ("n_f", 3))
+        self.check_faces(len(magnetization))
+        return self._choices(
+            magnetization / self.strength, torch.from_numpy(self.rays.copy()).to(magnetization)
+        )[2]
+
+    def _choices(self, share, rays):
+        """Amounts (n_f, c), rays (n_f or 1, k, 3), squared distances (n_f, c) of all that might be printed; of arrays or
+        tensors."""
+        rays = rays if rays.ndim == 3 else rays[None]
+        along = (share[:, None, :] * rays).sum(-1)[:, :, None]  # (n_f, k, 1)
+        if self.levels is None:
+            amounts = along.clip(0.0, 1.0)
+        else:
+            levels = np.array(self.levels)
+            amounts = 0.0 * along + (
+                require_torch("an ink").from_numpy(levels).to(along) if is_tensor(along) else levels
+            )
+        squares = ((share[:, None, None, :] - amounts[..., None] * rays[:, :, None, :]) ** 2).sum(-1)
+        return amounts.reshape(len(share), -1), rays, squares.reshape(len(share), -1)
+
+    def _ray_of(self, choice):
+        """The direction of a choice."""
+        return choice // (1 if self.levels is None else len(self.levels))
+
+    def _shares(self, remanent_magnetization) -> np.ndarray:
+        values = quantity("remanent_magnetization", "A/m", detached(remanent_magnetization), ("n_f", 3))
+        self.check_faces(len(values))
+        return values / self.strength
+
+    def check_faces(self, count: int) -> None:
+        """Raises ValueError where there are none, or the frames are not those of so many faces."""
+        if count == 0:
+            raise ValueError("remanent_magnetization has no faces")
+        if self.frames is not None and len(self.frames) != count:
+            raise ValueError(
+                f"the ink has frames for {len(self.frames)} faces, and remanent_magnetization has {count}"
+            )
+
+    def __repr__(self) -> str:
+        levels = (
+            "any share" if self.levels is None else f"levels {', '.join(f'{each:g}' for each in self.levels)}"
+        )
+        axes = "" if self.frames is None else f", in the frames of {len(self.frames)} faces"
+        return f"Ink: {len(self.directions)} directions of {self.strength:g} A/m, {levels}{axes}"
+
+
+def _checked_levels(levels) -> tuple[float, ...]:
+    given = one_or_more("levels", "1", detached(levels), ("n",))
+    if not (len(given) and given.min() >= 0 and 0 < given.max() <= 1):
+        raise ValueError(
+            f"levels must be shares of the strength from 0 to 1, one of them positive, got {given.tolist()}"
+        )
+    return tuple(np.unique(given).tolist())
+
+
+def _checked_frames(frames) -> np.ndarray:
+    given = quantity("frames", "1", detached(frames), ("n_f", 3, 3))
+    wrong = np.abs(given @ given.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2), initial=0.0) > _UNIT
+    if wrong.any():
+        raise ValueError(
+            f"the rows of frames must be orthogonal unit vectors, but frames[{int(wrong.argmax())}] are not"
+        )
+    return given
+
+
+def _constant(array: np.ndarray) -> np.ndarray:
+    array.flags.writeable = False
+    return array

@@ -1,0 +1,1 @@
+"""Runs one optimization from many starts in parallel processes."""

@@ -1,0 +1,273 @@
+"""The same optimization from many starts, side by side: ms.multistart."""
+
+from __future__ import annotations
+
+import numbers
+import os
+import pickle
+import queue
+import time
+from collections.abc import Callable, Iterable
+from concurrent import futures
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
+from pathlib import Path
+from typing import Any
+
+from ..._input.arrays import number as checked_number
+from ..._input.tensors import is_tensor
+from ..._runtime.log import log
+from ..._runtime.progress import progress_bar
+from ...errors import Interrupted, MultistartFailed
+from ..minimum import Minimum, effort
+from .run_start import CallOff, Outcome, attempt_packed, attempt_sent, failure, this_process
+from .serialization import packed, refuse_while_importing
+from .start_files import StartFiles
+from .starts import FailedStart, FinishedStart, Multistart
+from .worker_processes import WorkerDied, WorkerProcesses
+
+
+def multistart(
+    run: Callable[..., Any],
+    starts: Iterable[Any],
+    executor: Executor | None = None,
+    *,
+    workers: int | None = None,
+    attempts: int = 3,
+    feasibility: float = 1e-6,
+    checkpoint: str | Path | None = None,
+    resume: bool = False,
+    progress: bool = True,
+) -> Multistart:
+    """Calls run(start) for every start, several at a time, and orders what they return: the best one first.
+
+    run: returns an ms.Minimum (or anything with an `objective`), a number, or a tuple that begins with one of these
+        and holds whatever else is to be kept, such as (minimum, equilibrium.positions). It gets a copy of its start.
+        Make the scene inside, or hand it in with functools.partial: meshes, shells, fields and scenes pickle.
+    starts: arrays, tensors or anything else that pickles; `ms.random_starts` makes some. A run that draws random
+        numbers should take its seed from its start, because nothing else distinguishes one worker from another.
+    executor: any concurrent.futures.Executor, such as dask.distributed's Client.get_executor(); it is left open. By
+        default processes are made here, and ended: `workers` of them, one for each processor.
+    attempts: how often a start is begun whose process, made here, dies; then it counts as failed. Other executors
+        have rules of their own.
+    feasibility: how far a Minimum may break its constraints and still come before all that break theirs by more.
+    checkpoint: a folder that gets a file for every start that has finished. The files hold data only: run must return
+        numbers, arrays, tensors, ms.Minimum, or containers of these, and reading them runs nothing.
+    resume: take from it what is there, and run the rest and what failed. What is taken is told by the bar, by the result
+        and by its `resumed`. Another start under the same number is refused, and so is a run that is another one: by its
+        name, its code, the arguments bound to it, what it holds, and what it looks up in its module and in others that
+        are not installed. (Results of another release of magshell or of a package are taken: name another folder.)
+    progress: show a bar. The bars of the runs themselves are not shown.
+
+    Every start has one thread, magshell's, torch's and in processes made here the BLAS's too, so that results are the
+    same bits on any executor and any number of workers. An error in one start is kept in `failed`, and the others go
+    on. Ctrl-C raises `ms.Interrupted`, and an executor that breaks, or no start that finishes, `ms.MultistartFailed`:
+    both hold what has finished, a Multistart, in `last_good`.
+
+    A script calls this under `if __name__ == "__main__":`, as its processes import the script. In a notebook
+    cloudpickle must be installed, or `run` come from a module.
+
+    >>> from concurrent.futures import ThreadPoolExecutor
+    >>> with ThreadPoolExecutor() as executor:
+    ...     found = ms.multistart(lambda x: (x - 1) ** 2, [3.0, 0.5, 2.0], executor, progress=False)
+    >>> found.objectives.tolist(), found.best.start
+    ([0.25, 1.0, 4.0], 0.5)
+    """
+    refuse_while_importing("ms.multistart")
+    starts = _listed(starts)
+    _check(run, executor, workers, attempts, feasibility, checkpoint, resume)
+    task = _tasks(run, starts, executor)
+    files = None if checkpoint is None else StartFiles(checkpoint, run, starts, resume)
+    state = _State(starts, feasibility, files)
+    bar = progress_bar("multistart", len(starts), shown=progress, initial=len(state.outcomes))
+    try:
+        with bar:
+            if state.resumed:
+                bar.set_postfix_str(state.summary())
+            if executor is not None:
+                _drive(state, executor, task, bar)
+            elif state.unfinished:
+                count = min(workers or _processors(), len(state.unfinished))
+                with WorkerProcesses(count, attempts) as own:
+                    _drive(state, own, task, bar)
+    except KeyboardInterrupt as error:
+        raise Interrupted(f"interrupted after {state.progress()}", state.result()) from error
+    except Exception as error:
+        raise MultistartFailed(
+            f"stopped after {state.progress()}: {_in_words(error)}\nWhat has finished is in `error.last_good`; with a "
+            "checkpoint, a call with resume=True does only the rest.",
+            state.result(),
+        ) from error
+    return _unless_all_failed(state.result())
+
+
+def _drive(state: _State, executor: Executor, task: Callable[..., Any], bar) -> None:
+    """Has every unfinished start run, and takes the outcomes as they come.
+
+    Ctrl-C comes at any moment, between the end of a start and its outcome being taken too: what has finished is kept.
+    """
+    done: queue.SimpleQueue[tuple[int, Future]] = queue.SimpleQueue()
+    running: dict[int, Future] = {}
+    call_off = CallOff()
+    try:
+        for number in state.unfinished:
+            running[number] = executor.submit(*task(number, call_off))
+            running[number].add_done_callback(lambda future, number=number: done.put((number, future)))
+        for _ in running:
+            number, future = _next(done)
+            state.take(number, _outcome(future))
+            bar.update()
+            bar.set_postfix_str(state.summary())
+    finally:
+        call_off.done = True
+        for future in running.values():
+            future.cancel()
+        for number, future in running.items():
+            if (
+                number not in state.outcomes
+                and future.done()
+                and not future.cancelled()
+                and not future.exception()
+            ):
+                state.take(number, _outcome(future))
+
+
+def _next(done: queue.SimpleQueue[tuple[int, Future]]) -> tuple[int, Future]:
+    """The next one that ends. A Ctrl-C that comes just as a wait begins is seen at its end only, so waits are short."""
+    while True:
+        try:
+            return done.get(timeout=0.2)
+        except queue.Empty:
+            continue
+
+
+class _State:
+    """What is known of each start."""
+
+    def __init__(self, starts: list[Any], feasibility: float, files: StartFiles | None):
+        self.starts, self._feasibility, self._files = starts, feasibility, files
+        self.outcomes: dict[int, Outcome] = files.finished() if files else {}
+        self.resumed = tuple(sorted(self.outcomes))
+        self._began = time.perf_counter()
+
+    @property
+    def unfinished(self) -> list[int]:
+        return [number for number in range(len(self.starts)) if number not in self.outcomes]
+
+    def take(self, number: int, outcome: Outcome) -> None:
+        self.outcomes[number] = outcome
+        told = outcome.error or f"objective {outcome.objective:.6g}"
+        log.info("multistart: start %d: %s, %.3g s", number, told, outcome.seconds)
+        if self._files and not outcome.failed:
+            self._files.write(number, outcome)
+
+    def result(self) -> Multistart:
+        finished, failed = [], []
+        for number, outcome in sorted(self.outcomes.items()):
+            start, seconds = self.starts[number], outcome.seconds
+            if outcome.failed:
+                words = outcome.error, outcome.traceback
+                failed.append(FailedStart(number, start, *words, outcome.last_good, seconds))
+            else:
+                values = outcome.objective, outcome.violation, outcome.result
+                finished.append(FinishedStart(number, start, *values, seconds))
+        finished.sort(key=self._rank)
+        seconds = time.perf_counter() - self._began
+        return Multistart(tuple(finished), tuple(failed), tuple(self.unfinished), seconds, self.resumed)
+
+    def _rank(self, found: FinishedStart) -> tuple[float, float]:
+        """Feasible designs by their objective, before all others by how far they are from it."""
+        if found.violation <= self._feasibility:
+            return 0.0, found.objective
+        return found.violation, found.objective
+
+    def progress(self) -> str:
+        return f"{len(self.outcomes)} of {len(self.starts)} starts"
+
+    def summary(self) -> str:
+        found = self.result()
+        best = f"best {found.best.objective:.6g}" if found else ""
+        done = effort(each.result for each in found if isinstance(each.result, Minimum))
+        failed = f"{len(found.failed)} failed" if found.failed else ""
+        resumed = f"{len(self.resumed)} from {self._files.folder}" if self.resumed else ""
+        return ", ".join(filter(None, (best, done, failed, resumed)))
+
+
+def _tasks(run, starts: list[Any], executor) -> Callable[[int, CallOff], tuple[Any, ...]]:
+    """What is submitted for each start. Whatever cannot go to another process is refused here, before any work."""
+    if executor is not None and not isinstance(executor, futures.ProcessPoolExecutor):
+        return lambda number, call_off: (attempt_sent, run, starts[number], this_process(), call_off)
+    run = packed("run", run)
+    for number, start in enumerate(starts):
+        packed(f"start {number}", start)
+    return lambda number, _: (attempt_packed, run, packed(f"start {number}", starts[number]))
+
+
+def _outcome(future: Future) -> Outcome:
+    """What came back. Raises where the executor is to blame, and not the start."""
+    try:
+        outcome = future.result()
+        return pickle.loads(outcome) if isinstance(outcome, bytes) else outcome
+    except (BrokenExecutor, CancelledError):
+        raise
+    except WorkerDied as error:
+        return Outcome(error=str(error))
+    except Exception as error:
+        return failure(error)
+
+
+def _in_words(error: Exception) -> str:
+    if isinstance(error, CancelledError):
+        return "the executor cancelled its work, as one that is closed does"
+    return f"{type(error).__name__}: {error}"
+
+
+def _unless_all_failed(found: Multistart) -> Multistart:
+    if found.finished:
+        return found
+    first = found.failed[0]
+    raise MultistartFailed(
+        f"none of {len(found.failed)} starts finished; start {first.number} failed with\n"
+        f"{first.traceback or first.error}",
+        found,
+    )
+
+
+def _listed(starts) -> list[Any]:
+    if isinstance(starts, str | bytes | dict):
+        raise ValueError(f"starts must be several, such as a list of arrays, got a {type(starts).__name__}")
+    if is_tensor(starts):
+        starts = starts.detach()
+    try:
+        # A row of a tensor would take the whole tensor along to every worker.
+        listed = [start.clone() if is_tensor(starts) else start for start in starts]
+    except TypeError as error:
+        raise ValueError(f"starts must be several, such as a list of arrays: {error}") from None
+    if not listed:
+        raise ValueError("starts is empty: there is nothing to run")
+    return listed
+
+
+def _check(run, executor, workers, attempts, feasibility, checkpoint, resume) -> None:
+    if not callable(run):
+        raise ValueError(f"run must be a function of a start, got {run!r:.60}")
+    if hasattr(executor, "get_executor"):
+        raise ValueError("executor must be a concurrent.futures.Executor: pass client.get_executor()")
+    if isinstance(executor, type) or not (executor is None or callable(getattr(executor, "submit", None))):
+        what = (
+            f"the class {executor.__name__}: call it" if isinstance(executor, type) else f"{executor!r:.60}"
+        )
+        raise ValueError(f"executor must be a concurrent.futures.Executor, got {what}")
+    if workers is not None and executor is not None:
+        raise ValueError("workers is for processes made here: an executor has its own")
+    for name, value in (("workers", 1 if workers is None else workers), ("attempts", attempts)):
+        if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < 1:
+            raise ValueError(f"{name} must be an integer of at least 1, got {value!r}")
+    if not checked_number("feasibility", feasibility) >= 0:
+        raise ValueError(f"feasibility must not be negative, got {feasibility}")
+    if resume and checkpoint is None:
+        raise ValueError("resume needs the checkpoint to continue from")
+
+
+def _processors() -> int:
+    """Those that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

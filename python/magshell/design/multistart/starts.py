@@ -1,0 +1,96 @@
+"""What became of many starts: the finished ones, best first, and the others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..._runtime.frozen import immutable
+
+_MOST_SHOWN = 5  # starts in a printed Multistart
+
+
+@immutable
+@dataclass(frozen=True, eq=False)
+class FinishedStart:
+    """number: of the start in the list. result: what run returned, its objective and by how much constraints are
+    broken. seconds: that it took."""
+
+    _as_given: ClassVar = ("start", "result")
+
+    number: int
+    start: Any = field(repr=False)
+    objective: float
+    violation: float
+    result: Any
+    seconds: float
+
+
+@immutable
+@dataclass(frozen=True, eq=False)
+class FailedStart:
+    """error: in words, with the traceback where there is one. last_good: what the error held, such as the best
+    Minimum until then."""
+
+    _as_given: ClassVar = ("start", "last_good")
+
+    number: int
+    start: Any = field(repr=False)
+    error: str
+    traceback: str = field(repr=False)
+    last_good: Any
+    seconds: float
+
+
+@immutable
+@dataclass(frozen=True, eq=False, repr=False)
+class Multistart(Sequence[Any]):
+    """The finished starts as a sequence, best first. failed: FailedStarts, by number. unfinished: numbers of the starts
+    that an interruption left. seconds: in all. resumed: numbers of the starts whose results came from the checkpoint."""
+
+    finished: tuple[FinishedStart, ...]
+    failed: tuple[FailedStart, ...]
+    unfinished: tuple[int, ...]
+    seconds: float
+    resumed: tuple[int, ...] = ()
+
+    def __getitem__(self, index: Any) -> Any:
+        return self.finished[index]
+
+    def __len__(self) -> int:
+        return len(self.finished)
+
+    @property
+    def best(self) -> FinishedStart:
+        """The start that came out best."""
+        if not self.finished:
+            raise ValueError(
+                f"no start has finished: {len(self.failed)} failed, {len(self.unfinished)} were left"
+            )
+        return self.finished[0]
+
+    @property
+    def objectives(self) -> np.ndarray:
+        """(n,), in the order of the sequence."""
+        return np.array([found.objective for found in self.finished])
+
+    def __repr__(self) -> str:
+        total = len(self.finished) + len(self.failed) + len(self.unfinished)
+        head = f"Multistart: {len(self.finished)} of {total} starts finished in {self.seconds:.3g} s"
+        head += f", {len(self.resumed)} of them earlier (from the checkpoint)" if self.resumed else ""
+        head += f", {len(self.failed)} failed" if self.failed else ""
+        lines = [f"  start {found.number}: {_in_words(found)}" for found in self.finished[:_MOST_SHOWN]]
+        if len(self.finished) > _MOST_SHOWN:
+            lines.append(
+                f"  ... and {len(self.finished) - _MOST_SHOWN} more, up to {self.objectives[-1]:.6g}"
+            )
+        lines += [f"  start {lost.number} failed: {lost.error:.200}" for lost in self.failed[:_MOST_SHOWN]]
+        return "\n".join([head, *lines])
+
+
+def _in_words(found: FinishedStart) -> str:
+    broken = f", constraints broken by {found.violation:.2g}" if found.violation > 0 else ""
+    return f"objective {found.objective:.6g}{broken}, {found.seconds:.3g} s"

@@ -1,0 +1,46 @@
+"""What an objective may return: its value, named terms, constraints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from .._input.quantity import real_numbers
+from .._input.tensors import detached, is_tensor
+
+
+@dataclass(frozen=True)
+class Answer:
+    """objective: as it was returned, or the sum of its terms. terms: numbers to record. constraints: (m,) or None."""
+
+    objective: Any
+    terms: dict[str, float]
+    constraints: Any
+
+    @staticmethod
+    def of(result: Any) -> Answer:
+        head, *rest = result if isinstance(result, tuple) else (result,)
+        terms, constraints = {}, None
+        if isinstance(head, dict):
+            if not head:
+                raise ValueError("the objective returned no terms")
+            terms, head = head, sum(head.values())
+        for part in rest:
+            if isinstance(part, dict):
+                terms = {**terms, **part}
+            elif is_tensor(part) and constraints is None:
+                constraints = part
+            else:
+                raise TypeError(
+                    "beside its value an objective returns a dict of terms and a tensor of constraints, "
+                    f"one of each at most, got {type(part).__name__}"
+                )
+        return Answer(head, {name: _number(name, value) for name, value in terms.items()}, constraints)
+
+
+def _number(name: str, value) -> float:
+    try:
+        return float(real_numbers(name, detached(value)))
+    except (TypeError, ValueError):
+        came = f"shape {tuple(value.shape)}" if is_tensor(value) else type(value).__name__
+        raise ValueError(f"the term {name!r} must be a number or a scalar tensor, got {came}") from None

@@ -1,0 +1,26 @@
+"""Optimizers for designs, as torch optimizers with closures: `MMA`, `GCMMA` and `LBFGS`.
+
+torch is imported when one of them is first asked for.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+from ..._input.tensors import require_torch
+
+_HOMES = {"GCMMA": ".gcmma", "LBFGS": ".lbfgs", "MMA": ".mma"}
+
+__all__ = ["GCMMA", "LBFGS", "MMA"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    require_torch(f"optim.{name}")
+    return getattr(import_module(_HOMES[name], __name__), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,194 @@
+"""Limited-memory BFGS within bounds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..._runtime.solver_entry_point import grouped
+from ...errors import DesignRejected
+from .base import BoxOptimizer
+from .box import Box
+from .cauchy import Curvature, cauchy_step, shows_curvature, subspace_step, updated_diagonal
+from .line_search import Probe, strong_wolfe
+from .sample import Sample
+from .stagnation import STANDSTILL
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Numbers
+
+
+_ROUNDING = 4 * np.finfo(float).eps  # of the objective: a smaller decrease cannot be seen
+
+
+class LBFGS(BoxOptimizer):
+    """L-BFGS-B: the generalized Cauchy point of a limited-memory model, its minimum over the free variables, and a
+    line search for the strong Wolfe conditions within the box. It has no other constraints.
+
+    lower, upper: bounds of a group: a number, a tensor that fits each parameter, or a list with one of these each.
+    scale: the typical size of a variable, in the same forms; by default upper - lower where both are finite, else 1.
+    memory: how many steps the model is made from. Before them it is a diagonal, learned from all steps so far, so that
+    variables whose sizes were guessed badly still move together.
+    first_step: how far the steepest variable is tried to move at first, in sizes. Less costs a few iterations more;
+    where an objective is dear and known only nearby, 0.1 is safer.
+    max_evaluations: of the closure in one line search; the lowest design of a search cut short is taken. Where each is dear
+    and the objective kinked, as of a sheet near a snap, 5 will do.
+    max_shortenings: how often a line search may meet a design that the closure rejects; it counts as higher than any.
+
+    R. H. Byrd, P. Lu, J. Nocedal, C. Zhu, A limited memory algorithm for bound constrained optimization,
+    SIAM J. Sci. Comput. 16 (1995).
+
+    params: tensors, or groups of them, as torch's optimizers take.
+
+    >>> import torch, magshell as ms
+    >>> x = torch.zeros(3, dtype=torch.float64, requires_grad=True)
+    >>> ms.optim.LBFGS([x], upper=0.5).step(lambda: ((x - 1) ** 2).sum())
+    0.75
+    """
+
+    first_step: float
+    max_evaluations: int
+    memory: int
+
+    _copied = (*BoxOptimizer._copied, "memory", "first_step", "max_evaluations")
+
+    @grouped()
+    def __init__(
+        self,
+        params: Iterable[Any],
+        *,
+        lower: Numbers = -math.inf,
+        upper: Numbers = math.inf,
+        scale: Numbers | None = None,
+        memory: int = 10,
+        first_step: float = 1.0,
+        max_evaluations: int = 20,
+        max_shortenings: int = 6,
+    ):
+        for name, count in (("memory", memory), ("max_evaluations", max_evaluations)):
+            if isinstance(count, bool) or not (isinstance(count, int) and count > 0):
+                raise ValueError(f"{name} must be a positive integer, got {count!r}")
+        if not (isinstance(first_step, int | float) and 0 < first_step < math.inf):
+            raise ValueError(f"first_step must be a positive number, got {first_step!r}")
+        self.memory, self.first_step, self.max_evaluations = memory, float(first_step), max_evaluations
+        super().__init__(params, {"lower": lower, "upper": upper, "scale": scale}, max_shortenings)
+
+    def _check_sample(self, sample: Sample) -> None:
+        if len(sample.constraints):
+            raise ValueError("LBFGS has bounds but no other constraints: use MMA or GCMMA, or add a penalty")
+
+    def _advance(self, sample: Sample, box: Box, x: np.ndarray) -> None:
+        self.standstill = STANDSTILL
+        # A model may be stale: once more along the gradient then.
+        for run in (self._run, {}) if self._run else ({},):
+            line = self._line(sample, box, x, run)
+            found = None if line is None else self._search(line, sample.objective)
+            if found is not None:
+                moved, reached = found
+                self._write(moved)
+                self._leave_gradients(reached.gradient)
+                self._run = self._learned(run, box, moved - x, reached.gradient - sample.gradient)
+                self._keep(moved, reached)
+                return
+        self._write(x)
+        self._leave_gradients(sample.gradient)
+
+    def _leap(self, sample: Sample, box: Box, x: np.ndarray) -> None:
+        line = self._line(sample, box, x, self._run)
+        if line is not None:
+            # The gradient's change across a jump is no curvature: nothing is learned from it.
+            moved, trial = self._trial(line.at(1.0))
+            self._keep(moved, trial.differentiate())
+
+    def _line(self, sample: Sample, box: Box, x: np.ndarray, run: dict[Any, Any]) -> _Line | None:
+        """The line to the minimum of the model; None where the model falls nowhere within the box."""
+        stretch = np.sqrt(run["diagonal"]) if run else 1.0
+        unit = _sizes(box) / stretch
+        gradient = sample.gradient[box.free] * unit
+        lower, upper = (box.lower - x)[box.free] / unit, (box.upper - x)[box.free] / unit
+        if not (np.where(gradient < 0, upper > 0, lower < 0) & (gradient != 0)).any():
+            return None
+        if run:
+            steps, changes = run["steps"] * stretch, run["changes"] / stretch
+            theta = float(changes[-1] @ changes[-1] / (steps[-1] @ changes[-1]))
+        else:
+            steps = changes = np.zeros((0, gradient.size))
+            theta = float(np.abs(gradient).max()) / self.first_step
+        model = Curvature(steps, changes, theta)
+        step = subspace_step(gradient, lower, upper, model, cauchy_step(gradient, lower, upper, model))
+        slope = float(gradient @ step)
+        if not -slope > _ROUNDING * abs(sample.objective):
+            return None
+        return _Line(x, step * unit, slope, _longest(step, lower, upper), box)
+
+    def _search(self, line: _Line, objective: float) -> tuple[np.ndarray, Sample] | None:
+        """A lower design on the line and its sample. The last rejection, if nothing short enough was accepted."""
+        rejections = []
+        probes = 0
+
+        def probe(length: float) -> Probe:
+            nonlocal probes
+            probes += 1
+            try:
+                moved, trial = self._trial(line.at(length))
+            except DesignRejected as error:
+                rejections.append(error)
+                return Probe(length, math.inf, math.nan)
+            sample = trial.differentiate()
+            slope = float(sample.gradient[line.box.free] @ line.change)
+            return Probe(length, sample.objective, slope, (moved, sample))
+
+        start = Probe(0.0, objective, line.slope)
+        limits = {"limit": self.max_evaluations - 1, "max_rejected": self.max_shortenings}  # beside the first
+        best = strong_wolfe(probe, start, 1.0, line.longest, **limits)
+        if best is not None:
+            return best.found
+        if len(rejections) > self.max_shortenings:
+            raise rejections[-1]
+        if probes == self.max_evaluations:
+            self.standstill: str = (
+                f"no lower design in as many evaluations of a line search as max_evaluations allows, {probes}"
+            )
+        return None
+
+    def _learned(self, run: dict[Any, Any], box: Box, step: np.ndarray, change: np.ndarray) -> dict[Any, Any]:
+        """The last steps and changes of the gradient, (k, n) in units of the sizes, and the model before them."""
+        size = _sizes(box)
+        step, change = step[box.free] / size, change[box.free] * size
+        if not shows_curvature(step, change):
+            return run
+        return {
+            "steps": np.vstack([*run.get("steps", ()), step])[-self.memory :],
+            "changes": np.vstack([*run.get("changes", ()), change])[-self.memory :],
+            "diagonal": updated_diagonal(run.get("diagonal"), step, change),
+        }
+
+
+@dataclass(frozen=True)
+class _Line:
+    """x + a change within the box, 0 <= a <= longest; slope: of the objective at a = 0."""
+
+    x: np.ndarray
+    change: np.ndarray
+    slope: float
+    longest: float
+    box: Box
+
+    def at(self, length: float) -> np.ndarray:
+        return self.box.moved(self.x, length * self.change)
+
+
+def _sizes(box: Box) -> np.ndarray:
+    """(n free,)"""
+    return np.where(np.isnan(box.scale), 1.0, box.scale)[box.free]
+
+
+def _longest(step: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> float:
+    """How often the step fits into the box; at least once, for it ends inside."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        fits = np.where(step > 0, upper / step, np.where(step < 0, lower / step, np.inf))
+    return max(1.0, float(fits.min(initial=np.inf)))

@@ -1,1 +1,0 @@
-"""Linear theory: small deflections, buckling, vibrations."""

@@ -1,0 +1,36 @@
+"""Generators of meshes: sheets, rings, shells of revolution, any planar outline; and solids of tetrahedra."""
+
+from .balls import ball
+from .boxes import box
+from .cuts import cut
+from .disks import disk
+from .extrusions import extruded, solid_cylinder
+from .filled import tetrahedralize
+from .outlines import outline
+from .rectangles import rectangle
+from .stuffed import from_distance
+from .surfaces_of_revolution import annulus, cylinder, sector, spherical_cap
+from .tubes import tube
+
+__all__ = [
+    "annulus",
+    "ball",
+    "box",
+    "cut",
+    "cylinder",
+    "disk",
+    "extruded",
+    "from_distance",
+    "outline",
+    "rectangle",
+    "sector",
+    "solid_cylinder",
+    "spherical_cap",
+    "tetrahedralize",
+    "tube",
+]
+
+
+def __dir__() -> list[str]:
+    """Returns what is public, for tab completion."""
+    return sorted(__all__)

@@ -1,0 +1,52 @@
+"""A flat round sheet."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..._input.scalars import positive
+from ..._runtime.solver_entry_point import grouped
+from ..triangles.triangle_mesh import TriangleMesh
+from ._grid import check_size
+from ._six_nodes import round_sheet
+
+
+@grouped()
+def disk(radius: float, cells: int, *, order: int = 1) -> TriangleMesh | Any:
+    """The disk of the given radius [m] around the origin in the plane z = 0, its normal along +z.
+
+    order: 1 for three nodes a face; 2 for a SixNodeMesh, whose edges on its rims are arcs.
+
+    Ring k of `cells` rings holds 6 k vertices, so all faces are nearly equilateral: 6 cells^2 of them.
+
+    >>> disk(0.01, cells=8).n_faces
+    384
+    """
+    radius = positive("radius", "m", radius)
+    if isinstance(cells, bool) or not isinstance(cells, (int, np.integer)) or cells < 1:
+        raise ValueError(f"cells is the number of rings, an integer of at least 1, got {cells!r}")
+    check_size(6 * int(cells) ** 2)
+    rings = [np.zeros((1, 3))]
+    for k in range(1, cells + 1):
+        angle = 2 * np.pi * np.arange(6 * k) / (6 * k)
+        rings.append(radius * k / cells * np.stack([np.cos(angle), np.sin(angle), np.zeros(6 * k)], axis=1))
+    faces = np.concatenate([_ring_faces(k) for k in range(1, cells + 1)])
+    return round_sheet(TriangleMesh(np.concatenate(rings), faces), order, axes=(0, 1))
+
+
+def _ring_faces(k: int) -> np.ndarray:
+    """Faces between rings k - 1 and k: in each of six sectors, k on the outer one, k - 1 on the inner."""
+    sector, i = (index.ravel() for index in np.meshgrid(np.arange(6), np.arange(k), indexing="ij"))
+
+    def outer(step):
+        return 1 + 3 * k * (k - 1) + (sector * k + i + step) % (6 * k)
+
+    def inner(step):
+        before = 1 + 3 * (k - 1) * (k - 2) if k > 1 else 0
+        return before + (sector * (k - 1) + i + step) % max(6 * (k - 1), 1)
+
+    on_outer = np.stack([inner(0), outer(0), outer(1)], axis=1)
+    on_inner = np.stack([inner(0), outer(1), inner(1)], axis=1)[i < k - 1]
+    return np.concatenate([on_outer, on_inner])

@@ -1,0 +1,44 @@
+"""A flat rectangular sheet."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..._input.scalars import positive
+from ..._runtime.solver_entry_point import grouped
+from ..triangles.triangle_mesh import TriangleMesh
+from ._grid import grid
+from ._six_nodes import sheet_of_order
+
+
+@grouped()
+def rectangle(
+    length: float,
+    width: float,
+    cells: tuple[int, int],
+    diagonals: str = "alternating",
+    irregular: float | None = None,
+    seed: int = 0,
+    *,
+    order: int = 1,
+) -> TriangleMesh | Any:
+    """The sheet [0, length] x [0, width] [m] in the plane z = 0, its normal along +z.
+
+    Args:
+        length, width: along x and y, m.
+        cells: along x and y.
+        diagonals: "alternating", "aligned" (all from the origin outwards) or "crossed" (four faces a cell).
+        irregular: moves interior vertices at random by up to this fraction of their spacing, at most 0.25.
+        seed: of these moves; the same seed gives the same mesh.
+        order: 1 for three nodes a face; 2 for a SixNodeMesh, whose `elements` the same triangles are.
+
+    >>> rectangle(0.12, 0.02, cells=(60, 10)).n_faces
+    1200
+    """
+    length, width = positive("length", "m", length), positive("width", "m", width)
+    g = grid(cells, diagonals, irregular, seed)
+    x, y = g.parameters.T
+    mesh = TriangleMesh(np.stack([length * x, width * y, np.zeros_like(x)], axis=1), g.faces)
+    return sheet_of_order(mesh, order)

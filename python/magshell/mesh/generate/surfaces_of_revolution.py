@@ -1,0 +1,187 @@
+"""Makes cylinders, rings and spherical caps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..._input.quantity import quantity
+from ..._input.scalars import positive
+from ..._runtime.solver_entry_point import grouped
+from ..triangles.triangle_mesh import TriangleMesh
+from ._angles import TURN, angle_span, is_full_turn
+from ._grid import checked_cells, grid
+from ._six_nodes import round_sheet
+
+
+def surface(points: np.ndarray, faces: np.ndarray, outwards: Callable[..., Any]) -> TriangleMesh:
+    """The mesh, if the normal of each face is on the side of outwards(barycenters).
+
+    Bending a grid is not linear: a face that is merely slanted in the unit square may turn over on a
+    coarse or pointed surface.
+    """
+    mesh = TriangleMesh(points, faces)
+    turned = np.flatnonzero((mesh.face_normals * outwards(mesh.face_barycenters)).sum(axis=1) <= 0)
+    if len(turned):
+        raise ValueError(
+            f"irregular moves turn face {turned[0]} over; choose a smaller fraction, another seed, more cells"
+        )
+    return mesh
+
+
+@grouped()
+def cylinder(
+    radius: float,
+    length: float,
+    angle: float | tuple[float, float] = TURN,
+    *,
+    cells: tuple[int, int],
+    diagonals: str = "alternating",
+    irregular: float | None = None,
+    seed: int = 0,
+    order: int = 1,
+) -> TriangleMesh | Any:
+    """A cylinder around the y axis, 0 <= y <= length, its normal outwards.
+
+        x = radius sin(phi),   z = radius cos(phi)
+
+    Args:
+        radius, length: m.
+        angle: phi in rad, measured from the top (+z) towards +x: (from, to), or the width of a span symmetric
+            about the top, so that a roof of half angle a has angle = 2 a. A full turn is closed: its seam is
+            joined.
+        cells: (around, along).
+        diagonals, irregular, seed: as for `rectangle`.
+        order: likewise; nodes between corners lie on the cylinder too.
+
+    >>> import math
+    >>> roof = cylinder(25.0, 50.0, angle=math.radians(80.0), cells=(16, 16))
+    >>> len(roof.vertices_at(x=0.0, z=25.0))
+    17
+    """
+    radius, length = positive("radius", "m", radius), positive("length", "m", length)
+    start, stop = angle_span("angle", angle, symmetric=True)
+    # the grid closes along its second parameter, so that is phi; -y then keeps d/du x d/dv outwards
+    around, along = checked_cells(cells)
+    g = grid((along, around), diagonals, irregular, seed, periodic=is_full_turn(start, stop))
+    y = length * (1 - g.parameters[:, 0])
+    phi = start + (stop - start) * g.parameters[:, 1]
+    points = np.stack([radius * np.sin(phi), y, radius * np.cos(phi)], axis=1)
+    mesh = surface(points, g.faces, lambda barycenters: barycenters * [1, 0, 1])
+    return round_sheet(mesh, order, axes=(0, 2))
+
+
+@grouped()
+def annulus(
+    inner_radius: float,
+    outer_radius: float,
+    cells: tuple[int, int],
+    diagonals: str = "alternating",
+    irregular: float | None = None,
+    seed: int = 0,
+    *,
+    order: int = 1,
+) -> TriangleMesh | Any:
+    """The ring between two radii [m] around the origin in the plane z = 0, its normal along +z.
+
+    Args:
+        inner_radius, outer_radius: m.
+        cells: (radial, around).
+        diagonals, irregular, seed: as for `rectangle`.
+        order: likewise; edges on its rims are arcs.
+
+    >>> import magshell as ms
+    >>> ms.meshes.annulus(0.01, 0.02, cells=(2, 24)).n_faces
+    96
+    """
+    return sector(inner_radius, outer_radius, 2 * np.pi, cells, diagonals, irregular, seed, order=order)
+
+
+@grouped()
+def sector(
+    inner_radius: float,
+    outer_radius: float,
+    angle: float | tuple[float, float],
+    cells: tuple[int, int],
+    diagonals: str = "alternating",
+    irregular: float | None = None,
+    seed: int = 0,
+    *,
+    order: int = 1,
+) -> TriangleMesh | Any:
+    """The part of a ring between two angles from the x axis, in the plane z = 0, its normal along +z.
+
+    Args:
+        inner_radius, outer_radius: m. With an inner radius of 0 the sector comes to a point at the origin.
+        angle: rad, from 0 to `angle` or (from, to). A full turn closes the ring: then the seam is joined.
+        cells: (radial, around).
+        diagonals, irregular, seed: as for `rectangle`.
+        order: likewise; edges on its rims are arcs.
+
+    >>> import math
+    >>> sector(0.0, 0.01, math.pi / 2, cells=(4, 6)).boundary_loops[0].size
+    14
+    """
+    outer = positive("outer_radius", "m", outer_radius)
+    inner = float(quantity("inner_radius", "m", inner_radius, ()))
+    if not 0 <= inner < outer:
+        raise ValueError(f"inner_radius [m] must be in [0, outer_radius = {outer}), got {inner_radius}")
+    start, stop = angle_span("angle", angle)
+    g = grid(cells, diagonals, irregular, seed, periodic=is_full_turn(start, stop), poles=(inner == 0, False))
+    radius = inner + (outer - inner) * g.parameters[:, 0]
+    theta = start + (stop - start) * g.parameters[:, 1]
+    points = np.stack([radius * np.cos(theta), radius * np.sin(theta), np.zeros_like(theta)], axis=1)
+    mesh = surface(points, g.faces, lambda barycenters: np.array([0.0, 0.0, 1.0]))
+    return round_sheet(mesh, order, axes=(0, 1))
+
+
+@grouped()
+def spherical_cap(
+    radius: float,
+    angle_from: float = 0.0,
+    angle_to: float = np.pi / 2,
+    sector_angle: float | tuple[float, float] = TURN,
+    *,
+    cells: tuple[int, int],
+    diagonals: str = "alternating",
+    irregular: float | None = None,
+    seed: int = 0,
+    order: int = 1,
+) -> TriangleMesh | Any:
+    """The part of the sphere around the origin between two polar angles, its normal outwards.
+
+    Args:
+        radius: m.
+        angle_from, angle_to: rad from the +z axis, 0 <= angle_from < angle_to <= pi. At 0 and pi the cap
+            closes in a vertex at the pole, with a fan of faces around it.
+        sector_angle: azimuth in rad from the x axis, from 0 to it or (from, to). A full turn joins its seam.
+        cells: (around, along the meridian).
+        diagonals, irregular, seed: as for `rectangle`.
+        order: likewise; nodes between corners lie on the sphere too.
+
+    >>> import math
+    >>> quarter = spherical_cap(10.0, math.radians(18), math.pi / 2, math.pi / 2, cells=(16, 16))
+    >>> len(quarter.vertices_at(y=0.0)), len(quarter.vertices_at(z=0.0))
+    (17, 17)
+    """
+    radius = positive("radius", "m", radius)
+    angle_from = float(quantity("angle_from", "rad", angle_from, ()))
+    angle_to = float(quantity("angle_to", "rad", angle_to, ()))
+    if not 0 <= angle_from < angle_to <= np.pi:
+        raise ValueError(
+            f"polar angles [rad] must be 0 <= angle_from < angle_to <= pi, got {angle_from} and {angle_to}"
+        )
+    start, stop = angle_span("sector_angle", sector_angle)
+    poles = (angle_from == 0, angle_to == np.pi)
+    around, along = checked_cells(cells)
+    if all(poles) and along < 2:
+        raise ValueError(f"from pole to pole a cap needs at least 2 cells along the meridian, got {along}")
+    g = grid((along, around), diagonals, irregular, seed, periodic=is_full_turn(start, stop), poles=poles)
+    theta = angle_from + (angle_to - angle_from) * g.parameters[:, 0]
+    phi = start + (stop - start) * g.parameters[:, 1]
+    sine = np.sin(theta)
+    points = radius * np.stack([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)], axis=1)
+    mesh = surface(points, g.faces, lambda barycenters: barycenters)
+    return round_sheet(mesh, order, axes=(0, 1, 2))

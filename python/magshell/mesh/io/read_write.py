@@ -1,0 +1,323 @@
+"""Meshes and fields from files and to files."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import scipy
+
+from ..._input.arrays import index_array, named_values
+from ..._input.quantity import quantity, shape_of
+from ..._input.tensors import detached
+from ..._runtime.files import replacing
+from ..._runtime.solver_entry_point import grouped
+from ..selection import RELATIVE_TOLERANCE
+from ..tetrahedra.tet_mesh import TetMesh
+from ..triangles.six_node_mesh import SixNodeMesh
+from ..triangles.triangle_mesh import TriangleMesh, checked_mesh
+from .file_counts import check_counts
+from .obj import read_obj
+from .ply import read_ply, write_ply
+from .tetrahedra import TetContent, TetFields, cells_and_data, tetrahedra_of
+
+if TYPE_CHECKING:
+    from ..._input.kinds import FilePath, Numbers
+
+
+_MESHIO_MODULES = {".stl": "stl", ".vtu": "vtu", ".msh": "gmsh"}
+_READABLE = (".obj", ".ply", *_MESHIO_MODULES)
+_WRITERS = (".vtu", ".ply")
+_LOWER_CELLS = ("vertex", "line", "line3")  # gmsh writes them beside the surface
+_TRIANGLES = ("triangle", "triangle6")
+
+
+class Fields(NamedTuple):
+    """What a file holds beside the mesh: name -> (n_v,) or (n_v, k), and name -> (n_f,) or (n_f, k)."""
+
+    vertex: dict[str, np.ndarray]
+    face: dict[str, np.ndarray]
+
+
+@grouped()
+def read_mesh(path: FilePath, drop_unused: bool = False, unit: str = "m") -> TriangleMesh | Any:
+    """The mesh in an OBJ, PLY, STL, VTU or gmsh MSH file (the last three need the extra `io`): a TetMesh where a VTU or
+    MSH file holds tetrahedra, a SixNodeMesh where it holds triangles of six points (gmsh's second order), else a
+    TriangleMesh.
+
+    No format has a word for the unit, and CAD programs write mm: say so by `unit`. Points in the plane get z = 0. An
+    STL file stores each triangle apart: its corners within 1e-6 of the mesh's size are one vertex.
+
+    Tetrahedra have 4 points or 10; triangles and lines beside them are left out. gmsh's physical groups of volumes become
+    parts with their names, as does a cell field `part` of integers.
+
+    Args:
+        path: the ending tells the format.
+        drop_unused: leave out points that no triangle, or no tetrahedron, uses, instead of refusing them.
+        unit: of the coordinates in the file, "m" or "mm".
+
+    Raises:
+        FileNotFoundError: no such file.
+        ValueError: unknown ending, a file that cannot be read, that holds other faces than triangles or none,
+            or whose mesh `TriangleMesh` or `TetMesh` refuses.
+        ImportError: without meshio, where it is needed.
+
+    >>> import magshell as ms, tempfile
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     ms.write_mesh(f"{folder}/sheet.ply", mesh)
+    ...     ms.read_mesh(f"{folder}/sheet.ply").n_faces
+    40
+    """
+    if unit not in ("m", "mm"):
+        raise ValueError(f'unit must be "m" or "mm", got {unit!r:.60}')
+    mesh = _read(path, drop_unused)[0]
+    return mesh if unit == "m" else mesh.scaled(1e-3)
+
+
+def read_fields(path: FilePath, drop_unused: bool = False) -> Fields | TetFields:
+    """The fields in a file, for the vertices and faces, or tetrahedra, of `read_mesh` with the same arguments.
+
+    path, drop_unused: as in `read_mesh`.
+
+    >>> import magshell as ms, tempfile
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     ms.write_mesh(f"{folder}/sheet.ply", mesh, vertex_fields={"height": mesh.rest_positions[:, 2]})
+    ...     list(ms.read_fields(f"{folder}/sheet.ply").vertex)
+    ['height']
+    """
+    return _read(path, drop_unused)[1]
+
+
+def write_mesh(
+    path: FilePath,
+    mesh: TriangleMesh | SixNodeMesh | TetMesh,
+    positions: Numbers | None = None,
+    vertex_fields: Mapping[str, Numbers] | None = None,
+    face_fields: Mapping[str, Numbers] | None = None,
+    tetrahedron_fields: Mapping[str, Numbers] | None = None,
+) -> None:
+    """Writes a mesh and fields on it to VTU (needs the extra `io`) or, of triangles, binary PLY.
+
+    Args:
+        path: ends in .vtu or .ply.
+        mesh: gives the faces, or the tetrahedra: their parts are written as the field `part`, without names. Fields on a
+            solid's faces go to a file of its `surface`. Of a SixNodeMesh the curved elements are written, and what
+            `face_fields` says of them; fields on its flat faces go to a file of its `surface` too.
+        positions: (n_v, 3), m, instead of the rest positions.
+        vertex_fields: name -> (n_v,) or (n_v, k).
+        face_fields: name -> (n_f,) or (n_f, k).
+        tetrahedron_fields: name -> (n_t,) or (n_t, k).
+
+    Raises:
+        ValueError: unknown ending, wrong shapes, or names with spaces or one of " < > &.
+        OSError: it cannot be written; an older file is as it was.
+
+    >>> import magshell as ms, tempfile
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     ms.write_mesh(f"{folder}/sheet.ply", mesh, vertex_fields={"height": mesh.rest_positions[:, 2]})
+    ...     ms.read_mesh(f"{folder}/sheet.ply").n_faces
+    40
+    """
+    path = Path(path)
+    ending = path.suffix.lower()
+    if ending not in _WRITERS:
+        other = "; write_surface writes .stl and .obj" if ending in (".stl", ".obj") else ""
+        raise ValueError(f"cannot write {path.name!r}: the ending must be {' or '.join(_WRITERS)}{other}")
+    solid, six = isinstance(mesh, TetMesh), isinstance(mesh, SixNodeMesh)
+    if not (solid or six or isinstance(mesh, TriangleMesh)) and hasattr(mesh, "surface"):
+        raise ValueError(
+            "mesh is that of several bodies, some of tetrahedra: write_series writes a result of all of them, and of one "
+            "write its own, result[body].mesh"
+        )
+    if six and ending == ".ply":
+        raise ValueError("PLY holds no triangles of six nodes: write .vtu, or the mesh's `surface`")
+    points = mesh.rest_positions if solid or six else checked_mesh(mesh).rest_positions
+    if positions is not None:
+        points = quantity("positions", "m", detached(positions), (mesh.n_vertices, 3))
+    _refuse_misplaced(solid, ending, face_fields, tetrahedron_fields)
+    on_vertices = _checked_fields("vertex", vertex_fields, mesh.n_vertices)
+    if solid:
+        on_cells = _checked_fields("tetrahedron", tetrahedron_fields, mesh.n_tetrahedra)
+        cells, cell_data = cells_and_data(mesh, on_cells)
+    else:
+        on_faces = _checked_fields("face", face_fields, mesh.n_elements)
+        cells = [(_TRIANGLES[mesh.order - 1], mesh.elements)]
+        cell_data = {name: [values] for name, values in on_faces.items()}
+    if ending == ".ply":
+        write_ply(path, points, mesh.faces, on_vertices, on_faces)
+        return
+    write_cells(path, points, cells, on_vertices, cell_data)
+
+
+def write_cells(
+    path: Path,
+    points: Numbers,
+    cells: list[Any],
+    on_vertices: dict[Any, Any],
+    cell_data: dict[str, list[Any]],
+) -> None:
+    """A VTU of what has been checked: cells [(meshio's kind, rows)] and data {name: [of each kind]}."""
+    meshio = _meshio("vtu")
+    content = _meshio().Mesh(points, cells, point_data=on_vertices, cell_data=cell_data)
+    with replacing(path) as part:
+        meshio.write(part, content)
+
+
+def _refuse_misplaced(solid: bool, ending: str, face_fields, tetrahedron_fields) -> None:
+    if solid and ending == ".ply":
+        raise ValueError("PLY holds no tetrahedra: write .vtu, or the mesh's `surface`")
+    if solid and face_fields:
+        raise ValueError(
+            "face_fields: a file of tetrahedra has no faces; write those of the mesh's `surface`"
+        )
+    if not solid and tetrahedron_fields:
+        raise ValueError("tetrahedron_fields: a TriangleMesh has no tetrahedra")
+
+
+def _read(path, drop_unused: bool) -> tuple[TriangleMesh | SixNodeMesh, Fields] | tuple[TetMesh, TetFields]:
+    path = Path(path)
+    ending = path.suffix.lower()
+    if ending not in _READABLE:
+        raise ValueError(f"cannot read {path.name!r}: the ending must be one of {', '.join(_READABLE)}")
+    if not path.is_file():
+        raise FileNotFoundError(f"no file {str(path)!r}")
+    reader = {".obj": read_obj, ".ply": read_ply}.get(ending, _read_with_meshio)
+    try:
+        found = reader(path)
+    except ImportError:
+        raise
+    except Exception as error:  # a reader fed garbage may raise anything
+        raise ValueError(f"cannot read {str(path)!r} as {ending[1:].upper()}: {_reason(error)}") from error
+    if isinstance(found, TetContent):
+        return _solid(path, found, drop_unused)
+    points, faces, vertex_fields, face_fields = found
+    if len(faces) == 0:
+        raise ValueError(f"{str(path)!r} holds no triangles")
+    faces = index_array(f"the faces of {str(path)!r}", faces)
+    if points.shape[1] == 2:
+        points = np.column_stack([points, np.zeros(len(points))])
+    if ending == ".stl":
+        points, faces = _merge_coincident(points, faces)
+
+    points, faces, vertex_fields = _used(path, "triangle", points, faces, vertex_fields, drop_unused)
+    try:
+        mesh = (TriangleMesh if faces.shape[1] == 3 else SixNodeMesh)(points, faces)
+    except ValueError as error:
+        raise ValueError(f"{str(path)!r}: {error}") from error
+    return mesh, Fields(vertex_fields, face_fields)
+
+
+def _reason(error: Exception) -> str:
+    """Say what a reader stumbled over; many say too little."""
+    text = str(error)
+    if text and not isinstance(error, LookupError | TypeError | AssertionError | AttributeError):
+        return text
+    return f"its contents do not fit together ({type(error).__name__}{': ' + text if text else ''})"
+
+
+def _solid(path: Path, found: TetContent, drop_unused: bool) -> tuple[TetMesh, TetFields]:
+    nodes = index_array(f"the tetrahedra of {str(path)!r}", found.tetrahedra)
+    found.points, found.tetrahedra, found.vertex_fields = _used(
+        path, "tetrahedron", found.points, nodes, found.vertex_fields, drop_unused
+    )
+    try:
+        return found.build()
+    except ValueError as error:
+        raise ValueError(f"{str(path)!r}: {error}") from error
+
+
+def _used(path: Path, cell: str, points, cells, vertex_fields, drop_unused: bool):
+    """Points, cells and fields without the points that no cell uses. Raises ValueError where those are not to be dropped."""
+    used = np.unique(cells)
+    within = used.size == 0 or (used[0] >= 0 and used[-1] < len(points))
+    if not within or len(used) == len(points):
+        return points, cells, vertex_fields
+    if not drop_unused:
+        unused = np.setdiff1d(np.arange(len(points)), used)
+        raise ValueError(
+            f"{str(path)!r} has {len(unused)} points that no {cell} uses, the first one {unused[0]}; "
+            "read_mesh(..., drop_unused=True) leaves them out"
+        )
+    fields = {name: values[used] for name, values in vertex_fields.items()}
+    return points[used], np.searchsorted(used, cells), fields
+
+
+def _meshio(module: str | None = None):
+    try:
+        return importlib.import_module(f"meshio.{module}" if module else "meshio")
+    except ImportError as error:
+        raise ImportError('this file format needs meshio: pip install "magshell[io]"') from error
+
+
+def _read_with_meshio(
+    path: Path,
+) -> tuple[np.ndarray, np.ndarray, dict[Any, Any], dict[Any, Any]] | TetContent:
+    check_counts(path)
+    # meshio.read ends the interpreter on a file it cannot read; the readers of the formats raise
+    with np.errstate(over="ignore"):  # its STL reader multiplies whatever stands where the count should
+        content = _meshio(_MESHIO_MODULES[path.suffix.lower()]).read(path)
+    solid = tetrahedra_of(content)
+    if solid is not None:
+        return solid
+    there = {block.type for block in content.cells}
+    kind = next((each for each in _TRIANGLES if each in there), _TRIANGLES[0])
+    others = {
+        block.type: len(block.data) for block in content.cells if block.type not in (kind, *_LOWER_CELLS)
+    }
+    if others:
+        other, count = next(iter(others.items()))
+        raise ValueError(
+            f"it holds {count} cells of type {other!r}; only triangles, all of 3 points or all of 6, are supported"
+        )
+    triangles = [k for k, block in enumerate(content.cells) if block.type == kind]
+    if not triangles:
+        return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64), {}, {}
+    faces = np.concatenate([content.cells[k].data for k in triangles])
+    face_fields = {
+        name: np.concatenate([blocks[k] for k in triangles]) for name, blocks in content.cell_data.items()
+    }
+    points = np.asarray(content.points, dtype=np.float64)
+    return points, faces, dict(content.point_data), face_fields
+
+
+def _merge_coincident(points: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    tolerance = RELATIVE_TOLERANCE * float(np.linalg.norm(np.ptp(points, axis=0)))
+    pairs = scipy.spatial.cKDTree(points).query_pairs(tolerance, output_type="ndarray")
+    graph = scipy.sparse.coo_array(
+        (np.ones(len(pairs), dtype=bool), tuple(pairs.T)), shape=(len(points), len(points))
+    )
+    _, first, vertex = np.unique(
+        scipy.sparse.csgraph.connected_components(graph, directed=False)[1],
+        return_index=True,
+        return_inverse=True,
+    )
+    return points[first], vertex.ravel()[faces]
+
+
+def check_field_name(kind: str, name: str) -> None:
+    """Refuses what one of the formats could not hold: PLY ends a name at a space, and XML has signs of its own."""
+    if not (isinstance(name, str) and name and name.isprintable()) or set(name) & set(' "<>&'):
+        raise ValueError(
+            f'{kind} field names must be printable words without spaces and without any of " < > &, got {name!r}'
+        )
+
+
+def _checked_fields(kind: str, fields, rows: int) -> dict[str, np.ndarray]:
+    checked = {}
+    for name, values in named_values(f"{kind}_fields", fields).items():
+        check_field_name(kind, name)
+        shape = shape_of(f"{kind} field {name!r}", values)
+        if len(shape) not in (1, 2) or shape[0] != rows or 0 in shape:
+            raise ValueError(f"{kind} field {name!r} must have shape ({rows},) or ({rows}, k), got {shape}")
+        array = np.asarray(detached(values))
+        if array.dtype.kind not in "biuf":
+            raise ValueError(f"{kind} field {name!r} must hold real numbers, got dtype {array.dtype}")
+        fits = array.dtype.kind == "b" or (array.dtype.kind in "iu" and np.abs(array).max() < 2**31)
+        checked[name] = array.astype(np.int32 if fits else np.float64)
+    return checked

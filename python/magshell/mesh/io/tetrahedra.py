@@ -1,0 +1,82 @@
+"""Tetrahedra in what meshio reads and writes: MSH and VTU."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..._input.arrays import whole_numbers
+from ..tetrahedra.tet_mesh import TetMesh
+
+LOWER_CELLS = ("vertex", "line", "line3", "triangle", "triangle6")  # gmsh writes them beside the solid
+_KINDS = ("tetra", "tetra10")
+_PART = "part"  # the cell field of ours
+_PART_FIELDS = (_PART, "gmsh:physical")
+
+
+class TetFields(NamedTuple):
+    """What a file holds beside a mesh of tetrahedra: name -> (n_v,) or (n_v, k), and name -> (n_t,) or (n_t, k)."""
+
+    vertex: dict[str, np.ndarray]
+    tetrahedron: dict[str, np.ndarray]
+
+
+@dataclass
+class TetContent:
+    """What was read of a file."""
+
+    points: np.ndarray
+    tetrahedra: np.ndarray
+    vertex_fields: dict[str, np.ndarray]
+    tetrahedron_fields: dict[str, np.ndarray]
+    part_names: dict[str, int]
+
+    def build(self) -> tuple[TetMesh, TetFields]:
+        """The mesh, its parts from the field `part` or gmsh's physical groups of volumes, and all other fields."""
+        fields = dict(self.tetrahedron_fields)
+        chosen = next((name for name in _PART_FIELDS if name in fields), None)
+        parts = None if chosen is None else whole_numbers(f"the cell field {chosen!r}", fields.pop(chosen))
+        mesh = TetMesh(self.points, self.tetrahedra, parts, self.part_names)
+        return mesh, TetFields(self.vertex_fields, fields)
+
+
+def tetrahedra_of(content: Any) -> TetContent | None:
+    """What meshio's mesh holds of tetrahedra; None where it holds none."""
+    kinds = {block.type for block in content.cells}
+    there = [kind for kind in _KINDS if kind in kinds]
+    if not there:
+        return None
+    others = kinds - {*LOWER_CELLS, there[0]}
+    if others:
+        kind = min(others)
+        count = sum(len(block.data) for block in content.cells if block.type == kind)
+        raise ValueError(
+            f"it holds {count} cells of type {kind!r} beside those of type {there[0]!r}; a mesh is of tetrahedra of 4 points"
+            " or of 10, and of nothing else"
+        )
+    blocks = [k for k, block in enumerate(content.cells) if block.type == there[0]]
+    fields = {name: np.concatenate([data[k] for k in blocks]) for name, data in content.cell_data.items()}
+    names = {
+        name: int(data[0]) for name, data in content.field_data.items() if len(data) == 2 and data[1] == 3
+    }
+    return TetContent(
+        np.asarray(content.points, dtype=np.float64),
+        np.concatenate([content.cells[k].data for k in blocks]),
+        dict(content.point_data),
+        fields,
+        names,
+    )
+
+
+def cells_and_data(mesh: TetMesh, fields: dict[str, np.ndarray]) -> tuple[list[Any], dict[str, list[Any]]]:
+    """For meshio. A mesh of several parts, or of one with another number than 0, has them in the field `part`."""
+    data = {name: [values] for name, values in fields.items()}
+    if mesh.parts.any():
+        if _PART in data:
+            raise ValueError(
+                f"tetrahedron field {_PART!r}: the mesh's own parts have this name; choose another"
+            )
+        data[_PART] = [np.asarray(mesh.parts)]
+    return [(_KINDS[mesh.order - 1], mesh.tetrahedra)], data

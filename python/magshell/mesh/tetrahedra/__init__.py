@@ -1,0 +1,1 @@
+"""Defines meshes of tetrahedra with four and with ten nodes."""

@@ -1,0 +1,125 @@
+"""What shapes the tetrahedra of a mesh have."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..._runtime.frozen import Frozen
+from ..mesh_base import frozen
+from ..topology import EDGES, FACES
+from .jacobian import jacobians, least_jacobians
+
+if TYPE_CHECKING:
+    from .tet_mesh import TetMesh
+
+
+class TetQuality(Frozen):
+    """The shapes of a mesh's tetrahedra at rest, as arrays (n_t,); `print` tells the extremes.
+
+    All are of the four corners, but for `jacobian_ratios`, which say how ten nodes bend a tetrahedron. Small dihedral
+    angles make the stiffness matrix ill-conditioned, angles near 180 degrees spoil the strain: both are best between 20
+    and 140 degrees. A regular tetrahedron has 70.5.
+
+    >>> import magshell as ms
+    >>> ms.meshes.box((1.0, 1.0, 1.0), cells=(2, 2, 2)).quality
+    TetQuality of 48 tetrahedra
+      dihedral angles 45.0 to 90.0 deg, radius ratio at least 0.717, aspect at most 2, volumes 1 to 1
+      smallest angles: 45.0 deg (tetrahedron 0), 45.0 deg (tetrahedron 1), 45.0 deg (tetrahedron 2)
+    """
+
+    def __init__(self, mesh: TetMesh):
+        self._mesh = mesh
+
+    @cached_property
+    def _corners(self) -> np.ndarray:
+        return self._mesh.rest_positions[self._mesh.corners]
+
+    @cached_property
+    def _lengths(self) -> np.ndarray:
+        """(n_t, 6), m."""
+        ends = self._corners[:, EDGES]
+        return np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
+
+    @cached_property
+    def _face_vectors(self) -> np.ndarray:
+        """(n_t, 4, 3), m2: twice the area of each face along its normal, outwards."""
+        a, b, c = np.moveaxis(self._corners[:, FACES], 2, 0)
+        return np.cross(b - a, c - a)
+
+    @cached_property
+    def _volumes(self) -> np.ndarray:
+        a, b, c = np.moveaxis(self._corners[:, 1:] - self._corners[:, :1], 1, 0)
+        return np.einsum("ti,ti->t", np.cross(a, b), c) / 6
+
+    @cached_property
+    def dihedral_angles(self) -> np.ndarray:
+        """(n_t, 6), rad, inside, at the edges 01 12 20 03 13 23."""
+        normals = self._face_vectors
+        opposite = np.array([[k for k in range(4) if k not in edge] for edge in EDGES.tolist()])
+        one, other = normals[:, opposite[:, 0]], normals[:, opposite[:, 1]]
+        sine = np.linalg.norm(np.cross(one, other), axis=2)
+        return frozen(np.arctan2(sine, -np.einsum("tei,tei->te", one, other)))
+
+    @cached_property
+    def smallest_angles(self) -> np.ndarray:
+        """(n_t,), rad: the smallest dihedral angle of each."""
+        return frozen(self.dihedral_angles.min(axis=1))
+
+    @cached_property
+    def largest_angles(self) -> np.ndarray:
+        """(n_t,), rad: the largest dihedral angle of each."""
+        return frozen(self.dihedral_angles.max(axis=1))
+
+    @cached_property
+    def radius_ratios(self) -> np.ndarray:
+        """(n_t,): three times the inscribed over the circumscribed radius; 1 where it is regular, 0 where it is flat."""
+        inscribed = 6 * self._volumes / np.linalg.norm(self._face_vectors, axis=2).sum(axis=1)
+        # Crelle: 6 V R is the area of a triangle whose sides are the products of opposite edges
+        sides = np.sort(self._lengths[:, [0, 1, 2]] * self._lengths[:, [5, 3, 4]], axis=1).T
+        c, b, a = sides
+        area = 0.25 * np.sqrt(np.maximum((a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c)), 0))
+        return frozen(18 * inscribed * self._volumes / area)
+
+    @cached_property
+    def aspects(self) -> np.ndarray:
+        """(n_t,): longest edge over shortest height, relative to the sqrt(3/2) of a regular tetrahedron."""
+        height = 6 * self._volumes / np.linalg.norm(self._face_vectors, axis=2).max(axis=1)
+        return frozen(self._lengths.max(axis=1) / (np.sqrt(1.5) * height))
+
+    @cached_property
+    def volume_ratios(self) -> np.ndarray:
+        """(n_t,): the volume over the mean of all."""
+        return frozen(self._mesh.volumes / self._mesh.volumes.mean())
+
+    @cached_property
+    def jacobian_ratios(self) -> np.ndarray:
+        """(n_t,): the least Jacobian over its mean; 1 where the edges are straight and their nodes in the middle."""
+        if self._mesh.order == 1:
+            return frozen(np.ones(self._mesh.n_tetrahedra))
+        coefficients = jacobians(self._mesh.rest_positions[self._mesh.tetrahedra])
+        return frozen(least_jacobians(coefficients) / coefficients.mean(axis=1))
+
+    def worst(self, count: int = 3) -> np.ndarray:
+        """The tetrahedra with the smallest dihedral angles, the worst first; of equal ones, the lowest number first."""
+        return np.argsort(np.round(self.smallest_angles, 9), kind="stable")[:count]
+
+    def __repr__(self) -> str:
+        worst = ", ".join(
+            f"{np.degrees(self.smallest_angles[t]):.1f} deg (tetrahedron {t})" for t in self.worst()
+        )
+        bent = (
+            ""
+            if self._mesh.order == 1
+            else f", Jacobian at least {self.jacobian_ratios.min():.3g} of its mean"
+        )
+        return (
+            f"TetQuality of {self._mesh.n_tetrahedra} tetrahedra\n"
+            f"  dihedral angles {np.degrees(self.smallest_angles.min()):.1f} to "
+            f"{np.degrees(self.largest_angles.max()):.1f} deg, radius ratio at least {self.radius_ratios.min():.3g}, "
+            f"aspect at most {self.aspects.max():.3g}, volumes {self.volume_ratios.min():.3g} to "
+            f"{self.volume_ratios.max():.3g}{bent}\n"
+            f"  smallest angles: {worst}"
+        )

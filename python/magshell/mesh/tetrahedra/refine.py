@@ -1,0 +1,116 @@
+"""Refines tetrahedra, and raises or lowers their order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import count
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..off_surface import warn_of_nodes_off
+from ..signed_distance import Distance, middles_on_surface
+from ..topology import EDGES, MIRRORED, edge_table
+from .jacobian import jacobians, not_positive, shape_values, straight_volumes
+
+if TYPE_CHECKING:
+    from .tet_mesh import TetMesh
+
+
+Projection = Distance
+_LEAST_JACOBIAN = 0.1  # of the straight tetrahedron's
+
+
+def quadratic(mesh: TetMesh, surface: Projection | None) -> TetMesh:
+    nodes = ten_nodes(mesh)
+    positions = np.concatenate([mesh.rest_positions, mesh.edge_midpoints])
+    if surface is None:
+        return type(mesh)(positions, nodes, mesh.parts, mesh.part_names)
+    edges, middles = middles_on_surface(mesh, mesh.boundary_edges, surface)
+    target = positions.copy()
+    target[mesh.n_vertices + edges] = middles
+    placed = held_back(positions, target, nodes)
+    warn_of_nodes_off(mesh, edges, placed[mesh.n_vertices + edges], surface)
+    return type(mesh)(placed, nodes, mesh.parts, mesh.part_names)
+
+
+def curved(mesh: TetMesh, place: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> TetMesh:
+    """The mesh with ten nodes, those on edges at place(midpoints, edges (n_e, 2)), or as far towards it as tetrahedra
+    keep a tenth of their Jacobian."""
+    nodes = ten_nodes(mesh)
+    straight = np.concatenate([mesh.rest_positions, mesh.edge_midpoints])
+    target = np.concatenate([mesh.rest_positions, place(mesh.edge_midpoints, mesh.edges)])
+    return type(mesh)(held_back(straight, target, nodes), nodes, mesh.parts, mesh.part_names)
+
+
+def ten_nodes(mesh: TetMesh) -> np.ndarray:
+    return np.concatenate([mesh.tetrahedra, mesh.n_vertices + mesh.tetrahedron_edges], axis=1)
+
+
+def held_back(straight: np.ndarray, target: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """Positions on the way from straight (n_v, 3) to target: all the way, or half of it and half again where a
+    tetrahedron (n_t, 10) would keep less than a tenth of its Jacobian."""
+    share = np.ones(len(straight))
+    floor = _LEAST_JACOBIAN * 6 * straight_volumes(straight[nodes[:, :4]])
+    checked = np.flatnonzero((straight != target).any(axis=1)[nodes].any(axis=1))
+    for halving in count():  # ends: nodes that no longer move at all make no tetrahedron bad
+        positions = straight + share[:, None] * (target - straight)
+        bad = checked[not_positive(jacobians(positions[nodes[checked]]), floor[checked])]
+        if len(bad) == 0:
+            return positions
+        share[np.unique(nodes[bad])] *= 0.5 if halving < 4 else 0.0
+
+
+def linear(mesh: TetMesh) -> TetMesh:
+    used = np.unique(mesh.corners)
+    return type(mesh)(
+        mesh.rest_positions[used], np.searchsorted(used, mesh.corners), mesh.parts, mesh.part_names
+    )
+
+
+# local nodes: 0 to 3 corners, 4 to 9 the middles of 01 12 20 03 13 23
+_CHILDREN = np.array(
+    [
+        (0, 4, 6, 7),
+        (4, 1, 5, 8),
+        (6, 5, 2, 9),
+        (7, 8, 9, 3),
+        (4, 6, 7, 8),
+        (4, 6, 5, 8),
+        (6, 7, 8, 9),
+        (6, 5, 8, 9),
+    ]
+)
+_BARYCENTRIC = np.concatenate([np.eye(4), 0.5 * (np.eye(4)[EDGES[:, 0]] + np.eye(4)[EDGES[:, 1]])])
+
+
+def _turned(children: np.ndarray) -> np.ndarray:
+    """The same with positive volumes."""
+    corners = _BARYCENTRIC[children][:, :, 1:]
+    inverted = straight_volumes(corners) < 0
+    return np.where(inverted[:, None], children[:, MIRRORED[:4]], children)
+
+
+CHILDREN = _turned(_CHILDREN)
+
+
+def refined(mesh: TetMesh, surface: Projection | None = None) -> TetMesh:
+    parts = np.repeat(mesh.parts, 8)
+    if mesh.order == 1:
+        nodes = ten_nodes(mesh)
+        positions = np.concatenate([mesh.rest_positions, mesh.edge_midpoints])
+        if surface is not None:
+            positions = quadratic(mesh, surface).rest_positions
+        return type(mesh)(positions, nodes[:, CHILDREN].reshape(-1, 4), parts, mesh.part_names)
+
+    corners = mesh.tetrahedra[:, CHILDREN].reshape(-1, 4)
+    table = edge_table(corners)
+    # the curved edges' middles are where the parent's map takes them, the same from each side but for round-off
+    middles = 0.5 * (_BARYCENTRIC[CHILDREN[:, EDGES[:, 0]]] + _BARYCENTRIC[CHILDREN[:, EDGES[:, 1]]])
+    values = shape_values(middles.reshape(-1, 4)).reshape(8, 6, 10)
+    on_edges = np.einsum("cen,tni->tcei", values, mesh.rest_positions[mesh.tetrahedra]).reshape(-1, 3)
+    first = np.unique(table.tetrahedron_edges.ravel(), return_index=True)[1]
+    positions = np.concatenate([mesh.rest_positions, on_edges[first]])
+    nodes = np.concatenate([corners, mesh.n_vertices + table.tetrahedron_edges], axis=1)
+    fine = type(mesh)(positions, nodes, parts, mesh.part_names)
+    return fine if surface is None else quadratic(fine.first_order(), surface)

@@ -1,0 +1,109 @@
+"""Tetrahedra of a mesh by where they are and which part they belong to; vertices, edges and faces as for triangles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..._input.arrays import count, index_array
+from ..._input.selections import Indices
+from ..mesh_base import MeshBase
+from ..selection import _where
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Numbers
+
+
+class TetSelection(MeshBase):
+    """The selecting half of TetMesh. Faces are the triangles of its surface; edges join corners.
+
+    Tolerances are those of `vertices_at`; a selection that finds nothing raises a ValueError that says what is there.
+    """
+
+    def tetrahedra_at(
+        self,
+        x: Numbers | None = None,
+        y: Numbers | None = None,
+        z: Numbers | None = None,
+        tolerance: float | None = None,
+    ) -> np.ndarray:
+        """Tetrahedra with a corner at the given coordinates [m]: the layer that lies against a plane, for example."""
+        wanted, tolerance = self._coordinates(x, y, z, tolerance)
+        found = np.flatnonzero(self._matches(wanted, tolerance)[self.corners].any(axis=1))
+        if len(found) == 0:
+            raise ValueError(self._nothing_at("tetrahedron", wanted, tolerance))
+        return Indices(found, "tetrahedra")
+
+    def tetrahedra_where(self, predicate: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """Tetrahedra where predicate((n_t, 3) barycenters [m]) -> (n_t,) bool holds."""
+        return _where("tetrahedron", predicate, self.tetrahedron_barycenters, np.arange(self.n_tetrahedra))
+
+    def tetrahedra_in(self, part: int | str | Sequence[int | str]) -> np.ndarray:
+        """Tetrahedra of a part, by its number or name, or of several.
+
+        >>> import magshell as ms
+        >>> block = ms.meshes.box((2.0, 1.0, 1.0), cells=(2, 1, 1))
+        >>> halves = block.with_parts(block.tetrahedron_barycenters[:, 0] > 1.0, names={"left": 0, "right": 1})
+        >>> len(halves.tetrahedra_in("right"))
+        6
+        """
+        return Indices(np.flatnonzero(self._in_parts(part)), "tetrahedra")
+
+    def vertices_in(self, part: int | str | Sequence[int | str]) -> np.ndarray:
+        """Vertices of the tetrahedra of a part; those on its border belong to both sides."""
+        return Indices(np.unique(self.tetrahedra[self._in_parts(part)]).astype(np.int64), "vertices")
+
+    def faces_in(self, part: int | str | Sequence[int | str]) -> np.ndarray:
+        """Faces of the surface whose tetrahedron belongs to a part. ValueError where none does."""
+        found = np.flatnonzero(self._in_parts(part)[self.face_tetrahedra])
+        if len(found) == 0:
+            raise ValueError(f"part {part!r} lies inside: none of its tetrahedra is on the surface")
+        return Indices(found, "faces")
+
+    def _in_parts(self, part) -> np.ndarray:
+        wanted = [part] if isinstance(part, str) or not isinstance(part, Iterable) else list(part)
+        numbers = [self._part_number(each) for each in wanted]
+        return np.isin(self.parts, numbers)
+
+    def _part_number(self, part) -> int:
+        there = np.unique(self.parts).tolist()
+        names = ", ".join(f"{name!r} ({number})" for name, number in self.part_names.items())
+        what = f"its parts are {', '.join(map(str, there[:20]))}" + (f", named {names}" if names else "")
+        if isinstance(part, str):
+            if part not in self.part_names:
+                raise ValueError(f"the mesh has no part {part!r}: {what}")
+            part = self.part_names[part]
+        if isinstance(part, bool) or not isinstance(part, int | np.integer) or part not in there:
+            raise ValueError(f"the mesh has no part {part!r:.60}: {what}")
+        return int(part)
+
+
+def checked_parts(parts: Numbers, n_tetrahedra: int) -> np.ndarray:
+    """(n_t,) int32, zeros for None."""
+    if parts is None:
+        return np.zeros(n_tetrahedra, dtype=np.int32)
+    array = np.asarray(parts) if isinstance(parts, np.ndarray) else parts
+    if isinstance(array, np.ndarray) and array.dtype == bool:
+        array = array.astype(np.int32)
+    array = index_array("parts", array)
+    if array.shape != (n_tetrahedra,):
+        raise ValueError(f"parts must have shape (n_t,) = ({n_tetrahedra},), got {array.shape}")
+    if len(array) and not (0 <= array.min() and array.max() < 2**31):
+        raise ValueError(
+            f"parts must be numbers from 0 to 2^31 - 1, got {array[(array < 0) | (array >= 2**31)][0]}"
+        )
+    return array.astype(np.int32)
+
+
+def checked_part_names(names: dict[str, int]) -> dict[str, int]:
+    """name -> number; a name may be of a part that has no tetrahedron any more."""
+    if not isinstance(names, Mapping | None):
+        raise ValueError(f"part_names must be a dictionary of name: number, got {type(names).__name__}")
+    checked = {}
+    for name, number in (names or {}).items():
+        if not (isinstance(name, str) and name):
+            raise ValueError(f"part_names: a name must be a word, got {name!r:.60}")
+        checked[name] = count(f"part_names[{name!r}]", number, least=0)
+    return checked

@@ -1,0 +1,94 @@
+"""What shapes the faces of a mesh have, and how thin they are beside the sheet."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..._runtime.frozen import Frozen
+from ..mesh_base import frozen
+
+if TYPE_CHECKING:
+    from .six_node_mesh import SixNodeMesh
+    from .triangle_mesh import TriangleMesh
+
+
+class MeshQuality(Frozen):
+    """The shapes of a mesh's faces at rest, as arrays (n_f,) that can be plotted; `print` tells the extremes.
+
+    A face with an angle near 180 degrees is a *cap*. Where a sheet bends along the long edge of a cap, the cap cannot
+    follow and stiffens what is around it, the more so the thinner the sheet: a solve warns where that shows. Needles,
+    long and thin with two angles near 90 degrees, do no such harm.
+
+    >>> import magshell as ms
+    >>> ms.meshes.rectangle(0.1, 0.02, cells=(10, 2)).quality
+    MeshQuality of 40 faces
+      angles 45.0 to 90.0 deg, aspect at most 1.39, shortest height 0.00707 m
+      largest angles: 90.0 deg (face 0), 90.0 deg (face 1), 90.0 deg (face 2)
+    """
+
+    def __init__(self, mesh: TriangleMesh | SixNodeMesh, thickness: np.ndarray | None = None):
+        self._mesh = mesh
+        self.thickness = thickness
+
+    @cached_property
+    def _sorted_edges(self) -> np.ndarray:
+        """(3, n_f), m, shortest first."""
+        return np.sort(self._mesh.edge_lengths[self._mesh.face_edges], axis=1).T
+
+    def _angles(self, opposite: int) -> np.ndarray:
+        squares = self._sorted_edges**2
+        # b c sin = 2 A,   b c cos = (b^2 + c^2 - a^2) / 2
+        return np.arctan2(2 * self._mesh.face_areas, 0.5 * (squares.sum(axis=0) - 2 * squares[opposite]))
+
+    @cached_property
+    def smallest_angles(self) -> np.ndarray:
+        """(n_f,), rad."""
+        return frozen(self._angles(opposite=0))
+
+    @cached_property
+    def largest_angles(self) -> np.ndarray:
+        """(n_f,), rad."""
+        return frozen(self._angles(opposite=2))
+
+    @cached_property
+    def aspects(self) -> np.ndarray:
+        """(n_f,): longest edge over inscribed radius, relative to the 2 sqrt(3) of an equilateral triangle."""
+        lengths = self._sorted_edges
+        inscribed_radius = 2 * self._mesh.face_areas / lengths.sum(axis=0)
+        return frozen(lengths[2] / (2 * np.sqrt(3) * inscribed_radius))
+
+    @cached_property
+    def heights(self) -> np.ndarray:
+        """(n_f,), m: the shortest height of each face, which stands on its longest edge."""
+        return frozen(2 * self._mesh.face_areas / self._sorted_edges[2])
+
+    @cached_property
+    def heights_over_lengths(self) -> np.ndarray:
+        """(n_f,): the shortest height over the longest edge; 0.87 where a face is equilateral, 0 where it is none."""
+        return frozen(self.heights / self._sorted_edges[2])
+
+    @cached_property
+    def heights_over_thickness(self) -> np.ndarray:
+        """(n_f,): the shortest height over the thickness of the sheet. ValueError where only the mesh is known."""
+        if self.thickness is None:
+            raise ValueError("a mesh has no thickness: ask the `quality` of a Shell")
+        return frozen(self.heights / self.thickness)
+
+    def worst(self, count: int = 3) -> np.ndarray:
+        """The faces with the largest angles, the worst first; of equal ones, the lowest number first."""
+        return np.argsort(-np.round(self.largest_angles, 9), kind="stable")[:count]
+
+    def __repr__(self) -> str:
+        thickness = (
+            "" if self.thickness is None else f" ({self.heights_over_thickness.min():.3g} of the thickness)"
+        )
+        worst = ", ".join(f"{np.degrees(self.largest_angles[f]):.1f} deg (face {f})" for f in self.worst())
+        return (
+            f"MeshQuality of {len(self.heights)} faces\n"
+            f"  angles {np.degrees(self.smallest_angles.min()):.1f} to {np.degrees(self.largest_angles.max()):.1f} deg, "
+            f"aspect at most {self.aspects.max():.3g}, shortest height {self.heights.min():.3g} m{thickness}\n"
+            f"  largest angles: {worst}"
+        )

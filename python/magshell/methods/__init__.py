@@ -1,1 +1,0 @@
-"""How equilibria are looked for and time steps are taken: options as objects."""

@@ -1,0 +1,1 @@
+"""Describes a scene: bodies, actuators, supports, loads, contacts and fields."""

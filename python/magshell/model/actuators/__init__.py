@@ -1,0 +1,1 @@
+"""Defines muscles, cavities, pneumatic cells and tendons."""

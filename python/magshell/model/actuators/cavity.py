@@ -1,0 +1,194 @@
+"""Closed cavities with a pressure, a gas or a liquid inside."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from ..._input.selections import indices, selection
+from ..bodies.bodies import BODIES, Bodies, on_body
+from ..shells.shell import Shell
+from ..solids.solid import Solid
+from .actuator import Actuator, number
+from .actuator_results import CavityResult
+from .closed_surface import ClosedSurface, of_faces
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Computed, Numbers
+    from ..scene.scene import Scene
+
+
+ATMOSPHERE = 101325.0  # Pa
+WATER = 2.2e9  # Pa, its bulk modulus
+_LAWS = {
+    "pressure": ("pressure",),
+    "gas": ("filling_pressure", "outside_pressure"),
+    "liquid": ("volume", "bulk_modulus"),
+}
+
+
+class Cavity(Actuator):
+    """A closed surface with a fluid inside, whose pressure is the same everywhere and follows the surface.
+
+    body: a Shell or a Solid, or several as [(body, faces), ...], with faces (k,) or None each.
+    faces: (k,), those around the cavity, of one body. By default all of a shell, and those of the one hollow inside a solid.
+        A solid's look into the cavity as they are; a shell's have to look out of it.
+    And what is inside, one of
+
+    pressure: Pa, over that outside, whatever the volume is. Negative: suction.
+    filling_pressure: Pa, of a gas at constant temperature, absolute and at the volume at rest: it is the amount of gas,
+        n R T over that volume. 0 is a vacuum.
+        outside_pressure: Pa, that of the surroundings, by default one atmosphere.
+    volume: m3, of a liquid. Its pressure is what that takes: that of a bulk modulus (Pa, by default water's) and no
+        multiplier, so it takes bulk_modulus / pressure digits of what a double has; solves treat it as a constraint.
+        A load factor says how much of what is missing at rest is filled in: load steps fill a volume far from that.
+
+    cap_rims: close what is open by lids without stiffness, fans of triangles from one vertex of each rim, flat where the rim
+        is. The pressure on them pulls at the rim.
+
+    All of its numbers may change in time, and have gradients. What a result says: `result[cavity].volume` (m3) and
+    `.pressure` (Pa, over that outside). Cavities that collapse to no volume are refused, as elements turned inside out are.
+
+    The volume at rest is `cavity.rest_volume(scene)`.
+
+    Raises ValueError where the surface is not closed (with the open edges) or inside out, in ms.Scene.
+
+    A box of a soft sheet, under a pressure and filled with as much liquid as that would make room for:
+
+    >>> import magshell as ms
+    >>> box = ms.meshes.box((0.1, 0.1, 0.1), cells=(2, 2, 1))
+    >>> sheet = ms.Shell(ms.TriangleMesh(box.rest_positions, box.faces), thickness=5e-3, young_modulus=1e6)
+    >>> floor = ms.Pin(sheet.mesh.vertices_at(z=0.0))
+    >>> air = ms.Cavity(sheet, pressure=200.0)
+    >>> blown = ms.equilibrium(ms.Scene(sheet, supports=[floor], actuators=[air]))
+    >>> water = ms.Cavity(sheet, volume=blown[air].volume, bulk_modulus=1e9)
+    >>> filled = ms.equilibrium(ms.Scene(sheet, supports=[floor], actuators=[water]))
+    >>> round(float(filled[water].pressure))
+    200
+    """
+
+    _units: ClassVar[dict[str, str]] = {
+        "pressure": "Pa",
+        "filling_pressure": "Pa",
+        "outside_pressure": "Pa",
+        "volume": "m3",
+        "bulk_modulus": "Pa",
+    }
+
+    def __init__(
+        self,
+        body: Shell | Solid | Sequence[Any],
+        faces: Numbers | None = None,
+        *,
+        pressure: Numbers | None = None,
+        filling_pressure: Numbers | None = None,
+        outside_pressure: Numbers | None = None,
+        volume: Numbers | None = None,
+        bulk_modulus: Numbers | None = None,
+        cap_rims: bool = False,
+    ):
+        self._parts = _parts(body, faces)
+        self.bodies: tuple[Any, ...] = tuple(each for each, _ in self._parts)
+        if not isinstance(cap_rims, bool):
+            raise ValueError(f"cap_rims must be True or False, got {cap_rims!r:.60}")
+        self.cap_rims = cap_rims
+        given = {"pressure": pressure, "filling_pressure": filling_pressure, "volume": volume}
+        chosen = [name for name, value in given.items() if value is not None]
+        if len(chosen) != 1:
+            raise ValueError(
+                "a Cavity takes one of pressure [Pa], filling_pressure [Pa] (a gas) and volume [m3] (a liquid), got "
+                + (" and ".join(chosen) or "none")
+            )
+        self.law: str = {"pressure": "pressure", "filling_pressure": "gas", "volume": "liquid"}[chosen[0]]
+        for name, value, law in (
+            ("outside_pressure", outside_pressure, "gas"),
+            ("bulk_modulus", bulk_modulus, "liquid"),
+        ):
+            if value is not None and self.law != law:
+                raise ValueError(
+                    f"{name} is that of a {law}, which a Cavity with a {chosen[0]} does not hold"
+                )
+        self._replaceable = self._in_time = _LAWS[self.law]
+        if self.law == "pressure":
+            self.pressure: np.ndarray = number("pressure", "Pa", pressure)
+            self._is_spring = False
+        elif self.law == "gas":
+            self.filling_pressure: np.ndarray = number("filling_pressure", "Pa", filling_pressure, 0.0)
+            outside = ATMOSPHERE if outside_pressure is None else outside_pressure
+            self.outside_pressure: np.ndarray = number("outside_pressure", "Pa", outside, 0.0)
+        else:
+            self.volume: np.ndarray = number("volume", "m3", volume, 0.0, above=True)
+            self.bulk_modulus: np.ndarray = number(
+                "bulk_modulus", "Pa", WATER if bulk_modulus is None else bulk_modulus, 0.0, above=True
+            )
+
+    _replaceable = _in_time = tuple(name for names in _LAWS.values() for name in names)
+
+    def replaced(self, **values: Any) -> Cavity:
+        """Returns the same cavity with other numbers of what is inside."""
+        now = {name: getattr(self, name) for name in self._replaceable} | values
+        return self._keep_shapes(Cavity(self._parts, cap_rims=self.cap_rims, **now))
+
+    def surface(self, bodies: Bodies) -> ClosedSurface:
+        """In a scene's bodies. Raises ValueError where it is not closed."""
+        return of_faces(bodies, [(body, _chosen(body, faces)) for body, faces in self._parts], self.cap_rims)
+
+    def rest_volume(self, scene: Scene) -> float:
+        """m3, in a scene that has it."""
+        return float(self.surface(scene._bodies).volume(scene.mesh.rest_positions))
+
+    def _filling(self, scene: Scene) -> float:
+        if self.law != "liquid":
+            return 0.0
+        return abs(self.volume / self.rest_volume(scene) - 1.0)
+
+    def _pressure_at(self, volume: Numbers, rest_volume: float, load_factor: float) -> Computed:
+        """Pa, over that outside, at a volume (m3)."""
+        if self.law == "pressure":
+            return load_factor * self.pressure + 0.0 * volume
+        if self.law == "gas":
+            return load_factor * (self.filling_pressure * rest_volume / volume - self.outside_pressure)
+        target = rest_volume + load_factor * (self.volume - rest_volume)
+        return -self.bulk_modulus * (volume - target) / rest_volume
+
+    def _core_input(self, label: str, bodies: Bodies) -> dict[Any, Any]:
+        return {
+            "owner": label,
+            "law": self.law,
+            "stays_open": True,
+            "coupled": False,
+            "surfaces": [self.surface(bodies).core_input],
+        }
+
+    def _result_in(self, result) -> CavityResult:
+        return CavityResult(result, self)
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{name}={float(getattr(self, name)):g}" for name in self._replaceable)
+        return f"Cavity({values}{on_body(self.body)})"
+
+
+def _parts(body, faces) -> list[tuple[Shell | Solid, np.ndarray | None]]:
+    if isinstance(body, BODIES):
+        return [(body, None if faces is None else selection("Cavity faces", faces))]
+    if faces is not None:
+        raise ValueError("faces are those of one body: of several give [(body, faces), ...]")
+    wanted = "a Cavity takes a Shell or a Solid, or several as [(body, faces), ...]"
+    if not isinstance(body, list | tuple) or not body:
+        raise ValueError(f"{wanted}, got {body!r:.60}")
+    parts = []
+    for each in body:
+        pair = (each, None) if isinstance(each, BODIES) else each
+        if not isinstance(pair, list | tuple) or len(pair) != 2 or not isinstance(pair[0], BODIES):
+            raise ValueError(f"{wanted}, got {each!r:.60} among them")
+        one, own = pair
+        if any(one is before for before, _ in parts):
+            raise ValueError(f"a Cavity names each body once, but twice {one!r:.60}")
+        parts.append((one, None if own is None else selection("Cavity faces", own)))
+    return parts
+
+
+def _chosen(body, faces: np.ndarray | None) -> np.ndarray | None:
+    return None if faces is None else indices("Cavity faces", faces, body.mesh.n_faces)

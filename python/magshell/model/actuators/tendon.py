@@ -1,0 +1,167 @@
+"""Tendons: strings through points that ride on bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from ..._input.quantity import quantity
+from ..bodies.bodies import BODIES, Bodies, on_body
+from ..rigid.rigid import Rigid
+from ..shells.shell import Shell
+from ..solids.solid import Solid
+from .actuator import Actuator, number
+from .actuator_results import TendonResult
+from .embedded_points import riding_points
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Computed, Numbers
+    from ..rigid.equimomental_points import Place
+
+
+_SMOOTHING = 1e-3  # of the length at rest
+_KINDS = (*BODIES, Rigid)
+
+
+class Tendon(Actuator):
+    """A string through points of bodies: it pulls, and is slack where it is shorter than its rest length.
+
+    points: (k, 3) m, k >= 2, where it passes at rest, in `body`: each rides on the element or face that it lies in. Or
+        [(body, (3,)), ...] for one of several bodies, links of a skeleton and Rigid parts among them.
+    body: a Shell, a Solid, or a Rigid part such as a Link.
+    tension: N, which it pulls with at any length.
+    stiffness: N/m, with which it pulls beyond rest_length, as a spring of the whole tendon.
+    rest_length: m, by default its length at rest.
+    sliding: whether it runs through the points between its ends without friction, so that one tension acts along all of it;
+        else each segment is a spring of its own, with its share of the rest length.
+    smoothing: m, over which the pull sets in beyond the rest length; by default 0.1 % of its length at rest.
+
+    All numbers may change in time, and have gradients. What a result says: `result[tendon].length` (m), `.tension` (N; of a
+    tendon that does not slide, one a segment) and `.positions` (..., k, 3).
+
+    A bar of E A = 1 N under a tendon of 0.01 N along its axis:
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.box((1, 0.1, 0.1), cells=(4, 2, 2))
+    >>> bar = ms.Solid(mesh, material=ms.NeoHookean(young_modulus=100.0, poisson_ratio=0.0))
+    >>> pull = ms.Tendon([(0, 0.05, 0.05), (1, 0.05, 0.05)], bar, tension=0.01)
+    >>> found = ms.equilibrium(ms.Scene(bar, supports=[ms.Pin(bar.mesh.vertices_at(x=0.0))], actuators=[pull]))
+    >>> float(found[pull].length) < 0.99
+    True
+    """
+
+    _replaceable = _in_time = ("tension", "stiffness", "rest_length", "smoothing")
+    _units: ClassVar[dict[str, str]] = {
+        "tension": "N",
+        "stiffness": "N/m",
+        "rest_length": "m",
+        "smoothing": "m",
+    }
+
+    def __init__(
+        self,
+        points: Numbers | Sequence[tuple[Shell | Solid | Rigid, Numbers]],
+        body: Shell | Solid | Rigid | None = None,
+        *,
+        tension: Numbers = 0.0,
+        stiffness: Numbers = 0.0,
+        rest_length: Numbers | None = None,
+        sliding: bool = True,
+        smoothing: Numbers | None = None,
+    ):
+        self._points = _points(points, body)
+        if not isinstance(sliding, bool):
+            raise ValueError(f"sliding must be True or False, got {sliding!r:.60}")
+        self.sliding = sliding
+        self.bodies: tuple[Any, ...] = tuple({id(each): each for each, _ in self._points}.values())
+        self._shares = np.linalg.norm(np.diff([point for _, point in self._points], axis=0), axis=1)
+        length = float(self._shares.sum())
+        if not self._shares.min() > 1e-9 * length:
+            raise ValueError(
+                f"points {np.argmin(self._shares)} and {np.argmin(self._shares) + 1} of the Tendon are one"
+            )
+        self._shares = self._shares / length
+        self.tension: np.ndarray = number("tension", "N", tension, 0.0)
+        self.stiffness: np.ndarray = number("stiffness", "N/m", stiffness, 0.0)
+        rest = length if rest_length is None else rest_length
+        self.rest_length: np.ndarray = number("rest_length", "m", rest, 0.0, above=True)
+        smooth = _SMOOTHING * length if smoothing is None else smoothing
+        self.smoothing: np.ndarray = number("smoothing", "m", smooth, 0.0, above=True)
+
+    @property
+    def _is_spring(self) -> bool:
+        """Whether it has a stiffness; else it pulls with a tension that is given."""
+        return bool(self.stiffness > 0.0)
+
+    @property
+    def points(self) -> np.ndarray:
+        """(k, 3) m, at rest."""
+        return np.array([point for _, point in self._points])
+
+    @property
+    def body(self) -> Shell | Solid | None:
+        """The first shell or solid that it goes through, or None."""
+        return next((each for each in self.bodies if isinstance(each, BODIES)), None)
+
+    def replaced(self, **values: Any) -> Tendon:
+        """Returns the same tendon with other numbers."""
+        now = {name: getattr(self, name) for name in self._replaceable} | values
+        return self._keep_shapes(Tendon(self._points, sliding=self.sliding, **now))
+
+    def _tension_at(self, length: Numbers) -> Computed:
+        """N, at a length, m; of a tendon that does not slide, at those of its segments, (..., segments)."""
+        shares = 1.0 if self.sliding else _like(self._shares, length)
+        beyond = length - shares * float(self.rest_length)
+        smoothing = shares * float(self.smoothing)
+        below = 0.5 * beyond**2 / smoothing
+        pull = (beyond - 0.5 * smoothing) * (beyond >= smoothing) + below * (
+            (beyond > 0.0) & (beyond < smoothing)
+        )
+        return float(self.tension) + float(self.stiffness) / shares * pull
+
+    def _riding(self, scene_bodies: Bodies, places: list[Place]) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Of each point the core's vertices that it rides on, and their weights."""
+        return riding_points(self._points, scene_bodies, places)
+
+    def _core_input(self, label: str, bodies: Bodies, places) -> dict[Any, Any]:
+        return {
+            "owner": label,
+            "slides": self.sliding,
+            "shares": self._shares.tolist(),
+            "points": [
+                {"vertices": vertices.tolist(), "weights": weights.tolist()}
+                for vertices, weights in self._riding(bodies, places)
+            ],
+        }
+
+    def _result_in(self, result) -> TendonResult:
+        return TendonResult(result, self)
+
+    def __repr__(self) -> str:
+        return f"Tendon({len(self._points)} points, tension={float(self.tension):g}{on_body(self.body)})"
+
+
+def _points(points, body) -> list[tuple[Shell | Solid | Rigid, np.ndarray]]:
+    if isinstance(points, list | tuple) and points and all(_is_pair(each) for each in points):
+        if body is not None:
+            raise ValueError("points name their bodies, so body= must not")
+        pairs = [(each, quantity("points", "m", point, (3,))) for each, point in points]
+    else:
+        if not isinstance(body, _KINDS):
+            raise ValueError(
+                f"a Tendon runs through a Shell, a Solid or a Rigid part: Tendon(points, body), got {body!r:.60}"
+            )
+        pairs = [(body, point) for point in quantity("points", "m", points, ("k", 3))]
+    if len(pairs) < 2:
+        raise ValueError(f"a Tendon needs two points or more, got {len(pairs)}")
+    return pairs
+
+
+def _is_pair(each) -> bool:
+    return isinstance(each, list | tuple) and len(each) == 2 and isinstance(each[0], _KINDS)
+
+
+def _like(array: np.ndarray, other):
+    return other.new_tensor(array) if hasattr(other, "new_tensor") else array

@@ -1,0 +1,362 @@
+"""The bodies of a scene, one after another: where each has its vertices, edges and faces among those of all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cached_property
+from itertools import takewhile
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..._input.checked_list import checked_list
+from ...mesh.triangles.face_quality import MeshQuality
+from ...mesh.triangles.six_node_mesh import SixNodeMesh
+from ...mesh.triangles.triangle_mesh import TriangleMesh
+from ..rigid.joints import Joint
+from ..rigid.rigid import Rigid
+from ..rigid.skeleton import Skeleton
+from ..shells.shell import Shell
+from ..solids.skin import Skin
+from ..solids.solid import Solid
+from .body_ranges import Span, magnetized_rows, rotations_of, turning_edges
+from .joined_mesh import JoinedMesh, NoMesh
+from .ties import Tie, joined_components, originals
+
+if TYPE_CHECKING:
+    from ..contact.contact import Contact
+
+BODIES = (Shell, Solid)
+
+
+class Bodies:
+    """Raises ValueError where one is no Shell, Solid, Rigid or Skeleton, or is there twice, or where a tie cannot be.
+
+    shells: all Shells and Solids. rigid: the Rigid parts, links among them, whose points come after all vertices.
+    touching: those of the rigid parts whose shapes touch: vertices of theirs come after the points of all.
+    original: (n_v of all,), the first of the vertices that each is welded to, or itself.
+    """
+
+    def __init__(
+        self,
+        bodies: Shell | Solid | Rigid | Skeleton | Iterable[Shell | Solid | Rigid | Skeleton],
+        ties: Iterable[Tie] = (),
+        touching: Iterable[Rigid] = (),
+    ):
+        self.touching: tuple[Rigid, ...] = tuple(touching)
+        listed = checked_list("bodies", bodies, (*BODIES, Rigid, Skeleton), repeats=True)
+        self.skeletons: tuple[Skeleton, ...] = tuple(body for body in listed if isinstance(body, Skeleton))
+        self.listed: tuple[Any, ...] = tuple(listed)
+        self.shells: tuple[Shell | Solid, ...] = tuple(body for body in listed if isinstance(body, BODIES))
+        self.rigid: tuple[Rigid, ...] = tuple(
+            part for body in listed for part in _parts(body) if isinstance(part, Rigid)
+        )
+        if not listed:
+            raise ValueError("bodies must hold at least one Shell, Solid, Rigid or Skeleton")
+        for k, part in enumerate(self.rigid):
+            if self.rigid_number(part) < k:
+                raise ValueError(
+                    f"bodies must differ, but rigid parts {self.rigid_number(part)} and {k} are one Rigid"
+                )
+        for k, shell in enumerate(self.shells):
+            if (before := self.number(shell)) < k:
+                raise ValueError(
+                    f"bodies must differ, but bodies {before} and {k} are one {type(shell).__name__}: make another of "
+                    "its mesh"
+                )
+        self.spans: list[Span] = []
+        rotation = dict(zip(map(id, self.sheets), self._first_rotations(), strict=True))
+        vertex = edge = face = row = 0
+        for k, shell in enumerate(self.shells):
+            mesh = shell.mesh
+            self.spans.append(
+                Span(mesh, slice(k, k + 1), vertex, edge, face, rotation.get(id(shell), 0), row)
+            )
+            vertex, edge, face = vertex + mesh.n_vertices, edge + turning_edges(mesh), face + mesh.n_faces
+            row += magnetized_rows(mesh)
+        self.ties: tuple[Tie, ...] = checked_list("ties", ties, (Tie,))
+        self._welded = np.concatenate([np.zeros((0, 2), dtype=np.int64), *map(self._pairs, self.ties)])
+        self.original: np.ndarray = originals(vertex, self._welded)
+        self._check_welded_once()
+
+    def _first_rotations(self) -> list[int]:
+        """Of each of `sheets`."""
+        return np.cumsum([0, *(rotations_of(sheet.mesh) for sheet in self.sheets)])[:-1].tolist()
+
+    def _pairs(self, tie: Tie) -> np.ndarray:
+        """(k, 2), the scene's vertices."""
+        first = [self.spans[self.number(body)].first_vertex for body in (tie.a, tie.b)]
+        return tie.pairs() + first
+
+    def _check_welded_once(self) -> None:
+        for k, span in enumerate(self.spans):
+            values, counts = np.unique(self.original[span.vertices], return_counts=True)
+            if counts.max() > 1:
+                twice = span.first_vertex + np.flatnonzero(
+                    self.original[span.vertices] == values[np.argmax(counts)]
+                )
+                raise ValueError(
+                    f"ties would make one of vertices {twice[0] - span.first_vertex} and {twice[1] - span.first_vertex} "
+                    f"of body {k}"
+                )
+
+    @property
+    def n_vertices(self) -> int:
+        """Those that are welded count once."""
+        return len(self.original) - int(np.sum(self.copies))
+
+    @property
+    def copies(self) -> np.ndarray:
+        """(n_v of all,), whether it is welded to an earlier one."""
+        return self.original != np.arange(len(self.original))
+
+    @property
+    def components(self) -> np.ndarray:
+        """(n_v of all,), the connected part of each vertex."""
+        return joined_components(self.mesh.components, self._welded) if self.ties else self.mesh.components
+
+    def check_welded(self, name: str, unit: str, rows: np.ndarray) -> None:
+        """Raises ValueError where rows (n_v of all, 3) say two things of one vertex."""
+        apart = np.abs(rows - rows[self.original]).max(axis=1)
+        if apart.max(initial=0.0) > 1e-9 * max(np.abs(rows).max(initial=0.0), 1e-300):
+            vertex = int(np.argmax(apart))
+            raise ValueError(
+                f"{name} [{unit}] must be the same where bodies are tied, but those of vertices "
+                f"{self.original[vertex]} and {vertex} differ by {apart[vertex]:.3g}"
+            )
+
+    def __len__(self) -> int:
+        return len(self.shells)
+
+    @property
+    def meshes(self) -> list[TriangleMesh]:
+        return [shell.mesh for shell in self.shells]
+
+    @cached_property
+    def mesh(self) -> TriangleMesh:
+        """Of all: as edges are sorted by their lower vertex, they too are those of one body after another."""
+        if len(self) == 1:
+            return self.shells[0].mesh
+        if not self.shells:
+            return NoMesh()
+        if not self.flat_sheets_alone:
+            return JoinedMesh(self.meshes)
+        faces = [span.mesh.faces + span.first_vertex for span in self.spans]
+        return TriangleMesh(
+            np.concatenate([mesh.rest_positions for mesh in self.meshes]), np.concatenate(faces)
+        )
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """Of all skeletons."""
+        return tuple(joint for skeleton in self.skeletons for joint in skeleton.joints)
+
+    def skeleton_of(self, part: Rigid) -> Skeleton | None:
+        """The one that it is a link of; None where it is alone."""
+        for skeleton in self.skeletons:
+            if any(part is link for link in skeleton.links):
+                return skeleton
+        return None
+
+    def moved_by(self, joint: Joint) -> list[int]:
+        """The numbers of the rigid parts that a joint carries."""
+        (skeleton,) = (each for each in self.skeletons if any(joint is own for own in each.joints))
+        return [self.rigid_number(each) for each in skeleton._moved_by(joint)]
+
+    def started_by(self, part: Rigid) -> list[int]:
+        """The numbers of the rigid parts that start with the velocity of a free one: of a skeleton, its tree."""
+        skeleton = self.skeleton_of(part)
+        moved = [part] if skeleton is None else skeleton._tree(part)
+        return [self.rigid_number(each) for each in moved]
+
+    def drifts(self, part: Rigid) -> bool:
+        """Whether nothing but itself tells a rigid part where to be."""
+        skeleton = self.skeleton_of(part)
+        return part.vertices is None if skeleton is None else skeleton._drifts(part)
+
+    def held_by_joints(self, part: Rigid) -> bool:
+        """Whether joints lead from it to the world."""
+        skeleton = self.skeleton_of(part)
+        return skeleton is not None and skeleton._held(part)
+
+    @property
+    def sheets(self) -> tuple[Shell, ...]:
+        """In the core's order: those of six-node elements come last."""
+        return (*self.flat_sheets, *self.six_node_sheets)
+
+    @property
+    def flat_sheets(self) -> tuple[Shell, ...]:
+        return tuple(body for body in self.shells if isinstance(body.mesh, TriangleMesh))
+
+    @property
+    def six_node_sheets(self) -> tuple[Shell, ...]:
+        return tuple(body for body in self.shells if isinstance(body.mesh, SixNodeMesh))
+
+    @property
+    def flat_sheets_alone(self) -> bool:
+        """Whether there are no solids, and no sheets of six-node elements."""
+        return len(self.flat_sheets) == len(self.shells)
+
+    @property
+    def n_rotations(self) -> int:
+        """Of all sheets, in the core's order."""
+        return sum(rotations_of(mesh) for mesh in self.meshes)
+
+    @property
+    def n_magnetized(self) -> int:
+        """How many rows a magnetization of all bodies has."""
+        return sum(map(magnetized_rows, self.meshes))
+
+    @property
+    def solids(self) -> tuple[Solid, ...]:
+        return tuple(body for body in self.shells if isinstance(body, Solid))
+
+    @property
+    def skins(self) -> tuple[Skin, ...]:
+        """Of the solids that have one, in their order."""
+        return tuple(body.skin for body in self.solids if body.skin is not None)
+
+    @property
+    def size(self) -> float:
+        """Of the largest body: the diagonal of its bounding box [m]."""
+        return max((mesh.size for mesh in self.meshes), default=0.0)
+
+    @property
+    def extent(self) -> float:
+        """Of the largest body: the longest side of its bounding box [m]."""
+        return max((float(np.ptp(mesh.rest_positions, axis=0).max()) for mesh in self.meshes), default=0.0)
+
+    def number(self, shell: Shell | Solid) -> int:
+        """Which of the bodies it is. Raises ValueError where it is none of them."""
+        for k, each in enumerate(self.shells):
+            if each is shell:
+                return k
+        what = (
+            f"a {type(shell).__name__} that is not in it" if isinstance(shell, BODIES) else f"{shell!r:.60}"
+        )
+        raise ValueError(f"a body of the scene is one of scene.bodies, got {what}")
+
+    def rigid_number(self, part: Rigid) -> int:
+        """Which of the rigid parts it is. Raises ValueError where it is none of them."""
+        for k, each in enumerate(self.rigid):
+            if each is part:
+                return k
+        raise ValueError(
+            "a rigid part of the scene is one of scene.rigid_parts, got a Rigid that is not in it"
+        )
+
+    @property
+    def n_points(self) -> int:
+        """Vertices, of which those that are welded count once, and points of rigid parts: what comes first in a state."""
+        return self.n_vertices + 10 * len(self.rigid) + self.n_on_surfaces
+
+    @property
+    def n_rows(self) -> int:
+        """Vertices of all bodies, those of shapes that touch, and points of rigid parts, as a caller counts them."""
+        return len(self.original) + 10 * len(self.rigid) + self.n_on_surfaces
+
+    @property
+    def n_on_surfaces(self) -> int:
+        """Vertices of shapes that touch."""
+        return sum(part.shape.n_vertices for part in self.touching)
+
+    def first_on_surface(self, part: Rigid) -> int:
+        """Where the vertices of its shape begin, among all points as a caller counts them."""
+        before = 0
+        for each in self.rigid:
+            if each is part:
+                break
+            before += each.shape.n_vertices if any(each is other for other in self.touching) else 0
+        return len(self.original) + 10 * len(self.rigid) + before
+
+    def of(self, item: Any) -> Span:
+        """What a support, a load or a contact is about. Raises ValueError where it does not say so, and has to."""
+        kind = type(item).__name__
+        if item.body is None:
+            if len(self) == 1:
+                return self.spans[0]
+            if item._for_all:
+                return Span(self.mesh, slice(None))
+            raise ValueError(
+                f"the scene has {len(self)} bodies, so a {kind} must say which of them it is about: {kind}(..., body=...)"
+            )
+        try:
+            return self.spans[self.number(item.body)]
+        except ValueError:
+            raise ValueError(f"a {kind} is about a body that is not in the scene: {item.body!r}") from None
+
+    def contact_points(self, contact: Contact) -> tuple[np.ndarray, np.ndarray]:
+        """Its points with the scene's vertices: (k, 3), -1 where there are fewer, and their weights (k, 3)."""
+        span = self.of(contact)
+        vertices, weights = contact.points(span.mesh)
+        numbers = np.where(vertices < 0, vertices, vertices + np.int32(span.first_vertex))
+        if not self.ties:
+            return numbers, weights
+        again = (vertices[:, 1] < 0) & np.isin(
+            self.original[numbers[:, 0]], numbers[~self.copies[numbers[:, 0]], 0]
+        )
+        kept = ~(again & self.copies[numbers[:, 0]])
+        return numbers[kept], weights[kept]
+
+    def split(self, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The body of each of the scene's edges, (k,), and its number there, (k,)."""
+        first = np.array([span.first_edge for span in self.spans])
+        of = np.searchsorted(first, edges, side="right") - 1
+        return of, edges - first[of]
+
+    def core_number(self, span: Span, n_skins: int = 0) -> int:
+        """Of one body, where flat sheets come first, solids after them, then so many skins, then six-node sheets."""
+        body = self.shells[span.bodies.start or 0]
+        before = 0
+        for kind, others in ((self.flat_sheets, 0), (self.solids, n_skins), (self.six_node_sheets, 0)):
+            for k, each in enumerate(kind):
+                if each is body:
+                    return before + k
+            before += len(kind) + others
+        raise ValueError("a body of the scene is one of scene.bodies")
+
+    def sheets_before(self, body: Shell | Solid) -> tuple[Shell, ...]:
+        """The sheets that come before one of them where there are rows of sheets alone."""
+        return tuple(takewhile(lambda each: each is not body, self.sheets))
+
+    def sheets_of(self, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """As `split`, with the number of the body among `sheets`."""
+        of, own = self.split(edges)
+        numbers = {id(sheet): k for k, sheet in enumerate(self.sheets)}
+        return np.array([numbers.get(id(body), -1) for body in self.shells], dtype=int)[of], own
+
+
+def _parts(body) -> tuple[Any, ...]:
+    return body.links if isinstance(body, Skeleton) else (body,)
+
+
+class Whole:
+    """What faces of several sheets, or of none, are made of, one sheet after another."""
+
+    def __init__(self, mesh: TriangleMesh, sheets: tuple[Shell, ...]):
+        self.mesh = mesh
+        self.thickness: np.ndarray = joined([sheet._face_thickness for sheet in sheets] or [np.zeros(0)])
+        self.young_modulus: np.ndarray = joined([sheet.young_modulus for sheet in sheets] or [np.zeros(0)])
+
+    @cached_property
+    def quality(self) -> MeshQuality:
+        return MeshQuality(self.mesh, self.thickness)
+
+
+def checked_body(body: Any) -> Shell | None:
+    """The body that something is about, as it was given."""
+    if body is not None and not isinstance(body, BODIES):
+        raise ValueError(f"body must be a Shell or Solid of the scene, got {body!r:.60}")
+    return body
+
+
+def on_body(body: Shell | None) -> str:
+    """For a repr."""
+    return "" if body is None else f", on a body of {body.mesh.n_faces} faces"
+
+
+def joined(arrays: list[np.ndarray]) -> np.ndarray:
+    """Rows of all bodies; of one body, its own."""
+    if not arrays:
+        return np.zeros(0)
+    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)

@@ -1,0 +1,1 @@
+"""Defines contact of bodies with obstacles, with each other and with themselves."""

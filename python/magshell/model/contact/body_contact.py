@@ -1,0 +1,346 @@
+"""Defines contact of bodies with each other and with themselves."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..._input.owner import Owner
+from ..._input.scalars import flag, not_negative, positive
+from ...mesh.triangles.triangle_mesh import TriangleMesh
+from ..bodies.bodies import BODIES
+from ..rigid.rigid import Rigid
+from ..shells.shell import Shell
+from ..solids.solid import Solid
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Numbers
+    from ...mesh.mesh_base import MeshBase
+
+
+def width_of(mesh: MeshBase) -> float:
+    """m, of a mesh at rest: twice the way from the middle of its surface to the vertex that is farthest from it. Of a
+    rectangle and a box that is the diagonal."""
+    corners = mesh.rest_positions[mesh.faces]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    middle = areas @ corners.mean(axis=1) / areas.sum()
+    return 2.0 * float(np.linalg.norm(mesh.rest_positions - middle, axis=1).max())
+
+
+_REACH_OF_SHEETS = 0.1  # of the thickness
+_REACH_OF_SOLIDS = 0.05  # of the mean edge on the surface
+_STICKING = 1e-2  # of the larger body's extent, a second
+_SMOOTHING = 0.1  # of the reach
+LAWS = ("barrier", "penalty")
+
+
+class BodyContact(Owner):
+    """Two bodies that do not pass through each other: what ms.Contact(a, b, ...) makes.
+
+    a, b: a Shell, a Solid, or a Rigid: of one with a shape, that touches; of others with vertices and a body, the faces
+        between these.
+    minimal_distance: m, that is always left between them, as sheets are thick: by default half the largest thickness of
+        each. Solids have none.
+    reach: m, beyond the minimal distance, from which on they push each other apart; by default a tenth of the thickness, or
+        a twentieth of the mean edge on the surface of solids, the smaller of the two bodies'. What touches lightly rests at
+        nearly all of it.
+    contact_stiffness: Pa, the pressure with which they push at about half the reach; by default Young's modulus, the smaller
+        of the two bodies'. Forces do not depend on a time step.
+    law: "barrier", which grows without bound: nothing ever passes, whatever presses; or "penalty", softer and cheaper,
+        which `contact_stiffness` bounds: what presses more is let into the minimal distance, and steps still do not pass.
+    smoothing: m, of a penalty, as of contacts with obstacles; by default a tenth of the reach.
+    friction_coefficient: Coulomb's, or None for contact without friction. It acts in ms.simulate only.
+    static_friction_coefficient: of what sticks, where it is larger; by default there is but one.
+    sticking_speed: m/s, below which friction holds, as of contacts with obstacles.
+    lagged_friction: as there.
+
+    Pairs are vertices and faces, and edges and edges, whatever side they come from. At a given gap what lies flat bears 1.0
+    to 3.5 times that pressure, by how its edges cross those below: most where two meshes coincide; and where single edges
+    cross, the force goes with the area of their faces. So meshes change the gap at which a load rests, within the reach,
+    and not the load. Friction acts at the middle surfaces of sheets. No step of a solve passes a pair; a
+    start in which faces intersect, or are nearer than the minimal distance, is refused with their numbers. Defaults are
+    taken from the bodies as they are here: a solve with another thickness or modulus keeps them.
+
+    Gradients go through impacts, exactly of the motion as its steps have it. The stiffer the contact and the longer the
+    step, the shorter is the way on which they hold: a barrier turns a body around within a fraction of the reach, and where
+    a small change moves an impact by a whole step, a loss is rough. Take steps that resolve the impact, a longer reach, or
+    the penalty, for a smooth loss.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.02, 0.02, cells=(4, 4))
+    >>> above = mesh.transformed(translation=(1e-3, 5e-4, 2e-3))
+    >>> lower = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> upper = ms.Shell(above, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> held = ms.Clamp(mesh.boundary_edges, body=lower)
+    >>> scene = ms.Scene(
+    ...     [lower, upper],
+    ...     supports=[held],
+    ...     contacts=[ms.Contact(lower, upper)],
+    ...     gravity=(0, 0, -9.81),
+    ...     allow_rigid_motions=True,
+    ... )
+    >>> fall = ms.simulate(scene, steps=40, time_step=1e-3)
+    >>> gap = fall[upper].positions[-1, :, 2].min() - fall[lower].positions[-1, :, 2].max()
+    >>> bool(1e-3 < gap < 1.2e-3)
+    True
+    """
+
+    a: Shell | Solid | Rigid
+    b: Shell | Solid | Rigid
+    lagged_friction: bool
+
+    body = None
+    _for_all = True
+    _replaceable = (
+        "contact_stiffness",
+        "reach",
+        "minimal_distance",
+        "smoothing",
+        "friction_coefficient",
+        "static_friction_coefficient",
+        "sticking_speed",
+    )
+
+    def __init__(
+        self,
+        a: Shell | Solid | Rigid,
+        b: Shell | Solid | Rigid,
+        *,
+        minimal_distance: Numbers | None = None,
+        reach: Numbers | None = None,
+        contact_stiffness: Numbers | None = None,
+        law: str = "barrier",
+        smoothing: Numbers | None = None,
+        friction_coefficient: Numbers | None = None,
+        static_friction_coefficient: Numbers | None = None,
+        sticking_speed: Numbers | None = None,
+        lagged_friction: bool = False,
+    ):
+        self.a, self.b = checked_side("a", a), checked_side("b", b)
+        if self.a is self.b:
+            raise ValueError("a and b are one body: SelfContact(body) is contact of a body with itself")
+        self._take(
+            minimal_distance=minimal_distance,
+            reach=reach,
+            contact_stiffness=contact_stiffness,
+            law=law,
+            smoothing=smoothing,
+            friction_coefficient=friction_coefficient,
+            static_friction_coefficient=static_friction_coefficient,
+            sticking_speed=sticking_speed,
+            lagged_friction=lagged_friction,
+        )
+
+    def _take(self, *, law, lagged_friction, **given) -> None:
+        if law not in LAWS:
+            raise ValueError(f'law must be "barrier" or "penalty", got {law!r:.60}')
+        self.law, self.lagged_friction = law, flag("lagged_friction", lagged_friction)
+        bodies = [side_of(side) for side in self._sides]
+
+        def number(name, unit, default, check=positive):
+            return default if given[name] is None else check(name, unit, given[name])
+
+        self._distance_given: bool = given["minimal_distance"] is not None
+        self.minimal_distance: float = number("minimal_distance", "m", self._distance(bodies), not_negative)
+        self.reach: float = number("reach", "m", self._reach(bodies))
+        stiffness = min(map(_modulus, bodies))
+        if stiffness == np.inf and given["contact_stiffness"] is None:
+            raise ValueError("contact_stiffness [Pa] is needed between rigid shapes, which have no modulus")
+        self.contact_stiffness: float = number("contact_stiffness", "Pa", stiffness)
+        self.smoothing: float = number("smoothing", "m", _SMOOTHING * self.reach)
+        self.friction_coefficient: float | None = number("friction_coefficient", "1", None, not_negative)
+        self.static_friction_coefficient: float | None = number(
+            "static_friction_coefficient", "1", None, not_negative
+        )
+        if self.static_friction_coefficient is not None:
+            if self.friction_coefficient is None:
+                raise ValueError(
+                    "static_friction_coefficient [1] was given without a friction_coefficient [1]"
+                )
+            if self.static_friction_coefficient < self.friction_coefficient:
+                raise ValueError(
+                    "static_friction_coefficient [1] must not be smaller than friction_coefficient, "
+                    f"{self.friction_coefficient:g}, got {self.static_friction_coefficient:g}"
+                )
+        extent = max(width_of(body.mesh) for body in bodies)
+        self.sticking_speed: float = number("sticking_speed", "m/s", _STICKING * extent)
+
+    def _distance(self, bodies) -> float:
+        return sum(0.5 * _thickness(body) for body in bodies)
+
+    def _reach(self, bodies) -> float:
+        return min(map(_reach, bodies))
+
+    @property
+    def _sides(self) -> tuple[Any, ...]:
+        return self.a, self.b
+
+    @property
+    def _numbers(self) -> dict[Any, Any]:
+        """What `replaced` begins with."""
+        own = {name: getattr(self, name) for name in self._replaceable}
+        return {**own, "law": self.law, "lagged_friction": self.lagged_friction}
+
+    def _checked_names(self, values: dict[Any, Any]) -> dict[Any, Any]:
+        """Of `replaced`: what a contact was made without, no solve gives it."""
+        for name in ("friction_coefficient", "static_friction_coefficient"):
+            if getattr(self, name) is None and name in values:
+                raise ValueError(
+                    f"a Contact without {name} cannot get one in a solve: give it one, and zero will do for friction"
+                )
+        return values
+
+    def replaced(self, **values: Any) -> BodyContact:
+        """The same contact with other numbers of its law."""
+        return BodyContact(self.a, self.b, **{**self._numbers, **self._checked_names(values)})
+
+    @property
+    def _one_coefficient(self) -> bool:
+        return self.static_friction_coefficient is None
+
+    def _add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
+        for name in self._replaceable:
+            numbers[label, name] = getattr(self, name) or 0.0
+        if self._one_coefficient:
+            numbers[label, "static_friction_coefficient"] = numbers[label, "friction_coefficient"]
+
+    def _gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
+        found = super()._gradients(label, values, gradient)
+        if self._one_coefficient:
+            found["friction_coefficient"] = (
+                found["friction_coefficient"] + found["static_friction_coefficient"]
+            )
+        return found
+
+    def __repr__(self) -> str:
+        friction = "" if self.friction_coefficient is None else f", friction {self.friction_coefficient:g}"
+        return (
+            f"{type(self).__name__}({' and '.join(type(side).__name__ for side in self._sides)}; {self.law}, "
+            f"{self.contact_stiffness:g} Pa within {self.reach:g} m beyond {self.minimal_distance:g} m{friction})"
+        )
+
+
+class SelfContact(BodyContact):
+    """A body that does not pass through itself.
+
+    a: a Shell or a Solid. The others are as in BodyContact, which ms.Contact(a, b, ...) makes, but that by default a sheet
+    keeps its whole thickness from itself. Neighbours along the surface that are nearer at rest than twice minimal distance
+    and reach keep half of what they have there, in the proportion of the two. Where that is less than the minimal distance
+    itself, a scene refuses one that was given, naming faces and the largest possible, and warns of a thickness
+    (ms.MeshQualityWarning). A mesh that passes through itself at rest is refused.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> strip = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+    >>> ms.SelfContact(strip)
+    SelfContact(Shell; barrier, 1e+06 Pa within 0.0001 m beyond 0.001 m)
+    """
+
+    b: Shell | Solid
+
+    def __init__(
+        self,
+        a: Shell | Solid | Rigid,
+        *,
+        minimal_distance: Numbers | None = None,
+        reach: Numbers | None = None,
+        contact_stiffness: Numbers | None = None,
+        law: str = "barrier",
+        smoothing: Numbers | None = None,
+        friction_coefficient: Numbers | None = None,
+        static_friction_coefficient: Numbers | None = None,
+        sticking_speed: Numbers | None = None,
+        lagged_friction: bool = False,
+    ):
+        if not isinstance(a, BODIES):
+            raise ValueError(f"a must be a Shell or Solid of the scene, got {a!r:.60}")
+        _check_does_not_cross(a)
+        self.a: Shell | Solid | Rigid = a
+        self.b: Shell | Solid | Rigid = a
+        self._take(
+            minimal_distance=minimal_distance,
+            reach=reach,
+            contact_stiffness=contact_stiffness,
+            law=law,
+            smoothing=smoothing,
+            friction_coefficient=friction_coefficient,
+            static_friction_coefficient=static_friction_coefficient,
+            sticking_speed=sticking_speed,
+            lagged_friction=lagged_friction,
+        )
+
+    def _distance(self, bodies) -> float:
+        return _thickness(self.a)
+
+    @property
+    def _sides(self) -> tuple[Any, ...]:
+        return (self.a,)
+
+    def replaced(self, **values: Any) -> SelfContact:
+        """The same contact with other numbers of its law."""
+        return SelfContact(self.a, **{**self._numbers, **self._checked_names(values)})
+
+
+class RigidShape(NamedTuple):
+    """What a Rigid with a shape touches with."""
+
+    mesh: TriangleMesh
+
+
+def touches_with_shape(side: Shell | Solid | Rigid) -> bool:
+    return isinstance(side, Rigid) and side.shape is not None
+
+
+def checked_side(name: str, side: Shell | Solid | Rigid) -> Shell | Solid | Rigid:
+    """A body in contact, as it was given."""
+    if isinstance(side, BODIES) or touches_with_shape(side):
+        return side
+    if not isinstance(side, Rigid):
+        raise ValueError(f"{name} must be a Shell, a Solid or a Rigid of the scene, got {side!r:.60}")
+    if side.vertices is None:
+        raise ValueError(
+            f"{name} is a free Rigid without faces to touch with: give it a shape, or make it of the vertices of a body"
+        )
+    if side.body is None:
+        raise ValueError(f"{name} is a Rigid that does not say of which body it is: Rigid(..., body=...)")
+    return side
+
+
+def _check_does_not_cross(body) -> None:
+    pairs = body.mesh.self_intersections(body.mesh.rest_positions)
+    if len(pairs):
+        raise ValueError(
+            f"the mesh of a passes through itself at rest, and cannot be kept from it: {len(pairs)} pairs of faces do, "
+            f"{pairs[0, 0]} and {pairs[0, 1]} the first"
+        )
+
+
+def side_of(side: Shell | Solid | Rigid) -> Shell | Solid | RigidShape:
+    """What it touches with."""
+    if touches_with_shape(side):
+        return RigidShape(side.shape)
+    return side.body if isinstance(side, Rigid) else side
+
+
+def _thickness(body) -> float:
+    return float(np.max(body.thickness)) if isinstance(body, Shell) else 0.0
+
+
+def _modulus(body) -> float:
+    if isinstance(body, RigidShape):
+        return np.inf
+    if isinstance(body, Solid):
+        return float(np.min(body.material._wave_modulus(body.mesh.n_tetrahedra)))
+    return float(np.min(body.young_modulus))
+
+
+def _reach(body) -> float:
+    if isinstance(body, Shell):
+        return _REACH_OF_SHEETS * float(np.min(body.thickness))
+    return _REACH_OF_SOLIDS * _mean_edge(body.mesh)
+
+
+def _mean_edge(mesh) -> float:
+    corners = mesh.rest_positions[mesh.faces]
+    return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())

@@ -1,0 +1,194 @@
+"""Frictional contact of a sheet with obstacles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+
+from ..._input.checked_list import checked_list
+from ..._input.owner import Owner
+from ..._input.scalars import not_negative, positive
+from ..._input.selections import indices, selection
+from ..._runtime.solver_entry_point import grouped
+from ...mesh.triangles.triangle_mesh import TriangleMesh
+from ..bodies.bodies import BODIES, checked_body, joined, on_body
+from ..rigid.rigid import Rigid
+from ..shells.shell import Shell
+from ..solids.solid import Solid
+from .body_contact import BodyContact, width_of
+from .obstacles import Obstacle
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Numbers
+    from ..scene.values import Gradient, Values
+
+_FACE_POINTS = {  # barycentric coordinates of the points on a face
+    0: np.zeros((0, 3)),
+    1: np.full((1, 3), 1.0 / 3.0),
+    3: np.array([[4.0, 1.0, 1.0], [1.0, 4.0, 1.0], [1.0, 1.0, 4.0]]) / 6.0,
+}
+_SMOOTHING = 1e-2  # of the mean thickness
+_SMOOTHING_OF_SOLIDS = 1e-4  # of the extent
+_STICKING = 1e-2  # of the largest sheet's extent, a second
+
+
+class Contact(Owner):
+    """Keeps points of a sheet out of obstacles, with friction if wanted [Chen22, 6.1; Geilinger et al. 2020].
+
+    Of two bodies, ms.Contact(a, b, ...) makes a BodyContact, which keeps them out of each other.
+
+    obstacles: one of ms.obstacles, or several.
+    contact_stiffness: N/m, of every point: a force that grows with the depth, from a short parabola on.
+    friction_coefficient: Coulomb's, or None for contact without friction. It acts in ms.simulate only.
+    sticking_speed: m/s. Below it friction holds: a point that carries a share r of its greatest friction creeps at
+        sticking_speed (1 - sqrt(1 - r)). By default a hundredth of the sheet's extent in a second
+        (of the largest where there are several).
+    smoothing: m, the length of the parabola; by default a hundredth of the thickness, of solids alone 1e-4 of the extent.
+    offset: m, the distance from the obstacle at which the force begins; half the thickness lets the face of the sheet
+        touch instead of its middle surface.
+    lagged_friction: take normal forces and normals of friction from the beginning of each step. The matrix stays
+        symmetric; the friction is late by a step.
+    vertices: those that touch; by default all, of a solid those on its surface.
+    body: the Shell or Solid that touches; by default all, where no vertices are given.
+    face_samples: points on every face that touch too: 0, 1 or 3, for meshes that are coarse beside the obstacle.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.02, 0.02, cells=(2, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> floor = ms.Contact(ms.obstacles.Plane(center=(0, 0, -1e-3)), friction_coefficient=0.6)
+    >>> scene = ms.Scene(sheet, contacts=[floor], gravity=(0, 0, -9.81), allow_rigid_motions=True)
+    >>> move = ms.simulate(scene, steps=50, time_step=1e-3, integrator=ms.ImplicitEuler())
+    >>> bool(abs(move.positions[-1, :, 2] + 1e-3).max() < 1e-4)
+    True
+    """
+
+    _replaceable = ("contact_stiffness", "smoothing", "offset", "friction_coefficient", "sticking_speed")
+
+    @overload
+    def __new__(cls, obstacles: Obstacle | Iterable[Obstacle], **options: Any) -> Contact: ...
+    @overload
+    def __new__(cls, a: Shell | Solid | Rigid, b: Shell | Solid | Rigid, **options: Any) -> BodyContact: ...
+    def __new__(cls, *given: Any, **options: Any) -> Contact | BodyContact:
+        if given and isinstance(given[0], (*BODIES, Rigid)):
+            return BodyContact(*given, **options)
+        if {"a", "b"} & set(options):
+            return BodyContact(*given, **options)
+        return super().__new__(cls)
+
+    @grouped()
+    def __init__(
+        self,
+        obstacles: Obstacle | Sequence[Obstacle],
+        *,
+        contact_stiffness: Numbers = 1e4,
+        friction_coefficient: Numbers | None = None,
+        sticking_speed: Numbers | None = None,
+        smoothing: Numbers | None = None,
+        offset: Numbers = 0.0,
+        lagged_friction: bool = False,
+        vertices: Numbers | None = None,
+        face_samples: int = 0,
+        body: Shell | Solid | None = None,
+    ):
+        self.body: Shell | Solid | None = checked_body(body)
+        listed = checked_list("obstacles", obstacles, (Obstacle,), "objects of ms.obstacles")
+        if not listed:
+            raise ValueError("obstacles must hold at least one obstacle")
+        self.obstacles = listed
+        self.contact_stiffness: float = positive("contact_stiffness", "N/m", contact_stiffness)
+        self.friction_coefficient: float | None = (
+            None
+            if friction_coefficient is None
+            else not_negative("friction_coefficient", "1", friction_coefficient)
+        )
+        self.sticking_speed: float | None = (
+            None if sticking_speed is None else positive("sticking_speed", "m/s", sticking_speed)
+        )
+        self.smoothing: float | None = None if smoothing is None else positive("smoothing", "m", smoothing)
+        self.offset: float = not_negative("offset", "m", offset)
+        if not isinstance(lagged_friction, bool):
+            raise ValueError(f"lagged_friction must be True or False, got {lagged_friction!r}")
+        self.lagged_friction = lagged_friction
+        self.vertices: np.ndarray | None = (
+            None if vertices is None else selection("Contact vertices", vertices)
+        )
+        if isinstance(face_samples, bool) or face_samples not in _FACE_POINTS:
+            raise ValueError(f"face_samples must be 0, 1 or 3, got {face_samples!r}")
+        self.face_samples: int = int(face_samples)
+
+    def replaced(self, **values: Any) -> Contact:
+        """The same contact with other numbers of its law."""
+        if "friction_coefficient" in values and self.friction_coefficient is None:
+            raise ValueError(
+                "a Contact without friction cannot get some in a solve: give it some, zero will do"
+            )
+        return Contact(
+            self.obstacles,
+            **{
+                "contact_stiffness": self.contact_stiffness,
+                "friction_coefficient": self.friction_coefficient,
+                "sticking_speed": self.sticking_speed,
+                "smoothing": self.smoothing,
+                "offset": self.offset,
+                "lagged_friction": self.lagged_friction,
+                "vertices": self.vertices,
+                "face_samples": self.face_samples,
+                "body": self.body,
+                **values,
+            },
+        )
+
+    @property
+    def _for_all(self) -> bool:
+        """Whether it is about all bodies where it names none."""
+        return self.vertices is None
+
+    def points(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
+        """What of a body touches: vertices (k, 3), -1 where there are fewer, and weights (k, 3); those on faces last."""
+        if self.vertices is not None:
+            chosen = indices("Contact vertices", self.vertices, mesh.n_vertices)
+        else:
+            sheet = isinstance(mesh, TriangleMesh)
+            chosen = np.arange(mesh.n_vertices) if sheet else np.unique(mesh.faces)
+        alone = np.full((len(chosen), 3), -1)
+        alone[:, 0] = chosen
+        faces = mesh.faces[np.isin(mesh.faces, chosen).all(axis=1)]
+        weights = _FACE_POINTS[self.face_samples]
+        on_faces = np.repeat(faces, len(weights), axis=0)
+        return (
+            np.concatenate([alone, on_faces]).astype(np.int32),
+            np.concatenate([np.tile([1.0, 0.0, 0.0], (len(alone), 1)), np.tile(weights, (len(faces), 1))]),
+        )
+
+    def _law(self, *sheets: Shell) -> tuple[float, ...]:
+        """The numbers of `_replaceable` for the sheets that touch: N/m, m, m, 1, m/s."""
+        extent = max(width_of(sheet.mesh) for sheet in sheets)
+        thick = [sheet.thickness for sheet in sheets if isinstance(sheet, Shell)]
+        smoothing = _SMOOTHING * float(np.mean(joined(thick))) if thick else _SMOOTHING_OF_SOLIDS * extent
+        return (
+            self.contact_stiffness,
+            smoothing if self.smoothing is None else self.smoothing,
+            self.offset,
+            self.friction_coefficient or 0.0,
+            _STICKING * extent if self.sticking_speed is None else self.sticking_speed,
+        )
+
+    def _add_numbers(self, label: str, values: Values, numbers: dict[Any, Any]) -> None:
+        for name, number in zip(self._replaceable, self._law(*values.touching(self)), strict=True):
+            numbers[label, name] = number
+
+    def _by_thickness(self, label: str, sheets: Sequence[Shell | Solid], gradient: Gradient) -> float:
+        """By the thickness of each face of the sheets that touch, which a default in `law` is made from."""
+        by_smoothing = gradient.value(label, "smoothing")[0] if self.smoothing is None else 0.0
+        return (
+            _SMOOTHING
+            * by_smoothing
+            / sum(sheet.thickness.size for sheet in sheets if isinstance(sheet, Shell))
+        )
+
+    def __repr__(self) -> str:
+        friction = "" if self.friction_coefficient is None else f", friction {self.friction_coefficient:g}"
+        with_what = ", ".join(repr(each) for each in self.obstacles)
+        return f"Contact({with_what}; {self.contact_stiffness:g} N/m{friction}{on_body(self.body)})"

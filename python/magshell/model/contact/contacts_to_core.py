@@ -1,0 +1,244 @@
+"""Contacts of a scene as the core takes them."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ... import _core
+from ..._input.selections import indices
+from ..._runtime.warning_stacklevel import callers_level
+from ...errors import MeshQualityWarning
+from ..bodies.words import called
+from ..rigid.rigid import Rigid
+from ..solids.solid import Solid
+from .body_contact import BodyContact, side_of, touches_with_shape
+
+if TYPE_CHECKING:
+    from ..bodies.bodies import Bodies
+    from ..rigid.equimomental_points import Place
+    from ..scene.scene import Scene
+    from ..shells.shell import Shell
+    from .contact import Contact
+    from .obstacles.obstacle import Obstacle
+
+
+def obstacles_of(contacts: Sequence[Contact | BodyContact]) -> tuple[Any, ...]:
+    """Every obstacle once, in the order in which contacts name them."""
+    return tuple({id(each): each for contact in contacts for each in contact.obstacles}.values())
+
+
+def split_contacts(contacts: Sequence[Contact | BodyContact]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+    """Those with obstacles, and those of bodies."""
+    of_bodies = tuple(each for each in contacts if isinstance(each, BodyContact))
+    return tuple(each for each in contacts if not isinstance(each, BodyContact)), of_bodies
+
+
+def body_contact_inputs(
+    contacts: Sequence[Contact | BodyContact], bodies: Bodies
+) -> tuple[list[dict[Any, Any]], list[dict[Any, Any]]]:
+    """What of the contacts of bodies no solve can change: surfaces, and which of them touch."""
+    _check_each_pair_once(contacts)
+    sides = list({id(side): side for contact in contacts for side in contact._sides}.values())
+    numbers = {id(side): k for k, side in enumerate(sides)}
+    return [_surface(side, bodies) for side in sides], [
+        {
+            "a": numbers[id(contact.a)],
+            "b": numbers[id(contact.b)],
+            "penalty": contact.law == "penalty",
+            "rubs": contact.friction_coefficient is not None,
+            "lagged": contact.lagged_friction,
+        }
+        for contact in contacts
+    ]
+
+
+def _check_each_pair_once(contacts) -> None:
+    """Two of the same sides would push, and rub, twice."""
+    sides = [frozenset(map(id, contact._sides)) for contact in contacts]
+    for k, contact in enumerate(contacts):
+        if sides[k] in sides[:k]:
+            raise ValueError(
+                f"contacts must hold what is between two sides once, got {contact!r} after one of the same sides"
+            )
+
+
+def shapes_that_touch(contacts: Sequence[Contact | BodyContact]) -> tuple[Rigid, ...]:
+    """Rigid parts that contacts are about with their shapes, each once."""
+    sides = [side for contact in contacts for side in contact._sides if touches_with_shape(side)]
+    return tuple({id(side): side for side in sides}.values())
+
+
+def _surface(side, bodies) -> dict[Any, Any]:
+    """The faces of a body, of a rigid part's shape, or those between its vertices: (k, 3), the scene's vertices."""
+    body = side_of(side)
+    try:
+        rigid = bodies.rigid_number(side) if isinstance(side, Rigid) else -1
+        number = -1 if touches_with_shape(side) else bodies.number(body)
+    except ValueError:
+        raise ValueError(f"a Contact is about a body that is not in the scene: {side!r}") from None
+    faces, chosen = body.mesh.faces, np.arange(body.mesh.n_faces)
+    if number < 0:
+        rows = (faces + bodies.first_on_surface(side)).astype(np.int32)
+        return {"name": f"rigid part {rigid}", "faces": rows, "numbers": chosen.astype(np.int32)}
+    span = bodies.spans[number]
+    if rigid >= 0:
+        own = indices("Rigid vertices", side.vertices, body.mesh.n_vertices)
+        chosen = np.flatnonzero(np.isin(faces, own).all(axis=1))
+        if not chosen.size:
+            raise ValueError(
+                f"rigid part {rigid} touches nothing, as no face of its body has all corners among its vertices"
+            )
+    return {
+        "name": f"body {number}",
+        "faces": bodies.original[faces[chosen] + span.first_vertex].astype(np.int32),
+        "numbers": chosen.astype(np.int32),
+    }
+
+
+def check_neighbours(scene: Scene, warns: bool = False) -> None:
+    """Neighbours along a surface cannot keep more from each other than they have at rest: a minimal distance that was asked
+    for is refused where they do not, and one that a thickness gave is told, if it warns."""
+    for k, contact in enumerate(scene._body_contacts):
+        wanted = scene._in_core.current(contact).minimal_distance
+        nearest, faces = _core.nearest_neighbours(scene._model, k)
+        if wanted <= nearest:
+            continue
+        kind = type(contact).__name__.removeprefix("Body")
+        told = (
+            f"the minimal_distance of a {kind}, {wanted:g} m, is larger than what neighbours along a surface have at rest: "
+            f"{faces} are {nearest:g} m apart"
+        )
+        if contact._distance_given or wanted != contact.minimal_distance:
+            raise ValueError(f"{told}. Give it at most {nearest:g} m, or a mesh with longer edges")
+        if warns:
+            kept = 0.5 * nearest * wanted / (wanted + contact.reach)
+            warnings.warn(
+                f"{told}, and keep {kept:g} m of it. All that are not neighbours keep it. A mesh with edges longer than the "
+                "thickness needs no such exception, nor does a smaller minimal_distance=",
+                MeshQualityWarning,
+                stacklevel=callers_level(),
+            )
+
+
+def check_apart(scene: Scene, state: np.ndarray) -> None:
+    """Bodies in contact that intersect, or are nearer than they may be, cannot start so."""
+    check_neighbours(scene)
+    if scene._body_contacts and (reason := scene._model.refusal(state)):
+        raise ValueError(f"the start cannot be: {reason}")
+
+
+def check_shapes(
+    contacts: Sequence[Contact | BodyContact], parts: Sequence[Rigid], places: list[Place]
+) -> None:
+    """Obstacles keep out vertices of sheets and solids: a contact that would seem to be about the shape of a rigid part
+    that has none of these has to say what it is about."""
+    bare = [
+        k
+        for k, (part, place) in enumerate(zip(parts, places, strict=True))
+        if part.shape is not None and not len(place.vertices)
+    ]
+    for contact in contacts:
+        if bare and contact.body is None and contact.vertices is None:
+            raise ValueError(
+                f"{contact!r} would let the shape of rigid part {bare[0]} through, as obstacles keep out vertices of sheets "
+                "and solids only: say which body it is about, Contact(..., body=...), and have a held Shell in the "
+                "obstacle's place for the rigid part, ms.Contact(rigid, shell)"
+            )
+
+
+def contact_inputs(contacts: Sequence[Contact | BodyContact], bodies: Bodies) -> list[dict[Any, Any]]:
+    """What of the contacts no solve can change."""
+    numbers = {id(each): k for k, each in enumerate(obstacles_of(contacts))}
+    inputs = []
+    for contact in contacts:
+        vertices, weights = bodies.contact_points(contact)
+        if not len(vertices):
+            raise ValueError(
+                f"{contact!r} is about nothing: the scene has no vertices that obstacles could keep out"
+            )
+        inputs.append(
+            {
+                "obstacles": [numbers[id(each)] for each in contact.obstacles],
+                "vertices": vertices,
+                "weights": weights,
+                "rubs": contact.friction_coefficient is not None,
+                "lagged": contact.lagged_friction,
+            }
+        )
+    return inputs
+
+
+def poses(obstacle: Obstacle, times: np.ndarray) -> np.ndarray:
+    """Displacements, rotation vectors, velocities and spins of a moving one at these times, (len(times), 4, 3)."""
+    return np.array([(*obstacle.pose(time), *obstacle.rates(time)) for time in times]).reshape(-1, 4, 3)
+
+
+LARGEST_SMOOTH_TURN = (
+    0.3  # rad, by which normals of smooth bodies do not turn within the smoothing of a contact
+)
+
+
+def near_kinks(
+    contact: Contact,
+    obstacles: Sequence[Obstacle],
+    sheets: Sequence[Shell | Solid],
+    bodies: Bodies,
+    positions: np.ndarray,
+    time: float,
+) -> np.ndarray:
+    """Vertices (k,) of points that touch one of the obstacles closer than the smoothing to a kink of its distance.
+
+    sheets: those that touch, as they are in this solve.
+    """
+    vertices, weights = bodies.contact_points(contact)
+    places = np.einsum("pk,pkc->pc", weights, positions[vertices])
+    reach = contact._law(*sheets)[1] * np.concatenate([np.eye(3), -np.eye(3)])
+    found = [np.zeros(0, dtype=vertices.dtype)]
+    for obstacle in obstacles:
+        touching = obstacle.signed_distance(places, time) < contact.offset
+        here = places[touching]
+        around = obstacle.normals(here[:, None, :] + reach, time)
+        turn = np.einsum("pc,pkc->pk", obstacle.normals(here, time), around).min(axis=1, initial=1.0)
+        found.append(vertices[touching][turn < np.cos(LARGEST_SMOOTH_TURN)].ravel())
+    every = np.unique(np.concatenate(found))
+    return every[every >= 0]
+
+
+def check_outside(scene: Scene, values: Any, positions: np.ndarray, time: float) -> None:
+    """A sheet that starts deeper in an obstacle than half its thickness would be shot out of it, or a solid that starts
+    deeper than a hundredth of its size."""
+    if not scene._obstacle_contacts:
+        return
+    allowed = np.empty(scene.mesh.n_vertices)
+    for span, sheet in zip(scene._bodies.spans, values.sheets, strict=True):
+        solid = isinstance(sheet, Solid)
+        allowed[span.vertices] = 0.01 * sheet.mesh.size if solid else 0.5 * np.max(sheet.thickness)
+    for contact in scene._obstacle_contacts:
+        vertices, weights = scene._bodies.contact_points(contact)
+        where = np.einsum("pk,pkc->pc", weights, positions[vertices])
+        offset = values.current(contact).offset
+        for obstacle in contact.obstacles:
+            depth = offset - values.current(obstacle).signed_distance(where, time)
+            inside = np.flatnonzero(depth > allowed[vertices[:, 0]])
+            if inside.size:
+                worst = inside[np.argmax(depth[inside])]
+                touched = np.unique(vertices[inside][vertices[inside] >= 0])
+                raise ValueError(
+                    f"{_owner(scene, vertices[worst, 0])} starts inside {obstacle!r}: {_list(touched)}, the deepest "
+                    f"{depth[worst]:.3g} m deep at vertex {vertices[worst, 0]}"
+                )
+
+
+def _owner(scene: Scene, vertex: int) -> str:
+    """Name the body that a vertex of the scene belongs to, by number where there are several."""
+    number = next(k for k, span in enumerate(scene._bodies.spans) if vertex < span.vertices.stop)
+    return called([scene.bodies[number]]) if len(scene.bodies) == 1 else f"body {number}"
+
+
+def _list(vertices: np.ndarray) -> str:
+    shown = ", ".join(map(str, vertices[:5]))
+    return f"vertices {shown}" + (f" and {len(vertices) - 5} more" if len(vertices) > 5 else "")

@@ -1,0 +1,1 @@
+"""Defines applied magnetic fields."""

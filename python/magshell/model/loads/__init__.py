@@ -1,0 +1,1 @@
+"""Defines loads, pressures, surface tension and water."""

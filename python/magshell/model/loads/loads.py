@@ -1,0 +1,244 @@
+"""Dead loads and edge couples."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..._input.owner import Owner
+from ..._input.quantity import quantity, real_numbers
+from ..._input.selections import indices, selection
+from ...mesh.face_shapes import edge_shares, shares
+from ...mesh.triangles.six_node_mesh import SixNodeMesh
+from ...mesh.triangles.triangle_mesh import TriangleMesh
+from ..bodies.bodies import checked_body
+from ..shells.shell import Shell
+from ..solids.solid import Solid
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Numbers
+
+
+class DeadLoad(Owner):
+    """Forces that keep size and direction, given by one value: so much of it on each of some parts of the mesh.
+
+    body: the Shell that they act on, or None. Meshes are that body's, and so are indices.
+    """
+
+    body: Shell | Solid | None
+
+    _for_all = False  # whether it acts on all bodies where it names none
+
+    def __init__(self, label: str, values: Any, body: Shell | Solid | None):
+        """label: the name and unit of the value."""
+        self._label, self.body = label, checked_body(body)
+        setattr(self, self._replaceable[0], _vectors(*label.rstrip("]").split(" [", 1), values))
+
+    def vertex_forces(self, mesh: TriangleMesh) -> np.ndarray:
+        """(n_v, 3), N."""
+        vertices, weights = self._shares(mesh)
+        rows = _rows(self._label, getattr(self, self._replaceable[0]), len(vertices))
+        return _spread(mesh, vertices, rows[:, None] * weights[..., None])
+
+    def _add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
+        key = ("loads", "forces")
+        part = values.scene._bodies.of(self)
+        forces = np.zeros((values.scene.mesh.n_vertices, 3)) if key not in numbers else numbers[key]
+        forces[part.vertices] += self.vertex_forces(part.mesh)
+        numbers[key] = forces
+
+    def _gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
+        part = values.scene._bodies.of(self)
+        vertices, weights = self._shares(part.mesh)
+        by_forces = gradient.value("loads", "forces")[part.vertices]
+        return {self._replaceable[0]: (by_forces[vertices] * weights[..., None]).sum(axis=1)}
+
+    def _shares(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
+        """The vertices of each part (k, m), and how much of the value each of them feels (k, 1) or (k, m)."""
+        raise TypeError(f"{type(self).__name__} is no load of its own")
+
+
+class PointLoad(DeadLoad):
+    """A force [N] on each of some vertices: `force` (3,) on every one of them, or (k, 3), one each.
+
+    body: the Shell whose vertices they are, in a scene of several.
+
+    >>> import magshell as ms
+    >>> ms.PointLoad([0, 1], (0, 0, -1e-3)).force
+    array([ 0.   ,  0.   , -0.001])
+    """
+
+    _replaceable = ("force",)
+
+    def __init__(self, vertices: Numbers, force: Numbers, body: Shell | Solid | None = None):
+        self.vertices: np.ndarray = selection("PointLoad vertices", vertices)
+        super().__init__("force [N]", force, body)
+
+    def replaced(self, *, force: Numbers) -> PointLoad:
+        """Returns the same load with another force [N]."""
+        return PointLoad(self.vertices, force, self.body)
+
+    def _shares(self, mesh: TriangleMesh):
+        vertices = indices("PointLoad vertices", self.vertices, mesh.n_vertices)
+        return vertices[:, None], np.ones((len(vertices), 1))
+
+
+class EdgeLoad(DeadLoad):
+    """A force per rest length [N/m] along some edges, half to each end (of six-node elements by their shapes): (3,) or
+    (k, 3), one an edge.
+
+    body: the Shell whose edges they are, in a scene of several.
+
+    edges: (k,). force_per_length: N/m, by rest length.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> load = ms.EdgeLoad(mesh.edges_at(x=0.1), (0, 0, 0.5))
+    >>> round(float(load.vertex_forces(mesh).sum()), 9)  # 0.5 N/m on 0.02 m
+    0.01
+    """
+
+    _replaceable = ("force_per_length",)
+
+    def __init__(self, edges: Numbers, force_per_length: Numbers, body: Shell | Solid | None = None):
+        self.edges: np.ndarray = selection("EdgeLoad edges", edges)
+        super().__init__("force_per_length [N/m]", force_per_length, body)
+
+    def replaced(self, *, force_per_length: Numbers) -> EdgeLoad:
+        """Returns the same load with another force per length [N/m]."""
+        return EdgeLoad(self.edges, force_per_length, self.body)
+
+    def _shares(self, mesh: TriangleMesh):
+        return edge_shares(mesh, indices("EdgeLoad edges", self.edges, mesh.n_edges))
+
+
+class AreaLoad(DeadLoad):
+    """A force per rest area [N/m2] on the sheet, or on some faces only: (3,) or (k, 3), one a face. Faces of quadratic
+    elements are curved, and share it out by their shapes.
+
+    body: the Shell or Solid that it acts on; by default all, where no faces are given.
+
+    force_per_area: N/m2, by rest area. faces: (k,), by default all.
+
+    >>> import magshell as ms
+    >>> ms.AreaLoad((0, 0, -10.0)).force_per_area
+    array([  0.,   0., -10.])
+    """
+
+    _replaceable = ("force_per_area",)
+
+    def __init__(
+        self, force_per_area: Numbers, faces: Numbers | None = None, body: Shell | Solid | None = None
+    ):
+        self.faces: np.ndarray | None = None if faces is None else selection("AreaLoad faces", faces)
+        self._for_all: bool = faces is None
+        super().__init__("force_per_area [N/m2]", force_per_area, body)
+
+    def replaced(self, *, force_per_area: Numbers) -> AreaLoad:
+        """Returns the same load with another force per area [N/m2]."""
+        return AreaLoad(force_per_area, self.faces, self.body)
+
+    def _shares(self, mesh: TriangleMesh):
+        faces = (
+            np.arange(mesh.n_faces)
+            if self.faces is None
+            else indices("AreaLoad faces", self.faces, mesh.n_faces)
+        )
+        return shares(mesh, faces)
+
+
+class EdgeCouple(Owner):
+    """A couple per rest length [N] turning the director of free boundary edges about the edge itself.
+
+    couple_per_length: a number, about the edge's direction with the sheet on its left (seen from the side its normals
+        point to); positive lifts nothing but turns as a right hand along that direction does. Or a vector (3,), of which
+        the part along each rest edge counts. The axis follows the edge.
+    body: the Shell whose edges they are, in a scene of several.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> couple = ms.EdgeCouple(mesh.edges_at(x=0.1), 1e-3)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[couple])
+    >>> bool(abs(ms.equilibrium(scene).displacements[:, 2]).max() > 1e-3)
+    True
+    """
+
+    _replaceable = ("couple_per_length",)
+    _for_all = False
+
+    def __init__(self, edges: Numbers, couple_per_length: Numbers, body: Shell | Solid | None = None):
+        self.body: Shell | None = checked_body(body)
+        self.edges: np.ndarray = selection("EdgeCouple edges", edges)
+        array = real_numbers("couple_per_length [N]", couple_per_length)
+        if array.shape not in ((), (3,)):
+            raise ValueError(f"couple_per_length [N] must be a number or have shape (3,), got {array.shape}")
+        self.couple_per_length: np.ndarray = quantity("couple_per_length", "N", array, array.shape)
+
+    def _edge_couples(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
+        """The edges (k,) and their couples (k,), N m. Raises ValueError for a solid, whose edges do not turn."""
+        if not isinstance(mesh, TriangleMesh | SixNodeMesh):
+            raise ValueError(
+                "an EdgeCouple turns edges of a shell: a couple on a solid is one of PointLoads on its face"
+            )
+        edges, along = self._along(mesh)
+        return edges, along @ np.atleast_1d(self.couple_per_length)
+
+    def _add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
+        key, turned = ("couples", "couples"), values.scene._couple_edges
+        part = values.scene._bodies.of(self)
+        edges, couples = self._edge_couples(part.mesh)
+        n_edges = values.scene.mesh.n_edges
+        by_edge = np.bincount(part.first_edge + edges, weights=couples, minlength=n_edges)
+        numbers[key] = numbers.get(key, 0.0) + by_edge[turned]
+
+    def _gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
+        part = values.scene._bodies.of(self)
+        edges, along = self._along(part.mesh)
+        of_edges = np.searchsorted(values.scene._couple_edges, part.first_edge + edges)
+        return {"couple_per_length": gradient.value("couples", "couples")[of_edges] @ along}
+
+    def replaced(self, *, couple_per_length: Numbers) -> EdgeCouple:
+        """Returns the same load with another couple per length [N], of the same shape."""
+        changed = EdgeCouple(self.edges, couple_per_length, self.body)
+        if changed.couple_per_length.shape != self.couple_per_length.shape:
+            raise ValueError(
+                f"couple_per_length [N] must keep its shape {self.couple_per_length.shape}, "
+                f"got {changed.couple_per_length.shape}"
+            )
+        return changed
+
+    def _along(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
+        """The edges and what a couple per length is multiplied by: lengths (k, 1), or edge vectors (k, 3)."""
+        edges = indices("EdgeCouple edges", self.edges, mesh.n_edges)
+        inside = np.setdiff1d(edges, mesh.boundary_edges)
+        if inside.size:
+            raise ValueError(f"EdgeCouple edges must be on the boundary, but edge {inside[0]} is not")
+        lengths = mesh.edge_lengths[edges]
+        if self.couple_per_length.ndim == 0:
+            return edges, lengths[:, None]
+        ends = mesh.rest_positions[mesh.edges[edges]]
+        faces = mesh.corners.edge_faces if isinstance(mesh, SixNodeMesh) else mesh.edge_faces
+        along = (ends[:, 1] - ends[:, 0]) * np.where(faces[edges, 0] >= 0, 1.0, -1.0)[:, None]
+        return edges, along
+
+
+def _vectors(name: str, unit: str, values) -> np.ndarray:
+    array = real_numbers(f"{name} [{unit}]", values)
+    if array.ndim not in (1, 2) or array.shape[-1] != 3:
+        raise ValueError(f"{name} [{unit}] must have shape (3,) or (k, 3), got {array.shape}")
+    return quantity(name, unit, array, array.shape)
+
+
+def _rows(label: str, vectors: np.ndarray, count: int) -> np.ndarray:
+    if vectors.ndim == 2 and len(vectors) != count:
+        raise ValueError(f"{label} must have shape (3,) or ({count}, 3), got {vectors.shape}")
+    return np.broadcast_to(vectors, (count, 3))
+
+
+def _spread(mesh: TriangleMesh, vertices: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    """The forces (k, 1, 3) or (k, m, 3) of each row on its vertices (k, m)."""
+    at_vertices = np.zeros((mesh.n_vertices, 3))
+    np.add.at(at_vertices, vertices, forces)
+    return at_vertices

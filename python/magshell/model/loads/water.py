@@ -1,0 +1,197 @@
+"""Water around a sheet: drag, thrust, and the water that the sheet carries along."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ... import _core
+from ..._input.owner import Owner
+from ..._input.quantity import quantity
+from ..._input.scalars import not_negative
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Numbers
+
+
+_HEAD_ON = 0.5 * np.pi
+_NONE = 1e-9  # what of a table counts as zero, over its largest value; and how far its angles may miss the ends [rad]
+
+
+class Water(Owner):
+    """Water, or another fluid, that flows past a sheet and through which the sheet moves: [Chen22] (42)-(44).
+
+    On a face of area A whose corners move at v on average, and are accelerated by w,
+
+        f = 1/2 rho A |u|^2 (C_d(phi) d - C_t(phi) n) - m A (n . w) n,    u = velocity - v,  d = u / |u|,
+
+    a third of it on each corner. The unit normal n is the one against the flow, n . u <= 0, so the two sides of a face
+    are alike (the paper leaves that open); phi in [0, pi/2] is the attack angle, sin phi = |n . d|: 0 where the water
+    runs along the face, pi/2 where it meets it head on. C_d = drag_coefficient C(phi), and C_t likewise with a C of its
+    own if there is one; C(phi) = 2 sin^2(phi) unless a table says otherwise. Every face feels the whole flow: nothing
+    is in the lee of anything. There is no buoyancy: where it matters, reduce the scene's gravity g by the factor
+    1 - fluid_density / mass_density.
+
+    A plate of areal mass s (mass_density * thickness) that falls face-on from rest thus has, with C_d and C_t head on
+    (2 each for the coefficients 1: the force is 2 rho A |v|^2),
+
+        v(t) = v_T tanh(t / T),    v_T = sqrt(2 s g / (rho (C_d + C_t))),    T = v_T (s + m) / (s g).
+
+    fluid_density: rho, kg/m3, not negative.
+    velocity: of the water, (3,), m/s.
+    drag_coefficient, thrust_coefficient: factors on the two forces, not negative.
+    attack_table: (angles, values), C of drag and of thrust, instead of 2 sin^2. Angles in rad ascend from 0 to pi/2;
+        between them runs a twice differentiable cubic spline, which reproduces cubics ("not a knot" at both ends). A
+        third entry (a, b) gives it the slopes a at 0 and b at pi/2 [1/rad] instead.
+    thrust_table: the same for the thrust alone.
+    added_mass: m, kg/m2, not negative: the water that a face has to accelerate when it moves along its normal, in
+        proportion to its current area. A disk of radius a in open water carries 8 a / (3 pi) rho on average.
+
+    Tables decide how smooth the force is, and a solve wants its derivatives. Faces are alike on both sides, so C is
+    taken as even about 0 and pi/2 (for the thrust: odd about 0): the force is continuously differentiable if the drag's
+    C has slope zero at both ends, and the thrust's C is zero at 0 and has slope zero at pi/2. Otherwise the force has a
+    kink there; a thrust that is not zero at 0 jumps from one side of the face to the other where the flow is
+    tangential. None of this is refused; `is_smooth` tells.
+
+    Raises ValueError on negative or non-finite numbers, and on tables that do not ascend from 0 to pi/2.
+
+    >>> Water(velocity=(0.1, 0, 0), thrust_coefficient=0.5)
+    Water(1000 kg/m3, velocity (0.1, 0, 0) m/s, drag_coefficient 1, thrust_coefficient 0.5)
+    """
+
+    _replaceable = ("fluid_density", "velocity", "drag_coefficient", "thrust_coefficient", "added_mass")
+
+    def __init__(
+        self,
+        fluid_density: Numbers = 1000.0,
+        velocity: Numbers = (0.0, 0.0, 0.0),
+        drag_coefficient: Numbers = 1.0,
+        thrust_coefficient: Numbers = 1.0,
+        attack_table: Numbers | None = None,
+        thrust_table: Numbers | None = None,
+        added_mass: Numbers = 0.0,
+    ):
+        self.fluid_density: float = not_negative("fluid_density", "kg/m3", fluid_density)
+        self.velocity: np.ndarray = quantity("velocity", "m/s", velocity, (3,))
+        self.drag_coefficient: float = not_negative("drag_coefficient", "1", drag_coefficient)
+        self.thrust_coefficient: float = not_negative("thrust_coefficient", "1", thrust_coefficient)
+        self.added_mass: float = not_negative("added_mass", "kg/m2", added_mass)
+        self.attack_table: Any = _table("attack_table", attack_table)
+        self.thrust_table: Any = _table("thrust_table", thrust_table)
+        self._drag_curve = _curve(self.attack_table)
+        self._thrust_curve = self._drag_curve if thrust_table is None else _curve(self.thrust_table)
+        self._core = _core.Water(
+            **{name: getattr(self, name) for name in self._replaceable},
+            drag_curve=self._drag_curve,
+            thrust_curve=self._thrust_curve,
+        )
+
+    def replaced(self, **values: Any) -> Water:
+        """The same water with other numbers: any of those that a solve may replace, and differentiate by."""
+        if unknown := sorted(set(values) - set(self._replaceable)):
+            raise ValueError(
+                f"Water has no value {unknown[0]!r} to be replaced: it has {', '.join(self._replaceable)}"
+            )
+        return Water(**{**self.__getstate__(), **values})
+
+    def coefficients(self, attack_angle: Numbers) -> tuple[np.ndarray, np.ndarray]:
+        """C_d and C_t, each (...), at attack angles [rad] in [0, pi/2], (...)."""
+        angles = quantity("attack_angle", "rad", attack_angle, ("...",))
+        if (bad := (angles < 0) | (angles > _HEAD_ON)).any():
+            raise ValueError(f"attack_angle [rad] must lie in [0, pi/2], got {angles[bad].flat[0]:g}")
+        drag, thrust = (
+            curve.samples(angles.ravel())[:, 0].reshape(angles.shape)
+            for curve in (self._drag_curve, self._thrust_curve)
+        )
+        return self.drag_coefficient * drag, self.thrust_coefficient * thrust
+
+    def force(
+        self, positions: Numbers, velocities: Numbers, accelerations: Numbers | None = None
+    ) -> np.ndarray:
+        """The force on each face, (n_f, 3), N; a third of it acts on each corner.
+
+        positions, velocities, accelerations: of the corners of the faces, (n_f, 3, 3), a row a corner; m, m/s, m/s2.
+            `mesh.rest_positions[mesh.faces]` has that shape. No accelerations are zero ones.
+
+        >>> Water().force([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], np.broadcast_to([0, 0, -0.1], (1, 3, 3))).round(9)
+        array([[ 0.,  0., 10.]])
+        """
+        positions = quantity("positions", "m", positions, ("n_f", 3, 3))
+        velocities = quantity("velocities", "m/s", velocities, positions.shape)
+        if accelerations is None:
+            accelerations = np.zeros_like(positions)
+        accelerations = quantity("accelerations", "m/s2", accelerations, positions.shape)
+        return 3.0 * _core.drag_faces(self._core, positions, velocities, accelerations)["corner_force"]
+
+    @property
+    def is_smooth(self) -> bool:
+        """Whether the force is continuously differentiable in the motion of a face: a matter of the tables."""
+        _, drag_slopes = _ends(self._drag_curve)
+        thrust, thrust_slopes = _ends(self._thrust_curve)
+        drag_is = self.drag_coefficient == 0 or not drag_slopes.any()
+        thrust_is = self.thrust_coefficient == 0 or (thrust[0] == 0 and thrust_slopes[1] == 0)
+        return bool(drag_is and thrust_is)
+
+    def __getstate__(self) -> dict[Any, Any]:
+        return {
+            **{name: getattr(self, name) for name in self._replaceable},
+            "attack_table": self.attack_table,
+            "thrust_table": self.thrust_table,
+        }
+
+    def __setstate__(self, arguments: dict[Any, Any]) -> None:
+        self.__init__(**arguments)
+
+    def __repr__(self) -> str:
+        parts = [f"{self.fluid_density:g} kg/m3"]
+        if self.velocity.any():
+            parts.append(f"velocity ({', '.join(f'{v:g}' for v in self.velocity)}) m/s")
+        parts.append(f"drag_coefficient {self.drag_coefficient:g}")
+        parts.append(f"thrust_coefficient {self.thrust_coefficient:g}")
+        for name in ("attack_table", "thrust_table"):
+            if (table := getattr(self, name)) is not None:
+                parts.append(f"{name} of {len(table[0])} angles")
+        if self.added_mass:
+            parts.append(f"added_mass {self.added_mass:g} kg/m2")
+        return f"Water({', '.join(parts)})"
+
+
+def _table(name: str, table) -> tuple[np.ndarray, ...] | None:
+    """Checked: angles, values and, where given, the two slopes."""
+    if table is None:
+        return None
+    if not isinstance(table, tuple | list) or len(table) not in (2, 3):
+        raise ValueError(f"{name} must be None, (angles, values) or (angles, values, slopes at both ends)")
+    angles = quantity(f"{name} angles", "rad", table[0], ("n",))
+    values = quantity(f"{name} values", "1", table[1], angles.shape)
+    if len(angles) < 2:
+        raise ValueError(f"{name} must have at least two angles, got {len(angles)}")
+    if (steps := np.diff(angles)).min() <= 0:
+        k = int(np.argmax(steps <= 0))
+        raise ValueError(
+            f"{name} angles [rad] must ascend, but angle {k} is {angles[k]:g} and angle {k + 1} is {angles[k + 1]:g}"
+        )
+    if abs(angles[0]) > _NONE or abs(angles[-1] - _HEAD_ON) > _NONE:
+        raise ValueError(
+            f"{name} angles [rad] must run from 0 to pi/2 = {_HEAD_ON:.7f}, got {angles[0]:g} to {angles[-1]:g}"
+        )
+    slopes = (quantity(f"{name} slopes", "1/rad", table[2], (2,)),) if len(table) == 3 else ()
+    return angles, values, *slopes
+
+
+def _curve(table: tuple[np.ndarray, ...] | None) -> _core.AttackCurve:
+    if table is None:
+        return _core.AttackCurve()
+    from scipy.interpolate import CubicSpline  # when needed, as loading it takes long
+
+    angles, values, *slopes = table
+    ends = [(1, slope) for slope in slopes[0]] if slopes else "not-a-knot"
+    return _core.AttackCurve(angles, CubicSpline(angles, values, bc_type=ends).c.T)
+
+
+def _ends(curve: _core.AttackCurve) -> tuple[np.ndarray, np.ndarray]:
+    """Values and slopes at 0 and pi/2, set to zero where they are rounding."""
+    samples = curve.samples(np.linspace(0.0, _HEAD_ON, 65))
+    samples[np.abs(samples) <= _NONE * np.abs(samples[:, 0]).max()] = 0.0
+    return samples[[0, -1], 0], samples[[0, -1], 1]

@@ -1,0 +1,1 @@
+"""Defines what results say of each body."""

@@ -1,0 +1,87 @@
+"""What a result says of one body of its scene."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..._runtime.frozen import Frozen
+from ...mesh.triangles.triangle_mesh import TriangleMesh
+from ..shells.shell import Shell
+from ..shells.shell_stresses import ShellStresses, stresses_of
+from ..shells.strains import Strains
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Computed, SolveResult
+
+
+class BodyResult(Frozen):
+    """One body of a result: its share of each array, of a tensor in its graph, with the body's own numbers.
+
+    body: Shell, as it is in the scene. mesh: its own.
+    """
+
+    def __init__(self, result: SolveResult, body: Shell):
+        bodies = result.scene._bodies
+        self._result, self._span = result, bodies.spans[bodies.number(body)]
+        self._first_row = sum(sheet.mesh.n_faces for sheet in bodies.sheets_before(body))
+        self.body = body
+
+    @property
+    def mesh(self) -> TriangleMesh:
+        """Of the body."""
+        return self.body.mesh
+
+    @property
+    def positions(self) -> Computed:
+        """(..., n_v, 3) m."""
+        return self._result.positions[..., self._span.vertices, :]
+
+    @property
+    def displacements(self) -> Computed:
+        """(..., n_v, 3) m, from the rest shape."""
+        return self._result.displacements[..., self._span.vertices, :]
+
+    @property
+    def edge_rotations(self) -> Computed:
+        """(..., n_e) rad, zero where an edge has none; of a SixNodeMesh (..., 2 n_e), two an edge, at its Gauss points from
+        the lower to the higher corner."""
+        return self._result.edge_rotations[..., self._span.rotations]
+
+    @property
+    def velocities(self) -> Computed:
+        """(n, n_v, 3) m/s, of a motion."""
+        return self._result.velocities[..., self._span.vertices, :]
+
+    def strains(self, index: int = -1) -> Strains:
+        """The principal strains of its faces (of a SixNodeMesh at the middles of its flat faces, four an element), as
+        `strains` of the result has them for all sheets; of a motion or a path in a recorded state, by default the last."""
+        arguments = () if np.ndim(self._result.positions) == 2 else (index,)
+        rows = slice(self._first_row, self._first_row + self.mesh.n_faces)
+        return Strains(*(each[rows] for each in self._result.strains(*arguments)))
+
+    def stresses(self, index: int = -1) -> ShellStresses:
+        """Membrane force and bending moment of its faces (of a SixNodeMesh at the middles of its flat faces) with the strain
+        and curvature that make them, stress at the surfaces, von Mises stress, with the values that the result was found
+        with; of a motion or a path in a recorded state, by default the last. Of a solid, `stresses` has the same names where
+        they mean the same.
+
+        >>> import magshell as ms
+        >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+        >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0)
+        >>> ends = [ms.Pin(mesh.vertices_at(x=0.0)), ms.Pin(mesh.vertices_at(x=0.1), displacement=(0.001, 0, 0))]
+        >>> stresses = ms.equilibrium(ms.Scene(sheet, supports=ends))[sheet].stresses()
+        >>> abs(stresses.principal_membrane_forces[0]).round(3)  # Y h times a Green strain of 1.005 %, nothing across
+        array([10.05,  0.  ])
+        """
+        return stresses_of(self._result._values_at(index), self.body, self._result._state_at(index))
+
+    @property
+    def remanent_magnetization(self) -> Computed:
+        """(n_f, 3), of a SixNodeMesh one an element, or (3,) A/m, or None."""
+        given = self._result.remanent_magnetization
+        return given if np.ndim(given) < 2 else given[self._span.rows]
+
+    def __repr__(self) -> str:
+        return f"{type(self._result).__name__} of {self.body!r}"

@@ -1,0 +1,153 @@
+"""What a result says of one joint of a skeleton."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..._runtime.frozen import Frozen
+from ..rigid.joints import Joint
+from ..rigid.rigid import RigidResult, _cross
+from ..rigid.skeleton import motor_rows
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Computed, SolveResult
+
+
+class JointResult(Frozen):
+    """A joint of a result. Of tensors in their graph, tensors."""
+
+    joint: Joint
+
+    def __init__(self, result: SolveResult, joint: Joint):
+        if not any(joint is each for each in result.scene.joints):
+            raise ValueError(f"a joint of the scene is one of scene.joints, got {joint!r} that is not in it")
+        self._result, self.joint = result, joint
+        self._child = RigidResult(result, joint.child)
+        self._parent = None if joint.parent is None else RigidResult(result, joint.parent)
+
+    @property
+    def angle(self) -> Computed:
+        """(...) rad, of a Revolute, with its full turns over a motion; of a Ball, that of its rotation."""
+        kind = self.joint._kind
+        if kind not in ("revolute", "ball"):
+            raise ValueError(f"a {type(self.joint).__name__} has no angle")
+        turn = self._relative
+        xp = np if isinstance(turn, np.ndarray) else __import__("torch")
+        if kind == "ball":
+            trace = turn[..., 0, 0] + turn[..., 1, 1] + turn[..., 2, 2]
+            return 2.0 * xp.arcsin(xp.sqrt(xp.clip(0.25 * (3.0 - trace), 0.0, 1.0)))
+        axis = _like(self._axis, turn)
+        # R = cos I + sin [a] + (1 - cos) a a^T
+        twice_sine = sum(
+            axis[..., k] * (turn[..., (k + 2) % 3, (k + 1) % 3] - turn[..., (k + 1) % 3, (k + 2) % 3])
+            for k in range(3)
+        )
+        trace = turn[..., 0, 0] + turn[..., 1, 1] + turn[..., 2, 2]
+        angle = xp.arctan2(twice_sine, trace - 1.0)
+        return _unwrapped(angle)
+
+    @property
+    def displacement(self) -> Computed:
+        """(...) m, of a Prismatic."""
+        if self.joint._kind != "prismatic":
+            raise ValueError(f"a {type(self.joint).__name__} has no displacement")
+        along = _like(self._axis, self._child.center)
+        if self._parent is not None:
+            along = _turned(self._parent.rotation, along)
+        return (along * (self.place - self._place_of(self._parent))).sum(-1)
+
+    @property
+    def rate(self) -> Computed:
+        """(n,) rad/s of a Revolute, m/s of a Prismatic: how fast its coordinate changes, in a motion. Of a Ball (n, 3)
+        rad/s, how its child turns to its parent, axes of the world."""
+        kind = self.joint._kind
+        if kind not in ("revolute", "prismatic", "ball"):
+            raise ValueError(f"a {type(self.joint).__name__} has no rate")
+        if kind == "ball":
+            turning = self._child.angular_velocity
+            return turning if self._parent is None else turning - self._parent.angular_velocity
+        axis, spin = _like(self._axis, self._child.center), 0.0
+        velocity = self._velocity_of(self._child) - self._velocity_of(self._parent)
+        if self._parent is not None:
+            axis, spin = _turned(self._parent.rotation, axis), self._parent.angular_velocity
+        if kind == "revolute":
+            return (axis * (self._child.angular_velocity - spin)).sum(-1)
+        slid = self.place - self._place_of(self._parent)
+        turned = 0.0 if self._parent is None else (_cross(spin, axis) * slid).sum(-1)
+        return (axis * velocity).sum(-1) + turned
+
+    @property
+    def motor_torque(self) -> Computed:
+        """(...) N m, with which the motor of a Revolute turns its child about the axis, against its parent; (..., 3) of a
+        Ball, axes of the world. In a motion NaN in the state that it starts from."""
+        if self.joint._kind == "ball":
+            return self._motor("ball", "motor_rotation")
+        return self._motor("revolute", "motor_angle")
+
+    @property
+    def motor_force(self) -> Computed:
+        """(...) N, likewise of a Prismatic, along the axis."""
+        return self._motor("prismatic", "motor_displacement")
+
+    def _motor(self, kind: str, value: str):
+        if self.joint._kind != kind or not self.joint._driven:
+            raise ValueError(f"only a {kind.capitalize()} with a {value} has a motor")
+        return self._result._driving[..., motor_rows(self._result.scene._bodies.skeletons, self.joint)]
+
+    @property
+    def place(self) -> Computed:
+        """(..., 3) m, of the joint as the scene has it, on its child: that point where a solve has another origin."""
+        return self._place_of(self._child)
+
+    @property
+    def gap(self) -> Computed:
+        """(...) m, between its place on the child and on the parent: what is left of a Closure, and round-off of others but
+        a Prismatic, whose displacement it is. Where a solve has another origin, that of the place as the scene has it."""
+        return ((self.place - self._place_of(self._parent)) ** 2).sum(-1) ** 0.5
+
+    @property
+    def _axis(self) -> np.ndarray:
+        """(3,), or (n, 3) of states that have their own, as solves may give it others. What is read off with it feels it
+        only by where the links are: it needs no gradient of its own."""
+        result = self._result
+        if np.ndim(result.positions) == 2 or hasattr(result, "_values"):
+            return result._values_at(0).current(self.joint).axis
+        return np.stack([result._values_at(k).current(self.joint).axis for k in range(len(result.positions))])
+
+    @property
+    def _relative(self):
+        child = self._child.rotation
+        return child if self._parent is None else self._parent.rotation.swapaxes(-1, -2) @ child
+
+    def _velocity_of(self, link: RigidResult | None):
+        if link is None:
+            return 0.0
+        return link.velocity + _cross(link.angular_velocity, self._place_of(link) - link.center)
+
+    def _place_of(self, link: RigidResult | None):
+        if link is None:
+            return _like(self.joint.origin, self._child.center)
+        middle = link._place.center
+        return link.center + link.rotation @ _like(self.joint.origin - middle, link.center)
+
+    def __repr__(self) -> str:
+        return f"{type(self._result).__name__} of {self.joint!r}"
+
+
+def _turned(turns, vectors):
+    """(..., 3), by matrices (..., 3, 3)."""
+    return (turns * vectors[..., None, :]).sum(-1)
+
+
+def _like(array: np.ndarray, other):
+    return array if isinstance(other, np.ndarray) else other.new_tensor(array)
+
+
+def _unwrapped(angle):
+    """Over the first axis, where there is one."""
+    if angle.ndim == 0:
+        return angle
+    numbers = angle if isinstance(angle, np.ndarray) else angle.detach().numpy()
+    return angle + _like(np.unwrap(numbers, axis=0) - numbers, angle)

@@ -1,0 +1,60 @@
+"""What a result says of one body, whatever it is."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ..actuators.muscle import Muscle, MuscleResult
+from ..rigid.joints import Joint
+from ..rigid.rigid import Rigid, RigidResult
+from ..shells.shell import Shell
+from ..solids.solid import Solid
+from .body_result import BodyResult
+from .joint_result import JointResult
+from .solid_result import SolidResult
+
+if TYPE_CHECKING:
+    from ..._input.kinds import SolveResult
+
+
+def result_of(
+    result: SolveResult, body: Shell | Solid | Rigid | Joint | Muscle
+) -> BodyResult | SolidResult | RigidResult | JointResult | MuscleResult:
+    """`result[body]`, `result[joint]` or `result[actuator]`. Raises ValueError where the scene has no such one."""
+    if hasattr(body, "_result_in"):  # an actuator
+        return body._result_in(result)
+    if isinstance(body, Joint):
+        return JointResult(result, body)
+    if isinstance(body, Muscle):
+        return MuscleResult(result, body)
+    if isinstance(body, Rigid):
+        return RigidResult(result, body)
+    return SolidResult(result, body) if isinstance(body, Solid) else BodyResult(result, body)
+
+
+class OfOneBody:
+    """A result that says of the one body of its scene what `result[body]` does."""
+
+    scene: Any
+
+    def stresses(self, index: int = -1) -> Any:
+        """Returns the stresses of the scene's one body, as result[body].stresses(); of a motion or a path in a recorded
+        state, of several equilibria in one of them, by default the last. Raises ValueError where there are several bodies.
+
+        >>> import magshell as ms
+        >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+        >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0)
+        >>> ends = [ms.Pin(mesh.vertices_at(x=0.0)), ms.Pin(mesh.vertices_at(x=0.1), displacement=(0.001, 0, 0))]
+        >>> rest = ms.equilibrium(ms.Scene(sheet, supports=ends))
+        >>> abs(rest.stresses().principal_membrane_forces[0]).round(3)
+        array([10.05,  0.  ])
+        """
+        bodies = self.scene.bodies
+        if len(bodies) != 1:
+            raise ValueError(f"the scene has {len(bodies)} bodies: say which, result[body].stresses()")
+        return result_of(self, bodies[0]).stresses(index)
+
+    def _one_solid(self) -> SolidResult | None:
+        """What `strains` asks where there are no sheets but one solid."""
+        bodies = self.scene.bodies
+        return SolidResult(self, bodies[0]) if len(bodies) == 1 and isinstance(bodies[0], Solid) else None

@@ -1,0 +1,68 @@
+"""What a result says of one solid of its scene: strain and stress of its tetrahedra too."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..._input.tensors import detached
+from ..actuators.muscle import muscles_of
+from ..solids.solid_stresses import SolidStates, states_at
+from .body_result import BodyResult
+
+if TYPE_CHECKING:
+    from ..._input.kinds import SolveResult
+
+# Tetrahedra that are looked at unasked, when a result is printed: some 30 ms.
+AFFORDABLE_TETRAHEDRA = 20_000
+
+
+class SolidResult(BodyResult):
+    """A solid of a result: as of any body, and what its tetrahedra go through."""
+
+    def strains(self, index: int = -1) -> SolidStates:
+        """Deformation, Green strain, J, Cauchy and von Mises stress of every tetrahedron, with the material values that
+        the result was found with; of a motion or a path in a recorded state, by default the last.
+
+        >>> import magshell as ms
+        >>> mesh = ms.meshes.box((0.1, 0.02, 0.02), cells=(5, 1, 1))
+        >>> bar = ms.Solid(mesh, material=ms.StVenantKirchhoff(young_modulus=1e5, poisson_ratio=0.0))
+        >>> ends = [bar.mesh.vertices_at(x=0.0), bar.mesh.vertices_at(x=0.1)]
+        >>> pulled = [ms.Pin(ends[0]), ms.Pin(ends[1], displacement=(0.01, 0, 0))]
+        >>> strains = ms.equilibrium(ms.Scene(bar, supports=pulled))[bar].strains()
+        >>> strains.mean(strains.volume_ratios)[0].round(6), strains.mean(strains.green_strains)[0, 0, 0].round(6)
+        (np.float64(1.1), np.float64(0.105))
+        """
+        positions = np.asarray(detached(self._result.positions), dtype=np.float64)
+        at = positions if positions.ndim == 2 else positions[index]
+        found = states_at(self._result._values_at(index), self.body, at)
+        return SolidStates(*found[:3], muscles=muscles_of(self._result, self.body, index))
+
+    def stresses(self, index: int = -1) -> SolidStates:
+        """As `strains`, which has both: `green_strains`, `cauchy_stresses`, `von_mises_stresses` and `mean` are those of
+        a shell's `stresses` too."""
+        return self.strains(index)
+
+
+def told_strains(result: SolveResult, of_sheets: str) -> str:
+    """For a repr, one line for all sheets and one a solid, of the last state. of_sheets: what is said of the sheets."""
+    bodies = result.scene._bodies
+    lines = [str(of_sheets)] if bodies.sheets or not bodies.solids else []
+    last = "" if np.ndim(result.positions) == 2 else ", in the last state"
+    for solid in bodies.solids:
+        name = f"body {bodies.number(solid)}" if len(bodies) > 1 else "solid"
+        if (
+            solid.mesh.n_tetrahedra > AFFORDABLE_TETRAHEDRA
+            or result.scene._solving
+            or not len(result.positions)
+        ):
+            lines.append(f"{name}: strain and stress: ask result[solid].strains()")
+            continue
+        strains = SolidResult(result, solid).strains()
+        ratios, stress = strains.volume_ratios, strains.von_mises_stresses
+        lines.append(
+            f"{name}: J {ratios.min():.4g} to {ratios.max():.4g}, largest principal Green strain "
+            f"{100 * strains.largest_green_strain:.3g} %, von Mises stress at most {stress.max():.4g} Pa{last}"
+        )
+    return "\n  ".join(lines)

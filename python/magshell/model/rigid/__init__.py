@@ -1,0 +1,1 @@
+"""Defines rigid bodies, links, joints and skeletons."""

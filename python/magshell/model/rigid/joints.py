@@ -1,0 +1,493 @@
+"""Defines joints: what all have in common, and each kind."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from ..._input.owner import Owner
+from ..._input.quantity import quantity
+from ..._input.scalars import not_negative, positive
+from .rigid import Rigid
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Numbers
+
+
+class Joint(Owner):
+    """Between two links; make one of its subclasses.
+
+    child: the link (Rigid) that it carries. parent: the link that it is fixed to, or None for the world.
+    """
+
+    child: Rigid
+    parent: Rigid | None
+
+    _kind: ClassVar[str] = ""
+    _defaults: ClassVar[dict[str, Any]] = {}  # by name: where it does not act
+    _vectors: ClassVar[dict[str, str]] = {}  # the units of those that have three numbers
+
+    def __init__(
+        self,
+        child: Rigid,
+        parent: Rigid | None,
+        origin: Numbers,
+        axis: Numbers | None = None,
+        rate: Numbers | None = None,
+        **law: Any,
+    ):
+        for name, link in (("child", child), ("parent", parent)):
+            if not isinstance(link, Rigid) and (name == "child" or link is not None):
+                raise ValueError(f"{name} of a {type(self).__name__} must be a Rigid, got {link!r:.60}")
+        if child is parent:
+            raise ValueError(f"child and parent of a {type(self).__name__} must be two links")
+        self.child, self.parent = child, parent
+        self.origin: np.ndarray = np.array(quantity("origin", "m", origin, (3,)))
+        self.axis: np.ndarray = np.zeros(3)
+        self._axis_length = 1.0  # of what was given
+        if axis is not None:
+            along = quantity("axis", "", axis, (3,))
+            self._axis_length = np.linalg.norm(along)
+            if not self._axis_length > 0:
+                raise ValueError("axis must not be zero")
+            self.axis = along / self._axis_length
+        self._given = {name: self._checked(name, value) for name, value in law.items() if value is not None}
+        self._check_together()
+        self.rate: float | np.ndarray | None = None if rate is None else self._checked_rate(rate)
+        # What it was made without, a solve cannot give it.
+        self._replaceable = (
+            *self._given,
+            *(() if rate is None else ("rate",)),
+            *self._places,
+        )
+        self._in_time = tuple(name for name in type(self)._in_time if name in self._given)
+
+    def __getattr__(self, name: str) -> Any:
+        given = self.__dict__.get("_given", {})
+        if name in given:
+            return given[name]
+        if name in self._defaults:
+            return None
+        raise AttributeError(f"{type(self).__name__} has no attribute {name!r}")
+
+    def _checked_rate(self, value) -> float | np.ndarray:
+        return float(quantity("rate", f"{self._unit('')}/s", value, ()))
+
+    def _checked(self, name: str, value) -> float | np.ndarray:
+        unit = self._unit(name)
+        if name in self._vectors:
+            return np.array(quantity(name, unit, value, (3,)))
+        if name in ("servo_stiffness", "torque_limit", "force_limit", "limit_stiffness", "limit_smoothing"):
+            return positive(name, unit, value)
+        if name in ("spring_stiffness", "damping"):
+            return not_negative(name, unit, value)
+        return float(quantity(name, unit, value, ()))
+
+    def _unit(self, name: str) -> str:
+        slides = self._kind == "prismatic"
+        if name in self._vectors:
+            return self._vectors[name]
+        if name == "damping":
+            return "N s/m" if slides else "N m s/rad"
+        if name in ("spring_stiffness", "servo_stiffness", "limit_stiffness"):
+            return "N/m" if slides else "N m/rad"
+        if name in ("torque", "torque_limit", "force", "force_limit"):
+            return "N" if slides else "N m"
+        return "m" if slides else "rad"
+
+    def _check_together(self) -> None:
+        given, kind = self._given, type(self).__name__
+        limited = [name for name in ("lower_limit", "upper_limit", "cone_limit") if name in given]
+        if limited and not {"limit_stiffness", "limit_smoothing"} <= given.keys():
+            raise ValueError(
+                f"a {kind} with {limited[0]} needs limit_stiffness and limit_smoothing, how stiff it is beyond and how soon"
+            )
+        if "lower_limit" in given and not given["lower_limit"] < given.get("upper_limit", np.inf):
+            raise ValueError(f"lower_limit of a {kind} must be below its upper_limit")
+        if self._driven:
+            (motor,) = (name for name in given if name.startswith("motor_"))
+            if idle := [name for name in _UNDER_MOTOR if name in given]:
+                raise ValueError(
+                    f"{motor} of a {kind} prescribes where it is: {', '.join(idle)} would do nothing"
+                )
+        target = [name for name in self._defaults if name.startswith("target_")]
+        if target and (target[0] in given) != ("servo_stiffness" in given):
+            raise ValueError(
+                f"a {kind} that is to follow a target needs both {target[0]} and servo_stiffness"
+            )
+
+    @property
+    def _driven(self) -> bool:
+        """Whether a motor prescribes its coordinate."""
+        return any(name.startswith("motor_") for name in self._given)
+
+    @property
+    def _acts(self) -> bool:
+        """Whether anything but the constraint itself is in it."""
+        return bool(self._given)
+
+    @property
+    def _resting(self) -> Joint:
+        """Itself without what pulls at rest: torques, springs and servos that want something else, limits beyond it."""
+        pulls = {name for name in self._given if name in _PULLS and np.any(self._given[name])}
+        beyond = {"lower_limit": -1.0, "upper_limit": 1.0}
+        pulls |= {name for name, way in beyond.items() if way * self._given.get(name, way) < 0}
+        return self.replaced(**{name: self._defaults[name] for name in pulls}) if pulls else self
+
+    def _has(self, name: str) -> bool:
+        """Whether it was made with this."""
+        return name in self._given
+
+    def replaced(self, **values: Any) -> Joint:
+        """The same joint with other numbers of what acts in it."""
+        for name in values:
+            if name not in self._replaceable:
+                raise ValueError(f"the {type(self).__name__} was made without {name}: zero will do")
+        own = {name: getattr(self, name) for name in self._replaceable}
+        return self._again({**own, **values})
+
+    @property
+    def _has_axis(self) -> bool:
+        """Whether it was made with one."""
+        return bool(self.axis.any())
+
+    @property
+    def _places(self) -> tuple[str, ...]:
+        """What of it says where it is at rest."""
+        return ("origin", "axis") if self._has_axis else ("origin",)
+
+    def _again(self, law: dict[Any, Any]) -> Joint:
+        own = {name: getattr(self, name) for name in self._places}
+        return type(self)(child=self.child, parent=self.parent, **{**own, **law})
+
+    def _add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
+        if self._acts:
+            for name, default in self._defaults.items():
+                numbers[label, name] = self._given.get(name, default)
+        for name in self._places:
+            numbers[label, name] = getattr(self, name)
+
+    def _gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
+        found = {name: gradient.value(label, name)[0] for name in (*self._given, *self._places)}
+        if self.rate is not None:
+            rows = gradient.others.get("own_velocities")
+            found["rate"] = np.zeros(np.shape(self.rate))
+            for place in values.moved_by(self) if rows is not None else ():
+                moved = rows[place.points]
+                found["rate"] = found["rate"] + self._rate_gradient(place.rest, moved)
+                if self._kind != "prismatic":
+                    found["origin"] = found["origin"] + np.cross(self._turning, moved).sum(axis=0)
+                if self._has_axis and self._kind != "ball":
+                    found["axis"] = found["axis"] + self._axis_gradient(place.rest, moved)
+        if self._has_axis:  # of a unit vector along what was given
+            across = found["axis"] - self.axis * (self.axis @ found["axis"])
+            found["axis"] = across / self._axis_length
+        return found
+
+    def velocities(self, points: np.ndarray) -> np.ndarray:
+        """Of points (n, 3) m of what it carries at rest, as it starts: (n, 3) m/s."""
+        return self.rate * self._directions(points)
+
+    def _rate_gradient(self, points: np.ndarray, by_velocities: np.ndarray) -> np.ndarray:
+        return (by_velocities * self._directions(points)).sum()
+
+    def _axis_gradient(self, points: np.ndarray, by_velocities: np.ndarray) -> np.ndarray:
+        slides = self._kind == "prismatic"
+        arms = by_velocities if slides else np.cross(points - self.origin, by_velocities)
+        return self.rate * arms.sum(axis=0)
+
+    @property
+    def _turning(self) -> np.ndarray:
+        """How fast it turns to start with: (3,) rad/s."""
+        return self.rate * self.axis if self._kind == "revolute" else self.rate
+
+    def _directions(self, points: np.ndarray) -> np.ndarray:
+        """How points move as its coordinate does: (n, 3), m/rad or 1."""
+        if self._kind == "prismatic":
+            return np.broadcast_to(self.axis, points.shape)
+        return np.cross(self.axis, points - self.origin)
+
+    def __repr__(self) -> str:
+        law = "".join(f", {name} {_told(value)}" for name, value in self._given.items())
+        return f"{type(self).__name__}({'to the world' if self.parent is None else 'between two links'}{law})"
+
+
+_PULLS = (
+    "torque",
+    "force",
+    "rest_angle",
+    "rest_displacement",
+    "target_angle",
+    "target_displacement",
+    "target_rotation",
+)
+_UNDER_MOTOR = ("torque", "force", "servo_stiffness", "lower_limit", "upper_limit", "cone_limit")
+
+
+def _told(value) -> str:
+    return f"{value:g}" if np.ndim(value) == 0 else f"({', '.join(f'{each:g}' for each in value)})"
+
+
+_FAR = 1e300  # a limit that nothing reaches
+
+
+class Fixed(Joint):
+    """Holds a link to its parent, or to the world: they move as one.
+
+    origin: where it is drawn; nothing depends on it. By default the world's.
+
+    child, parent: Link objects; without a parent, the world.
+
+    >>> import magshell as ms
+    >>> bob = ms.Link(mass=1.0, center=(0, 0, -1.0), inertia=0.1)
+    >>> mast = ms.Link(mass=1.0, center=(0, 0, 1.0), inertia=0.1)
+    >>> joints = [ms.Ball(bob, origin=(0, 0, 0)), ms.Fixed(mast, bob)]
+    >>> ms.Skeleton([bob, mast], joints)
+    Skeleton(2 links, 2 joints)
+    """
+
+    _kind = "fixed"
+    _replaceable = ("origin",)
+
+    def __init__(self, child: Rigid, parent: Rigid | None = None, origin: Numbers = (0.0, 0.0, 0.0)):
+        super().__init__(child, parent, origin)
+
+
+class Revolute(Joint):
+    """Turns a link about an axis: a hinge. Its angle is zero at rest, and counts full turns.
+
+    origin, axis: (3,) m, and a direction, both in the world at rest and riding on the parent.
+    spring_stiffness, rest_angle: N m/rad, rad: a spring.
+    damping: N m s/rad, a torque against the rate of the angle, in motions.
+    torque: N m, on the child about the axis, and on the parent against it.
+    target_angle, servo_stiffness, torque_limit: rad, N m/rad, N m: a servo that pulls towards the target, with a torque
+        that stays below the limit (none by default).
+    lower_limit, upper_limit, limit_stiffness, limit_smoothing: rad, rad, N m/rad, rad: beyond a limit the torque grows by
+        a parabola of the length of the smoothing, then at this stiffness.
+    motor_angle: rad, prescribes the angle: a motor, reached by the shorter way round; `result[hinge].motor_torque` says
+        what it takes, in motions to second order. In place of a torque, a servo and limits. How fast it is to start with,
+        `rate` says.
+    rate: rad/s, at the start of a motion from rest positions, in a tree without vertices.
+
+    Solves take another origin and axis too, with the same links at rest. An axis may have any length, which changes
+    nothing, so that a gradient by it is across the axis. All but the rate and the places may change in ms.simulate, one
+    value a step or at the ends of steps.
+
+    >>> import numpy as np
+    >>> import magshell as ms
+    >>> rod = ms.Rigid(mass=1.0, inertia=1 / 12, center=(0.5, 0, 0))
+    >>> hinge = ms.Revolute(rod, origin=(0, 0, 0), axis=(0, 1, 0))
+    >>> scene = ms.Scene(ms.Skeleton([rod], [hinge]), gravity=(0, 0, -9.81))
+    >>> move = ms.simulate(scene, steps=100, time_step=5e-3)
+    >>> bool(abs(np.linalg.norm(move[rod].center[-1]) - 0.5) < 1e-12)
+    True
+    """
+
+    _kind = "revolute"
+    _defaults: ClassVar[dict[str, float]] = {
+        "spring_stiffness": 0.0,
+        "rest_angle": 0.0,
+        "damping": 0.0,
+        "torque": 0.0,
+        "motor_angle": 0.0,
+        "target_angle": 0.0,
+        "servo_stiffness": 0.0,
+        "torque_limit": _FAR,
+        "lower_limit": -_FAR,
+        "upper_limit": _FAR,
+        "limit_stiffness": 0.0,
+        "limit_smoothing": 1.0,
+    }
+    _in_time = tuple(_defaults)
+    _replaceable = (*_in_time, "rate", "origin", "axis")
+
+    def __init__(
+        self,
+        child: Rigid,
+        parent: Rigid | None = None,
+        *,
+        origin: Numbers,
+        axis: Numbers,
+        spring_stiffness: Numbers | None = None,
+        rest_angle: Numbers | None = None,
+        damping: Numbers | None = None,
+        torque: Numbers | None = None,
+        motor_angle: Numbers | None = None,
+        target_angle: Numbers | None = None,
+        servo_stiffness: Numbers | None = None,
+        torque_limit: Numbers | None = None,
+        lower_limit: Numbers | None = None,
+        upper_limit: Numbers | None = None,
+        limit_stiffness: Numbers | None = None,
+        limit_smoothing: Numbers | None = None,
+        rate: Numbers | None = None,
+    ):
+        law = {name: value for name, value in locals().items() if name in self._defaults}
+        super().__init__(child, parent, origin, axis, rate, **law)
+
+
+class Prismatic(Joint):
+    """Slides a link along an axis. Its displacement [m] is zero at rest; nothing depends on where its origin is.
+
+    As Revolute, with lengths for angles and forces [N] for torques: spring_stiffness N/m, rest_displacement m, damping
+    N s/m, force N, motor_displacement m (`result[slide].motor_force`), target_displacement m, servo_stiffness N/m,
+    force_limit N, lower_limit, upper_limit m, limit_stiffness N/m,
+    limit_smoothing m, rate m/s.
+
+    child, parent, origin, axis: as in Revolute.
+
+    >>> import magshell as ms
+    >>> bob = ms.Link(mass=1.0, center=(0, 0, -1.0), inertia=0.1)
+    >>> ms.Skeleton([bob], [ms.Prismatic(bob, origin=(0, 0, 0), axis=(0, 0, 1), spring_stiffness=100.0)])
+    Skeleton(1 link, 1 joint)
+    """
+
+    _kind = "prismatic"
+    _defaults: ClassVar[dict[str, float]] = {
+        "spring_stiffness": 0.0,
+        "rest_displacement": 0.0,
+        "damping": 0.0,
+        "force": 0.0,
+        "motor_displacement": 0.0,
+        "target_displacement": 0.0,
+        "servo_stiffness": 0.0,
+        "force_limit": _FAR,
+        "lower_limit": -_FAR,
+        "upper_limit": _FAR,
+        "limit_stiffness": 0.0,
+        "limit_smoothing": 1.0,
+    }
+    _in_time = tuple(_defaults)
+    _replaceable = (*_in_time, "rate", "origin", "axis")
+
+    def __init__(
+        self,
+        child: Rigid,
+        parent: Rigid | None = None,
+        *,
+        origin: Numbers,
+        axis: Numbers,
+        spring_stiffness: Numbers | None = None,
+        rest_displacement: Numbers | None = None,
+        damping: Numbers | None = None,
+        force: Numbers | None = None,
+        motor_displacement: Numbers | None = None,
+        target_displacement: Numbers | None = None,
+        servo_stiffness: Numbers | None = None,
+        force_limit: Numbers | None = None,
+        lower_limit: Numbers | None = None,
+        upper_limit: Numbers | None = None,
+        limit_stiffness: Numbers | None = None,
+        limit_smoothing: Numbers | None = None,
+        rate: Numbers | None = None,
+    ):
+        law = {name: value for name, value in locals().items() if name in self._defaults}
+        super().__init__(child, parent, origin, axis, rate, **law)
+
+
+class Ball(Joint):
+    """Turns a link about a point, any way.
+
+    origin: (3,) m, that point, in the world at rest and riding on the parent.
+    spring_stiffness: N m/rad, pulls the rotation, as one angle, back to none.
+    damping: N m s/rad, a torque against the rate at which the link turns to its parent, in motions.
+    torque: (3,) N m, a moment on the child, and against it on the parent, its axes those of the world: it keeps its
+        direction as they turn. It has no potential, as a following pressure has none.
+    motor_rotation: (3,) rad, prescribes the rotation from the parent to the child as a rotation vector, whose axes are those
+        of the world at rest and ride on the parent: a motor, reached by the shorter way round.
+        `result[ball].motor_torque` is the moment (3,) that it takes, as in Revolute.
+    target_rotation, servo_stiffness, torque_limit: (3,) rad likewise, N m/rad, N m: a servo that turns to the target along
+        one axis, with a torque that stays below the limit (none by default). A target half a turn away has no such axis.
+    upper_limit: rad, of the angle of the rotation, from 1e-3 to below pi.
+    axis, cone_limit: (3,), a direction in the world at rest, and rad, from 1e-3 to below pi: how far the direction may be
+        off on the child from where it is on the parent: the swing, whatever the twist about it.
+    limit_stiffness, limit_smoothing: N m/rad, rad: of these two limits, as in Revolute.
+    rate: (3,) rad/s, how the child turns to its parent at the start of a motion, as in Revolute; axes of the world.
+
+    >>> import magshell as ms
+    >>> bob = ms.Link(mass=1.0, center=(0, 0, -1.0), inertia=0.1)
+    >>> ms.Skeleton([bob], [ms.Ball(bob, origin=(0, 0, 0))])
+    Skeleton(1 link, 1 joint)
+    """
+
+    _kind = "ball"
+    _defaults: ClassVar[dict[str, Any]] = {
+        "spring_stiffness": 0.0,
+        "damping": 0.0,
+        "torque": np.zeros(3),
+        "motor_rotation": np.zeros(3),
+        "target_rotation": np.zeros(3),
+        "servo_stiffness": 0.0,
+        "torque_limit": _FAR,
+        "upper_limit": _FAR,
+        "cone_limit": _FAR,
+        "limit_stiffness": 0.0,
+        "limit_smoothing": 1.0,
+    }
+    _vectors: ClassVar[dict[str, str]] = {"torque": "N m", "motor_rotation": "rad", "target_rotation": "rad"}
+    _in_time = tuple(_defaults)
+    _replaceable = (*_in_time, "rate", "origin", "axis")
+
+    def __init__(
+        self,
+        child: Rigid,
+        parent: Rigid | None = None,
+        *,
+        origin: Numbers,
+        axis: Numbers | None = None,
+        spring_stiffness: Numbers | None = None,
+        damping: Numbers | None = None,
+        torque: Numbers | None = None,
+        motor_rotation: Numbers | None = None,
+        target_rotation: Numbers | None = None,
+        servo_stiffness: Numbers | None = None,
+        torque_limit: Numbers | None = None,
+        upper_limit: Numbers | None = None,
+        cone_limit: Numbers | None = None,
+        limit_stiffness: Numbers | None = None,
+        limit_smoothing: Numbers | None = None,
+        rate: Numbers | None = None,
+    ):
+        law = {name: value for name, value in locals().items() if name in self._defaults}
+        super().__init__(child, parent, origin, axis, rate, **law)
+        if (axis is None) != (cone_limit is None):
+            raise ValueError("a Ball that is to stay in a cone needs both axis and cone_limit")
+
+    def _checked(self, name: str, value) -> float | np.ndarray:
+        checked = super()._checked(name, value)
+        if name in ("upper_limit", "cone_limit") and not 1e-3 <= checked < np.pi:
+            raise ValueError(f"{name} [rad] of a Ball must be from 1e-3 to pi, got {checked:g}")
+        return checked
+
+    def _checked_rate(self, value) -> np.ndarray:
+        return np.array(quantity("rate", "rad/s", value, (3,)))
+
+    def velocities(self, points: np.ndarray) -> np.ndarray:
+        return np.cross(self.rate, points - self.origin)
+
+    def _rate_gradient(self, points: np.ndarray, by_velocities: np.ndarray) -> np.ndarray:
+        return np.cross(points - self.origin, by_velocities).sum(axis=0)
+
+
+class Closure(Joint):
+    """Closes a loop: pulls a point of one link, and the same place on another or in the world, together.
+
+    origin: (3,) m, the place at rest, which solves may change. stiffness: N/m; the gap is the force over it, and
+        `result[closure].gap` says it.
+
+    child, parent: the two links; without a parent, the world.
+
+    >>> import magshell as ms
+    >>> a, b = (ms.Link(mass=1.0, center=(x, 0, -1.0), inertia=0.1) for x in (0.0, 1.0))
+    >>> hinges = [ms.Revolute(link, origin=(x, 0, 0), axis=(0, 1, 0)) for link, x in ((a, 0.0), (b, 1.0))]
+    >>> ms.Skeleton([a, b], [*hinges, ms.Closure(a, b, origin=(0.5, 0, -1.0), stiffness=1e4)])
+    Skeleton(2 links, 3 joints)
+    """
+
+    _kind = "closure"
+    _defaults: ClassVar[dict[str, float]] = {"stiffness": 0.0}
+    _replaceable = (*_defaults, "origin")
+
+    def __init__(self, child: Rigid, parent: Rigid | None = None, *, origin: Numbers, stiffness: Numbers):
+        super().__init__(child, parent, origin, stiffness=positive("stiffness", "N/m", stiffness))

@@ -1,0 +1,316 @@
+"""Defines rigid bodies, their mass properties, and what results say of them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..._input.owner import Owner
+from ..._input.quantity import quantity, real_numbers
+from ..._input.scalars import positive
+from ..._input.selections import selection
+from ..._runtime.frozen import Frozen
+from ..._runtime.solver_entry_point import grouped
+from ...mesh.generate.stuffed import from_distance
+from ...mesh.shapes import Shape
+from ...mesh.triangles.triangle_mesh import TriangleMesh
+from ..shells.shell import Shell
+from ..solids.solid import Solid
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Computed, Numbers, SolveResult
+    from ..scene.values import Gradient, Values
+
+
+def filled(shape: TriangleMesh, mass_density: Numbers) -> dict[Any, Any]:
+    """mass [kg], inertia [kg m2] and center [m] of a Rigid that fills it. Raises ValueError where it is open, or turned
+    inside out."""
+    density = positive("mass_density", "kg/m3", mass_density)
+    volume, center, second = moments_of(shape)
+    inertia = density * (np.trace(second) * np.eye(3) - second)
+    return {"mass": density * volume, "inertia": inertia, "center": center}
+
+
+def moments_of(shape: TriangleMesh) -> tuple[float, np.ndarray, np.ndarray]:
+    """Volume, center and second moments about it of what a closed surface holds, by tetrahedra to the origin."""
+    faces, points = shape.faces, shape.rest_positions
+    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    _, counts = np.unique(edges, axis=0, return_counts=True)
+    if (counts != 2).any():
+        raise ValueError(
+            f"a shape must be closed to have a mass density, but {np.sum(counts != 2)} of its edges are open"
+        )
+    middle = points.mean(axis=0)
+    a, b, c = (points[faces[:, k]] - middle for k in range(3))
+    volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
+    volume = float(volumes.sum())
+    if not volume > 0:
+        raise ValueError("a shape holds no volume: its faces must look outwards")
+    center = (volumes[:, None] * (a + b + c)).sum(axis=0) / (4.0 * volume)
+    total = a + b + c
+    second = sum(np.einsum("i,ij,ik->jk", volumes, x, x) for x in (a, b, c, total)) / 20.0
+    return volume, middle + center, second - volume * np.outer(center, center)
+
+
+_ROUNDING = 1e-9
+
+
+class Rigid(Owner):
+    """Vertices of a body that move as one rigid body: a payload, a stiff frame, a magnet glued on. Or a free body without
+    a mesh. One of the bodies of a scene.
+
+    vertices: (k,), three at least and not all on a line; or None for a free body.
+    mass: kg, its own, beside that of the sheet it is part of; None where it has none: a frame.
+    inertia: kg m2, about `center`, in the world's axes at rest: (3, 3), or (3,) where those are its principal axes, or one
+        number for all three. By default that of a point mass, none.
+    center: (3,) m, of its own mass and of its moment, at rest; by default the mean of the vertices, or the origin.
+    magnetic_moment: (3,) A m2 at rest, in a scene with a field; it turns with the part.
+    velocity, angular_velocity: (3,) m/s of the center, (3,) rad/s in the world's axes: of a free body, where a motion
+        starts at rest positions. Vertices have theirs from the `velocities` of ms.simulate.
+    body: the Shell or Solid whose vertices they are, in a scene of several.
+    shape: a TriangleMesh where it is at rest, or one of ms.shapes, of which the surface of some 2000 tetrahedra is taken:
+        what an ms.Contact of the part with bodies touches with, and pictures show. `Rigid.of` makes mass, inertia and
+        center from one.
+
+    Supports hold none of its vertices. `result[part]` has its center and rotation, and how fast it moves. ms.simulate
+    takes it by TRBDF2, the first step in seven parts, or by ImplicitEuler; viscous damping acts on vertices only. Faces
+    between its vertices still bend at its border: where that half of a face matters, give them a larger modulus too.
+
+    >>> import numpy as np
+    >>> import magshell as ms
+    >>> top = ms.Rigid(mass=1.0, inertia=(1.0, 2.0, 3.0), angular_velocity=(0, 0, 2.0))
+    >>> scene = ms.Scene(top, allow_rigid_motions=True)
+    >>> move = ms.simulate(scene, steps=50, time_step=np.pi / 100)
+    >>> bool(np.abs(move[top].rotation[-1] - np.diag([-1.0, -1.0, 1.0])).max() < 1e-2)  # half a turn
+    True
+    """
+
+    _for_all = False
+    _replaceable = ("mass", "inertia", "center", "magnetic_moment", "velocity", "angular_velocity")
+
+    @grouped()
+    def __init__(
+        self,
+        vertices: Numbers | None = None,
+        *,
+        mass: Numbers | None = None,
+        inertia: Numbers | None = None,
+        center: Numbers | None = None,
+        magnetic_moment: Numbers | None = None,
+        velocity: Numbers | None = None,
+        angular_velocity: Numbers | None = None,
+        body: Shell | Solid | None = None,
+        shape: TriangleMesh | Shape | None = None,
+    ):
+        if body is not None and not isinstance(body, Shell | Solid):
+            raise ValueError(f"body must be a Shell or a Solid of the scene, got {body!r:.60}")
+        if vertices is None and body is not None:
+            raise ValueError("a Rigid of a body needs its vertices: Rigid(vertices=..., body=...)")
+        self.shape: TriangleMesh | None = _checked_shape(shape)
+        self.vertices: np.ndarray | None = None if vertices is None else selection("Rigid vertices", vertices)
+        self.body = body
+        self.mass: float | None = None if mass is None else float(quantity("mass", "kg", mass, ()))
+        if self.mass is not None and not self.mass > 0:
+            raise ValueError(f"mass [kg] must be positive, got {self.mass:g}")
+        self.inertia: np.ndarray | None = None if inertia is None else _checked_inertia(inertia)
+        if self.mass is None and self.inertia is not None:
+            raise ValueError("inertia [kg m2] was given without a mass [kg]")
+        self.center: np.ndarray | None = _vector("center", "m", center)
+        self.magnetic_moment: np.ndarray | None = _vector("magnetic_moment", "A m2", magnetic_moment)
+        self.velocity: np.ndarray | None = _vector("velocity", "m/s", velocity)
+        self.angular_velocity: np.ndarray | None = _vector("angular_velocity", "rad/s", angular_velocity)
+        if vertices is None:
+            self._check_free()
+        elif velocity is not None or angular_velocity is not None:
+            raise ValueError(
+                "velocity and angular_velocity are those of a free body: vertices have theirs from ms.simulate's velocities"
+            )
+
+    def _check_free(self) -> None:
+        if self.mass is None:
+            raise ValueError(
+                "a free Rigid needs a mass [kg], and an inertia [kg m2]: Rigid(mass=..., inertia=...)"
+            )
+        least = 0.0 if self.inertia is None else np.linalg.eigvalsh(self.inertia_tensor)[0]
+        if not least > 0:
+            raise ValueError(
+                f"a free Rigid needs an inertia [kg m2] about every axis, but the smallest is {least:g}: it could spin "
+                "without a force"
+            )
+
+    @property
+    def inertia_tensor(self) -> np.ndarray:
+        """(3, 3), kg m2, about the center; zero where there is none."""
+        given = np.zeros(()) if self.inertia is None else self.inertia
+        return given if given.ndim == 2 else given * np.eye(3)
+
+    def replaced(self, **values: Any) -> Rigid:
+        """The same part with other values."""
+        own = {name: getattr(self, name) for name in self._replaceable}
+        for name in values:
+            if own[name] is None and not (name in ("velocity", "angular_velocity") and self.vertices is None):
+                raise ValueError(f"the Rigid was made without {name}: give it one in the scene, zero will do")
+        return self._again({**own, **values})
+
+    @classmethod
+    def of(cls, shape: TriangleMesh | Shape, mass_density: float, **others: Any) -> Rigid:
+        """The one that fills a closed surface, faces outwards: mass [kg], inertia and center by its density [kg/m3].
+        others: of its arguments.
+
+        Raises ValueError where the surface is open, or turned inside out.
+
+        >>> import magshell as ms
+        >>> ms.Rigid.of(ms.meshes.box((0.02, 0.02, 0.02), cells=(1, 1, 1)).surface, 1e3)
+        Rigid(free, mass 0.008 kg)
+        """
+        surface = _checked_shape(shape)
+        if surface is None:
+            raise ValueError("shape must be a TriangleMesh or one of ms.shapes, got None")
+        return cls(shape=surface, **filled(surface, mass_density), **others)
+
+    def _again(self, values: dict[Any, Any]) -> Rigid:
+        return type(self)(self.vertices, body=self.body, shape=self.shape, **values)
+
+    def _add_numbers(self, label: str, values: Values, numbers: dict[Any, Any]) -> None:
+        if self.magnetic_moment is not None:
+            numbers[label, "magnetic_moment"] = self.magnetic_moment
+            numbers[label, "center"] = values.rigid_place(self).center_of(self)
+
+    def _gradients(self, label: str, values: Values, gradient: Gradient) -> dict[str, np.ndarray]:
+        place, found = values.rigid_place(self), {}
+        by_center = np.zeros(3)
+        if gradient.has(label, "magnetic_moment"):
+            found["magnetic_moment"] = gradient.value(label, "magnetic_moment")[0]
+            by_center += gradient.value(label, "center")[0]
+        elif self.magnetic_moment is not None:
+            found["magnetic_moment"] = np.zeros(3)
+        by_masses = values.by_masses(gradient)
+        if self.mass is not None and by_masses is not None:
+            found["mass"], found["inertia"], by_place = place.masses_vjp(self, by_masses[place.points])
+            by_center += by_place
+        by_mass_points = gradient.others.get("own_velocities")
+        if by_mass_points is not None:
+            started = values.started_by(self)
+            rows = np.concatenate([by_mass_points[each.points] for each in started])
+            at = np.concatenate([each.rest for each in started]) - place.center_of(self)
+            found["velocity"], found["angular_velocity"] = rows.sum(axis=0), np.cross(at, rows).sum(axis=0)
+            if self.vertices is None:  # points start at velocity + angular_velocity x (point - center)
+                by_center -= np.cross(rows.sum(axis=0), or_zero(self.angular_velocity))
+        found["center"] = by_center
+        none = {"mass": np.zeros(()), "inertia": np.zeros(np.shape(self.inertia)), "velocity": np.zeros(3)}
+        return {**none, "angular_velocity": np.zeros(3), **found}
+
+    def __repr__(self) -> str:
+        what = "free" if self.vertices is None else f"{np.size(self.vertices)} vertices"
+        mass = "" if self.mass is None else f", mass {self.mass:g} kg"
+        magnet = (
+            ""
+            if self.magnetic_moment is None
+            else f", magnetic_moment {tuple(self.magnetic_moment.tolist())} A m2"
+        )
+        return f"Rigid({what}{mass}{magnet})"
+
+
+_SHAPE_TETRAHEDRA = 2000
+
+
+def _checked_shape(shape) -> TriangleMesh | None:
+    if isinstance(shape, Shape):
+        return from_distance(shape, n_tetrahedra=_SHAPE_TETRAHEDRA).surface
+    if shape is not None and not isinstance(shape, TriangleMesh):
+        raise ValueError(f"shape must be a TriangleMesh or one of ms.shapes, got {shape!r:.60}")
+    return shape
+
+
+def _checked_inertia(given) -> np.ndarray:
+    given = real_numbers("inertia [kg m2]", given)
+    if given.shape not in ((), (3,), (3, 3)):
+        raise ValueError(f"inertia [kg m2] must be a number or have shape (3,) or (3, 3), got {given.shape}")
+    given = np.array(quantity("inertia", "kg m2", given, given.shape))
+    tensor = given if given.ndim == 2 else given * np.eye(3)
+    size = np.abs(tensor).max()
+    if np.abs(tensor - tensor.T).max() > _ROUNDING * size:
+        raise ValueError("inertia [kg m2] must be symmetric")
+    low, middle, high = np.linalg.eigvalsh(tensor)
+    if low < -_ROUNDING * size:
+        raise ValueError(f"inertia [kg m2] must not be negative about any axis, but the smallest is {low:g}")
+    if high > low + middle + _ROUNDING * size:
+        raise ValueError(
+            f"no body has the inertia [kg m2]: its largest principal moment {high:g} is more than the sum of the other "
+            f"two, {low:g} and {middle:g}"
+        )
+    return 0.5 * (tensor + tensor.T) if given.ndim == 2 else given
+
+
+def _vector(name: str, unit: str, given) -> np.ndarray | None:
+    return None if given is None else np.array(quantity(name, unit, given, (3,)))
+
+
+def or_zero(vector: np.ndarray | None) -> np.ndarray:
+    return np.zeros(3) if vector is None else vector
+
+
+class RigidResult(Frozen):
+    """A rigid part of a result. Of tensors in their graph, tensors.
+
+    rotation: (..., 3, 3), from how it was turned at rest. center: (..., 3) m, of its own mass as the scene has it: a point
+        that stays the same one where a solve has another center.
+    """
+
+    body: Rigid
+
+    def __init__(self, result: SolveResult, part: Rigid):
+        scene = result.scene
+        k = scene._bodies.rigid_number(part)
+        self._result, self.body = result, part
+        self._place, self._rows = scene._rigid[k], slice(10 * k, 10 * k + 4)
+        self._offsets = self._place.rest[:4] - self._place.center
+
+    @property
+    def positions(self) -> Computed:
+        """(..., k, 3) m, of its vertices, in their order. Raises ValueError for a free body, which has none."""
+        if not len(self._place.vertices):
+            raise ValueError("a free Rigid has no vertices: ask for its center and rotation")
+        return self._result.positions[..., self._place.vertices, :]
+
+    @property
+    def rotation(self) -> Computed:
+        """Rotation vector, rad: (3,), or (n, 3) of a motion."""
+        return self._turned(self._result._own_points[..., self._rows, :])
+
+    @property
+    def center(self) -> Computed:
+        """m: (3,), or (n, 3) of a motion."""
+        return self._result._own_points[..., self._rows, :].mean(-2)
+
+    @property
+    def velocity(self) -> Computed:
+        """(n, 3) m/s, of the center, of a motion."""
+        return self._result._own_velocities[..., self._rows, :].mean(-2)
+
+    @property
+    def angular_velocity(self) -> Computed:
+        """(n, 3) rad/s, in the world's axes, of a motion."""
+        velocities = self._result._own_velocities[..., self._rows, :]
+        corners = self._result._own_points[..., self._rows, :]
+        around = corners - corners.mean(-2)[..., None, :]
+        moments = _cross(around, velocities).sum(-2)
+        return moments / (8.0 * self._place.length**2)
+
+    def _turned(self, corners):
+        """Of corners c + R rho, sum of (x - c) rho^T over 4 length^2."""
+        around = corners - corners.mean(-2)[..., None, :]
+        offsets = _like(self._offsets / (4.0 * self._place.length**2), corners)
+        return (around[..., :, :, None] * offsets[:, None, :]).sum(-3)
+
+    def __repr__(self) -> str:
+        return f"{type(self._result).__name__} of {self.body!r}"
+
+
+def _like(array: np.ndarray, other):
+    return array if isinstance(other, np.ndarray) else other.new_tensor(array)
+
+
+def _cross(a, b):
+    return np.cross(a, b) if isinstance(a, np.ndarray) else a.cross(b, dim=-1)

@@ -1,0 +1,266 @@
+"""Defines skeletons, and their description for the core."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..._input.checked_list import checked_list
+from ..._runtime.frozen import FixedDict, Frozen, remember, variant
+from .joints import Closure, Fixed, Joint, Prismatic
+from .rigid import Rigid
+
+if TYPE_CHECKING:
+    from ..._input.kinds import FilePath, Numbers
+    from ..bodies.bodies import Bodies
+    from .link import Link
+
+
+class Skeleton(Frozen):
+    """Links and the joints between them: one tree, or several. One of the bodies of a scene, and so are its links.
+
+    links: Link (or Rigid) objects: vertices of a body that they carry, or numbers alone, or both.
+    joints: Fixed, Revolute, Prismatic and Ball objects, each leading to a link; a link to which none leads is free.
+        Closure objects close loops.
+
+    Soft material around a link rides on it by its vertices, Link(vertices=..., body=solid). Joints hold to round-off, also
+    over many steps. Values of joints go by the joint, values={hinge: {"torque": ...}}, and may change in time;
+    `result[hinge].angle` and `result[link]` tell how it moves. ms.simulate takes it by TRBDF2 or ImplicitEuler.
+    Gradients are by all values of joints, their origins and axes too. In motions of long chains (200 links) round-off of
+    angles, which are read off places far away, is above the tolerance of solvers: ms.MixedNewton(tolerance=1e-8) will do.
+
+    >>> import numpy as np
+    >>> import magshell as ms
+    >>> upper, lower = (ms.Link(mass=1.0, center=(0, 0, -z), inertia=1e-3) for z in (0.5, 1.5))
+    >>> shoulder = ms.Revolute(upper, origin=(0, 0, 0), axis=(0, 1, 0), torque=-2.0, spring_stiffness=10.0)
+    >>> elbow = ms.Revolute(lower, upper, origin=(0, 0, -1.0), axis=(0, 1, 0), spring_stiffness=1.0)
+    >>> rest = ms.equilibrium(ms.Scene(ms.Skeleton([upper, lower], [shoulder, elbow]), gravity=(0, 0, -9.81)))
+    >>> bool(0 < abs(float(rest[shoulder].angle)) < 0.2)
+    True
+    """
+
+    def __init__(self, links: Link | Iterable[Link], joints: Joint | Iterable[Joint] = ()):
+        self.links: tuple[Rigid, ...] = checked_list("links", links, (Rigid,))
+        self.joints: tuple[Joint, ...] = checked_list("joints", joints, (Joint,))
+        if not self.links:
+            raise ValueError("links must hold at least one Link")
+        self.named: dict[str, Rigid | Joint] = FixedDict()  # of a file
+        self._leading: dict[int, Joint] = {}
+        for k, joint in enumerate(self.joints):
+            self._check(k, joint)
+        self._order = self._in_order()
+        self._check_velocities()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy, or another process, makes it from again: it knows links by where they are in memory."""
+        return {"links": self.links, "joints": self.joints, "named": self.named}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(state["links"], state["joints"])
+        remember(self, named=state["named"])
+
+    @classmethod
+    def from_urdf(
+        cls,
+        path: FilePath,
+        *,
+        fixed_base: bool = True,
+        limits: bool = True,
+        limit_stiffness: Numbers | None = None,
+        limit_smoothing: Numbers | None = None,
+    ) -> Skeleton:
+        """Reads a URDF file, with the extra `urdf`: links with masses and inertias, at rest where all joints are at zero;
+        revolute, continuous, prismatic and fixed joints with axes, limits and damping; links on a floating joint are free.
+        `skeleton.named["elbow"]` is the link or joint of that name.
+
+        fixed_base: the root is held in the world; else it is free.
+        limit_stiffness, limit_smoothing: of all joints that have limits, in their units (see Revolute, Prismatic);
+            limits=False leaves limits out. Limits of effort and velocity are those of actuators, and not read, nor are
+            shapes: pictures show rods.
+
+        Raises ValueError on what cannot be: mimic joints, dry friction, planar joints, loops, broken files; ImportError
+        without the extra.
+        """
+        from .urdf import read_urdf
+
+        links, joints, named = read_urdf(
+            path,
+            fixed_base=fixed_base,
+            limits=limits,
+            limit_stiffness=limit_stiffness,
+            limit_smoothing=limit_smoothing,
+        )
+        skeleton = cls(links, joints)
+        return variant(skeleton, named=FixedDict(named))
+
+    def _check(self, k: int, joint: Joint) -> None:
+        for role in ("child", "parent"):
+            link = getattr(joint, role)
+            if link is not None and not any(link is each for each in self.links):
+                raise ValueError(f"the {role} of joint {k} is not among the links of the skeleton")
+        if isinstance(joint, Closure):
+            return
+        if id(joint.child) in self._leading:
+            raise ValueError(
+                f"two joints lead to one link (joint {k} is the second): in a tree one does; close a loop by a Closure"
+            )
+        self._leading[id(joint.child)] = joint
+
+    def _check_velocities(self) -> None:
+        for k, link in enumerate(self.links):
+            if link.velocity is None and link.angular_velocity is None:
+                continue
+            if self._root(link) is not link or any(each.vertices is not None for each in self._tree(link)):
+                raise ValueError(
+                    f"link {k} has a velocity, but only that of a free link, to which no joint leads and whose tree has no "
+                    "vertices, can be given: its whole tree starts with it"
+                )
+
+        for k, joint in enumerate(self.joints):
+            if joint.rate is not None and any(each.vertices is not None for each in self._tree(joint.child)):
+                raise ValueError(
+                    f"joint {k} has a rate, but its tree has vertices, whose velocities ms.simulate takes"
+                )
+
+    def _in_order(self) -> list[int]:
+        """The numbers of the links, parents first."""
+        number = {id(link): k for k, link in enumerate(self.links)}
+        order: list[int] = []
+        waiting = list(range(len(self.links)))
+        while waiting:
+            now = [k for k in waiting if (p := self._parent_of(k)) is None or number[id(p)] in order]
+            if not now:
+                raise ValueError(
+                    f"joints must make trees, but links {waiting} make a loop: close it by a Closure instead"
+                )
+            order += now
+            waiting = [k for k in waiting if k not in now]
+        return order
+
+    def _parent_of(self, number: int) -> Rigid | None:
+        """The link that a link, by its number, hangs on; None where that is the world."""
+        joint = self._joint_to(self.links[number])
+        return None if joint is None else joint.parent
+
+    def _reach(self, link: Rigid, center: np.ndarray) -> float:
+        """How far from a point of a link its joints are, m."""
+        places = [joint.origin for joint in self.joints if link is joint.child or link is joint.parent]
+        return max((float(np.linalg.norm(place - center)) for place in places), default=0.0)
+
+    def _turning_scale(self, link: Rigid) -> float:
+        """Return a length, m, for a link that does not turn by itself as one of its joints is a slide or fixed; else 0.
+
+        It only sets how rotations of the link are scaled: that of the skeleton, 0.01 m where all of it is at one place.
+        """
+        own = [joint for joint in self.joints if link is joint.child or link is joint.parent]
+        if not any(isinstance(joint, Prismatic | Fixed) for joint in own):
+            return 0.0
+        centers = [each.center for each in self.links if each.center is not None]
+        places = np.array([*centers, *(joint.origin for joint in self.joints)])
+        return float(np.linalg.norm(np.ptp(places, axis=0))) or 0.01
+
+    def _held(self, link: Rigid) -> bool:
+        """Whether joints lead from a link to the world."""
+        return id(self._root(link)) in self._leading
+
+    def _drifts(self, link: Rigid) -> bool:
+        """Whether neither the world nor a vertex of a body is in the tree of a link."""
+        return not self._held(link) and all(each.vertices is None for each in self._tree(link))
+
+    def _moved_by(self, joint: Joint) -> list[Rigid]:
+        """All links that it carries."""
+        return [link for link in self.links if self._on_the_way(joint, link)]
+
+    def _on_the_way(self, joint: Joint, link: Rigid) -> bool:
+        before = self._leading.get(id(link))
+        while before is not None and before is not joint:
+            before = None if before.parent is None else self._leading.get(id(before.parent))
+        return before is joint
+
+    def _tree(self, link: Rigid) -> list[Rigid]:
+        """All links that joints lead to from the root of this one."""
+        root = self._root(link)
+        return [each for each in self.links if self._root(each) is root]
+
+    def _root(self, link: Rigid) -> Rigid:
+        joint = self._leading.get(id(link))
+        while joint is not None and joint.parent is not None:
+            link, joint = joint.parent, self._leading.get(id(joint.parent))
+        return link
+
+    @property
+    def _links_in_order(self) -> tuple[Rigid, ...]:
+        """The links, parents first."""
+        return tuple(self.links[k] for k in self._order)
+
+    def _joint_to(self, link: Rigid) -> Joint | None:
+        """The joint that leads to a link; None where it is free."""
+        return self._leading.get(id(link))
+
+    def __repr__(self) -> str:
+        def count(items, word):
+            return f"{len(items)} {word}{'s' * (len(items) != 1)}"
+
+        return f"Skeleton({count(self.links, 'link')}, {count(self.joints, 'joint')})"
+
+
+def skeleton_inputs(bodies: Bodies, labels: list[tuple[object, str]]) -> dict[str, list[dict[Any, Any]]]:
+    """Of a scene's Bodies. labels: the core's name of every object."""
+    part = {id(link): k for k, link in enumerate(bodies.rigid)}
+    label = {id(item): name for item, name in labels if isinstance(item, Joint)}
+    closures = [joint for joint in bodies.joints if isinstance(joint, Closure)]
+    return {
+        "skeletons": [_skeleton(each, part, label) for each in bodies.skeletons],
+        "closures": [
+            {
+                "owner": label[id(each)],
+                "parent": -1 if each.parent is None else part[id(each.parent)],
+                "child": part[id(each.child)],
+                "place": each.origin,
+            }
+            for each in closures
+        ],
+    }
+
+
+def _skeleton(skeleton: Skeleton, part: dict[int, int], label: dict[int, str]) -> dict[Any, Any]:
+    links = skeleton._links_in_order
+    place = {id(link): k for k, link in enumerate(links)}
+    joints = [skeleton._joint_to(link) for link in links]
+    return {
+        "links": [part[id(link)] for link in links],
+        "joints": [_joint(each, place) for each in joints],
+        "owners": [label[id(each)] if each is not None and each._acts else "" for each in joints],
+        "labels": ["" if each is None else label[id(each)] for each in joints],
+    }
+
+
+def _joint(joint: Joint | None, place: dict[int, int]) -> dict[Any, Any]:
+    if joint is None:
+        still = dict.fromkeys(("driven", "damped", "twisted", "served", "coned"), False)
+        return {"kind": "free", "parent": -1, "origin": np.zeros(3), "axis": np.zeros(3), **still}
+    return {
+        "kind": joint._kind,
+        "parent": -1 if joint.parent is None else place[id(joint.parent)],
+        "origin": joint.origin,
+        "axis": joint.axis,
+        "driven": joint._driven,
+        "damped": joint._has("damping"),
+        "twisted": joint._kind == "ball" and joint._has("torque"),
+        "served": joint._kind == "ball" and joint._has("servo_stiffness"),
+        "coned": joint._has("cone_limit"),
+    }
+
+
+def motor_rows(skeletons: Sequence[Skeleton], joint: Joint) -> int | slice:
+    """Where the numbers of a joint's motor stand among those of all, in the core's order: one, or of a Ball three."""
+    leading = [skeleton._joint_to(link) for skeleton in skeletons for link in skeleton._links_in_order]
+    first = 0
+    for each in leading:
+        if each is joint:
+            break
+        if each is not None and each._driven:
+            first += 3 if each._kind == "ball" else 1
+    return slice(first, first + 3) if joint._kind == "ball" else first

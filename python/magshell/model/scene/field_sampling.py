@@ -1,0 +1,138 @@
+"""The error of magnetic forces on sheets whose three-node faces sample a field once, and a warning where it is large.
+
+A face with the magnetic moment m at its barycenter x_b feels the force F = (dB/dx)^T m. Over a face on which the field
+changes, the mean of F at six points (Dunavant, degree 4) tells how far the one at the barycenter is off,
+
+    error = |sum F(x_b) - sum mean F| / max(|sum mean F|, sum |mean F| / 10, sum |m x B| / extent),
+
+of each body: relative to the resultant force, or to the forces and couples that act where these cancel in it. The error of
+one point falls with the square of the edges, that of six points with their fourth power: of two parallel magnets 10 mm
+wide and 0.2 mm apart the estimate is 16.4, 5.0, 1.96 and 1.04 % with 16, 32, 48 and 64 cells, the error itself 15.7, 5.0,
+1.97 and 1.04 %.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ... import _core
+from ..._runtime.warning_stacklevel import callers_level
+from ...errors import FieldSamplingWarning
+from ..solids.solid import Solid
+from .magnetization import carriers
+
+if TYPE_CHECKING:
+    from .values import Values
+
+TRUSTED = 0.01  # [-] of a body's magnetic force; fixed by test_a_warning_comes_where_the_force_is_off_by_more_than_1_percent
+_CANCELLING = 0.1  # [-] of the sum of the forces: what is left of them where they cancel counts no less
+_MOST_NAMED = 4  # faces in a warning
+_A, _B = 0.445948490915965, 0.091576213509771
+_POINTS = np.array(  # (6, 3) barycentric coordinates of Dunavant's rule of degree 4
+    [np.roll((each, each, 1.0 - 2.0 * each), turn) for each in (_A, _B) for turn in range(3)]
+)
+_WEIGHTS = np.repeat([0.223381589678011, 0.109951743655322], 3)
+
+
+class SamplingError(NamedTuple):
+    """The error of the magnetic force on one body. error: relative; faces: (n,) by how much each has of it, most first."""
+
+    body: Any
+    error: float
+    faces: np.ndarray
+
+
+def warn_of_sampling(
+    values: Values, positions: np.ndarray, field_factor: float, flux_density: Any, where: str
+) -> None:
+    """Warns where the force on a body is off by more than a hundredth.
+
+    values: with the sources as they are there. positions: (n_v, 3) m. field_factor: on the sources. flux_density: (3,) T of
+    a uniform field, or None.
+    """
+    worst = max(
+        sampling_errors(values, positions, field_factor, flux_density),
+        key=lambda each: each.error,
+        default=None,
+    )
+    if worst is None or not worst.error > TRUSTED:
+        return
+    named = ", ".join(map(str, worst.faces[:_MOST_NAMED].tolist()))
+    shorter = np.sqrt(worst.error / TRUSTED)
+    warnings.warn(
+        FieldSamplingWarning(
+            f"{where}: the magnetic force on {worst.body!r} is off by about {worst.error:.2%}, as each of its faces samples "
+            f"the field once, and it changes over them; most of that is of faces {named}. Take a finer mesh near the "
+            f"sources (edges {shorter:.2g} times shorter leave {TRUSTED:.0%}), or six-node elements, which sample the field "
+            "at more points"
+        ),
+        stacklevel=callers_level(),
+    )
+
+
+def sampling_errors(
+    values: Values, positions: np.ndarray, field_factor: float, flux_density: Any
+) -> Iterator[SamplingError]:
+    """Yields the error of each body with three-node faces that a field acts on which varies in space."""
+    fields = [
+        each._core
+        for each in map(values.current, values.scene.fields)
+        if not getattr(each, "_is_uniform", False)
+    ]
+    if not fields or field_factor == 0.0 or not np.isfinite(positions).all():
+        return
+    scales = [float(field_factor)] * len(fields)
+    extent = values.scene._bodies.extent
+    for body, corners, moments in _magnetized_faces(values, positions):
+        if not moments.any():
+            continue
+        flux, once = _forces(fields, scales, corners.mean(axis=1), moments)
+        points = np.einsum("qk,fkd->fqd", _POINTS, corners)
+        _, each = _forces(fields, scales, points.reshape(-1, 3), np.repeat(moments, len(_POINTS), axis=0))
+        mean = np.einsum("q,fqd->fd", _WEIGHTS, each.reshape(points.shape))
+        couples = np.cross(moments, flux if flux_density is None else flux + flux_density)
+        total = max(
+            float(np.linalg.norm(mean.sum(axis=0))),
+            _CANCELLING * float(np.linalg.norm(mean, axis=1).sum()),
+            float(np.linalg.norm(couples, axis=1).sum()) / extent,
+        )
+        off = once - mean
+        if total > 0.0 and np.isfinite(total) and np.isfinite(off).all():
+            order = np.argsort(-np.linalg.norm(off, axis=1), kind="stable")
+            yield SamplingError(body, float(np.linalg.norm(off.sum(axis=0))) / total, order)
+
+
+def _forces(fields, scales, points, moments) -> tuple[np.ndarray, np.ndarray]:
+    """B [T] at points (n, 3) and the forces [N] on moments [A m2] there."""
+    flux, gradient, _ = _core.sample_fields(fields, scales, points, np.zeros_like(points), 1)
+    return flux, np.einsum("nij,ni->nj", gradient, moments)
+
+
+def _magnetized_faces(values, positions) -> Iterator[tuple[Any, np.ndarray, np.ndarray]]:
+    """(Shell or Skin, (n, 3, 3) m corners of its faces there, (n, 3) A m2 their moments there)."""
+    scene = values.scene
+    labels = {id(each): label for each, label in scene._labels}
+    for number, carrier, _ in carriers(scene):
+        span, now = scene._bodies.spans[number], values.current(carrier)
+        body = scene.bodies[number]
+        if not isinstance(body, Solid) and span.mesh.order == 2:
+            continue
+        faces = span.mesh.faces[carrier.faces] if isinstance(body, Solid) else span.mesh.faces
+        magnetization = scene._value_layout.of(values.numbers, labels[id(carrier)], "remanent_magnetization")
+        rest, corners = span.mesh.rest_positions[faces], positions[span.vertices][faces]
+        frame, volumes = _frames(rest)
+        turned, _ = _frames(corners)
+        own = np.linalg.solve(frame, np.broadcast_to(magnetization, (len(faces), 3))[..., None])
+        yield now, corners, (volumes * now.thickness)[:, None] * (turned @ own)[..., 0]
+
+
+def _frames(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(a_1, a_2, n) of faces as columns (n, 3, 3), and their areas (n,) m2 [Chen22] (20)."""
+    a1, a2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    across = np.cross(a1, a2)
+    area2 = np.linalg.norm(across, axis=1)
+    return np.stack([a1, a2, across / area2[:, None]], axis=2), 0.5 * area2

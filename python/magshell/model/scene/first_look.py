@@ -1,0 +1,38 @@
+"""What a scene that was just made is warned of."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..contact.contacts_to_core import check_neighbours
+from ..solids.mean_volume import warn_of_thin_regions
+from ..solids.solid import Solid
+from .plausible import warn_of_units
+
+if TYPE_CHECKING:
+    from .scene import Scene
+
+
+def look_at(scene: Scene) -> None:
+    """Warn of contact between neighbours, of sizes that no body has, and of solids one cell thick.
+
+    Raises ValueError as `check_neighbours`.
+    """
+    check_neighbours(scene, warns=True)
+    warn_of_units(scene, scene._values)
+    for span, body in zip(scene._bodies.spans, scene.bodies, strict=True):
+        if isinstance(body, Solid) and body.mean_volume:
+            warn_of_thin_regions(body.mesh, _held(scene)[span.vertices])
+
+
+def _held(scene: Scene) -> np.ndarray:
+    """(n_v, 3, 3): the projections onto the directions in which supports hold each vertex."""
+    bodies, constraints = scene._bodies, scene._constraints
+    found = np.zeros((len(bodies.original), 3, 3))
+    of_vertices = constraints.held_nodes[:, 0] < len(found)
+    nodes, counts = constraints.held_nodes[of_vertices, :2].T
+    columns = constraints.held_frames[of_vertices] * (np.arange(3) < counts[:, None])[:, None, :]
+    found[nodes] = columns @ np.swapaxes(columns, 1, 2)
+    return found[bodies.original]

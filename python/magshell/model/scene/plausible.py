@@ -1,0 +1,103 @@
+"""Sizes and material values that no soft body has: most often a unit that was mistaken, which a warning says once."""
+
+from __future__ import annotations
+
+import warnings
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..._runtime.warning_stacklevel import callers_level
+from ...errors import UnitWarning
+from ..shells.shell import Shell
+
+if TYPE_CHECKING:
+    from .scene import Scene
+    from .values import Values
+
+# Far outside of what there is, so that models without units and limits of theory pass; fixed by
+# test_usual_sizes_and_materials_are_not_warned_of and its neighbours.
+MOST_OF_EXTENT = 3.0  # [-] thickness of a sheet over its extent: from 1 on it is no sheet
+LEAST_OF_EXTENT = 1e-8  # [-] a layer of one atom on a metre has 1e-10
+MOST_OF_EDGE = 100.0  # [-] thickness over the median edge
+YOUNG_MODULUS = (0.1, 1e13)  # Pa: the softest gels have 10, diamond 1.2e12
+MASS_DENSITY = (1e-7, 1e6)  # kg/m3: aerogel has 1, osmium 2.3e4; 1e-6 stands for none of what a Rigid carries
+MOST_MAGNETIZATION = 1e8  # A/m: iron saturates at 1.7e6
+MOST_FLUX_DENSITY = 30.0  # T: what moves soft robots has 0.1, the strongest magnets of hospitals 12
+
+
+def warn_of_units(scene: Scene, values: Values) -> None:
+    """Warn of bodies whose sizes, stiffness, density or magnetization are absurd, once a scene and kind of value."""
+    for k, body in enumerate(values.sheets):
+        whose = f" of body {k}" if len(values.sheets) > 1 else ""
+        if isinstance(body, Shell):
+            _warn_of_thickness(scene, body, whose)
+        _warn_of_range(
+            scene, "young_modulus", "Pa", _held(body, "young_modulus"), YOUNG_MODULUS, "kPa? MPa?", whose
+        )
+        density = _held(body, "mass_density")
+        _warn_of_range(scene, "mass_density", "kg/m3", density, MASS_DENSITY, "t/mm3?", whose)
+    for label, name in scene._value_layout:
+        if name == "remanent_magnetization":
+            rows = scene._value_layout.of(values.numbers, label, name)
+            _warn_of_most(scene, name, "A/m", rows, MOST_MAGNETIZATION, "multiplied by 1000 twice?")
+
+
+def warn_of_field(scene: Scene, flux_density: np.ndarray) -> None:
+    """Warn of an applied field (..., 3) T that is absurd, once a scene."""
+    _warn_of_most(scene, "applied_flux_density", "T", flux_density, MOST_FLUX_DENSITY, "mT?")
+
+
+def _warn_of_thickness(scene: Scene, shell: Shell, whose: str) -> None:
+    thickest, thinnest = float(shell.thickness.max()), float(shell.thickness.min())
+    extent, edge = shell.mesh.size, float(np.median(shell.mesh.edge_lengths))
+    if thickest > MOST_OF_EXTENT * extent or thinnest < LEAST_OF_EXTENT * extent:
+        worst = thickest if thickest > MOST_OF_EXTENT * extent else thinnest
+        _warn(
+            scene,
+            "thickness",
+            f"thickness [m]{whose} is {worst:g}, {worst / extent:.3g} times the extent of the sheet, {extent:.3g} m",
+            "mm?",
+        )
+    elif thickest > MOST_OF_EDGE * edge:
+        _warn(
+            scene,
+            "thickness",
+            f"thickness [m]{whose} is {thickest:g}, {thickest / edge:.3g} times the usual edge of the mesh, {edge:.3g} m",
+            "mm? A mesh this fine is for a Solid",
+        )
+
+
+def _held(body: Any, name: str) -> np.ndarray | None:
+    """A value of a body, None where it or its material has none of this name."""
+    return getattr(body, name, None)
+
+
+def _warn_of_range(
+    scene: Scene, name: str, unit: str, rows: Any, limits: tuple[float, float], hint: str, whose: str
+) -> None:
+    if rows is None:
+        return
+    low, high = float(np.min(rows)), float(np.max(rows))
+    if low < limits[0] or high > limits[1]:
+        worst = low if low < limits[0] else high
+        text = f"{name} [{unit}]{whose} is {worst:g}, outside of {limits[0]:g} to {limits[1]:g}, far beyond all matter"
+        _warn(scene, name, text, hint)
+
+
+def _warn_of_most(scene: Scene, name: str, unit: str, rows: np.ndarray, most: float, hint: str) -> None:
+    largest = float(np.abs(rows).max(initial=0.0))
+    if largest > most:
+        _warn(
+            scene,
+            name,
+            f"{name} [{unit}] has entries up to {largest:g}, beyond {most:g}, the most there is",
+            hint,
+        )
+
+
+def _warn(scene: Scene, kind: str, what: str, hint: str) -> None:
+    if kind in scene._warned_of_units:
+        return
+    scene._warned_of_units.add(kind)
+    warnings.warn(f"{what}: {hint} Units are SI", UnitWarning, stacklevel=callers_level())

@@ -1,0 +1,117 @@
+"""What a solve may replace of its scene's values, and how it is asked for."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ..._input.quantity import quantity
+from ..._runtime.keywords import controls_of, meant, nearest_first
+from ..loads.loads import DeadLoad
+from ..shells.shell import Shell
+from .time_series import refuse_functions
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Numbers
+    from .scene import Scene
+
+
+# Those of a scene's one body that have a keyword of their own.
+SHELL_NAMES = tuple(
+    name for name in Shell._replaceable if name not in ("remanent_magnetization", *Shell._in_time)
+)
+
+
+def requested(
+    scene: Scene,
+    vertex_loads: Numbers,
+    values: Any,
+    moving: bool = False,
+    in_time: bool = False,
+    **shell: Any,
+) -> dict[object, dict[str, object]]:
+    """{object of the scene: {name: value}} from a solve's arguments. Raises ValueError on what has no place.
+
+    moving: the scene has inertia in this solve; in_time: values may change during it.
+    """
+    asked: dict[object, dict[str, object]] = {}
+    if values is not None and not isinstance(values, dict):
+        raise ValueError(
+            f"values must be a dict {{object of the scene: {{name: value}}}}, got {type(values).__name__}"
+        )
+    for owner, named in (values or {}).items():
+        _check(scene, owner, named)
+        for name, value in named.items():
+            if not in_time:
+                refuse_functions(owner, name, value, in_time)
+        asked[owner] = dict(named)
+    for name, value in shell.items():
+        if value is not None:
+            body = _one_body(scene, name)
+            if name not in body._replaceable:
+                raise ValueError(f"{name} was given, but a {type(body).__name__} has none: {body!r}")
+            _add(asked, body, name, value)
+    if vertex_loads is not None:
+        _add(asked, scene, "vertex_loads", vertex_loads)
+    _check_against_scene(scene, asked, moving)
+    return asked
+
+
+def checked(scene: Scene, owner: Any, name: str, value: Any) -> Any:
+    """The values that no constructor checks."""
+    if owner is not scene:
+        return value
+    unit, shape = {"gravity": ("m/s2", (3,)), "vertex_loads": ("N", (scene.mesh.n_vertices, 3))}[name]
+    return quantity(name, unit, value, shape)
+
+
+def _add(asked: dict[Any, Any], owner, name: str, value) -> None:
+    if name in asked.setdefault(owner, {}):
+        raise ValueError(f"{name} was given twice: as an argument and in values")
+    asked[owner][name] = value
+
+
+def _one_body(scene, name: str) -> Shell:
+    if len(scene.bodies) > 1:
+        raise ValueError(
+            f"{name} was given as an argument, but the scene has {len(scene.bodies)} bodies: say whose it is, "
+            f"values={{body: {{{name!r}: ...}}}}"
+        )
+    return scene.bodies[0]
+
+
+def _check(scene, owner, named) -> None:
+    if not any(owner is item for item in (scene, *scene.objects)):
+        raise ValueError(f"values has a key that is not the scene, nor an object of it: {owner!r}")
+    if not isinstance(named, dict):
+        raise ValueError(f"values of {owner!r} must be a dict {{name: value}}, got {type(named).__name__}")
+    names = (*getattr(owner, "_replaceable", ()), *controls_of(owner, scene))
+    for name in named:
+        if name in controls_of(owner, scene):  # a solve that has it has taken it already
+            raise ValueError(f"{name} of the scene has no part in this solve: leave it out of values")
+        if name not in names:
+            what = f"it has {nearest_first(name, names)}" if names else "it has none that can be"
+            what = f"{use}; {what}" if (use := meant(name, names)) else what
+            raise ValueError(
+                f"{type(owner).__name__} has no value {name!r} to be replaced in a solve: {what}"
+            )
+
+
+def _check_against_scene(scene, asked: dict[Any, Any], moving: bool) -> None:
+    heavy = bool(scene.gravity.any())
+    dense = any("mass_density" in asked.get(body, {}) for body in scene.bodies)
+    idle_density = dense and not moving
+    if not heavy and ("gravity" in asked.get(scene, {}) or idle_density):
+        raise ValueError(
+            "gravity or mass_density was given, but the scene has no gravity: Scene(..., gravity=...)"
+        )
+    if "vertex_loads" in asked.get(scene, {}):
+        forces = [load for load in scene.loads if isinstance(load, DeadLoad)]
+        if not forces:
+            raise ValueError(
+                "vertex_loads was given, but the scene has no PointLoad, EdgeLoad or AreaLoad: Scene(..., loads=...), zero "
+                "will do"
+            )
+        if any(load in asked for load in forces):
+            raise ValueError(
+                "vertex_loads stands for all point, edge and area loads: leave them out of values"
+            )

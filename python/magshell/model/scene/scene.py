@@ -1,0 +1,402 @@
+"""A scene: one shell or several, how they are held, and what acts on them."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterable
+from contextlib import contextmanager
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ... import _core
+from ..._input.checked_list import checked_list
+from ..._input.quantity import quantity
+from ..._runtime.frozen import remember
+from ..._runtime.mixins import Drawn
+from ..._runtime.solver_entry_point import grouped
+from ...mesh.triangles.triangle_mesh import TriangleMesh
+from ..actuators.actuator import Actuator
+from ..bodies.bodies import Bodies
+from ..bodies.ties import Tie
+from ..bodies.words import called
+from ..contact.body_contact import BodyContact
+from ..contact.contact import Contact
+from ..contact.contacts_to_core import (
+    body_contact_inputs,
+    check_shapes,
+    contact_inputs,
+    obstacles_of,
+    shapes_that_touch,
+    split_contacts,
+)
+from ..fields.field import FIELDS, AppliedField, UniformField
+from ..loads.face_energies import FaceEnergy
+from ..loads.loads import AreaLoad, DeadLoad, EdgeCouple, EdgeLoad, PointLoad
+from ..loads.pressure import Pressure
+from ..loads.water import Water
+from ..rigid.equimomental_points import places
+from ..rigid.joints import Joint
+from ..rigid.rigid import Rigid
+from ..rigid.skeleton import Skeleton, skeleton_inputs
+from ..shells.obtuse_faces import Caps
+from ..shells.shell import Shell
+from ..solids.solid import Solid
+from ..supports.constraints import free_rigid_motions, gather
+from ..supports.supports import Clamp, Pin, SymmetryPlane
+from .first_look import look_at
+from .parameter_layout import Layout
+from .scene_to_core import (
+    actuator_inputs,
+    body_inputs,
+    couple_directions,
+    couple_edges,
+    face_inputs,
+    muscle_inputs,
+)
+from .values import Values
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Fielded, Load, Numbers
+    from ..supports.supports import Support
+
+_LOADS = (PointLoad, EdgeLoad, AreaLoad, EdgeCouple, FaceEnergy, Pressure)
+_SUPPORTS = (Pin, Clamp, SymmetryPlane)
+_ACTUATORS = "Muscle, Cavity, Cells and Tendon objects"
+
+
+class Scene(Drawn):
+    """What is modelled. What a scene lacks costs nothing; it can be solved many times, and keeps for that what its matrix
+    needs and, up to 256 MB, the memory of its last factorization.
+
+    bodies: a Shell or a Solid, or several, which feel each other through ties and contacts only, Rigid parts and
+        Skeletons. Positions and faces of a result are those of one body after another, `result[body]` has those of one.
+    ties: Tie objects: bodies that are welded to each other.
+    supports: Pin, Clamp and SymmetryPlane objects; with several bodies they say by `body=` which one they hold.
+    loads: PointLoad, EdgeLoad, AreaLoad, EdgeCouple, Pressure and SurfaceTension objects; likewise.
+    actuators: Muscle, Cavity, Cells and Tendon objects.
+    field: None, an applied field, or several that superpose. A UniformField takes its value when the scene is solved.
+    gravity: (3,), m/s2; needs the mass density of all bodies.
+    contacts: Contact objects, each with the obstacles or the bodies that it is about, and SelfContact objects. Bodies pass
+        through each other, and themselves, where no contact says otherwise.
+    water: what the sheet moves through, in ms.simulate only.
+    allow_rigid_motions: accept a scene that supports do not hold entirely, because a field or gravity does.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e5)
+    >>> ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField()).n_unknowns
+    160
+
+    >>> other = ms.Shell(mesh.transformed(translation=(0, 0, 0.05)), thickness=5e-4, young_modulus=1e5, bending="hinge")
+    >>> held = [ms.Clamp(mesh.edges_at(x=0.0), body=body) for body in (sheet, other)]
+    >>> pair = ms.Scene([sheet, other], supports=held, field=ms.UniformField())
+    >>> rest = ms.equilibrium(
+    ...     pair,
+    ...     applied_flux_density=(0, 0, 1e-4),
+    ...     values={sheet: {"remanent_magnetization": (2e4, 0, 0)}, other: {"remanent_magnetization": (-1e4, 0, 0)}},
+    ... )
+    >>> rest[other].positions.shape, bool(rest[sheet].displacements[-1, 2] > 0 > rest[other].displacements[-1, 2])
+    ((33, 3), True)
+    """
+
+    _replaceable = ("gravity", "vertex_loads")
+
+    @grouped()
+    def __init__(
+        self,
+        bodies: Shell | Solid | Rigid | Skeleton | Iterable[Shell | Solid | Rigid | Skeleton],
+        *,
+        ties: Tie | Iterable[Tie] = (),
+        supports: Support | Iterable[Support] = (),
+        loads: Load | Iterable[Load] = (),
+        actuators: Actuator | Iterable[Actuator] = (),
+        field: Fielded | None = None,
+        gravity: Numbers | None = None,
+        contacts: Contact | BodyContact | Iterable[Contact | BodyContact] = (),
+        water: Water | None = None,
+        allow_rigid_motions: bool = False,
+    ):
+        self.contacts: tuple[Contact | BodyContact, ...] = checked_list(
+            "contacts", contacts, (Contact, BodyContact)
+        )
+        self._obstacle_contacts, self._body_contacts = split_contacts(self.contacts)
+        self._bodies = Bodies(bodies, ties, shapes_that_touch(self._body_contacts))
+        self.supports: tuple[Pin | Clamp | SymmetryPlane, ...] = checked_list("supports", supports, _SUPPORTS)
+        self.loads: tuple[Any, ...] = checked_list("loads", loads, _LOADS)
+        self.actuators: tuple[Actuator, ...] = checked_list("actuators", actuators, (Actuator,), _ACTUATORS)
+        self.fields: tuple[AppliedField, ...] = (
+            () if field is None else checked_list("field", field, (AppliedField,), FIELDS)
+        )
+        self.obstacles: tuple[Any, ...] = obstacles_of(self._obstacle_contacts)
+        if water is not None and not isinstance(water, Water):
+            raise ValueError(f"water must be a Water, got {type(water).__name__}")
+        self.water = water
+        _refuse_idle_magnetization(self)
+        self.gravity: np.ndarray = (
+            np.zeros(3) if gravity is None else quantity("gravity", "m/s2", gravity, (3,))
+        )
+        if any(f._core is None and not isinstance(f, UniformField) for f in self.fields):
+            raise ValueError("field holds an AppliedField without a value: use a CustomField")
+        if not isinstance(allow_rigid_motions, bool):
+            raise ValueError(f"allow_rigid_motions must be True or False, got {allow_rigid_motions!r}")
+        if sum(isinstance(f, UniformField) for f in self.fields) > 1:
+            raise ValueError(
+                "field holds several UniformFields: one is enough, its value comes when the scene is solved"
+            )
+        self._allow_rigid_motions = allow_rigid_motions
+        self._build(allow_rigid_motions)
+
+    def __getstate__(self) -> dict[Any, Any]:
+        """What a copy, or another process, makes the scene from again."""
+        return {
+            "bodies": self._bodies.listed,
+            "ties": self.ties,
+            "supports": self.supports,
+            "loads": self.loads,
+            "actuators": self.actuators,
+            "field": self.fields,
+            "gravity": self.gravity,
+            "contacts": self.contacts,
+            "water": self.water,
+            "allow_rigid_motions": self._allow_rigid_motions,
+        }
+
+    def __setstate__(self, arguments: dict[Any, Any]) -> None:
+        self.__init__(**arguments)
+
+    def _build(self, allow_rigid_motions: bool) -> None:
+        bodies, mesh = self._bodies, self.mesh
+        edges = couple_edges(bodies, self.loads)
+        self._couple_directions = couple_directions(bodies, edges)
+        constraints = gather(bodies, self.supports, self._couple_directions)
+        self._rigid = places(bodies)
+        check_shapes(self._obstacle_contacts, self.rigid_parts, self._rigid)
+        for k, part in enumerate(self.rigid_parts):
+            if part.magnetic_moment is not None and not self.fields:
+                raise ValueError(
+                    f"rigid part {k} has a magnetic_moment, but the scene has no field: Scene(..., field=...)"
+                )
+        _refuse_support(self._rigid, constraints.held_nodes[:, 0])
+        held = np.intersect1d(edges, constraints.directed_edges[:, 0])
+        if held.size:
+            raise ValueError(f"an EdgeCouple acts on edge {held[0]}, whose direction a support holds")
+        free = [] if allow_rigid_motions else free_rigid_motions(bodies, constraints, self._held_by_joints())
+        if not allow_rigid_motions:
+            free += [
+                f"rigid part {k}, which is free"
+                for k, each in enumerate(self.rigid_parts)
+                if bodies.drifts(each)
+            ]
+        if free:
+            it = "it" if len(bodies.listed) == 1 else "them"
+            raise ValueError(
+                f"the supports leave {called(bodies.listed)} free: {'; '.join(free)}. Hold {it}, or say "
+                "allow_rigid_motions=True if a field or gravity does"
+            )
+        n_directions, n_couples = len(constraints.directions), len(edges)
+        surfaces, body_contacts = body_contact_inputs(self._body_contacts, bodies)
+        self._constraints, self._couple_edges = constraints, edges
+        self._turn, self._solving = threading.RLock(), False
+        self._warned_of_caps = False
+        self._warned_of_strain = 0.0
+        self._warned_of_units: set[str] = set()
+        self._model = _core.Model(
+            n_vertices=mesh.n_vertices,
+            original=bodies.original if bodies.ties else [],
+            **body_inputs(self, constraints.directed_edges),
+            **skeleton_inputs(bodies, self._labels),
+            directions=constraints.directions,
+            held_nodes=constraints.held_nodes,
+            held_frames=constraints.held_frames,
+            moves=len(constraints.moves),
+            couples=np.stack(
+                [*bodies.sheets_of(edges), n_directions - n_couples + np.arange(n_couples)], axis=1
+            ).astype(np.int32),
+            gravity=bool(self.gravity.any()),
+            **face_inputs(self),
+            muscles=muscle_inputs(self),
+            **actuator_inputs(self),
+            loads=any(isinstance(load, DeadLoad) for load in self.loads),
+            field_sources=[source._core for source in self._sources],
+            contacts=contact_inputs(self._obstacle_contacts, bodies),
+            contact_surfaces=surfaces,
+            body_contacts=body_contacts,
+            obstacles=[each._core for each in self.obstacles],
+            water=None if self.water is None else self.water._core,
+        )
+        self._value_layout = Layout(self._model.parameters)
+        self._control_layout = Layout(self._model.controls)
+        # What the core holds now: a solve with other values puts its own there.
+        self._values = self._in_core = Values(self)
+        self._model.set_values(self._values.numbers)
+        look_at(self)
+
+    def _held_by_joints(self) -> np.ndarray:
+        """The vertices of links that joints hold to the world."""
+        held = [
+            place.vertices
+            for part, place in zip(self.rigid_parts, self._rigid, strict=True)
+            if self._bodies.held_by_joints(part)
+        ]
+        return np.concatenate([np.zeros(0, dtype=np.int64), *held])
+
+    @property
+    def _sources(self) -> list[AppliedField]:
+        return [field for field in self.fields if not isinstance(field, UniformField)]
+
+    @property
+    def _labels(self) -> list[tuple[object, str]]:
+        """Every object of it with the name that the core has for its values."""
+        kinds = (
+            ("body", self.bodies),
+            ("skin", self._bodies.skins),
+            ("rigid", self.rigid_parts),
+            ("joint", self.joints),
+            ("support", self.supports),
+            ("load", self.loads),
+            ("actuator", self.actuators),
+            ("field", self._sources),
+            ("contact", self._obstacle_contacts),
+            ("body contact", self._body_contacts),
+            ("obstacle", self.obstacles),
+        )
+        labels = [(each, f"{kind} {k}") for kind, objects in kinds for k, each in enumerate(objects)]
+        return labels if self.water is None else [*labels, (self.water, "water")]
+
+    @contextmanager
+    def _exclusive(self):
+        """One solve at a time: the core keeps the magnetization and the last evaluated state."""
+        with self._turn:
+            if self._solving:
+                raise RuntimeError("the scene is being solved: what a solve calls cannot solve it again")
+            remember(self, _solving=True)
+            try:
+                yield
+            finally:
+                remember(self, _solving=False)
+
+    @cached_property
+    def _caps(self) -> Caps:
+        return Caps(self._values.whole, self._model.recut_faces)
+
+    @property
+    def bodies(self) -> tuple[Shell | Solid, ...]:
+        """Shells and solids, in the order of their vertices."""
+        return self._bodies.shells
+
+    @property
+    def ties(self) -> tuple[Tie, ...]:
+        """What welds bodies."""
+        return self._bodies.ties
+
+    @property
+    def rigid_parts(self) -> tuple[Rigid, ...]:
+        """Rigid parts and links."""
+        return self._bodies.rigid
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """Of all skeletons."""
+        return self._bodies.joints
+
+    @property
+    def shell(self) -> Shell:
+        """The one body. Raises ValueError where there are several."""
+        if len(self.bodies) != 1:
+            raise ValueError(f"the scene has {len(self.bodies)} bodies: say which, scene.bodies[k]")
+        return self.bodies[0]
+
+    @property
+    def mesh(self) -> TriangleMesh:
+        """Of all bodies: vertices, edges and faces of one after another."""
+        return self._bodies.mesh
+
+    @property
+    def objects(self) -> tuple[Any, ...]:
+        """Every object of it, always in the same order. What a solve's `values` may name beside the scene itself."""
+        water = () if self.water is None else (self.water,)
+        return (
+            *self.bodies,
+            *self._bodies.skins,
+            *self.rigid_parts,
+            *self.joints,
+            *self.supports,
+            *self.loads,
+            *self.actuators,
+            *self.fields,
+            *self.contacts,
+            *self.obstacles,
+            *water,
+        )
+
+    @property
+    def has_uniform_field(self) -> bool:
+        """Whether solves need an applied_flux_density."""
+        return any(isinstance(f, UniformField) for f in self.fields)
+
+    @property
+    def has_forces_of_motion(self) -> bool:
+        """Whether forces act on it that no energy has: friction, water."""
+        rubs = any(contact.friction_coefficient is not None for contact in self.contacts)
+        return self.water is not None or rubs
+
+    @property
+    def n_unknowns(self) -> int:
+        """Free position components and edge rotations."""
+        return self._model.free_size
+
+    def __repr__(self) -> str:
+        several = len(self.bodies) > 1
+        lines = [
+            f"Scene: {self.bodies[0]!r}" if len(self.bodies) == 1 else f"Scene: {len(self.bodies)} bodies"
+        ]
+        if several:
+            lines += [f"  body {k}: {body!r}" for k, body in enumerate(self.bodies)]
+        lines += [f"  welded by {tie!r}" for tie in self.ties]
+        lines += [f"  with {part!r}{self._whose(part)}" for part in self.rigid_parts]
+        lines += [f"  joined by {joint!r}" for joint in self.joints]
+        lines += [f"  held by {support!r}{self._whose(support)}" for support in self.supports]
+        lines += [f"  loaded by {type(load).__name__}{self._whose(load)}" for load in self.loads]
+        lines += [f"  driven by {each!r}{self._whose(each)}" for each in self.actuators]
+        lines += [f"  in {field!r}" for field in self.fields]
+        lines += [f"  kept out by {contact!r}{self._whose(contact)}" for contact in self.contacts]
+        if self.water is not None:
+            lines.append(f"  in {self.water!r}")
+        if self.gravity.any():
+            lines.append(f"  under gravity {tuple(self.gravity.tolist())} m/s2")
+        lines.append(f"  {self.n_unknowns} unknowns")
+        return "\n".join(lines)
+
+    def _whose(self, item) -> str:
+        """For the repr of a scene with several bodies."""
+        if len(self.bodies) < 2 or item.body is None:
+            return ""
+        return f" (body {self._bodies.number(item.body)})"
+
+
+def _refuse_support(parts, held: np.ndarray) -> None:
+    """Raises ValueError where a support holds a vertex of a rigid part."""
+    for k, place in enumerate(parts):
+        both = np.intersect1d(place.vertices, held)
+        if both.size:
+            raise ValueError(
+                f"a support holds vertex {both[0]}, which rigid part {k} carries: leave it out of the part's vertices; what "
+                "is to stand still altogether needs no Rigid"
+            )
+
+
+def _refuse_idle_magnetization(scene: Scene) -> None:
+    """A skin does nothing but feel a field, and weigh if it has a mass density."""
+    if scene.fields:
+        return
+    for k, body in enumerate(scene.bodies):
+        if not isinstance(body, Solid):
+            continue
+        idle = body.skin is not None and (
+            body.skin.mass_density is None or body.skin.remanent_magnetization is not None
+        )
+        if idle or body.remanent_magnetization is not None:
+            what = "a skin" if idle else "a remanent_magnetization"
+            raise ValueError(f"body {k} has {what}, but the scene has no field: Scene(..., field=...)")

@@ -1,0 +1,1 @@
+"""Defines shells, and what results say of their strains and stresses."""

@@ -1,0 +1,438 @@
+"""Defines shells and the growth of their faces."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..._input.owner import Owner
+from ..._input.quantity import quantity, real_numbers
+from ..._runtime.solver_entry_point import grouped
+from ...mesh.face_shapes import corner_axes, sides
+from ...mesh.triangles.face_quality import MeshQuality
+from ...mesh.triangles.six_node_checks import shape_integrals, shape_products
+from ...mesh.triangles.six_node_mesh import SixNodeMesh
+from ...mesh.triangles.triangle_mesh import TriangleMesh
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Numbers
+    from ..scene.values import Gradient, Values
+
+
+_SYMMETRIC = 1e-9  # of the largest entry
+UNITS = {"growth": "1", "rest_curvature": "1/m"}
+
+
+class Growth:
+    """What a shell's growth and rest curvature may be, for `n` faces or elements.
+
+    rows: what messages call n. axes: (n, 2, 3), two unit vectors in each face at rest.
+    """
+
+    def __init__(self, rows: str, axes: np.ndarray):
+        self._rows, self._axes = rows, axes
+
+    def checked(self, name: str, given: Any, before: np.ndarray | None = None) -> np.ndarray:
+        """A number, (n,), (3, 3) or (n, 3, 3), as it was given; of the shape of what was `before`. Raises ValueError."""
+        label, n = f"{name} [{UNITS[name]}]", len(self._axes)
+        array = real_numbers(label, given)
+        if array.shape not in ((), (n,), (3, 3), (n, 3, 3)):
+            raise ValueError(
+                f"{label} must be a number or have shape ({self._rows},) = ({n},), or (3, 3) or ({self._rows}, 3, 3) = "
+                f"({n}, 3, 3) for symmetric tensors in world axes, got {array.shape}"
+            )
+        array = quantity(name, UNITS[name], array, array.shape)
+        self.check(name, array[None])
+        if before is None or array.shape == before.shape:
+            return array
+        if array.shape != before.shape[1:]:
+            raise ValueError(
+                f"{label} was made with shape {before.shape} and keeps it, got {array.shape}: where faces are to have "
+                "their own later, or directions, give them in the scene, np.ones will do"
+            )
+        return np.broadcast_to(array, before.shape)
+
+    def check(self, name: str, rows: np.ndarray) -> None:
+        """Raises ValueError where a face cannot have one of the values (k, *shape), finite and of an allowed shape."""
+        label, is_tensor = f"{name} [{UNITS[name]}]", _is_tensor(rows.shape[1:])
+        of_faces = rows.ndim in (2, 4)
+        if is_tensor:
+            skew = np.abs(rows - np.swapaxes(rows, -1, -2)).max(axis=(-2, -1))
+            if (skew > _SYMMETRIC * np.abs(rows).max()).any():
+                which = _which(skew) if of_faces else " it"
+                raise ValueError(
+                    f"{label} must be symmetric, but{which} differs from its transpose by {skew.max():.3g}"
+                )
+        if name != "growth":
+            return
+        smallest = np.linalg.eigvalsh(self._in_faces(rows))[..., 0] if is_tensor else rows
+        if (smallest <= 0).any():
+            which = _which(-smallest) if is_tensor or of_faces else " it"
+            raise ValueError(
+                f"{label} must be positive{' along the faces' * is_tensor}, but{which} is {smallest.min():g}"
+            )
+
+    def in_faces(self, array: np.ndarray) -> np.ndarray:
+        """Return what lies in the faces, in their axes, (n, 2, 2): of a value of one of the allowed shapes."""
+        return self._in_faces(array[None])[0]
+
+    def _in_faces(self, rows: np.ndarray) -> np.ndarray:
+        """Return the same, (k, n, 2, 2), of k values (k, *shape)."""
+        if _is_tensor(rows.shape[1:]):
+            rows = rows[:, None] if rows.ndim == 3 else rows
+            every = np.broadcast_to(rows, (len(rows), len(self._axes), 3, 3))
+            return np.einsum("fai,tfij,fbj->tfab", self._axes, every, self._axes)
+        rows = rows[:, None] if rows.ndim == 1 else rows
+        return np.broadcast_to(rows, (len(rows), len(self._axes)))[..., None, None] * np.eye(2)
+
+
+def _is_tensor(shape: tuple[int, ...]) -> bool:
+    """Whether a value of an allowed shape, (), (n,), (3, 3) or (n, 3, 3), holds tensors."""
+    return len(shape) > 1
+
+
+def core_form(array: np.ndarray | None) -> tuple[int, int]:
+    """How many rows of how many numbers the core keeps of a value; none of one that is not there."""
+    if array is None:
+        return 0, 1
+    width = 9 if _is_tensor(array.shape) else 1
+    return array.size // width, width
+
+
+def _which(sizes: np.ndarray) -> str:
+    """Name the face, the last axis, of the largest entry."""
+    return f" that of face {int(np.argmax(sizes)) % sizes.shape[-1]}"
+
+
+BENDING = ("midedge", "midedge2", "hinge")
+# Of an element's mass at its nodes, in proportion to the diagonal of its mass matrix where it is flat (Hinton, Rock,
+# Zienkiewicz 1976): positive, as those of the shape functions are not.
+_LUMPED = {3: np.full(3, 1 / 3), 6: np.array([1 / 19] * 3 + [16 / 57] * 3)}
+
+
+class Shell(Owner):
+    """A thin sheet of St. Venant-Kirchhoff material under the Kirchhoff-Love assumption.
+
+    Every property is a number, or an array with one entry a face (of a SixNodeMesh an element); `curvature_scale` one an
+    edge.
+
+    mesh: TriangleMesh or SixNodeMesh, its positions are the rest shape.
+    thickness: m, positive.
+    young_modulus: Pa, positive.
+    poisson_ratio: in (-1, 1/2].
+    mass_density: kg/m3, positive; only gravity asks for it.
+    curvature_scale: positive factor on every bending strain, [Chen22] k_cur; not for "midedge2".
+    bending: "midedge", the default (second order on irregular meshes too, see `quality`; one rotation an edge: the
+        lowest-order Hellan-Herrmann-Johnson element); "midedge2", the default and the only one for a SixNodeMesh (fourth
+        order in smooth problems; curved elements, two rotations an edge, linear moments, and membrane strains of Regge
+        elements: Neunteufel and Schoeberl 2019, 2021); or "hinge" ([Chen22] (19): no rotations, cheaper, and off by several
+        percent on irregular meshes).
+    remanent_magnetization: (3,) or (n_f, 3) A/m, in a scene with a field, where a solve says nothing else.
+    growth: by what factor lengths have grown in the faces: what they would be without stress. A positive number, or a
+        symmetric tensor in world axes at rest, (3, 3) or one a face (n_f, 3, 3), of which counts what lies in the face:
+        np.eye(3) + 0.1 np.outer(d, d) grows by a tenth along d. A sheet that is stretched by s before it is fixed to others
+        has growth 1/s. None: 1, and no solve can change it.
+    rest_curvature: 1/m, added to the curvature of the rest shape: a number (alike in all directions), or a symmetric
+        tensor as above, np.outer(d, d) / R bends along d; in lengths as they have grown. Positive where normals lean
+        together. None: nothing is added, and no solve can.
+
+    Growth changes what stretching and bending are measured from, and the area whose energy they are; an even one leaves
+    the angles of a curved rest shape as they are, so that it scales the shape (in general its second fundamental form is
+    multiplied by the root of det G). Everything else stays: thickness is that of the grown sheet; mass, weight,
+    magnetization and area loads are those of the mesh, and the magnetization stretches with the sheet, grown or not. Both
+    may change along ms.follow and in ms.simulate. With "hinge" both faces of an edge share one angle, their mean, and free
+    edges have none.
+
+    Which one: an element of "midedge2" costs about eight times a face of "midedge", and needs far fewer of them. Where
+    deflections and loads are wanted to a percent or better, and where sheets are curved at rest or twist, take "midedge2"
+    with a SixNodeMesh; the coarsest mesh that shows the shape will often do. Where the mesh has to be fine anyway, for
+    contacts, many small faces of their own magnetization, creases and folds, or where a few percent are enough, take
+    "midedge". Smoothness is what order four lives on: at clamps' corners, point forces and jumps inside an element the two
+    are alike.
+
+    >>> import magshell as ms
+    >>> ms.Shell(ms.meshes.rectangle(0.1, 0.02, cells=(10, 2)), thickness=1e-3, young_modulus=1e5)
+    Shell(40 faces, thickness 0.001 m, young_modulus 100000 Pa, poisson_ratio 0.5, bending midedge)
+    """
+
+    growth: np.ndarray | None
+    rest_curvature: np.ndarray | None
+
+    _replaceable = (
+        "thickness",
+        "young_modulus",
+        "poisson_ratio",
+        "mass_density",
+        "curvature_scale",
+        "remanent_magnetization",
+        "growth",
+        "rest_curvature",
+    )
+    _in_time = ("growth", "rest_curvature")
+
+    @grouped()
+    def __init__(
+        self,
+        mesh: TriangleMesh | SixNodeMesh,
+        *,
+        thickness: Numbers,
+        young_modulus: Numbers,
+        poisson_ratio: Numbers = 0.5,
+        mass_density: Numbers | None = None,
+        curvature_scale: Numbers = 1.0,
+        bending: str | None = None,
+        remanent_magnetization: Numbers | None = None,
+        growth: Numbers | None = None,
+        rest_curvature: Numbers | None = None,
+    ):
+        if not isinstance(mesh, TriangleMesh | SixNodeMesh):
+            raise ValueError(f"mesh must be a TriangleMesh or a SixNodeMesh, got {type(mesh).__name__}")
+        self.mesh = mesh
+        self.bending: str = _checked_bending(bending, mesh)
+        faces = ("n_f" if mesh.order == 1 else "n", mesh.n_elements)
+        self.thickness: np.ndarray = _positive("thickness", "m", thickness, faces)
+        self.young_modulus: np.ndarray = _positive("young_modulus", "Pa", young_modulus, faces)
+        self.poisson_ratio: np.ndarray = _property("poisson_ratio", "1", poisson_ratio, faces)
+        _refuse(
+            "poisson_ratio [1]",
+            "in (-1, 1/2]",
+            self.poisson_ratio,
+            (self.poisson_ratio <= -1) | (self.poisson_ratio > 0.5),
+        )
+        self.mass_density: np.ndarray | None = (
+            None if mass_density is None else _positive("mass_density", "kg/m3", mass_density, faces)
+        )
+        self.curvature_scale: np.ndarray = _positive(
+            "curvature_scale", "1", curvature_scale, ("n_e", mesh.n_edges)
+        )
+        if mesh.order == 2:
+            if (self.curvature_scale != 1.0).any():
+                raise ValueError(
+                    'curvature_scale [1] must be 1 with bending="midedge2": make the thickness or the modulus another'
+                )
+            self._replaceable = tuple(name for name in self._replaceable if name != "curvature_scale")
+        self.remanent_magnetization: np.ndarray | None = (
+            None
+            if remanent_magnetization is None
+            else magnetization_of(
+                remanent_magnetization, mesh.n_elements, "(n_f, 3)" if mesh.order == 1 else "(n, 3)"
+            )
+        )
+
+        self.growth, self.rest_curvature = (
+            None if given is None else self._growth.checked(name, given)
+            for name, given in (("growth", growth), ("rest_curvature", rest_curvature))
+        )
+        absent = [name for name in type(self)._in_time if getattr(self, name) is None]
+        self._replaceable = tuple(name for name in self._replaceable if name not in absent)
+        self._in_time = tuple(name for name in type(self)._in_time if name not in absent)
+
+    def replaced(self, **values: Any) -> Shell:
+        """The same sheet with other properties."""
+        properties = {name: getattr(self, name) for name in self._replaceable}
+        grown = {
+            name: self._growth.checked(name, values[name], getattr(self, name))
+            for name in self._in_time
+            if name in values
+        }
+        return Shell(self.mesh, bending=self.bending, **{**properties, **values, **grown})
+
+    def _add_numbers(self, label: str, values: Values, numbers: dict[Any, Any]) -> None:
+        for name in self._stiffnesses:
+            numbers[label, name] = getattr(self, name)
+        if self.remanent_magnetization is not None:  # else a solve brings it
+            numbers[label, "remanent_magnetization"] = self.remanent_magnetization
+
+    def _gradients(self, label: str, values: Values, gradient: Gradient) -> dict[str, np.ndarray]:
+        """With what its values do to the masses of the vertices, and to what contacts make of the thickness."""
+        found = {name: gradient.value(label, name) for name in self._stiffnesses}
+        if gradient.has(label, "remanent_magnetization"):
+            found["remanent_magnetization"] = gradient.value(label, "remanent_magnetization")
+        for contact, of_contact, sheets in values.contacts:
+            if any(self is sheet for sheet in sheets):
+                found["thickness"] = found["thickness"] + contact._by_thickness(of_contact, sheets, gradient)
+        at = values.part_of(self).vertices
+        by_volume_mass = [
+            (by[at][self.mesh.elements] * shares).sum(axis=1)
+            for by, shares in zip(values.by_inertia_and_weight(gradient), self._shares, strict=True)
+            if by is not None
+        ]
+        if by_volume_mass:
+            by_areal_mass = np.sum(by_volume_mass, axis=0)
+            found["thickness"] = found["thickness"] + by_areal_mass * self.mass_density
+            found["mass_density"] = by_areal_mass * self.thickness
+        return found
+
+    @property
+    def _stiffnesses(self) -> tuple[str, ...]:
+        """What of it the core's elastic terms read."""
+        names = ("thickness", "young_modulus", "poisson_ratio", "curvature_scale")
+        return (*(names if self.mesh.order == 1 else names[:3]), *self._in_time)
+
+    @property
+    def _growth(self) -> Growth:
+        """What its growth may be."""
+        corners = self.mesh.rest_positions[self.mesh.elements[:, :3]]
+        return Growth("n_f" if self.mesh.order == 1 else "n", corner_axes(corners))
+
+    @property
+    def _has_grown(self) -> bool:
+        """Whether its rest shape is under stress by itself."""
+        without = {"growth": np.eye(2), "rest_curvature": np.zeros((2, 2))}
+        return any(
+            (self._growth.in_faces(getattr(self, name)) != without[name]).any() for name in self._in_time
+        )
+
+    @property
+    def _grown_by(self) -> np.ndarray:
+        """(n_f, 2, 2) in `corner_axes` of the faces; of a SixNodeMesh, each flat face like its element."""
+        n = len(self.mesh.faces)
+        if self.growth is None:
+            return np.broadcast_to(np.eye(2), (n, 2, 2))
+        growth = self._on_faces(self.growth) if self.growth.ndim in (1, 3) else self.growth
+        return Growth("n_f", corner_axes(self.mesh.rest_positions[self.mesh.faces])).in_faces(growth)
+
+    def _check_in_time(self, name: str, rows: np.ndarray) -> None:
+        """Of a value over time. Raises ValueError."""
+        self._growth.check(name, rows)
+
+    def __getstate__(self) -> dict[Any, Any]:
+        """What a copy is made from: not what was looked up meanwhile."""
+        return {name: value for name, value in vars(self).items() if name != "quality"}
+
+    @cached_property
+    def quality(self) -> MeshQuality:
+        """The shapes of its faces, their heights also beside the thickness."""
+        return MeshQuality(self.mesh if self.mesh.order == 1 else self.mesh.surface, self._face_thickness)
+
+    @property
+    def _face_thickness(self) -> np.ndarray:
+        """(n_f,), m: of a SixNodeMesh, of its flat faces."""
+        return self._on_faces(self.thickness)
+
+    @property
+    def _face_magnetization(self) -> np.ndarray | None:
+        """(n_f, 3) A/m, of its own; of a SixNodeMesh, on its flat faces."""
+        own = self.remanent_magnetization
+        return None if own is None else self._on_faces(own)
+
+    def _on_faces(self, of_elements: np.ndarray) -> np.ndarray:
+        return np.repeat(of_elements, sides(self.mesh)[1], axis=0) if self.mesh.order == 2 else of_elements
+
+    @property
+    def face_volumes(self) -> np.ndarray:
+        """Rest volumes, (n_f,), m3: of a SixNodeMesh, of its elements."""
+        return self.mesh.element_areas * self.thickness
+
+    @property
+    def _shares(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of each element's area, at its nodes, (n, 3) or (n, 6) m2: for inertia, for weights, which of six nodes are shared
+        out by their shape functions: a third between corners and none at them where it is straight."""
+        even = self.mesh.element_areas[:, None] * _LUMPED[self.mesh.elements.shape[1]]
+        if self.mesh.order == 1:
+            return even, even
+        return even, shape_integrals(self.mesh.rest_positions[self.mesh.elements])
+
+    def _gathered(self, shares: np.ndarray) -> np.ndarray:
+        masses = np.zeros(self.mesh.n_vertices)
+        np.add.at(masses, self.mesh.elements, self._areal_masses[:, None] * shares)
+        return masses
+
+    @property
+    def _areal_masses(self) -> np.ndarray:
+        """(n,), kg/m2. Raises ValueError without mass density."""
+        if self.mass_density is None:
+            raise ValueError("the shell has no mass_density [kg/m3]")
+        return self.thickness * self.mass_density
+
+    @property
+    def vertex_masses(self) -> np.ndarray:
+        """Lumped masses for inertia, (n_v,), kg: a third of each face's at its corners; 1/19 of each six-node element's at
+        its corners and 16/57 between them. A sheet without mass density has none."""
+        return self._gathered(self._shares[0])
+
+    @property
+    def _weighed_masses(self) -> np.ndarray:
+        """What gravity pulls at each vertex by, (n_v,), kg."""
+        return self._gathered(self._shares[1])
+
+    @property
+    def element_masses(self) -> tuple[np.ndarray, np.ndarray]:
+        """Consistent masses: the nodes of each element (n, 3) or (n, 6), and the integrals of its mass per area times the
+        products of their shape functions (n, 3, 3) or (n, 6, 6), kg."""
+        masses, nodes = self._areal_masses[:, None, None], self.mesh.elements
+        if self.mesh.order == 2:
+            return nodes, masses * shape_products(self.mesh.rest_positions[nodes])
+        products = (np.ones((3, 3)) + np.eye(3)) / 12.0
+        return nodes, masses * self.mesh.element_areas[:, None, None] * products
+
+    def __repr__(self) -> str:
+        what = "faces" if self.mesh.order == 1 else "six-node elements"
+        parts = [f"{self.mesh.n_elements} {what}"]
+        for name, unit in (
+            ("thickness", " m"),
+            ("young_modulus", " Pa"),
+            ("poisson_ratio", ""),
+            ("mass_density", " kg/m3"),
+        ):
+            values = getattr(self, name)
+            if values is not None:
+                parts.append(f"{name} {_range(values)}{unit}")
+        return f"Shell({', '.join(parts)}, bending {self.bending})"
+
+
+def _checked_bending(bending, mesh) -> str:
+    if bending is None:
+        return "midedge" if mesh.order == 1 else "midedge2"
+    if bending not in BENDING:
+        raise ValueError(f"bending must be one of {BENDING}, got {bending!r}")
+    if bending == "midedge2" and mesh.order == 1:
+        raise ValueError(
+            'bending="midedge2" needs a mesh of six-node elements: ms.meshes.rectangle(..., order=2) and its like, '
+            "ms.SixNodeMesh.of(mesh, place=...) of a TriangleMesh, or a file of second order from gmsh"
+        )
+    if bending != "midedge2" and mesh.order == 2:
+        raise ValueError(
+            f'bending="{bending}" is for meshes of flat faces, and this one has six-node elements, which may be curved: '
+            'take bending="midedge2", or mesh.first_order() without their middle nodes'
+        )
+    return bending
+
+
+def magnetization_of(given: Numbers, count: int, rows: str = "(n_f, 3)") -> np.ndarray:
+    """One row for each of `count`, of one vector for all or one each."""
+    given = real_numbers("remanent_magnetization [A/m]", given)
+    if given.shape not in ((3,), (count, 3)):
+        raise ValueError(
+            f"remanent_magnetization [A/m] must have shape {rows} = ({count}, 3) or (3,), got {given.shape}"
+        )
+    return np.broadcast_to(quantity("remanent_magnetization", "A/m", given, given.shape), (count, 3))
+
+
+def _property(name: str, unit: str, value, rows: tuple[str, int]) -> np.ndarray:
+    """One finite number a row, from an array of that length or from a single number."""
+    array = real_numbers(f"{name} [{unit}]", value)
+    if array.shape not in ((), (rows[1],)):
+        raise ValueError(
+            f"{name} [{unit}] must be a number or have shape ({rows[0]},) = ({rows[1]},), got {array.shape}"
+        )
+    return np.broadcast_to(quantity(name, unit, array, array.shape), (rows[1],))
+
+
+def _positive(name: str, unit: str, value, rows: tuple[str, int]) -> np.ndarray:
+    array = _property(name, unit, value, rows)
+    _refuse(f"{name} [{unit}]", "positive", array, array <= 0)
+    return array
+
+
+def _refuse(label: str, wanted: str, array: np.ndarray, bad: np.ndarray) -> None:
+    if bad.any():
+        index = int(np.argmax(bad))
+        raise ValueError(f"{label} must be {wanted}, but entry {index} is {array[index]:g}")
+
+
+def _range(values: np.ndarray) -> str:
+    low, high = values.min(), values.max()
+    return f"{low:g}" if low == high else f"{low:g} to {high:g}"

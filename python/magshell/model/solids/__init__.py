@@ -1,0 +1,1 @@
+"""Defines solids, their materials and skins, and what results say of them."""

@@ -1,0 +1,295 @@
+"""Materials of solids: energies a volume, each under its own name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from ..._input.quantity import quantity, real_numbers
+from ..._runtime.frozen import Frozen, variant
+from ..._runtime.solver_entry_point import grouped
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Numbers
+
+
+# Beyond this Poisson's ratio the volume of quadratic elements counts on their mean, see Solid.
+NEARLY_INCOMPRESSIBLE = 0.4
+
+
+class SolidMaterial(Frozen):
+    """What a solid is made of. Every value is a number, or an array with one entry a tetrahedron.
+
+    Raises ValueError where a value is out of range.
+    """
+
+    isochoric = False  # whether the part that resists shear is blind to growth
+
+    # Of each value: unit, what it has to be, and a test of that.
+    _ranges: ClassVar[dict[str, tuple[str, str, Callable[..., Any]]]] = {}
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """A keyword that its constructor does not have is told with those that it has."""
+        super().__init_subclass__(**options)
+        if "__init__" in vars(cls):
+            setattr(cls, "__init__", grouped()(cls.__init__))  # noqa: B010 - assigned, it were declared to type checkers
+
+    def __init__(self, **values: Any):
+        self._given = {name: self._checked(name, value) for name, value in values.items()}
+
+    def _checked(self, name: str, value) -> np.ndarray:
+        unit, wanted, holds = self._ranges[name]
+        array = real_numbers(f"{name} [{unit}]", value)
+        array = quantity(name, unit, array, array.shape)
+        row = self._row_shapes().get(name, ())
+        if row and array.shape[-1:] != row:
+            raise ValueError(f"{name} [{unit}] must have shape {row} or (n_t, {row[0]}), got {array.shape}")
+        bad = ~holds(array)
+        if bad.any():
+            index = np.argmax(bad)
+            entry = f", but entry {index} is" if array.ndim else ", got"
+            raise ValueError(f"{name} [{unit}] must be {wanted}{entry} {array.ravel()[index]:g}")
+        return array
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return self.__dict__["_given"][name]
+        except KeyError:
+            raise AttributeError(f"{type(self).__name__} has no {name}") from None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of its values."""
+        return tuple(self._given)
+
+    @property
+    def _core_name(self) -> str:
+        return type(self).__name__
+
+    def replaced(self, **values: Any) -> SolidMaterial:
+        """The same material with other values."""
+        given = {**self._given, **{name: self._checked(name, value) for name, value in values.items()}}
+        return variant(self, _given=given)
+
+    def rows(self, name: str, n_tetrahedra: int) -> np.ndarray:
+        """One value a tetrahedron. Raises ValueError where there are not so many."""
+        array = self._given[name]
+        row = self._row_shapes().get(name, ())
+        if array.shape not in (row, (n_tetrahedra, *row)):
+            raise ValueError(
+                f"{name} [{self._ranges[name][0]}] must be {'of shape (3,)' if row else 'a number'} or have shape "
+                f"{(n_tetrahedra, *row)} (one a tetrahedron), got {array.shape}"
+            )
+        return np.broadcast_to(array, (n_tetrahedra, *row))
+
+    def _row_shapes(self) -> dict[str, tuple[int, ...]]:
+        return {}
+
+    @property
+    def _nearly_incompressible(self) -> bool:
+        """Whether it hardly changes its volume anywhere."""
+        return bool(np.max(self.poisson_ratio) > NEARLY_INCOMPRESSIBLE)
+
+    def _wave_modulus(self, n_tetrahedra: int) -> np.ndarray:
+        """Pa, (n_t,): a modulus that its stiffness for small strains is of the size of."""
+        return self.rows("young_modulus", n_tetrahedra)
+
+    def __repr__(self) -> str:
+        shown = [f"{name} {_range(value)}" for name, value in self._given.items() if value.ndim < 2]
+        return f"{type(self).__name__}({', '.join(shown)})"
+
+
+def _range(values: np.ndarray) -> str:
+    low, high = values.min(), values.max()
+    return f"{low:g}" if low == high else f"{low:g} to {high:g}"
+
+
+def _positive(values: np.ndarray) -> np.ndarray:
+    return values > 0
+
+
+_YOUNG = {
+    "young_modulus": ("Pa", "positive", _positive),
+    "poisson_ratio": (
+        "1",
+        "in (-1, 1/2): these materials change their volume, and 0.499 with quadratic elements is as near to 1/2 as "
+        "matters",
+        lambda nu: (nu > -1) & (nu < 0.5),
+    ),
+}
+
+
+class _Isotropic(SolidMaterial):
+    _ranges = _YOUNG
+
+    def __init__(self, *, young_modulus: Numbers, poisson_ratio: Numbers):
+        super().__init__(young_modulus=young_modulus, poisson_ratio=poisson_ratio)
+
+
+class NeoHookean(_Isotropic):
+    """Neo-Hookean; refuses elements that are turned inside out, and solves take steps that leave none so.
+
+    volume: what it charges for a change of volume,
+        "ln J": mu/2 (I1 - 3) - mu ln J + lam/2 (ln J)^2, the default;
+        "J": mu/2 (I1 - 3) - mu ln J + lam/2 (J - 1)^2;
+        "isochoric": mu/2 (J^(-2/3) I1 - 3) + K/2 (J - 1)^2, K = lam + 2/3 mu, for nearly incompressible material.
+    young_modulus: Pa, positive. poisson_ratio: in (-1, 1/2). Each a number, or (n_t,).
+
+    >>> import magshell as ms
+    >>> ms.NeoHookean(young_modulus=1e6, poisson_ratio=0.45)
+    NeoHookean(young_modulus 1e+06, poisson_ratio 0.45)
+    """
+
+    isochoric: bool
+
+    _VOLUMES = ("ln J", "J", "isochoric")
+
+    def __init__(self, volume: str = "ln J", *, young_modulus: Numbers, poisson_ratio: Numbers):
+        if volume not in self._VOLUMES:
+            raise ValueError(f"volume must be one of {self._VOLUMES}, got {volume!r}")
+        self.volume, self.isochoric = volume, volume == "isochoric"
+        super().__init__(young_modulus=young_modulus, poisson_ratio=poisson_ratio)
+
+    @property
+    def _core_name(self) -> str:
+        return f"NeoHookean {self.volume}"
+
+
+class StableNeoHookean(_Isotropic):
+    """Neo-Hookean that comes back from elements turned inside out: mu/2 (I1 - 3) - mu (J - 1) + (lam + mu)/2 (J - 1)^2
+    (Smith, de Goes, Kim 2018).
+
+    log_barrier: with their barrier, m/2 (I1 - 3) + l/2 (J - a)^2 - m/2 ln((I1 + 1)/4), m = 4/3 mu, l = lam + 5/6 mu,
+        a = 1 + 3 m/(4 l), which is stable where elements are flat as well.
+    young_modulus: Pa, positive. poisson_ratio: in (-1, 1/2). Each a number, or (n_t,).
+
+    >>> import magshell as ms
+    >>> bar = ms.meshes.box((0.1, 0.02, 0.02), cells=(4, 1, 1))
+    >>> ms.Solid(bar, material=ms.StableNeoHookean(young_modulus=1e6, poisson_ratio=0.3)).material.young_modulus
+    array(1000000.)
+    """
+
+    def __init__(self, *, young_modulus: Numbers, poisson_ratio: Numbers, log_barrier: bool = False):
+        if not isinstance(log_barrier, bool):
+            raise ValueError(f"log_barrier must be True or False, got {log_barrier!r}")
+        self.log_barrier = log_barrier
+        super().__init__(young_modulus=young_modulus, poisson_ratio=poisson_ratio)
+
+    @property
+    def _core_name(self) -> str:
+        return "StableNeoHookean barrier" if self.log_barrier else "StableNeoHookean"
+
+
+class StVenantKirchhoff(_Isotropic):
+    """Quadratic in Green's strain, as shells are: mu tr(E^2) + lam/2 (tr E)^2. For small strains; it softens under
+    compression, and a mirror image costs it nothing.
+
+    young_modulus: Pa, positive. poisson_ratio: in (-1, 1/2). Each a number, or (n_t,).
+
+    >>> import magshell as ms
+    >>> bar = ms.meshes.box((0.1, 0.02, 0.02), cells=(4, 1, 1))
+    >>> ms.Solid(bar, material=ms.StVenantKirchhoff(young_modulus=1e6, poisson_ratio=0.3)).material.young_modulus
+    array(1000000.)
+    """
+
+
+class Corotated(_Isotropic):
+    """Linear elasticity in a frame that turns along: mu |F - R|^2 + lam/2 tr(R^T F - I)^2, R the nearest rotation.
+
+    young_modulus: Pa, positive. poisson_ratio: in (-1, 1/2). Each a number, or (n_t,).
+
+    >>> import magshell as ms
+    >>> bar = ms.meshes.box((0.1, 0.02, 0.02), cells=(4, 1, 1))
+    >>> ms.Solid(bar, material=ms.Corotated(young_modulus=1e6, poisson_ratio=0.3)).material.young_modulus
+    array(1000000.)
+    """
+
+
+class Projective(_Isotropic):
+    """What Projective Dynamics is for: mu |F - R|^2 + lam/2 |F - P|^2, R the nearest rotation, P the nearest matrix with
+    determinant 1 (Bouaziz et al. 2014; with the weights 2 mu and lam of [Qiao21]). Elements turned inside out come back.
+    Volume counts at every point of an element, so that it has no mean_volume.
+
+    young_modulus: Pa, positive. poisson_ratio: in [0, 1/2). Each a number, or (n_t,). They give mu and lam as everywhere;
+        but for small strains e this energy is mu |e|^2 + lam/6 (tr e)^2: it resists changes of volume with a third of lam.
+
+    >>> import magshell as ms
+    >>> bar = ms.meshes.box((0.1, 0.02, 0.02), cells=(4, 1, 1))
+    >>> ms.Solid(bar, material=ms.Projective(young_modulus=1e6, poisson_ratio=0.3)).material.young_modulus
+    array(1000000.)
+    """
+
+    _ranges: ClassVar = {
+        "young_modulus": _YOUNG["young_modulus"],
+        "poisson_ratio": ("1", "in [0, 1/2): lam is a weight here", lambda nu: (nu >= 0) & (nu < 0.5)),
+    }
+
+    @property
+    def _nearly_incompressible(self) -> bool:
+        return False
+
+
+class Guccione(SolidMaterial):
+    """Muscle, transversely isotropic (Guccione et al. 1995): C/2 (exp(Q) - 1) + K/2 (J - 1)^2,
+    Q = bf Eff^2 + bt (Ess^2 + Enn^2 + 2 Esn^2) + 2 bfs (Efs^2 + Efn^2), E Green's strain.
+
+    stiffness: C, Pa. fibre_exponent, cross_fibre_exponent, fibre_shear_exponent: bf, bt, bfs. bulk_modulus: K, Pa. All
+        positive, numbers or (n_t,).
+    fibres: (3,) or (n_t, 3), directions at rest; only the direction counts.
+
+    >>> import magshell as ms
+    >>> heart = ms.Guccione(
+    ...     stiffness=2e3,
+    ...     fibre_exponent=8.0,
+    ...     cross_fibre_exponent=2.0,
+    ...     fibre_shear_exponent=4.0,
+    ...     bulk_modulus=1e5,
+    ...     fibres=(1, 0, 0),
+    ... )
+    >>> heart.stiffness
+    array(2000.)
+    """
+
+    _ranges: ClassVar = {
+        **{name: ("Pa", "positive", _positive) for name in ("stiffness", "bulk_modulus")},
+        **{
+            name: ("1", "positive", _positive)
+            for name in ("fibre_exponent", "cross_fibre_exponent", "fibre_shear_exponent")
+        },
+        "fibres": (
+            "1",
+            "no zero vectors",
+            lambda m: np.broadcast_to(np.linalg.norm(m, axis=-1, keepdims=True) > 0, m.shape),
+        ),
+    }
+
+    def __init__(
+        self,
+        *,
+        stiffness: Numbers,
+        fibre_exponent: Numbers,
+        cross_fibre_exponent: Numbers,
+        fibre_shear_exponent: Numbers,
+        bulk_modulus: Numbers,
+        fibres: Numbers,
+    ):
+        super().__init__(
+            stiffness=stiffness,
+            fibre_exponent=fibre_exponent,
+            cross_fibre_exponent=cross_fibre_exponent,
+            fibre_shear_exponent=fibre_shear_exponent,
+            bulk_modulus=bulk_modulus,
+            fibres=fibres,
+        )
+
+    def _row_shapes(self) -> dict[str, tuple[int, ...]]:
+        return {"fibres": (3,)}
+
+    @property
+    def _nearly_incompressible(self) -> bool:
+        return True
+
+    def _wave_modulus(self, n_tetrahedra: int) -> np.ndarray:
+        return self.rows("stiffness", n_tetrahedra) * self.rows("fibre_exponent", n_tetrahedra)

@@ -1,0 +1,1 @@
+"""Defines supports and the constraints that they make."""

@@ -1,0 +1,221 @@
+"""The strip under the panels: axes, scale bar, what arrows mean, the colour bar; in one row where that has room."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..results.units import round_below
+from . import colors
+from .colors import Scalar, scale_colors
+from .label_layout import Box, Room
+from .panels import Drawing
+from .texts import Ruler
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+TEXT = 8.0  # points
+ROW = 0.72  # inches
+SMALLER = (1.0, 0.9, 0.8)  # than full size, at which all of it is tried in one row
+EDGE = 0.05  # inches that stay free at the picture's sides
+SPACE = 0.35  # inches between the parts
+TRIAD = np.array([0.36, 0.32])  # where the axes meet
+SCALE_BAR = 0.85  # where it begins, after them
+KEY, KEY_ROW = 0.38, 0.2  # of an arrow and the gap before its text; from one row of them to the next
+NARROWEST, WIDEST, OVERHANG = 0.8, 2.4, 0.25  # of a colour bar; how far its ticks may reach beyond it
+LINE = 0.15  # that one more line of the colour bar's text takes
+
+
+@dataclass(frozen=True)
+class Legend:
+    """Where its parts are, in inches times `scale`.
+
+    rows: heights, from the first on. keys, bar: (row, left end), or None. label: the colour bar's text in lines, and its
+    points. width: of the colour bar.
+    """
+
+    scale: float
+    rows: tuple[float, ...]
+    length: float
+    keys: tuple[int, float] | None
+    key_size: float
+    bar: tuple[int, float] | None
+    width: float
+    label: tuple[str, float]
+
+    @property
+    def height(self) -> float:
+        """Inches, as it is painted."""
+        return self.scale * sum(self.rows)
+
+    def bottom(self, row: int) -> float:
+        """Of a row, above that of the last."""
+        return sum(self.rows[row + 1 :])
+
+
+def arranged(drawing: Drawing, inches: float, inches_per_meter: float, ruler: Ruler) -> Legend:
+    """For a picture so many inches wide. At full size if it fits into one row, a little smaller if it does then, else in
+    rows."""
+    tried = [_arranged(drawing, inches / scale, inches_per_meter / scale, scale, ruler) for scale in SMALLER]
+    flat = [each for each in tried if len(each.rows) == 1]
+    return flat[0] if flat else tried[1]
+
+
+def _arranged(drawing: Drawing, inches: float, inches_per_meter: float, scale: float, ruler: Ruler) -> Legend:
+    length = round_below(min(1.2, 0.2 * inches) / inches_per_meter)
+    rows, end = [ROW], _scale_bar_end(drawing, length, inches_per_meter, ruler)
+    keys, key_size = None, TEXT
+    if drawing.arrows:
+        wide = KEY + max(ruler.size(text, TEXT)[0] for text, _ in drawing.arrows)
+        if end + SPACE + wide > inches - EDGE:
+            rows.append(KEY_ROW * (len(drawing.arrows) + 0.6))
+            end = EDGE - SPACE
+            key_size *= min(1.0, (inches - 2 * EDGE - KEY) / (wide - KEY))
+        keys = len(rows) - 1, end + SPACE
+        end += SPACE + wide
+    bar, width, label = None, 0.0, ("", TEXT)
+    if (scalar := drawing.scalar) is not None:
+        asked = min(ruler.size(scalar.label, TEXT)[0], 0.45 * inches)
+        needed = max(NARROWEST + 2 * OVERHANG, asked)
+        if end + SPACE + needed > inches - EDGE:
+            rows.append(ROW)
+            end = EDGE - SPACE
+        room = inches - EDGE - end - SPACE
+        width = max(min(WIDEST, 0.32 * inches, room - 2 * OVERHANG), min(NARROWEST, room - 2 * OVERHANG))
+        bar = len(rows) - 1, end + SPACE
+        label = ruler.fitted(scalar.label, TEXT, room, 4 * LINE)
+        rows[-1] = max(rows[-1], ROW) + label[0].count("\n") * LINE
+    return Legend(scale, tuple(rows), length, keys, key_size, bar, width, label)
+
+
+def _scale_bar_end(drawing: Drawing, length: float, inches_per_meter: float, ruler: Ruler) -> float:
+    return SCALE_BAR + max(length * inches_per_meter, ruler.size(_length(drawing, length), TEXT)[0], 0.5)
+
+
+def _length(drawing: Drawing, length: float) -> str:
+    return f"{round(length / drawing.unit.meters, 9):g} {drawing.unit.name}"
+
+
+def write(
+    axes: Axes, drawing: Drawing, legend: Legend, inches: float, inches_per_meter: float, ruler: Ruler
+) -> None:
+    """Into axes as wide as the picture and as high as the legend."""
+    scale = legend.scale
+    writer = _Writer(axes, inches / scale, legend.height / scale, scale, ruler)
+    first = legend.bottom(0)
+    _triad(writer, drawing, TRIAD + np.array([0.0, first]))
+    text, long = _length(drawing, legend.length), legend.length * inches_per_meter / scale
+    middle = SCALE_BAR + 0.5 * max(long, ruler.size(text, TEXT)[0])
+    writer.line([middle - 0.5 * long, middle + 0.5 * long], [first + 0.36] * 2, 2.0)
+    writer.text((middle, first + 0.28), text, TEXT, "center", "top")
+    if legend.keys is not None:
+        row, left = legend.keys
+        height = ROW if row == 0 or (legend.bar and legend.bar[0] == row) else legend.rows[row]
+        middle = legend.bottom(row) + 0.5 * height + 0.5 * KEY_ROW * (len(drawing.arrows) - 1)
+        for k, (text, color) in enumerate(drawing.arrows):
+            y = middle - KEY_ROW * k
+            writer.arrow((left, y), (left + 0.3, y), color, 1.4)
+            writer.text((left + KEY, y), text, legend.key_size, "left", "center")
+    if legend.bar is not None and drawing.scalar is not None:
+        _color_bar(writer, drawing.scalar, legend)
+
+
+class _Writer:
+    """Draws in inches at full size, into axes that may be smaller."""
+
+    def __init__(self, axes, width: float, height: float, scale: float, ruler: Ruler):
+        self.axes, self.width, self.height, self.scale, self.ruler = axes, width, height, scale, ruler
+        axes.set_axis_off()
+        self.set_limits()
+
+    def set_limits(self) -> None:
+        self.axes.set_xlim(0.0, self.width)
+        self.axes.set_ylim(0.0, self.height)
+
+    def line(self, x, y, width: float) -> None:
+        self.axes.plot(x, y, color=colors.OUTLINE, linewidth=width, solid_capstyle="butt")
+
+    def text(self, place, text: str, size: float, across: str, up: str) -> None:
+        self.axes.text(
+            *place, text, ha=across, va=up, fontsize=size * self.scale, color=colors.OUTLINE, linespacing=1.1
+        )
+
+    def arrow(self, start, end, color: str, width: float, **style) -> None:
+        style = {"arrowstyle": "-|>", "color": color, "linewidth": width, "shrinkA": 0, "shrinkB": 0, **style}
+        self.axes.annotate("", end, start, arrowprops=style)
+
+
+def _triad(writer: _Writer, drawing: Drawing, origin: np.ndarray) -> None:
+    """The letters of axes that lie over each other stand one after another."""
+    room = Room(Box(np.zeros(2), np.array([SCALE_BAR, writer.height])))
+    size = TEXT - 1
+    for name, tip in zip("xyz", 0.24 * drawing.view.axes[:2].T, strict=True):
+        if np.linalg.norm(tip) < 0.03:  # it points at the eye
+            continue
+        writer.arrow(origin, origin + tip, colors.OUTLINE, 0.9, mutation_scale=6)
+        along = tip / np.linalg.norm(tip)
+        aside = np.array([-along[1], along[0]])
+        box = writer.ruler.size(name, size)
+        places = (
+            origin + tip + out * along + off * aside
+            for out in (0.07, 0.0, -0.1)
+            for off in (0.0, 0.14, -0.14, 0.28, -0.28)
+        )
+        found = room.take(box, places)
+        if found is not None:
+            writer.text(0.5 * (found.low + found.high), name, size, "center", "center")
+
+
+def _color_bar(writer: _Writer, scalar: Scalar, legend: Legend) -> None:
+    """At the right end of its row."""
+    low, high = scalar.limits
+    right = writer.width - EDGE - OVERHANG
+    left = right - legend.width
+    shades = scale_colors(scalar.scale, np.linspace(low, high, 256), (low, high))
+    extent = (left, right, 0.30, 0.42)
+    writer.axes.imshow(shades[None], extent=extent, aspect="auto", interpolation="bilinear")
+    writer.set_limits()
+    for tick, text in ticks_of(scalar, legend.width, writer.ruler):
+        x = left + (tick - low) / (high - low) * legend.width
+        writer.line([x, x], [0.27, 0.30], 0.7)
+        writer.text((x, 0.25), text, TEXT - 1, "center", "top")
+    text, points = legend.label
+    half = 0.5 * writer.ruler.size(text, points)[0]
+    middle = min((left + right) / 2, writer.width - EDGE - half)  # it may be longer than the bar
+    writer.text((middle, 0.47), text, points, "center", "bottom")
+
+
+def ticks_of(scalar: Scalar, width: float, ruler: Ruler) -> list[tuple[float, str]]:
+    """Numbers beside a bar so many inches wide and what is written there: as many as do not cross, at least one."""
+    from matplotlib.ticker import MaxNLocator
+
+    low, high = scalar.limits
+    tried = [MaxNLocator(count).tick_values(low, high) for count in (4, 3, 2)]
+    if scalar.scale == "cyclic" and (low, high) == (0.0, 360.0):
+        tried = [np.array([0, 90, 180, 270, 360.0]), np.array([0, 180, 360.0])]
+    for ticks in [*tried, np.array([low, high])]:
+        inside = ticks[(ticks >= low - 1e-9 * (high - low)) & (ticks <= high + 1e-9 * (high - low))]
+        if len(inside) < 2:
+            continue
+        texts = _written(inside, high - low)
+        middles = (inside - low) / (high - low) * width
+        halves = np.array([0.5 * ruler.size(text, TEXT - 1)[0] for text in texts])
+        apart = np.diff(middles) - halves[1:] - halves[:-1]
+        held = (middles - halves).min() > -OVERHANG and (middles + halves).max() < width + OVERHANG
+        if apart.min() > 0.06 and held:
+            return list(zip(inside.tolist(), texts, strict=True))
+    middle = 0.5 * (low + high)
+    return [(middle, _written(np.array([middle]), high - low)[0])]
+
+
+def _written(ticks: np.ndarray, extent: float) -> list[str]:
+    """With as many digits as tell them apart."""
+    ticks = np.where(np.abs(ticks) < 1e-9 * extent, 0.0, ticks)
+    for digits in range(6, 17):
+        texts = [f"{float(f'{tick:.12g}'):.{digits}g}" for tick in ticks.tolist()]
+        if np.abs(np.array(texts, dtype=float) - ticks).max() <= 1e-3 * extent:
+            break
+    return texts

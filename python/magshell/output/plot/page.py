@@ -1,0 +1,264 @@
+"""ms.write_page: a sheet that turns in a browser, in one file that asks the network for nothing."""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..._input.scalars import positive
+from ..._runtime.files import replace_file
+from ..._runtime.solver_entry_point import grouped
+from ..results.state import State, states_of, with_times
+from ..results.units import LengthUnit, length_unit, prefixed, with_unit
+from . import colors, glyphs
+from .colors import Scalar, scalar_of
+from .drawing import checked_titles
+from .limits import arrow_count
+from .page_surroundings import Placed
+from .panels import outline, size_of
+from .playback import SAMPLES, same_faces, speed_of, spread
+from .solids import Solid
+from .style import Color, Style, colored, style_of
+from .surfaces import on_surfaces, scalar_on_surfaces
+from .view import View, view_of
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Fielded, FilePath, Numbers, Shown
+    from ...model.contact.obstacles.obstacle import Obstacle
+
+
+@grouped(color=Color, view=View, style=Style)
+def write_page(
+    what: Shown,
+    path: FilePath,
+    *,
+    positions: Numbers | None = None,
+    times: Numbers | None = None,
+    remanent_magnetization: Numbers | None = None,
+    applied_flux_density: Numbers | None = None,
+    field: Fielded | None = None,
+    obstacles: Obstacle | Sequence[Obstacle] | None = None,
+    color: Any = None,
+    titles: str | Sequence[str] | None = None,
+    view: View | Sequence[float] | str | None = None,
+    title: str = "magshell",
+    speed: float | None = None,
+    size_limit: float = 10e6,
+    style: Style | None = None,
+) -> Path:
+    """Writes a page that shows a sheet from every side, with its magnetization and the field, offline.
+
+    Drag to turn, scroll or pinch to zoom, shift-drag to move. Several states, as of a path or a motion, get a slider
+    and play; a motion starts by itself. The reader chooses the colours: magnetization, displacement, and what `color`
+    (a name or arrays, as in `plot`) adds. Obstacles, magnets and wires of fields, magpylib's too, and free rigid parts are
+    where they are in each state.
+
+    what, obstacles: as in `plot`, but all states on one mesh. titles: one a state. title: of the page.
+    times: s, one a state, where positions (n, n_v, 3) of a mesh are given.
+    speed: seconds of the motion that one second of playing shows, which the reader can change; by default as in
+        `animate`. States without times are shown ten a second.
+    size_limit: bytes for the states. They are kept in float32 (16 bytes a vertex for the positions, 6 for a scalar that
+        changes) if they fit, else in 16 bits (half of it, to 1/65000 of the sheet's size), else as many as fit, evenly
+        spread; the page says how many there were. The mesh takes about 85 bytes a vertex, the viewer 25 kB.
+
+    style: as in `plot`; what it says of the rest shape and the mesh's lines, the reader can change. A page has no contacts.
+
+    Raises ValueError on bad input, FileNotFoundError without the folder.
+
+    >>> import magshell as ms, tempfile
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     ms.write_page(mesh, f"{folder}/sheet.html").name
+    'sheet.html'
+    """
+    path = Path(path)
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise ValueError(f"a page is saved as .html, got {path.name!r}")
+    style = style_of(style)
+    count = arrow_count(style.arrows)
+    if style.contacts:
+        raise ValueError(
+            "a page does not show contacts: leave them out of its style; ms.plot and ms.animate do"
+        )
+    if isinstance(view, View) and view.frame is not None:
+        raise ValueError("a page shows all of it, and its reader zooms: leave the frame out of its view")
+    if not isinstance(title, str):
+        raise ValueError(f"title must be a string, got {title!r:.60}")
+    if not path.parent.is_dir():
+        raise FileNotFoundError(f"cannot write {path.name!r}: there is no folder {str(path.parent)!r}")
+    states = states_of(
+        what,
+        positions=positions,
+        remanent_magnetization=remanent_magnetization,
+        applied_flux_density=applied_flux_density,
+        field=field,
+        obstacles=obstacles,
+    )
+    same_faces(states, "a page")
+    size_limit = positive("size_limit", "bytes", size_limit)
+    states = with_times(states, times)
+    speed = speed_of(states, speed)
+    size = size_of(states)
+    unit = length_unit(size)
+    scalars = [scalar_on_surfaces(scalar, states) for scalar in _scalars(states, color, unit)]
+    states = on_surfaces(states)
+    mesh = states[0].mesh
+    titles = checked_titles(titles, states)
+    placed = Placed(states, size)
+    if not style.show_field:
+        states = [replace(state, flux_density=None, fields=()) for state in states]
+    fields = _sources(states, size)
+    numbers = 3 * mesh.n_vertices + 6 * count + sum(len(s.values[0]) for s in scalars if not _is_constant(s))
+    numbers += 20 * max(map(len, placed.places))  # where what is around is
+    numbers += max((6 * len(field.starts) for field in fields[0] if field is not None), default=0)
+    dtype, kept = _that_fit(len(states), numbers, size_limit)
+    seen = view_of(states, view)
+    data = {
+        "view": [seen.elevation, seen.azimuth],
+        "size": size,
+        "unit": unit._asdict(),
+        "palette": {"sheet": colors.SHEET, "field": colors.FIELD},
+        "faces": _packed(mesh.faces, "<u4"),
+        "outline": _packed(outline(mesh), "<u4"),
+        "edges": _packed(mesh.edges, "<u4"),
+        "rest": _packed(mesh.rest_positions, "<f4"),
+        "scalars": [_scalar(s, kept, dtype) for s in scalars],
+        "states": _states(states, kept, titles, fields, count, dtype, placed),
+        "around": [_surface(each) for each in placed.surfaces],
+        "window": _window(placed.window(states, seen)),
+        "recorded": len(states),
+        "shown": {"rest": style.rest, "edges": style.mesh_lines},
+        "speed": None if states[0].time is None else speed,
+    }
+    template = files(__package__).joinpath("page.html").read_text(encoding="utf-8")
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    parts = {"title": html.escape(title), "data": text}
+    page = re.sub(
+        r"\{\{(title|data)\}\}", lambda place: parts[place[1]], template
+    )  # what is put in is not searched
+    replace_file(path, lambda file: file.write(page.encode()))
+    return path
+
+
+def _scalars(states: list[State], color, unit: LengthUnit) -> list[Scalar]:
+    """What the reader can choose from; the first is shown first."""
+    chosen = [] if color is None else [colored(states, color, unit)]
+    if any(state.is_magnetized for state in states):
+        chosen.append(scalar_of(states, "magnetization", None, None, unit))
+    if any(state.displacements.any() for state in states):
+        chosen.append(scalar_of(states, "displacement", None, None, unit))
+    return list({scalar.label: scalar for scalar in chosen if scalar is not None}.values())
+
+
+def _is_constant(scalar: Scalar) -> bool:
+    return all(np.array_equal(value, scalar.values[0], equal_nan=True) for value in scalar.values)
+
+
+def _scalar(scalar: Scalar, kept: list[int], dtype: str) -> dict[Any, Any]:
+    """One array if it is the same in all states, else one a state."""
+    values = scalar.values[:1] if _is_constant(scalar) else [scalar.values[k] for k in kept]
+    return {
+        "label": _plain(scalar.label),
+        "limits": list(scalar.limits),
+        "anchors": list(colors.SCALES[scalar.scale]),
+        "values": [_packed(value, dtype) for value in values],
+    }
+
+
+def _that_fit(count: int, numbers: int, size_limit: float) -> tuple[str, list[int]]:
+    """How the numbers of a state are kept, and the states that are, so that all takes no more bytes."""
+    for dtype, each in (("<f4", 4), ("<u2", 2)):
+        a_state = each * numbers * 4 / 3 + 300  # base64, and what is said about it
+        if count * a_state <= size_limit:
+            return dtype, list(range(count))
+    return "<u2", spread(list(range(count)), max(2, int(size_limit / a_state)))
+
+
+def _sources(states: list[State], size: float) -> tuple[list[glyphs.Glyphs | None], float]:
+    """Fields that vary in space, around each state; around a motion at places that stay."""
+    if not any(state.has_sources for state in states):
+        return [None] * len(states), 0.0
+    if states[0].time is None:
+        points = [glyphs.halo([state], size) for state in states]
+    else:
+        points = [glyphs.halo(spread(states, SAMPLES), size)] * len(states)
+    return glyphs.sources_glyphs(states, points, size)
+
+
+def _states(
+    states: list[State], kept: list[int], titles: list[str], fields, count: int, dtype: str, placed: Placed
+) -> list[dict[Any, Any]]:
+    strongest, (around, full_length) = glyphs.largest(states), fields
+    magnitude = max(
+        (np.linalg.norm(s.flux_density) for s in states if s.flux_density is not None), default=0.0
+    )
+    factor, unit = prefixed(float(magnitude), "T")
+    packed = []
+    for k in kept:
+        state, field = states[k], around[k]
+        one: dict[str, Any] = {"title": titles[k], "positions": _packed(state.positions, dtype)}
+        if state.time is not None:
+            one["time"] = state.time
+        if count and state.is_magnetized:
+            one["magnetization"] = _arrows(glyphs.magnetization_glyphs(state, count, strongest), dtype)
+            one["magnetizationLabel"] = f"magnetization, up to {with_unit(strongest, 'A/m')}"
+        if state.flux_density is not None:
+            one["fluxDensity"] = state.flux_density.tolist()
+            one["fluxDensityLabel"] = f"B = {np.linalg.norm(state.flux_density) / factor:.3g} {unit}"
+        if field is not None:
+            one["field"] = _arrows(field, dtype)
+            one["fieldLabel"] = f"field, full length at {with_unit(full_length, 'T')}"
+        if placed.places[k]:
+            one["around"] = [
+                {"surface": number} | ({} if moved is None else {"place": _packed(moved, "<f4")})
+                for number, moved in placed.places[k]
+            ]
+        packed.append(one)
+    return packed
+
+
+def _surface(solid: Solid) -> dict[str, Any]:
+    return {
+        "positions": _packed(solid.positions, "<f4"),
+        "faces": _packed(solid.faces, "<u4"),
+        "color": np.asarray(solid.colors[0]).tolist(),
+        "opacity": solid.opacity,
+        "smooth": solid.smooth,
+    }
+
+
+def _window(found: tuple[np.ndarray, np.ndarray, float] | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    middle, half, farthest = found
+    return {"middle": middle.tolist(), "half": half.tolist(), "farthest": farthest}
+
+
+def _arrows(chosen: glyphs.Glyphs, dtype: str) -> dict[Any, Any]:
+    """Six numbers an arrow: start, vector."""
+    return {"radius": chosen.radius, "arrows": _packed(np.hstack([chosen.starts, chosen.vectors]), dtype)}
+
+
+def _packed(array: np.ndarray, dtype: str) -> str | dict[Any, Any]:
+    """Base64; for "<u2" with the numbers that 0 and a step of 1 stand for, unless an entry is NaN."""
+    if dtype != "<u2":
+        return base64.b64encode(np.ascontiguousarray(array, dtype=dtype).tobytes()).decode("ascii")
+    if not array.size or not np.isfinite(array).all():
+        return _packed(array, "<f4")
+    low = float(array.min())
+    step = float(np.ptp(array)) / 65535 or 1.0
+    return {"low": low, "step": step, "u2": _packed(np.round((array - low) / step), "<H")}
+
+
+def _plain(label: str) -> str:
+    """Without matplotlib's mathematics."""
+    return label.replace("$", "").replace("^3", "³").replace("M_r", "Mᵣ")

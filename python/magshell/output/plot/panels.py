@@ -1,0 +1,373 @@
+"""A picture before it is painted: panels of solids and labels, seen from one direction at one scale."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import scipy
+
+from ...mesh.triangles.triangle_mesh import TriangleMesh
+from ..results.state import State
+from ..results.units import LengthUnit, with_unit
+from . import colors, glyphs
+from .colors import Scalar, rgb
+from .cuts import Cut, Section, cut_edges, opened, section_solid
+from .limits import arrow_count
+from .solids import Solid, arrows, ribbons, sheet
+from .style import Style
+from .surroundings import box_of, obstacle_solids
+from .view import View
+
+CREASE = np.cos(np.radians(40.0))  # rest edges that turn by more are drawn as lines
+SOLID_CREASE = np.cos(
+    np.radians(65.0)
+)  # of closed surfaces, where coarse triangles turn by more on what is round
+LINE = 0.0022  # width, in sizes of the drawing
+LONGEST_FIELD = 0.2  # arrow of a uniform field, in sizes of the drawing
+LONGEST_CONTACT = 0.12  # arrow of a contact force, likewise
+FLESH = 0.45  # the opacity of what has bones or tendons inside
+PALEST = 0.8  # the way to white of the first of many states that fade
+
+
+@dataclass(frozen=True)
+class Label:
+    """Text beside a point (3,), m, on the side that `towards` (right, up) says."""
+
+    point: np.ndarray
+    text: str
+    color: str
+    towards: tuple[float, float] = (0.0, 1.0)
+
+
+@dataclass
+class Panel:
+    title: str = ""
+    solids: list[Solid] = field(default_factory=list)
+    labels: list[Label] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """All that a painter and the layout need. `arrows`: what the legend says about arrows: (text, colour).
+
+    hold: points (n, 3), m, that the window holds beside the solids.
+    """
+
+    panels: list[Panel]
+    view: View
+    unit: LengthUnit
+    scalar: Scalar | None
+    arrows: list[tuple[str, str]]
+    hold: np.ndarray | None = None
+
+    @property
+    def window(self) -> np.ndarray:
+        """(left, right, bottom, top), m, on the screen: holds the bodies of every panel, and of what is around them as much
+        as leaves them large."""
+        if self.view.corners is not None:
+            framed = self.view.project(self.view.corners)[:, :2]
+            return np.stack([framed.min(axis=0), framed.max(axis=0)], axis=1).ravel()
+        held = [] if self.hold is None else [self.hold]
+        solids = [solid for panel in self.panels for solid in panel.solids]
+        held += [solid.positions for solid in solids if not solid.around]
+        around = [] if self.hold is not None else [solid.positions for solid in solids if solid.around]
+        low, high = box_of(*([self.view.project(each)[:, :2] for each in some] for some in (held, around)))
+        margin = 0.03 * (high - low).max()
+        return np.array([low[0] - margin, high[0] + margin, low[1] - margin, high[1] + margin])
+
+
+@dataclass(frozen=True)
+class Options:
+    """What to draw beside the sheets."""
+
+    arrows: int = glyphs.ARROWS  # 0 for none
+    field: bool = True
+    rest: bool = False
+    mesh_lines: bool = False
+    fade: bool = False  # of the states in one panel, the earlier ones are paler
+    cut: Cut | None = None
+    sections: tuple[Section, ...] = ()  # one a state, where there is a cut
+    contacts: bool = False  # their forces as arrows
+
+    @classmethod
+    def of(cls, style: Style) -> Options:
+        """What a caller asks for."""
+        count = arrow_count(style.arrows)
+        return cls(count, style.show_field, style.rest, style.mesh_lines, contacts=style.contacts)
+
+
+def draw(
+    groups: list[list[State]],
+    titles: list[str],
+    scalar: Scalar | None,
+    view: View,
+    unit: LengthUnit,
+    options: Options,
+) -> Drawing:
+    """One panel a group of states; the states of a group lie over each other."""
+    states = [state for group in groups for state in group]
+    size = size_of(states)
+    legend: list[tuple[str, str]] = []
+    panels = []
+    for number, group in enumerate(groups):
+        panel = Panel(titles[number] if len(groups) > 1 or len(group) == 1 else "")
+        first = sum(map(len, groups[:number]))
+        for index, (state, paleness) in enumerate(zip(group, _paleness(len(group), options), strict=True)):
+            series = 0 if options.fade else index % len(colors.SERIES)
+            plain = colors.SERIES[series] if len(group) > 1 else colors.SHEET
+            shades = rgb(plain) if scalar is None else scalar.colors(first + index)
+            solids = sheet_solids(state, shades, view, size, options)
+            if options.cut is not None:
+                solids = [opened(each, options.cut) for each in solids]
+                solids += _section_solids(state, first + index, scalar, view, size, options)
+                solids = [each for each in solids if len(each.faces)]
+            panel.solids += _pale(solids, paleness)
+        panel.solids += obstacle_solids(group, size)
+        if len(group) > 1:
+            labels = _series_labels(group, titles, view)
+            panel.labels += _apart(labels, view, 0.1 * size) if options.fade else labels
+        panels.append(panel)
+    if options.arrows and any(state.is_magnetized for state in states):
+        strongest = glyphs.largest(states)
+        for panel, group in zip(panels, groups, strict=True):
+            for state, paleness in zip(group, _paleness(len(group), options), strict=True):
+                chosen = magnetization_solids(state, strongest, options.arrows, options.cut)
+                panel.solids += _pale(chosen, paleness)
+        legend.append(magnetization_key(strongest))
+    if options.contacts:
+        legend += _contacts(panels, groups, size, options)
+    if options.field:
+        _uniform_fields(panels, groups, view, size, options)
+        legend += _sources(panels, groups, size)
+    return Drawing(panels, view, unit, scalar, legend)
+
+
+def size_of(states: list[State]) -> float:
+    """The diagonal of the box around the sheets and their rest shapes, m."""
+    points = np.concatenate([x for state in states for x in (state.positions, state.mesh.rest_positions)])
+    return float(np.linalg.norm(np.ptp(points, axis=0)))
+
+
+def outline(mesh: TriangleMesh) -> np.ndarray:
+    """Edges to draw as lines: those of the boundary, and creases of the rest shape."""
+    return mesh.edges[_outline(mesh)]
+
+
+def _outline(mesh: TriangleMesh) -> np.ndarray:
+    """Their numbers."""
+    interior = mesh.interior_edges
+    normals = mesh.face_normals[mesh.edge_faces[interior]]
+    turn = np.einsum("ei,ei->e", normals[:, 0], normals[:, 1])
+    creases = interior[turn < np.where(_of_closed(mesh)[interior], SOLID_CREASE, CREASE)]
+    return np.sort(np.concatenate([mesh.boundary_edges, creases]))
+
+
+def _of_closed(mesh: TriangleMesh) -> np.ndarray:
+    """(n_e,), whether the piece that each edge belongs to has no boundary."""
+    of_edge = mesh.components[mesh.edges[:, 0]]
+    return ~np.isin(of_edge, of_edge[mesh.boundary_edges])
+
+
+def _seen(state: State, edges: np.ndarray, eye: np.ndarray) -> np.ndarray:
+    """Those of the edges (k,) that are not behind a closed surface, where a line's lift would let them shine through."""
+    mesh = state.mesh
+    x0, x1, x2 = np.moveaxis(state.positions[mesh.faces], 1, 0)
+    piece = mesh.components[mesh.faces[:, 0]]
+    volumes = np.bincount(
+        piece, np.einsum("fi,fi->f", x0, np.cross(x1, x2))
+    )  # negative where normals point inwards
+    towards = np.cross(x1 - x0, x2 - x0) @ eye * np.sign(volumes)[piece] > 0
+    hidden = _of_closed(mesh)[edges] & ~towards[mesh.edge_faces[edges]].any(axis=1)
+    return edges[~hidden]
+
+
+def sheet_solids(state: State, shades: np.ndarray, view: View, size: float, options: Options) -> list[Solid]:
+    mesh, eye = state.mesh, view.axes[2]
+    step = float(mesh.edge_lengths.mean())
+    skin = sheet(state.positions, mesh.faces, shades)
+    bones = [sheet(*each, rgb(colors.BONE)) for each in state.bones]
+    inside = [*bones, *(sheet(*each, rgb(colors.TENDON)) for each in state.tendons)]
+    shapes = [sheet(*each, rgb(colors.BONE)) for each in state.shapes]
+    solids = [*inside, *shapes, replace(skin, opacity=FLESH) if inside else skin]
+    if options.mesh_lines:
+        edges = mesh.edges[_seen(state, np.arange(mesh.n_edges), eye)]
+        solids.append(ribbons(state.positions[edges], eye, 0.5 * LINE * size, colors.OUTLINE, 0.6 * step))
+    lines = _outline(mesh)
+    if len(shown := mesh.edges[_seen(state, lines, eye)]):
+        solids.append(ribbons(state.positions[shown], eye, LINE * size, colors.OUTLINE, 0.8 * step))
+    if options.rest and state.displacements.any():
+        lines = mesh.edges[lines] if len(lines) else mesh.edges
+        solids.append(ribbons(mesh.rest_positions[lines], eye, 0.8 * LINE * size, colors.REST, 0.0))
+    return solids
+
+
+def _section_solids(
+    state: State, number: int, scalar: Scalar | None, view: View, size: float, options: Options
+) -> list[Solid]:
+    """What a cut shows: the plane's part inside solids, and its edges."""
+    found, step, eye = options.sections[number], float(state.mesh.edge_lengths.mean()), view.axes[2]
+    solids = [section_solid(found, options.cut, scalar, number)]
+    if options.mesh_lines:
+        lines = found.points[found.lines]
+        solids.append(ribbons(lines, eye, 0.5 * LINE * size, colors.OUTLINE, 0.6 * step))
+    return [*solids, ribbons(cut_edges(state, options.cut), eye, LINE * size, colors.OUTLINE, 0.8 * step)]
+
+
+def magnetization_solids(state: State, strongest: float, count: int, cut: Cut | None = None) -> list[Solid]:
+    if not state.is_magnetized:
+        return []
+    chosen = glyphs.magnetization_glyphs(state, count, strongest)
+    starts, vectors = chosen.starts, chosen.vectors
+    if cut is not None:
+        kept = cut.heights(starts + 0.5 * vectors) <= 0
+        starts, vectors = starts[kept], vectors[kept]
+    return [arrows(starts, vectors, chosen.radius, colors.MAGNETIZATION, chosen.lift)]
+
+
+def _paleness(count: int, options: Options) -> list[float]:
+    """Of the states in one panel."""
+    fading = options.fade and count > 1
+    return [PALEST * (1.0 - k / (count - 1)) if fading else 0.0 for k in range(count)]
+
+
+def _pale(solids: list[Solid], paleness: float) -> list[Solid]:
+    return [replace(solid, colors=paleness + (1.0 - paleness) * solid.colors) for solid in solids]
+
+
+def _uniform_fields(
+    panels: list[Panel], groups: list[list[State]], view: View, size: float, options: Options
+) -> None:
+    """An arrow to the left of the sheets of each panel, as long as the field is strong, and its magnitude."""
+    strongest = max((_magnitude(state) for group in groups for state in group), default=0.0)
+    if strongest == 0.0:
+        return
+    scale = LONGEST_FIELD * size / strongest
+    right, up, eye = view.axes
+    solids = [solid for panel in panels for solid in panel.solids]
+    some = ([view.project(s.positions) for s in solids if s.around is around] for around in (False, True))
+    low, high = box_of(*some)
+    left, middle = low[0], (low + high) / 2.0
+    for panel, group in zip(panels, groups, strict=True):
+        fields = _distinct([s.flux_density for s in group if s.flux_density is not None])
+        place = left - 0.07 * size
+        if options.fade and len(fields) > 1:
+            _fan(panel, np.array(fields), scale, place * right + middle[1] * up + middle[2] * eye, view, size)
+            fields = []
+        for flux_density in fields:
+            vector = scale * flux_density
+            width = abs(vector @ right)
+            center = (place - 0.5 * width) * right + middle[1] * up + middle[2] * eye
+            panel.solids += field_arrow(center, vector, size)
+            low = center - (0.5 * abs(vector @ up) + 0.015 * size) * up
+            panel.labels.append(field_label(low, with_unit(float(np.linalg.norm(flux_density)), "T")))
+            place -= width + 0.12 * size
+
+
+def _fan(panel: Panel, fields: np.ndarray, scale: float, place: np.ndarray, view: View, size: float) -> None:
+    """Uniform fields (n, 3) that follow each other, as arrows from one tail, to the left of a place (3,), m."""
+    right, up, _ = view.axes
+    vectors = scale * fields
+    reach = np.vstack([view.project(vectors), np.zeros(3)])
+    low, high = reach.min(axis=0), reach.max(axis=0)
+    tail = place - high[0] * right - 0.5 * (low[1] + high[1]) * up
+    for vector, paleness in zip(vectors, _paleness(len(vectors), Options(fade=True)), strict=True):
+        panel.solids += _pale(field_arrow(tail + 0.5 * vector, vector, size), paleness)
+    middle = tail + 0.5 * (low[0] + high[0]) * right + (low[1] - 0.015 * size) * up
+    strongest = with_unit(float(np.linalg.norm(fields, axis=1).max()), "T")
+    panel.labels.append(Label(middle, f"$B$ up to {strongest}", colors.FIELD, (0.0, -1.0)))
+
+
+def field_label(point: np.ndarray, magnitude: str) -> Label:
+    """What stands under the arrow of a uniform field."""
+    return Label(point, f"$B$ = {magnitude}", colors.FIELD, (0.0, -1.0))
+
+
+def field_arrow(center: np.ndarray, vector: np.ndarray, size: float) -> list[Solid]:
+    """A uniform field as an arrow (3,), m, about its center (3,), m; none if it is zero."""
+    if not vector.any():
+        return []
+    return [arrows(center[None] - vector / 2, vector[None], 0.0065 * size, colors.FIELD)]
+
+
+def _magnitude(state: State) -> float:
+    return 0.0 if state.flux_density is None else float(np.linalg.norm(state.flux_density))
+
+
+def _distinct(vectors: list[np.ndarray]) -> list[np.ndarray]:
+    return list({tuple(np.round(v, 12).tolist()): v for v in vectors}.values())
+
+
+def _sources(panels: list[Panel], groups: list[list[State]], size: float) -> list[tuple[str, str]]:
+    """Arrows of the fields that vary in space, and what the legend says."""
+    points = [glyphs.halo(group, size) if group[-1].has_sources else np.zeros((0, 3)) for group in groups]
+    around, strong = glyphs.sources_glyphs([group[-1] for group in groups], points, size)
+    for panel, chosen in zip(panels, around, strict=True):
+        if chosen is not None:
+            panel.solids.append(arrows(chosen.starts, chosen.vectors, chosen.radius, colors.FIELD))
+    return [sources_key(strong)] if strong else []
+
+
+def _contacts(panels: list[Panel], groups: list[list[State]], size: float, options: Options):
+    """Adds the forces of contacts, and returns what the legend says of them: nothing where nothing touches."""
+    strongest = strongest_contact([state for group in groups for state in group])
+    if strongest == 0.0:
+        return []
+    for panel, group in zip(panels, groups, strict=True):
+        for state, paleness in zip(group, _paleness(len(group), options), strict=True):
+            panel.solids += _pale([contact_solid(state, strongest, size)], paleness)
+    return [contacts_key(strongest)]
+
+
+def strongest_contact(states: list[State]) -> float:
+    """N, the largest force of contacts on a vertex."""
+    forces = [glyphs.contact_forces(state).forces for state in states]
+    return max((float(np.linalg.norm(each, axis=1).max(initial=0.0)) for each in forces), default=0.0)
+
+
+def contact_solid(state: State, strongest: float, size: float) -> Solid:
+    """The forces of contacts in a state as arrows."""
+    found = glyphs.contact_forces(state)
+    vectors = LONGEST_CONTACT * size / strongest * found.forces
+    return arrows(found.places, vectors, 0.003 * size, colors.CONTACT, 0.5 * size)
+
+
+def contacts_key(strongest: float) -> tuple[str, str]:
+    """What the legend says about arrows of contact forces."""
+    return f"contact force, up to {with_unit(strongest, 'N')}", colors.CONTACT
+
+
+def magnetization_key(strongest: float) -> tuple[str, str]:
+    """What the legend says about arrows of magnetization."""
+    return f"$M_r$, up to {with_unit(strongest, 'A/m')}", colors.MAGNETIZATION
+
+
+def sources_key(full_length: float) -> tuple[str, str]:
+    """What the legend says about arrows of fields that vary in space."""
+    return f"$B$, full length at {with_unit(full_length, 'T')}", colors.FIELD
+
+
+def _series_labels(group: list[State], titles: list[str], view: View) -> list[Label]:
+    """Each state's title where it is farthest from the others on the screen, on the side away from them."""
+    labels = []
+    screens = [view.project(state.positions)[:, :2] for state in group]
+    for state, screen, title in zip(group, screens, titles, strict=True):
+        others = np.concatenate([other for other in screens if other is not screen])
+        distance, nearest = scipy.spatial.cKDTree(others).query(screen)
+        vertex = int(np.argmax(distance))
+        away = (screen[vertex] - others[nearest[vertex]]) / max(distance[vertex], 1e-300)
+        if title:
+            labels.append(
+                Label(state.positions[vertex], title, colors.OUTLINE, (float(away[0]), float(away[1])))
+            )
+    return labels
+
+
+def _apart(labels: list[Label], view: View, distance: float) -> list[Label]:
+    """Those, the last and the first before the others, that are a distance [m] from each other on the screen."""
+    kept: list[Label] = []
+    for label in [*labels[-1:], *labels[:-1]]:
+        gaps = [np.linalg.norm(view.project(label.point - other.point)[:2]) for other in kept]
+        if min(gaps, default=np.inf) >= distance:
+            kept.append(label)
+    return kept

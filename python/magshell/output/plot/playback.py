@@ -1,0 +1,130 @@
+"""How a motion is played: when each frame is, how fast, and what lies between two recorded states."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..._input.scalars import positive
+from ...model.scene.time_series import names_in_time, values_between
+from ..results.state import State
+from ..results.units import clock
+from .limits import check_frames
+
+BEARABLE = (3.0, 20.0)  # s: a motion that takes this long is played as it was
+HANDY = 8.0  # s: about this long is any other, by default
+SAMPLES = 50  # states of a motion that say how far arrows reach and where a field is drawn
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A moment between two recorded states: the number of the one before, and the share of the way to the next."""
+
+    before: int
+    share: float
+    time: float | None
+
+
+def duration_of(states: list[State]) -> float:
+    """s; 0 where the states have no times."""
+    first, last = states[0].time, states[-1].time
+    return 0.0 if first is None or last is None else last - first
+
+
+def speed_of(states: list[State], speed: float | None) -> float:
+    """Seconds of the motion that one second shows: as asked for, else 1 or the round number that shows it well."""
+    if speed is not None:
+        return positive("speed", "", speed)
+    duration = duration_of(states)
+    if duration <= 0 or BEARABLE[0] <= duration <= BEARABLE[1]:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(duration / HANDY))
+    return float(
+        min((power, 2 * power, 5 * power, 10 * power), key=lambda s: abs(np.log(duration / HANDY / s)))
+    )
+
+
+def same_faces(states: list[State], what: str) -> None:
+    """Raises ValueError where states have different faces."""
+    if any(not np.array_equal(state.mesh.faces, states[0].mesh.faces) for state in states):
+        raise ValueError(f"{what} shows the states of one mesh, but these have different faces")
+
+
+def spoken(speed: float) -> str:
+    """
+    >>> spoken(0.05), spoken(1.0), spoken(20.0)
+    ('20 times slower', 'real time', '20 times faster')
+    """
+    if speed == 1.0:
+        return "real time"
+    return f"{1 / speed:.3g} times slower" if speed < 1 else f"{speed:.3g} times faster"
+
+
+def moments(states: list[State], fps: float, speed: float) -> list[Moment]:
+    """Those that the frames show, the last state among them; without times, each state once."""
+    duration = duration_of(states)
+    check_frames(len(states) if duration <= 0 else duration * (fps / speed))
+    if duration <= 0:
+        return [Moment(k, 0.0, state.time) for k, state in enumerate(states)]
+    times = np.array([state.time for state in states])
+    count = max(int(np.ceil((times[-1] - times[0]) * fps / speed - 1e-9)), 1)
+    shown = np.append(times[0] + np.arange(count) * speed / fps, times[-1])
+    before = np.clip(np.searchsorted(times, shown, side="right") - 1, 0, len(times) - 2)
+    gaps = times[before + 1] - times[before]
+    shares = np.clip((shown - times[before]) / np.where(gaps > 0, gaps, 1.0), 0.0, 1.0)
+    return [Moment(*each) for each in zip(before.tolist(), shares.tolist(), shown.tolist(), strict=True)]
+
+
+def state_at(states: list[State], moment: Moment) -> State:
+    """On the straight line between the two recorded states."""
+    if not moment.share:
+        return states[moment.before]
+    start, end = states[moment.before : moment.before + 2]
+    nearer = start if moment.share < 0.5 else end
+    flux_density = nearer.flux_density
+    if start.flux_density is not None and end.flux_density is not None:
+        flux_density = between(start.flux_density, end.flux_density, moment.share)
+    positions = between(start.positions, end.positions, moment.share)
+    title = clock(max(abs(states[0].time), abs(states[-1].time)))(moment.time)
+    moved = {
+        name: tuple(_surfaces_between(getattr(start, name), getattr(end, name), moment.share))
+        for name in ("bones", "tendons", "shapes")
+    }
+    moved |= {
+        name: tuple(_moved(getattr(start, name), getattr(end, name), moment.share))
+        for name in ("fields", "obstacles")
+    }
+    return replace(
+        nearer, positions=positions, flux_density=flux_density, time=moment.time, title=title, **moved
+    )
+
+
+def _surfaces_between(starts, ends, share: float):
+    """Of two states of one body: points (n, 3) and faces each; those of the nearer state where they are others."""
+    if [len(points) for points, _ in starts] != [len(points) for points, _ in ends]:
+        return starts if share < 0.5 else ends
+    return [(between(a, b, share), faces) for (a, faces), (b, _) in zip(starts, ends, strict=True)]
+
+
+def _moved(starts, ends, share: float):
+    """Field sources or obstacles between two places; those of the nearer state where they are others."""
+    if [_form(each) for each in starts] != [_form(each) for each in ends]:
+        return starts if share < 0.5 else ends
+    pairs = zip(starts, ends, strict=True)
+    return [a if a is b else b.replaced(**values_between(a, b, share)) for a, b in pairs]
+
+
+def _form(each) -> tuple[Any, ...]:
+    return type(each), *(np.shape(getattr(each, name)) for name in names_in_time(each))
+
+
+def between(start: np.ndarray, end: np.ndarray, share: float) -> np.ndarray:
+    return (1.0 - share) * start + share * end
+
+
+def spread(these: list[Any], count: int) -> list[Any]:
+    """At most so many of them, evenly spread, the first and the last among them."""
+    numbers = np.round(np.linspace(0, len(these) - 1, min(len(these), count))).astype(np.int64)
+    return [these[k] for k in numbers]

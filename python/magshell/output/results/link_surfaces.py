@@ -1,0 +1,149 @@
+"""Makes surfaces of links and of tendons, for pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..._input.tensors import detached
+from ...mesh.triangles.triangle_mesh import TriangleMesh
+from ...model.actuators.tendon import Tendon
+from ...model.contact.obstacles import Capsule, Sphere
+from ...model.rigid.joints import Fixed
+from ...model.rigid.skeleton import Skeleton
+
+if TYPE_CHECKING:
+    from ..._input.kinds import SolveResult
+    from ...model.rigid.rigid import Rigid
+    from ...model.scene.scene import Scene
+
+
+_THICK = 0.06  # the radius of a rod, in its length
+_KNOB = 1.4  # and of its ends, in that
+
+
+def surface_of(skeleton: Skeleton, link: Rigid, center: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """At rest: vertices (n, 3) m, faces (m, 3). center: (3,) m, of the link."""
+    shape = getattr(link, "shape", None)
+    if shape is not None:
+        return shape.rest_positions, shape.faces
+    turning = [joint for joint in skeleton.joints if not isinstance(joint, Fixed)]
+    ends = [joint.origin for joint in turning if link is joint.child or link is joint.parent]
+    ends = [*ends, center] if len(ends) < 2 else ends
+    middle = np.mean(ends, axis=0)
+    rods = [(middle, end) for end in ends] if len(ends) > 2 else [tuple(ends)] if len(ends) == 2 else []
+    lengths = [np.linalg.norm(b - a) for a, b in rods]
+    radius = _THICK * (max(lengths, default=0.0) or skeleton._reach(link, center) or 1e-3)
+    parts = [_knob(end, _KNOB * radius) for end in ends]
+    parts += [_rod(a, b, radius) for (a, b), length in zip(rods, lengths, strict=True) if length > 0]
+    return joined(parts)
+
+
+def joined(parts: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+    """Several surfaces as one."""
+    first = np.cumsum([0, *(len(points) for points, _ in parts)])
+    faces = [faces + start for (_, faces), start in zip(parts, first[:-1], strict=True)]
+    return np.concatenate([points for points, _ in parts]), np.concatenate(faces)
+
+
+def _knob(center: np.ndarray, radius: float):
+    return Sphere(radius, center=center).surface()
+
+
+def _rod(a: np.ndarray, b: np.ndarray, radius: float):
+    return Capsule(np.stack([a, b]), radius=radius).surface()
+
+
+def bones_of(result: SolveResult) -> list[list[tuple[np.ndarray, np.ndarray]]]:
+    """Of every state of a result (one, or k of them), the surfaces of its links, where they are."""
+    return _where(
+        result,
+        [
+            (link, *surface_of(skeleton, link, result[link]._place.center))
+            for skeleton in result.scene._bodies.skeletons
+            for link in skeleton.links
+        ],
+    )
+
+
+def shapes_of(result: SolveResult) -> list[list[tuple[np.ndarray, np.ndarray]]]:
+    """Likewise of the free parts that have a shape."""
+    return _where(result, _shapes(result.scene))
+
+
+def shapes_at_rest(scene: Scene) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Of a scene."""
+    return [(points, faces) for _, points, faces in _shapes(scene)]
+
+
+def _shapes(scene) -> list[Any]:
+    """(part, vertices at rest (n, 3) m, faces (m, 3)) of the rigid parts, no links, that have a shape."""
+    bodies = scene._bodies
+    parts = [part for part in bodies.rigid if part.shape is not None and bodies.skeleton_of(part) is None]
+    return [(part, part.shape.rest_positions, part.shape.faces) for part in parts]
+
+
+def _where(result, surfaces) -> list[list[tuple[np.ndarray, np.ndarray]]]:
+    """surfaces: (part, vertices at rest (n, 3) m, faces (m, 3)) of each."""
+    found: list[list[tuple[np.ndarray, np.ndarray]]] = []
+    for part, points, faces in surfaces:
+        of = result[part]
+        turns, centers = np.asarray(detached(of.rotation)), np.asarray(detached(of.center))
+        around = points - of._place.center
+        moved = np.einsum("kij,nj->kni", turns.reshape(-1, 3, 3), around) + centers.reshape(-1, 1, 3)
+        found = found or [[] for _ in moved]
+        for state, positions in zip(found, moved, strict=True):
+            state.append((positions, faces))
+    return found
+
+
+def bones_at_rest(scene: Scene) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Of a scene: the surfaces of its links."""
+    places = dict(zip(map(id, scene.rigid_parts), scene._rigid, strict=True))
+    return [
+        surface_of(skeleton, link, places[id(link)].center)
+        for skeleton in scene._bodies.skeletons
+        for link in skeleton.links
+    ]
+
+
+def mesh_of(bones: list[tuple[np.ndarray, np.ndarray]]) -> TriangleMesh:
+    """Of skeletons without flesh, for pictures: the bones as a sheet."""
+    return TriangleMesh(*joined(bones))
+
+
+_THICK_TENDONS = (
+    0.012  # the radius, in the length of a tendon at rest, and at most so much of its shortest segment
+)
+_MOST = 0.2
+
+
+def tendons_of(result: SolveResult) -> list[list[tuple[np.ndarray, np.ndarray]]]:
+    """Of every state of a result (one, or k of them), the surfaces of its tendons; none without any."""
+    found: list[list[tuple[np.ndarray, np.ndarray]]] = []
+    for tendon in _tendons(result.scene):
+        points = np.asarray(detached(result[tendon].positions))
+        frames = points.reshape(-1, *points.shape[-2:])
+        found = found or [[] for _ in frames]
+        for state, frame in zip(found, frames, strict=True):
+            state.append(_rods(tendon, frame))
+    return found
+
+
+def tendons_at_rest(scene: Scene) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Of a scene."""
+    return [_rods(tendon, tendon.points) for tendon in _tendons(scene)]
+
+
+def _tendons(scene) -> list[Tendon]:
+    return [each for each in scene.actuators if isinstance(each, Tendon)]
+
+
+def _rods(tendon: Tendon, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    lengths = np.linalg.norm(np.diff(tendon.points, axis=0), axis=1)
+    radius = min(_THICK_TENDONS * float(lengths.sum()), _MOST * float(lengths.min()))
+    apart = np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-6 * radius
+    rods = [Capsule(np.stack(points[k : k + 2]), radius=radius).surface() for k in np.flatnonzero(apart)]
+    return joined(rods) if rods else (np.zeros((0, 3)), np.zeros((0, 3), dtype=int))

@@ -1,0 +1,121 @@
+"""Magnets and wires of fields as surfaces, magpylib's too: vertices (n, 3) m, faces (m, 3) each."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import scipy
+
+from ...mesh.triangles.triangle_mesh import TriangleMesh
+from ...model.contact.obstacles import Box, Capsule, Sphere
+from ...model.fields.adapters import MagpylibField
+from ...model.fields.field import AppliedField
+from ...model.fields.magnets import CuboidMagnet, CylinderMagnet, Magnet
+from ...model.fields.placed import PlacedField
+from .link_surfaces import joined
+
+_AROUND = 32  # cells around what is round
+_HALVED = 3  # times: the edges of a block's faces
+_WIRE = 0.015  # the radius of a wire, in the extent of what it runs along
+Surface = tuple[np.ndarray, np.ndarray]
+
+
+def surfaces_of(field: AppliedField) -> list[Surface]:
+    """Of a field's magnets and wires, where they are; none of what has no body."""
+    if isinstance(field, PlacedField):
+        return [_placed(each, field.center, field.rotation) for each in surfaces_of(field.field)]
+    if isinstance(field, MagpylibField):
+        return [each for source in field._made_from["sources"] for each in _of_source(source)]
+    if not isinstance(field, Magnet):
+        return []
+    return [_placed(_own_surface(field), field.center, field.rotation)]
+
+
+def _own_surface(magnet: Magnet) -> Surface:
+    if isinstance(magnet, CuboidMagnet):
+        return _block(magnet.dimensions)
+    if isinstance(magnet, CylinderMagnet):
+        return _ring(0.0, magnet.radius, magnet.height)
+    raise TypeError(f"no picture of a {type(magnet).__name__}")
+
+
+def _of_source(source) -> list[Surface]:
+    """Of one of magpylib's, by its name: magshell does not load magpylib to draw."""
+    if hasattr(source, "children"):  # a collection, whose children stand where they stand
+        return [each for child in source.children for each in _of_source(child)]
+    make = _BY_NAME.get(type(source).__name__)
+    if make is None:
+        return []
+    turned = np.reshape(source.orientation.as_rotvec(), (-1, 3))[0]
+    return [_placed(make(source), np.reshape(source.position, (-1, 3))[0], turned)]
+
+
+def _placed(surface: Surface, center: np.ndarray, rotation: np.ndarray) -> Surface:
+    points, faces = surface
+    return scipy.spatial.transform.Rotation.from_rotvec(np.array(rotation)).apply(points) + center, faces
+
+
+def _block(edges) -> Surface:
+    """Of small faces: painters sort faces by their middles."""
+    mesh = TriangleMesh(*Box(edges).surface())
+    for _ in range(_HALVED):
+        mesh = mesh.refined()
+    return np.array(mesh.rest_positions), mesh.faces
+
+
+def _ring(inner: float, outer: float, height: float, start: float = 0.0, end: float = 360.0) -> Surface:
+    """A piece of a hollow cylinder from an angle to another [deg], closed; of a whole one without inner radius a disk."""
+    whole = end - start >= 360.0 - 1e-9
+    angles = np.radians(np.linspace(start, end, _AROUND + 1))[: _AROUND + (not whole)]
+    corners = np.array([(inner, -1), (outer, -1), (outer, 1), (inner, 1)]) * (1.0, 0.5 * height)
+    radii, heights = corners.T
+    points = np.stack(
+        np.broadcast_arrays(
+            radii * np.cos(angles)[:, None],
+            radii * np.sin(angles)[:, None],
+            np.broadcast_to(heights, (len(angles), 4)),
+        ),
+        axis=-1,
+    ).reshape(-1, 3)
+    here = np.arange(_AROUND)
+    there = (here + 1) % len(angles)
+    faces = []
+    for corner in range(4 if inner else 3):
+        a, b = 4 * here + corner, 4 * here + (corner + 1) % 4
+        c, d = 4 * there + (corner + 1) % 4, 4 * there + corner
+        faces += [np.stack([a, c, b], axis=1), np.stack([a, d, c], axis=1)]
+    if not whole:
+        last = 4 * (len(angles) - 1)
+        faces += [[(0, 1, 2), (0, 2, 3)], [(last, last + 2, last + 1), (last, last + 3, last + 2)]]
+    faces = np.concatenate(faces)
+    return points, faces[_areas(points, faces) > 1e-12 * outer**2]
+
+
+def _areas(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    x0, x1, x2 = np.moveaxis(points[faces], 1, 0)
+    return np.linalg.norm(np.cross(x1 - x0, x2 - x0), axis=1)
+
+
+def _wire(points: np.ndarray) -> Surface:
+    radius = _WIRE * float(np.ptp(points, axis=0).max())
+    pairs = [pair for pair in pairwise(points) if np.any(pair[0] != pair[1])]
+    return joined([Capsule(np.stack(pair), radius=radius).surface() for pair in pairs])
+
+
+def _circle(diameter: float) -> np.ndarray:
+    angles = np.linspace(0.0, 2.0 * np.pi, _AROUND + 1)
+    return 0.5 * diameter * np.stack([np.cos(angles), np.sin(angles), 0.0 * angles], axis=1)
+
+
+_SIDES = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)])
+_BY_NAME = {
+    "Cuboid": lambda it: _block(it.dimension),
+    "Cylinder": lambda it: _ring(0.0, 0.5 * it.dimension[0], it.dimension[1]),
+    "CylinderSegment": lambda it: _ring(*it.dimension),
+    "Sphere": lambda it: Sphere(0.5 * it.diameter).surface(),
+    "Tetrahedron": lambda it: (np.array(it.vertices), _SIDES),
+    "TriangularMesh": lambda it: (np.array(it.vertices), np.array(it.faces)),
+    "Circle": lambda it: _wire(_circle(it.diameter)),
+    "Polyline": lambda it: _wire(np.array(it.vertices)),
+}

@@ -1,0 +1,262 @@
+"""Saves results and loads them, with the checks of what a file holds."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..._core import __version__
+from ..._input.quantity import quantity
+from ..._runtime.files import replace_file
+from ..._runtime.mixins import offered
+from ..._runtime.npz import open_npz
+from ...design.digest import digest
+from ...design.multistart.json_data import from_plain, to_plain
+from ...model.scene.scene import Scene
+from ...solve.dynamics.trajectory import MotionState, Trajectory
+from ...solve.statics.equilibria import Equilibria
+from ...solve.statics.equilibrium import Equilibrium
+
+
+def check_fits(held: dict[Any, Any], scene: Scene) -> None:
+    """Raises ValueError where an array has another shape than one of this scene, or is not finite where it must be."""
+    mesh, model = scene.mesh, scene._model
+    of_motion = "times" in held
+    n = (len(held["times"]),) if of_motion else ()
+    shapes = {
+        "positions": (*n, mesh.n_vertices, 3),
+        "edge_rotations": (*n, len(model.edge_rotations(model.rest_state()))),
+        "applied_flux_density": (*n, 3),
+    }
+    own = 10 * len(scene.rigid_parts) + scene._bodies.n_on_surfaces
+    if of_motion:
+        shapes |= {"times": n, "velocities": shapes["positions"], "kinetic_energy": n}
+        shapes |= {"_field_factors": n, "_load_factors": n, "_directions": (*n, 3 * _n_directions(scene))}
+        shapes["_own_velocities"] = (*n, own, 3)
+        _check_end(held["end"], model)
+    else:
+        shapes |= {"_state": (model.size,), "_controls": (scene._control_layout.size,)}
+        _check_turns(held["_turns"])
+    shapes["_own_points"] = (*n, own, 3)
+    for name, shape in shapes.items():
+        optional = name in ("_own_points", "_own_velocities", "applied_flux_density")
+        if not (optional and held[name] is None):
+            quantity(name, "SI", held[name], shape)
+
+
+def _n_directions(scene: Scene) -> int:
+    return len(scene._constraints.directions)
+
+
+def _check_end(end, model) -> None:
+    if not isinstance(end, MotionState):
+        raise ValueError(f"its end is a {type(end).__name__}")
+    quantity("end.state", "SI", end.state, (model.size,))
+    quantity("end.velocity", "SI", end.velocity, (model.size,))
+    _check_turns(end.turns)
+
+
+def _check_turns(turns) -> None:
+    if not isinstance(turns, list | tuple):
+        raise ValueError(f"turns must be a list, got {type(turns).__name__}")
+    for k, each in enumerate(turns):
+        quantity(f"turns[{k}]", "SI", each, ("n",))
+
+
+def digests(scene: Scene) -> dict[str, str]:
+    """{name of a part: its digest}, the same in every process. Raises ValueError where a part has none."""
+    found = {}
+    for name, part in _parts(scene).items():
+        try:
+            found[name] = digest(part)
+        except TypeError as error:
+            raise ValueError(
+                f"a file must tell of which scene it is, and cannot for {name}, {part!r}: {error}"
+            ) from error
+    return found
+
+
+def differing(of: dict[str, str], now: dict[str, str]) -> list[str]:
+    """The names of what is not the same."""
+    return [name for name in {**of, **now} if of.get(name) != now.get(name)]
+
+
+def _parts(scene: Scene) -> dict[str, object]:
+    parts = {}
+    for name, part in scene.__getstate__().items():
+        if isinstance(part, list | tuple):
+            parts |= {f"{name}[{k}]": each for k, each in enumerate(part)}
+        else:
+            parts[name] = part
+    return parts
+
+
+_FORMAT = 1
+_KINDS = {each.__name__: each for each in (Equilibrium, Equilibria, Trajectory)}
+_CONTENTS = "contents"
+
+
+@offered
+def save(path: str | Path, result: Equilibrium | Equilibria | Trajectory) -> None:
+    """Writes a result into one file, an .npz of arrays and of JSON text, from which `load` makes it again.
+
+    result: an Equilibrium, Equilibria, or a Trajectory; of a Path its points, `path.equilibrium(k)`. Tensors become arrays,
+        and gradients do not survive.
+
+    The file has no scene, only a digest of each of its parts: the script that makes the scene is what to keep beside it.
+    numpy reads it as well: `np.load(path)["positions"]`, m. Written beside its place and then renamed.
+
+    Raises ValueError on what is not such a result, and for a scene with something that has no digest, such as a function
+    that holds a lock; OSError where the file cannot be written.
+
+    >>> import magshell as ms, numpy as np, tempfile
+    >>> mesh = ms.meshes.rectangle(0.05, 0.01, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    >>> rest = ms.equilibrium(scene)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     ms.save(f"{folder}/rest.npz", rest)
+    ...     again = ms.load(f"{folder}/rest.npz", scene)
+    >>> np.array_equal(again.positions, rest.positions), again.energies == rest.energies
+    (True, True)
+    """
+    if type(result) not in _KINDS.values():
+        points = ": save its points, ms.Equilibria(path.equilibrium(k) for k in ...)"
+        why = points if type(result).__name__ == "Path" else ""
+        why = ": several are ms.Equilibria([...])" if isinstance(result, list | tuple) else why
+        raise ValueError(
+            f"result must be an Equilibrium, Equilibria or a Trajectory, got {type(result).__name__}{why}"
+        )
+    scene, arrays = result.scene, []
+    held = to_plain(_fields(result, scene), arrays, "the result")
+    names = dict(_names(held))
+    known = {
+        "format": _FORMAT,
+        "magshell": __version__,
+        "kind": type(result).__name__,
+        "scene": digests(scene),
+        "arrays": [names[k] for k in range(len(arrays))],
+        "result": held,
+    }
+    named = {names[k]: array for k, array in enumerate(arrays)}
+    text = np.frombuffer(json.dumps(known).encode(), dtype=np.uint8)
+    replace_file(path, lambda file: np.savez_compressed(file, **{_CONTENTS: text}, **named))
+
+
+def load(path: str | Path, scene: Scene) -> Any:  # which of them, the file tells
+    """What `save` wrote, as a result of the scene that it is of, to look at, to draw and to go on from with the same bits.
+
+    scene: made by the same script as the one that was solved.
+
+    The file is data: reading it runs nothing, whoever wrote it. Raises ValueError where it is no such file, of a later
+    magshell, or of another scene (and says which of its parts differ); OSError where it cannot be read.
+
+    path: of the file.
+
+    >>> import magshell as ms, tempfile
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     ms.save(f"{folder}/rest.npz", ms.equilibrium(scene))
+    ...     ms.load(f"{folder}/rest.npz", scene).stable
+    True
+    """
+    if not isinstance(scene, Scene):
+        raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
+    with open(path, "rb") as opened:
+        try:
+            with open_npz(opened) as file:
+                known = json.loads(file[_CONTENTS].tobytes())
+                if known["format"] > _FORMAT:
+                    raise _Later
+                arrays = [file[name] for name in known["arrays"]]
+            kind, version, of = _KINDS[known["kind"]], str(known["magshell"]), dict(known["scene"])
+            held = from_plain(known["result"], lambda k: arrays[int(k)])
+        except _Later:
+            raise ValueError(
+                f"{path} was written by magshell {known['magshell']}, in a format that {__version__} does not know"
+            ) from None
+        except Exception as error:
+            raise ValueError(f"{path} is not a saved result: {error}") from error
+    if differ := differing(of, digests(scene)):
+        versions = (
+            "" if version == __version__ else f" It was written by magshell {version}, this is {__version__}."
+        )
+        raise ValueError(
+            f"{path} is the result of another scene: {', '.join(differ)} differ. Make the scene as it was made "
+            f"then.{versions}"
+        )
+    try:
+        cases = held["_cases"] if kind is Equilibria else [held]
+        made = [_made(Equilibrium if kind is Equilibria else kind, case, scene) for case in cases]
+    except Exception as error:
+        raise ValueError(f"{path} is not a saved result: {error}") from error
+    return Equilibria(made) if kind is Equilibria else made[0]
+
+
+class _Later(Exception):
+    pass
+
+
+def _fields(result, scene: Scene) -> dict[Any, Any]:
+    """What makes it again, with numbers in the place of the scene's objects."""
+    if isinstance(result, Equilibria):
+        return {"_cases": [_fields(case, scene) for case in result]}
+    numbers = {id(each): k for k, each in enumerate((scene, *scene.objects))}
+    held = {name: value for name, value in result.__getstate__().items() if name != "scene"}
+    for name in ("replaced", "paths"):
+        if name in held["_values"]:
+            held["_values"] = {**held["_values"], name: _numbered(held["_values"][name], numbers)}
+    if "_varied" in held:
+        held["_varied"] = {(numbers[id(each)], name): rows for (each, name), rows in held["_varied"].items()}
+    return held
+
+
+def _numbered(of_objects: dict[Any, Any], numbers: dict[int, int]) -> dict[Any, Any]:
+    return {numbers[id(each)]: value for each, value in of_objects.items()}
+
+
+def _made(kind: type[Any], held: dict[Any, Any], scene: Scene):
+    """The other way round. Raises an error where it does not fit the scene."""
+    objects = (scene, *scene.objects)
+    if held.keys() != _expected(kind):
+        raise ValueError("it lacks some of what makes a result, or has too much")
+    values = dict(held["_values"])
+    for name in ("replaced", "paths"):
+        if name in values:
+            values[name] = {objects[number]: value for number, value in values[name].items()}
+    held = {**held, "_values": values}
+    if "_varied" in held:
+        held["_varied"] = {(objects[number], name): rows for (number, name), rows in held["_varied"].items()}
+    check_fits(held, scene)
+    result = object.__new__(kind)
+    result.__setstate__({"scene": scene, **held})
+    return result
+
+
+def _expected(kind: type[Any]) -> set[str]:
+    return kind.__dataclass_fields__.keys() - {"scene"}
+
+
+def _names(held, prefix: str = "") -> Iterator[tuple[int, str]]:
+    """(number of an array, where it stands in the result)."""
+    if not isinstance(held, dict):
+        return
+    ((kind, content),) = held.items()
+    if kind in ("array", "number"):
+        yield content, prefix
+    elif kind in ("list", "tuple"):
+        for k, each in enumerate(content):
+            yield from _names(each, f"{prefix}.{k}" if prefix else str(k))
+    elif kind == "dict":
+        for k, (key, each) in enumerate(content):
+            name = key if isinstance(key, str | int) else k
+            yield from _names(each, f"{prefix}.{name}" if prefix else str(name))
+    elif isinstance(content, dict):
+        for name, each in content.items():
+            yield from _names(each, f"{prefix}.{name}")

@@ -1,0 +1,280 @@
+"""Writes series of states, with the fields of their elements."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..._input.arrays import named_values
+from ..._input.quantity import quantity, shape_of
+from ..._input.tensors import detached
+from ..._runtime.files import replacing
+from ..._runtime.progress import SolveBar
+from ...mesh.io.read_write import check_field_name, write_cells, write_mesh
+from ...mesh.io.tetrahedra import cells_and_data
+from ...mesh.tetrahedra.tet_mesh import TetMesh
+from ...mesh.triangles.six_node_mesh import SixNodeMesh
+from ...mesh.triangles.triangle_mesh import TriangleMesh
+from ...model.shells.shell_stresses import ShellStresses
+from ...model.solids.solid_stresses import SolidStates
+from .state import State, states_of, with_times
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Fielded, FilePath, Numbers, Shown
+
+
+def element_fields(found: ShellStresses | SolidStates) -> dict[str, np.ndarray]:
+    """{name: (n,) or (n, 9)}; von Mises stress of a solid is the mean of an element, of a shell the larger of both
+    surfaces'."""
+    if isinstance(found, ShellStresses):
+        return {
+            "von_mises_stress": found.von_mises_stresses.max(axis=1),
+            "membrane_force": found.in_space(found.membrane_forces).reshape(-1, 9),
+            "bending_moment": found.in_space(found.bending_moments).reshape(-1, 9),
+        }
+    return {
+        "von_mises_stress": found.mean(found.von_mises_stresses),
+        "volume_ratio": found.mean(found.volume_ratios),
+        "green_strain": found.mean(found.green_strains).reshape(-1, 9),
+        "cauchy_stress": found.mean(found.cauchy_stresses).reshape(-1, 9),
+        **(found.muscles or {}),
+    }
+
+
+def write_solids(
+    path: Path,
+    state: State,
+    on_vertices: dict[str, np.ndarray],
+    on_faces: dict[str, np.ndarray],
+    on_tetrahedra: dict[str, np.ndarray],
+) -> None:
+    """Tetrahedra and triangles of the bodies, one after another. Triangles of a solid's surface are there where they are
+    magnetized or have fields, as nothing else would say so. Fields have rows for all of the bodies."""
+    meshes = [state.mesh] if isinstance(state.mesh, TetMesh) else state.mesh.meshes
+    elements = {} if state.elements is None else {first: each for first, _, each in state.elements()}
+    magnetization = state.magnetization
+    cells, data = [], []
+    vertex = face = tetrahedron = 0
+    for mesh in meshes:
+        rows, solid = slice(face, face + mesh.n_faces), isinstance(mesh, TetMesh)
+        own = element_fields(elements[face]) if face in elements else {}
+        if solid:
+            (kind, tetrahedra), *_ = cells_and_data(mesh, {})[0]
+            cells.append((kind, tetrahedra + vertex))
+            inside = slice(tetrahedron, tetrahedron + mesh.n_tetrahedra)
+            given = {name: values[inside] for name, values in on_tetrahedra.items()}
+            data.append({"part": mesh.parts.astype(float), **own, **given})
+            tetrahedron = inside.stop
+        if not solid or on_faces or magnetization[rows].any():
+            cells.append(("triangle", mesh.faces + vertex))
+            given = {name: values[rows] for name, values in on_faces.items()}
+            data.append({"magnetization": magnetization[rows], **({} if solid else own), **given})
+        vertex, face = vertex + mesh.n_vertices, face + mesh.n_faces
+    missing = {"magnetization": 0.0} if state.is_magnetized else {}
+    shapes = {name: values.shape[1:] for each in data for name, values in each.items()}
+    if not any(mesh.parts.any() for mesh in meshes if isinstance(mesh, TetMesh)):
+        del shapes["part"]
+    if not state.is_magnetized:
+        shapes.pop("magnetization", None)
+    filled = {
+        name: [
+            each[name] if name in each else np.full((len(rows), *shape), missing.get(name, np.nan))
+            for each, (_, rows) in zip(data, cells, strict=True)
+        ]
+        for name, shape in shapes.items()
+    }
+    write_cells(path, state.positions, cells, on_vertices, filled)
+
+
+def write_series(
+    path: FilePath,
+    what: Shown,
+    *,
+    positions: Numbers | None = None,
+    times: Numbers | None = None,
+    velocities: Numbers | None = None,
+    remanent_magnetization: Numbers | None = None,
+    applied_flux_density: Numbers | None = None,
+    field: Fielded | None = None,
+    vertex_fields: dict[Any, Any] | None = None,
+    face_fields: dict[Any, Any] | None = None,
+    tetrahedron_fields: dict[Any, Any] | None = None,
+    progress: bool = True,
+) -> Path:
+    """Writes a motion for ParaView: strip.pvd, and in a folder strip/ beside it one VTU a state (the extra `io`).
+
+    what: a Trajectory, a Path, Equilibria, a mesh with positions, or whatever else `plot` takes.
+    positions: (n, n_v, 3) m, where `what` has none. times: (n,) s; by default its own, else 0, 1, 2, ...
+    velocities: (n, n_v, 3) m/s; by default its own.
+    remanent_magnetization, applied_flux_density, field: as in `plot`.
+    vertex_fields, face_fields, tetrahedron_fields: name -> (n, n_v) or (n, n_v, k), (n, n_f) or (n, n_f, k), and (n, n_t)
+        or (n, n_t, k), which are added; rows are those of one body after another, faces those of solids' surfaces too.
+
+    Tetrahedra are written as such, with sheets beside them as triangles. Of a result they have their means of
+    `volume_ratio` (J), `von_mises_stress` and `cauchy_stress` [Pa] and `green_strain`, and where muscles are `activation`,
+    `fibre_stretch` and `fibre_tension` [Pa]; sheets have `membrane_force` [N/m]
+    and `bending_moment` [N] as they pull now, and the larger `von_mises_stress` [Pa] of their surfaces. Matrices are
+    by rows; what an element does not have is NaN.
+
+    Points have `displacement` [m], `velocity` [m/s], in a field `flux_density` [T], and of a result of a scene with contacts
+    `contact_pressure` [Pa]: what pushes them, on both sides of a sheet, over a third of their faces' area. Faces of a
+    magnetized sheet have `magnetization` [A/m], F_0 M_r, as it turns with them. Returns the path of the PVD. progress: show
+    a bar once it has taken two seconds.
+
+    Replaces an earlier series of this name. The PVD is there at the end, and lists whole files only: after an error,
+    a full disk or Ctrl-C those that are done.
+
+    Raises ValueError on bad input, FileNotFoundError without the folder, ImportError without meshio, and OSError, with
+    the states that are on disk, if a file cannot be written.
+
+    >>> import magshell as ms, tempfile
+    >>> strip = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> rising = [strip.rest_positions + (0, 0, height) for height in (0, 0.01, 0.02)]
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     ms.write_series(f"{folder}/rise.pvd", strip, positions=rising, times=(0, 0.1, 0.2)).name
+    'rise.pvd'
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".pvd":
+        raise ValueError(f"a series is saved as .pvd, got {path.name!r}; write_mesh writes one state as .vtu")
+    if not path.name.isprintable():
+        raise ValueError(f"the name of a series must be printable, got {path.name!r}")
+    if not path.parent.is_dir():
+        raise FileNotFoundError(f"cannot write {path.name!r}: there is no folder {str(path.parent)!r}")
+    states = states_of(
+        what,
+        positions=positions,
+        remanent_magnetization=remanent_magnetization,
+        applied_flux_density=applied_flux_density,
+        field=field,
+    )
+    states = with_times(states, times)
+    velocities = getattr(what, "velocities", None) if velocities is None else velocities
+    more = {
+        "vertex": _by_state(vertex_fields, "vertex", states),
+        "face": _by_state(face_fields, "face", states),
+        "tetrahedron": _by_state(tetrahedron_fields, "tetrahedron", states),
+    }
+    if velocities is not None:
+        row = (states[0].mesh.n_vertices, 3)
+        more["vertex"]["velocity"] = quantity("velocities", "m/s", detached(velocities), (len(states), *row))
+    in_field = any(state.flux_density is not None or state.has_sources for state in states)
+    magnetized = any(state.is_magnetized for state in states)
+    digits = len(str(len(states) - 1))
+    names = [f"{path.stem}/{path.stem}_{k:0{digits}}.vtu" for k in range(len(states))]
+    with _listed(path, names, states) as done, SolveBar("write_series", progress) as bar:
+        for k, state in enumerate(bar.through(states)):
+            on_vertices = {"displacement": state.displacements}
+            on_vertices |= {name: values[k] for name, values in more["vertex"].items()}
+            if (pressures := state.contact_pressures) is not None:
+                on_vertices = {"contact_pressure": pressures, **on_vertices}
+            if in_field:
+                on_vertices["flux_density"] = state.flux_density_at(state.positions)
+            on_faces, on_tetrahedra = (
+                {name: values[k] for name, values in more[kind].items()} for kind in ("face", "tetrahedron")
+            )
+            if isinstance(state.mesh, TriangleMesh | SixNodeMesh):
+                on_faces = _of_sheets(state, magnetized) | on_faces
+                flat = state.mesh if isinstance(state.mesh, TriangleMesh) else state.mesh.surface
+                write_mesh(path.parent / names[k], flat, state.positions, on_vertices, on_faces)
+            else:
+                write_solids(path.parent / names[k], state, on_vertices, on_faces, on_tetrahedra)
+            done.append(k)
+    return path
+
+
+def _by_state(fields: dict[Any, Any] | None, kind: str, states: list[State]) -> dict[str, np.ndarray]:
+    fields = named_values(f"{kind}_fields", fields)
+    mesh = states[0].mesh
+    if kind == "tetrahedron" and fields and isinstance(mesh, TriangleMesh | SixNodeMesh):
+        raise ValueError("tetrahedron_fields: there are no tetrahedra")
+    rows = _counts(mesh)[kind]
+    for name, values in fields.items():
+        check_field_name(kind, name)
+        shape = shape_of(f"{kind} field {name!r}", values)
+        if len(shape) not in (2, 3) or shape[:2] != (len(states), rows):
+            raise ValueError(
+                f"{kind} field {name!r} must have shape ({len(states)}, {rows}) or ({len(states)}, {rows}, k), "
+                f"got {shape}"
+            )
+    return {name: np.asarray(detached(values)) for name, values in fields.items()}
+
+
+def _counts(mesh) -> dict[str, int]:
+    bodies = getattr(mesh, "meshes", [mesh])
+    tetrahedra = sum(each.n_tetrahedra for each in bodies if isinstance(each, TetMesh))
+    return {"vertex": mesh.n_vertices, "face": mesh.n_faces, "tetrahedron": tetrahedra}
+
+
+def _of_sheets(state: State, magnetized: bool) -> dict[str, np.ndarray]:
+    """What their faces have of themselves."""
+    found: dict[str, np.ndarray] = {}
+    if state.elements is not None:
+        fields = [element_fields(each) for _, _, each in state.elements()]
+        found |= (
+            {name: np.concatenate([each[name] for each in fields]) for name in fields[0]} if fields else {}
+        )
+    if magnetized:
+        found["magnetization"] = state.magnetization
+    return found
+
+
+@contextmanager
+def _listed(path: Path, names: list[str], states: list[State]) -> Iterator[list[int]]:
+    """Writes the PVD of the states whose numbers are appended to the list it gives, also after an error."""
+    done: list[int] = []
+    stopped = None
+    try:
+        with replacing(path) as part:
+            (path.parent / path.stem).mkdir(exist_ok=True)
+            _clear(path)
+            # in full at first, so that it has its place on a disk that the states fill
+            part.write_bytes(_contents(names, states, range(len(states))))
+            try:
+                yield done
+            except BaseException as error:
+                if not done:
+                    raise
+                stopped = error
+            with part.open("r+b") as file:
+                file.write(_contents(names, states, done))
+                file.truncate()
+        if stopped is not None:
+            raise stopped
+    except OSError as error:
+        kept = "no state is" if not done else f"{len(done)} of {len(states)} states are"
+        where = f", listed in {path.name!r}" if done else ""
+        reason = os.strerror(error.errno) if error.errno else str(error)
+        raise OSError(
+            error.errno, f"cannot write the series {str(path)!r}: {reason}; {kept} on disk{where}"
+        ) from error
+
+
+def _clear(path: Path) -> None:
+    """Removes an earlier series of this name: its list, and the files that bear the names of its states."""
+    path.unlink(missing_ok=True)
+    state = re.compile(rf"\.?{re.escape(path.stem)}_\d+(\.[0-9a-f]+)?\.vtu")
+    for file in (path.parent / path.stem).glob("*.vtu"):
+        if state.fullmatch(file.name):
+            file.unlink()
+
+
+def _time(states: list[State], number: int) -> float:
+    time = states[number].time
+    return float(number) if time is None else time
+
+
+def _contents(names: list[str], states: list[State], chosen) -> bytes:
+    from xml.sax.saxutils import quoteattr  # late, as it loads all of urllib
+
+    rows = [
+        f'    <DataSet timestep="{_time(states, k)!r}" part="0" file={quoteattr(names[k])}/>' for k in chosen
+    ]
+    head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n  <Collection>'
+    return "\n".join([head, *rows, "  </Collection>\n</VTKFile>\n"]).encode()

@@ -1,0 +1,397 @@
+"""What there is to draw: the states of a sheet or a solid, from whatever holds them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..._input.quantity import quantity
+from ..._input.tensors import detached
+from ...mesh.face_shapes import sides
+from ...mesh.tetrahedra.tet_mesh import TetMesh
+from ...mesh.triangles.six_node_mesh import SixNodeMesh
+from ...mesh.triangles.triangle_mesh import TriangleMesh
+from ...model.bodies.body_ranges import magnetized_rows
+from ...model.bodies.joined_mesh import JoinedMesh
+from ...model.contact.obstacles import Obstacle
+from ...model.fields.field import AppliedField, UniformField
+from ...model.results.result_lookup import result_of
+from ...model.scene.scene import Scene
+from ...model.shells.shell import Shell
+from ...model.shells.shell_stresses import ShellStresses
+from ...model.solids.solid import Solid
+from ...model.solids.solid_stresses import SolidStates
+from ...solve.dynamics.trajectory import Trajectory
+from ...solve.statics.equilibria import Equilibria
+from ...solve.statics.path import Path
+from .contact_loads import ContactLoads, contact_loads
+from .link_surfaces import (
+    bones_at_rest,
+    bones_of,
+    joined,
+    mesh_of,
+    shapes_at_rest,
+    shapes_of,
+    tendons_at_rest,
+    tendons_of,
+)
+from .magnets import surfaces_of
+from .surroundings import surroundings_of
+from .units import clock
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Fielded, Numbers, Shown
+
+
+@dataclass(frozen=True)
+class State:
+    """A sheet at one moment.
+
+    positions: (n_v, 3), m. remanent_magnetization: (n_f, 3), A/m, at rest, or None.
+    flux_density: (3,), T, the uniform field, or None without one.
+    fields: those that vary in space, with their sources where they are; strength: the factor on them.
+    title: what the result calls it. time: s, of a motion, or None. obstacles: what is around the sheet.
+    bones, tendons: surfaces of links and of tendons inside, vertices (n, 3) m and faces (m, 3) each. shapes: of free rigid
+        parts, likewise.
+    elements: () -> [(first face, mesh, SolidStates or ShellStresses)] of the bodies of a result, or None without any.
+    loads: () -> ContactLoads of a result of a scene with contacts, or None without any.
+    """
+
+    mesh: TriangleMesh | SixNodeMesh | TetMesh | JoinedMesh
+    positions: np.ndarray
+    remanent_magnetization: np.ndarray | None = None
+    flux_density: np.ndarray | None = None
+    fields: tuple[AppliedField, ...] = ()
+    strength: float = 1.0
+    title: str = ""
+    time: float | None = None
+    obstacles: tuple[Obstacle, ...] = ()
+    elements: Callable[[], list[tuple[int, TriangleMesh | TetMesh, SolidStates | ShellStresses]]] | None = (
+        None
+    )
+    bones: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+    tendons: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+    loads: Callable[[], ContactLoads] | None = None
+    shapes: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+
+    @property
+    def contact_pressures(self) -> np.ndarray | None:
+        """(n_v,) Pa, or None without contacts."""
+        return None if self.loads is None else self.loads().pressures(self.positions, self.mesh.faces)
+
+    @property
+    def magnetization(self) -> np.ndarray:
+        """F_0 M_r, (n_f, 3), A/m: the magnetization as the sheet carries it along, [Chen22] (20)."""
+        if self.remanent_magnetization is None:
+            return np.zeros((self.mesh.n_faces, 3))
+        coordinates = np.linalg.solve(
+            _frames(self.mesh.rest_positions, self.mesh.faces), self.remanent_magnetization[:, :, None]
+        )
+        return (_frames(self.positions, self.mesh.faces) @ coordinates)[:, :, 0]
+
+    @property
+    def is_magnetized(self) -> bool:
+        return self.remanent_magnetization is not None and bool(self.remanent_magnetization.any())
+
+    @property
+    def displacements(self) -> np.ndarray:
+        """(n_v, 3), m, from the rest shape."""
+        return self.positions - self.mesh.rest_positions
+
+    @property
+    def barycenters(self) -> np.ndarray:
+        """(n_f, 3), m."""
+        return self.positions[self.mesh.faces].mean(axis=1)
+
+    @property
+    def has_sources(self) -> bool:
+        """Whether there is a field that varies in space."""
+        return bool(self.fields) and self.strength != 0.0
+
+    @property
+    def magnets(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Surfaces of the fields' magnets and wires, vertices (n, 3) m and faces (m, 3) each."""
+        return (
+            [surface for field in self.fields for surface in surfaces_of(field)] if self.has_sources else []
+        )
+
+    def sources(self, points: np.ndarray) -> np.ndarray:
+        """B, (n, 3), T, of the fields that vary in space at points (n, 3), m."""
+        return self.strength * np.sum([field.flux_density(points) for field in self.fields], axis=0)
+
+    def flux_density_at(self, points: np.ndarray) -> np.ndarray:
+        """All of B, (n, 3), T, at points (n, 3), m."""
+        total = np.zeros_like(points)
+        if self.flux_density is not None:
+            total = total + self.flux_density
+        if self.has_sources:
+            total = total + self.sources(points)
+        return total
+
+
+def states_of(
+    what: Shown,
+    *,
+    positions: Numbers | None = None,
+    remanent_magnetization: Numbers | None = None,
+    applied_flux_density: Numbers | None = None,
+    field: Fielded | None = None,
+    obstacles: Obstacle | Sequence[Obstacle] | None = None,
+) -> list[State]:
+    """The states in a mesh, a Shell, a Solid, a Scene, a result, or a list of those; keywords come before their own.
+
+    A result is anything with a `scene` and `positions`: (n_v, 3) is one state, (k, n_v, 3) are k of them.
+    """
+    given = {
+        "positions": positions,
+        "remanent_magnetization": remanent_magnetization,
+        "applied_flux_density": applied_flux_density,
+        "field": field,
+        "obstacles": obstacles,
+    }
+    if isinstance(what, TriangleMesh | SixNodeMesh | TetMesh):
+        return _states(what, given)
+    if isinstance(what, Shell | Solid):
+        return _states(what.mesh, _magnetized(given, [what]))
+    if isinstance(what, Scene):
+        bones, shapes = bones_at_rest(what), shapes_at_rest(what)
+        if (bones or shapes) and not what.bodies:
+            return _states(mesh_of([*bones, *shapes]), _with_own(given, what), [what.fields])
+        states = _states(what.mesh, _with_own(given, what), [what.fields])
+        tendons = tuple(tendons_at_rest(what))
+        return [replace(state, bones=tuple(bones), shapes=tuple(shapes), tendons=tendons) for state in states]
+    is_result = isinstance(getattr(what, "scene", None), Scene) and hasattr(what, "positions")
+    if is_result and not isinstance(what, Equilibria):
+        own = _held_by(what)
+        merged = {name: own.get(name) if value is None else value for name, value in given.items()}
+        around = surroundings_of(what)
+        merged = _with_own(merged, what.scene, around.obstacles[0])
+        mesh = what.scene.mesh
+        if not what.scene.bodies and positions is None:
+            mesh, merged["positions"] = _skeletons_alone(what)
+        states = _states(mesh, merged, around.fields, own["strengths"], own["titles"])
+        if obstacles is None and len(around.obstacles) == len(states):
+            pairs = zip(states, around.obstacles, strict=True)
+            states = [replace(state, obstacles=each) for state, each in pairs]
+        states = _with_tendons(what, _with_bones(what, states, positions), positions)
+        states = _with_elements(what, states, positions)
+        own_times = isinstance(what, Trajectory) and len(states) == len(what)
+        return timed(states, what.times) if own_times else states
+    if isinstance(what, Iterable) and not isinstance(what, str | bytes | np.ndarray):
+        try:
+            states = [state for item in what for state in states_of(item, **given)]
+        except RecursionError:
+            raise ValueError("cannot draw a list that holds itself") from None
+        if states:
+            return states
+        raise ValueError("there is nothing to draw: the list is empty")
+    kinds = "a mesh, a Shell, a Solid, a Scene, a result, or a list of them"
+    raise ValueError(f"cannot draw a {type(what).__name__}: give {kinds}")
+
+
+def _with_bones(result, states: list[State], positions) -> list[State]:
+    """With the skeletons inside its bodies and the shapes of free parts, where the states are those that it has itself."""
+    if positions is not None or not result.scene.bodies:
+        return states
+    none = [[] for _ in states]
+    pairs = zip(states, bones_of(result) or none, shapes_of(result) or none, strict=True)
+    return [replace(state, bones=tuple(bones), shapes=tuple(shapes)) for state, bones, shapes in pairs]
+
+
+def _with_tendons(result, states: list[State], positions) -> list[State]:
+    """With the tendons in its bodies, where the states are those that it has itself."""
+    tendons = [] if positions is not None else tendons_of(result)
+    if not tendons:
+        return states
+    return [replace(state, tendons=tuple(each)) for state, each in zip(states, tendons, strict=True)]
+
+
+def _skeletons_alone(result) -> tuple[TriangleMesh, np.ndarray]:
+    """Of a result without flesh: its bones as a sheet, and where they are, (k, n, 3) m."""
+    bones, shapes = bones_of(result), shapes_of(result)
+    if not bones and not shapes:
+        raise ValueError("cannot draw a scene of free rigid parts: they have no shape")
+    count = len(bones or shapes)
+    pairs = zip(bones or [[]] * count, shapes or [[]] * count, strict=True)
+    frames = [joined([*each, *others])[0] for each, others in pairs]
+    at_rest = [*bones_at_rest(result.scene), *shapes_at_rest(result.scene)]
+    return mesh_of(at_rest), np.stack(frames)
+
+
+def _with_elements(result, states: list[State], positions) -> list[State]:
+    """With what the elements of its bodies go through, and contacts do, where the states are those that it has itself."""
+    if positions is not None or not hasattr(result, "_values_at"):
+        return states
+    bodies = result.scene._bodies
+
+    def elements_of(k: int):
+        return lambda: [
+            (span.first_face, body.mesh, result_of(result, body).stresses(k))
+            for body, span in zip(bodies.shells, bodies.spans, strict=True)
+        ]
+
+    def loads_of(k: int):
+        return (lambda: contact_loads(result, k)) if result.scene.contacts else None
+
+    return [replace(state, elements=elements_of(k), loads=loads_of(k)) for k, state in enumerate(states)]
+
+
+def timed(states: list[State], times: Numbers) -> list[State]:
+    """The states at these times, (n,), s, which are their titles too. Raises ValueError unless there is one a state
+    and none falls."""
+    array = quantity("times", "s", detached(times), ("n",))
+    if len(array) != len(states):
+        raise ValueError(f"times [s] must be {len(states)} numbers, one a state, got {len(array)}")
+    if (np.diff(array) < 0).any():
+        first = int(np.argmax(np.diff(array) < 0))
+        raise ValueError(f"times [s] must not fall, but {array[first]:g} is followed by {array[first + 1]:g}")
+    written = clock(float(np.abs(array).max()))
+    return [
+        replace(state, time=time, title=written(time))
+        for state, time in zip(states, array.tolist(), strict=True)
+    ]
+
+
+def with_times(states: list[State], times: Numbers) -> list[State]:
+    """The states at the times given; else at their own, which must not fall where a motion follows another."""
+    own = [state.time for state in states]
+    if times is None and None in own:
+        return [replace(state, time=None) for state in states]
+    return timed(states, own if times is None else times)
+
+
+def _held_by(result) -> dict[str, Any]:
+    """What a result says of its states; `strengths` are the factors on the fields that vary in space."""
+    held = {name: getattr(result, name, None) for name in ("positions", "remanent_magnetization", "field")}
+    if isinstance(result, Path):
+        flux_densities = result.applied_flux_densities
+        strengths = result._control("field_factor")[:, 0].tolist()
+        titles = [f"parameter {parameter:.4g}" for parameter in result.parameters]
+    elif isinstance(result, Trajectory):
+        flux_densities = result.applied_flux_density
+        strengths = result._field_factors.tolist()
+        titles = [""]
+    else:
+        flux_densities = getattr(result, "applied_flux_density", None)
+        strengths = [_field_factor(result)]
+        titles = [""]
+    if not result.scene.has_uniform_field:
+        flux_densities = None
+    return held | {"applied_flux_density": flux_densities, "strengths": strengths, "titles": titles}
+
+
+def _field_factor(result) -> float:
+    controls = getattr(result, "_controls", None)
+    if controls is None:
+        return 1.0
+    return float(result.scene._control_layout.of(controls, "scene", "field_factor")[0])
+
+
+def _states(
+    mesh: TriangleMesh, given: dict[str, Any], fields=((),), strengths=(1.0,), titles=("",)
+) -> list[State]:
+    """fields, strengths, titles: one a state, or one for all."""
+    frames = _positions(mesh, given["positions"])
+    count = len(frames)
+    magnetization = _magnetization(mesh, given["remanent_magnetization"])
+    flux_densities = _flux_densities(given["applied_flux_density"], count)
+    obstacles = _obstacles(given["obstacles"])
+    if own := _listed(given["field"]):
+        fields = [own]
+    fields, strengths, titles = (
+        list(each) if len(each) == count else [each[0]] * count for each in (fields, strengths, titles)
+    )
+    return [
+        State(
+            mesh,
+            frame,
+            magnetization,
+            flux,
+            tuple(each for each in sources if not isinstance(each, UniformField)),
+            strength,
+            title,
+            obstacles=obstacles,
+        )
+        for frame, flux, sources, strength, title in zip(
+            frames, flux_densities, fields, strengths, titles, strict=True
+        )
+    ]
+
+
+def _positions(mesh: TriangleMesh, values) -> np.ndarray:
+    if values is None:
+        return mesh.rest_positions[None]
+    array = quantity("positions", "m", detached(values), ("...", "n_v", 3))
+    if array.shape[-2] != mesh.n_vertices or array.ndim not in (2, 3) or not array.size:
+        wanted = f"(n_v, 3) = ({mesh.n_vertices}, 3), or (k, n_v, 3) for k states"
+        raise ValueError(f"positions [m] must have shape {wanted}, got {array.shape}")
+    return array.reshape(-1, mesh.n_vertices, 3)
+
+
+def _magnetization(mesh: TriangleMesh, values) -> np.ndarray | None:
+    if values is None:
+        return None
+    array = quantity("remanent_magnetization", "A/m", detached(values), ("...", 3))
+    meshes = getattr(mesh, "meshes", [mesh])
+    parts = [sides(each)[1] if isinstance(each, SixNodeMesh) else 1 for each in meshes]
+    rows = [magnetized_rows(each) for each in meshes]
+    if max(parts, default=1) > 1 and array.shape == (sum(rows), 3):
+        return np.repeat(array, np.repeat(parts, rows), axis=0)
+    if array.shape not in ((3,), (mesh.n_faces, 3)):
+        wanted = f"(n_f, 3) = ({mesh.n_faces}, 3) or (3,)"
+        raise ValueError(f"remanent_magnetization [A/m] must have shape {wanted}, got {array.shape}")
+    return np.broadcast_to(array, (mesh.n_faces, 3))
+
+
+def _flux_densities(values, count: int) -> list[np.ndarray | None]:
+    if values is None:
+        return [None] * count
+    array = quantity("applied_flux_density", "T", detached(values), ("...", 3))
+    if array.shape not in ((3,), (count, 3)):
+        raise ValueError(f"applied_flux_density [T] must have shape (3,) or ({count}, 3), got {array.shape}")
+    return list(np.broadcast_to(array, (count, 3)))
+
+
+def _with_own(given: dict[str, Any], scene: Scene, obstacles=None) -> dict[str, Any]:
+    """With the scene's obstacles, as a solve has placed them, and its bodies' magnetization, unless others are given."""
+    given = _magnetized(given, scene.bodies)
+    placed = scene.obstacles if obstacles is None else obstacles
+    return {**given, "obstacles": placed} if given["obstacles"] is None else given
+
+
+def _magnetized(given: dict[str, Any], bodies) -> dict[str, Any]:
+    """With the magnetization that the bodies themselves have, unless another is given."""
+    own = [body._face_magnetization for body in bodies]
+    if given["remanent_magnetization"] is not None or all(each is None for each in own):
+        return given
+    pairs = zip(own, bodies, strict=True)
+    rows = [
+        np.broadcast_to(np.zeros(3) if each is None else each, (body.mesh.n_faces, 3)) for each, body in pairs
+    ]
+    return {**given, "remanent_magnetization": np.concatenate(rows)}
+
+
+def _obstacles(values) -> tuple[Obstacle, ...]:
+    listed = (values,) if isinstance(values, Obstacle) else tuple(values or ())
+    for each in listed:
+        if not isinstance(each, Obstacle):
+            raise ValueError(f"obstacles must be obstacles of ms.obstacles, got a {type(each).__name__}")
+    return listed
+
+
+def _listed(value) -> tuple[Any, ...]:
+    if value is None:
+        return ()
+    return tuple(value) if isinstance(value, list | tuple) else (value,)
+
+
+def _frames(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Columns a_1, a_2 and the unit normal of each face, (n_f, 3, 3)."""
+    x0, x1, x2 = np.moveaxis(positions[faces], 1, 0)
+    normal = np.cross(x1 - x0, x2 - x0)
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+    return np.stack([x1 - x0, x2 - x0, normal], axis=2)

@@ -1,0 +1,149 @@
+"""Results as tables of pandas and labelled arrays of xarray, with units."""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..._input.tensors import detached
+from ...solve.dynamics.trajectory import Trajectory
+from ...solve.statics.equilibria import Equilibria
+from ...solve.statics.equilibrium import Equilibrium
+from ...solve.statics.path import Path
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+_RESULTS = Equilibrium | Equilibria | Path | Trajectory
+_PER = ("state", "vertex")
+
+
+def to_xarray(result: Equilibrium | Equilibria | Path | Trajectory) -> xarray.Dataset:
+    """A result as an xarray.Dataset (needs the package xarray).
+
+    Along `time` [s] of a Trajectory, `parameter` of a Path or `case` of Equilibria: `positions`, `displacements` and, of a
+    motion, `velocities`, (..., vertex, axis); energies, one variable a term, and `kinetic_energy`; the largest strains;
+    `applied_flux_density` (..., axis). Beside them `rest_positions` (vertex, axis) and `faces` (face, corner). What has a
+    unit has it in `attrs["units"]`. Tensors become arrays.
+
+    Raises ValueError on what is not a result, ImportError without xarray.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.05, 0.01, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    >>> fall = ms.to_xarray(ms.simulate(scene, steps=5, time_step=2e-3))
+    >>> fall.positions.dims, fall.positions.attrs["units"]
+    (('time', 'vertex', 'axis'), 'm')
+    """
+    xarray = _imported("xarray")
+    coordinate, numbers = _states(result)
+    along = () if coordinate is None else (coordinate,)
+    variables = {}
+    for name, (unit, values) in _columns(result).items():
+        variables[name] = (along, values, {"units": unit})
+    for name, (unit, values) in _rows(result).items():
+        variables[name] = ((*along, "vertex", "axis"), values, {"units": unit})
+    if (flux := getattr(result, "applied_flux_density", None)) is not None:
+        variables["applied_flux_density"] = ((*along, "axis"), np.asarray(detached(flux)), {"units": "T"})
+    mesh = result.scene.mesh
+    variables["rest_positions"] = (("vertex", "axis"), mesh.rest_positions, {"units": "m"})
+    variables["faces"] = (("face", "corner"), mesh.faces)
+    labels = {"axis": ["x", "y", "z"]}
+    if coordinate is not None:
+        labels[coordinate] = (along, numbers, {"units": "s"} if coordinate == "time" else {})
+    return xarray.Dataset(variables, labels, {"kind": type(result).__name__})
+
+
+def to_pandas(result: Equilibrium | Equilibria | Path | Trajectory, per: str = "state") -> pandas.DataFrame:
+    """A result as a pandas.DataFrame (needs the package pandas), the units in the names of its columns.
+
+    per: "state": a row for each state, of energies, strains and the uniform field; "vertex": a row for each vertex in each
+        state, of where it is, and of a motion how fast it goes. The index is `time [s]` of a Trajectory, `parameter` of a
+        Path or `case` of Equilibria, and `vertex`.
+
+    Raises ValueError on bad input, ImportError without pandas.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.05, 0.01, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    >>> fall = ms.simulate(scene, steps=5, time_step=2e-3)
+    >>> bool((ms.to_pandas(fall)["kinetic_energy [J]"].diff()[1:] > 0).all()), ms.to_pandas(fall, per="vertex").shape
+    (True, (198, 6))
+    """
+    if per not in _PER:
+        raise ValueError(f'per must be "state" or "vertex", got {per!r}')
+    pandas = _imported("pandas")
+    coordinate, numbers = _states(result)
+    name = "time [s]" if coordinate == "time" else coordinate
+    states = pandas.Index([0] if coordinate is None else numbers, name=name or "case")
+    if per == "state":
+        columns = {
+            f"{what} [{unit}]": np.atleast_1d(values) for what, (unit, values) in _columns(result).items()
+        }
+        if (flux := getattr(result, "applied_flux_density", None)) is not None:
+            for axis, values in zip("xyz", np.atleast_2d(np.asarray(detached(flux))).T, strict=True):
+                columns[f"applied_flux_density {axis} [T]"] = values
+        return pandas.DataFrame(columns, index=states)
+    n_v = result.scene.mesh.n_vertices
+    index = pandas.MultiIndex.from_product([states, range(n_v)], names=[states.name, "vertex"])
+    columns = {}
+    for what, (unit, values) in _rows(result).items():
+        if what != "displacements":
+            for axis, each in zip("xyz", values.reshape(-1, 3).T, strict=True):
+                columns[f"{what} {axis} [{unit}]"] = each
+    return pandas.DataFrame(columns, index=index)
+
+
+def _imported(package: str):
+    try:
+        return importlib.import_module(package)
+    except ImportError as error:
+        raise ImportError(f'this needs {package}: pip install "magshell[tables]"') from error
+
+
+def _states(result) -> tuple[str | None, np.ndarray | None]:
+    """The coordinate that its states lie along, and where they are."""
+    if not isinstance(result, _RESULTS):
+        raise ValueError(
+            f"result must be an Equilibrium, Equilibria, a Path or a Trajectory, got {type(result).__name__}"
+        )
+    if isinstance(result, Equilibrium):
+        return None, None
+    if isinstance(result, Trajectory):
+        return "time", result.times
+    return ("parameter", result.parameters) if isinstance(result, Path) else ("case", np.arange(len(result)))
+
+
+def _columns(result) -> dict[str, tuple[str, np.ndarray]]:
+    """{name: (unit, a number a state)}."""
+    if isinstance(result, Equilibria):
+        cases = [_columns(case) for case in result]
+        return {
+            name: (unit, np.array([case[name][1] for case in cases]))
+            for name, (unit, _) in (cases[0] if cases else {}).items()
+        }
+    found = {
+        f"{term}_energy": ("J", np.asarray(each)) for term, each in getattr(result, "energies", {}).items()
+    }
+    if isinstance(result, Trajectory):
+        found["kinetic_energy"] = ("J", result.kinetic_energy)
+    if isinstance(result, Path):
+        found["unstable_directions"] = ("1", result.unstable_directions)
+    for name in ("largest_membrane_strain", "largest_bending_strain"):
+        found[name] = ("1", np.asarray(getattr(result, name)))
+    return found
+
+
+def _rows(result) -> dict[str, tuple[str, np.ndarray]]:
+    """{name: (unit, (..., n_v, 3))}."""
+    found = {
+        name: ("m", np.asarray(detached(getattr(result, name)))) for name in ("positions", "displacements")
+    }
+    if isinstance(result, Trajectory):
+        found["velocities"] = ("m/s", np.asarray(detached(result.velocities)))
+    return found

@@ -1,0 +1,1 @@
+"""Solves for equilibria, motions, linear responses and their gradients."""

@@ -1,0 +1,1 @@
+"""Connects the gradients of the core with torch."""

@@ -1,0 +1,61 @@
+"""The way back from an equilibrium to its inputs: arrays only, autograd.py has the tensors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ... import _core
+from ...errors import NoGradient
+from ...model.scene.solve_inputs import Inputs
+from ...model.scene.values import Gradient
+
+if TYPE_CHECKING:
+    from ...model.scene.solve_inputs import Leaf
+
+
+class Adjoint:
+    """Gradients of one equilibrium. Keeps its factorization, so that each costs one back-substitution."""
+
+    def __init__(self, inputs: Inputs, found: _core.StaticsResult):
+        self._inputs, self._found = inputs, found
+
+    def gradients(self, by_outputs: list[np.ndarray], wanted: Sequence[bool]) -> list[np.ndarray | None]:
+        """By each wanted leaf of the inputs, shaped like it. Raises NoGradient where there is none."""
+        self._refuse()
+        inputs, model = self._inputs, self._inputs.scene._model
+        with inputs.in_core():
+            gradient = Gradient(inputs.scene, *_core.pull_back(model, self._found, *by_outputs))
+        leaves = zip(inputs.leaves, wanted, strict=True)
+        return [by_leaf(inputs, leaf, gradient) if asked else None for leaf, asked in leaves]
+
+    def _refuse(self) -> None:
+        found = self._found
+        if found.progress < 1.0 or found.outcome != _core.Outcome.converged:
+            raise NoGradient(
+                "no gradient here: the solve did not converge, "
+                f"it got {found.progress:.3g} of the way ({found.reason})"
+            )
+        if not found.stable:
+            raise NoGradient(
+                "no gradient here: the equilibrium is not stable "
+                f"({found.unstable_directions} directions lower its energy, or its Hessian is singular), "
+                "and no body would stay in it. Solve with require_stable=True."
+            )
+
+
+def by_leaf(inputs: Inputs, leaf: Leaf, gradient: Gradient) -> np.ndarray:
+    """By one leaf, from the core's gradients. Raises NoGradient where it has none."""
+    if leaf.refusal:
+        raise NoGradient(f"no gradient by {leaf.name}: {leaf.refusal}")
+    if leaf.owner is None:
+        by_rows = np.asarray(gradient.own(leaf.name))
+    elif hasattr(leaf.owner, "by_knots"):
+        by_rows = np.asarray(leaf.owner.by_knots(gradient))
+    else:
+        by_rows = np.asarray(inputs.values.gradients(leaf.owner, gradient)[leaf.name])
+    if by_rows.size == np.prod(leaf.shape, dtype=int):
+        return by_rows.reshape(leaf.shape)
+    return by_rows.sum(axis=0).reshape(leaf.shape)  # one value for every row

@@ -1,0 +1,299 @@
+"""What a simulation is asked for beyond the scene's values, checked; and as the core takes it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ... import _core
+from ..._input.arrays import count
+from ..._input.quantity import quantity, shape_of
+from ..._input.scalars import not_negative, positive
+from ..._input.tensors import detached, is_tensor, wants_gradient
+from ..._runtime.memory import check_memory
+from ...model.contact.contacts_to_core import check_outside, poses
+from ...model.rigid.equimomental_points import check_joints, check_rigid, own_velocities
+from ...model.scene.plausible import warn_of_field
+from ...model.scene.solve_inputs import Inputs
+from ..options import Clock, Integrator, Newton, clock_of
+from ..statics.equilibrium import Equilibrium
+from ..statics.start import check_faces
+from .in_time import InTime
+from .schedule import scheduled
+from .trajectory import MotionState, Trajectory
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Numbers
+    from ...model.scene.time_series import Course
+    from ..options import Keep
+
+
+_CONTROLS = {  # (unit, of one time)
+    "applied_flux_density": ("T", (3,)),
+    "field_factor": ("1", ()),
+    "load_factor": ("1", ()),
+    "gravity_factor": ("1", ()),
+    "motion_factor": ("1", ()),
+}
+
+
+class MotionInputs:
+    """The inputs of one simulation. Adds to the leaves of `inputs` what of them is a tensor with a gradient."""
+
+    inputs: Inputs
+    integrator: Integrator
+    record_every: int
+    steps: int
+    keep: Any
+    memory_budget: int
+    given_time_step: Numbers
+
+    def __init__(
+        self,
+        inputs: Inputs,
+        *,
+        steps: int,
+        time_step: Numbers,
+        record_every: int,
+        keep: Keep,
+        start: Any,
+        velocities: Numbers,
+        damping: Numbers,
+        stiffness_damping: Numbers,
+        maxwell_modulus: Numbers,
+        maxwell_time: Numbers,
+        integrator: Integrator,
+        solver: Newton,
+        courses: Iterable[Course] = (),
+        **controls: Any,
+    ):
+        self.inputs, self.integrator = inputs, integrator
+        self.steps, self.record_every = count("steps", steps), count("record_every", record_every)
+        if self.record_every > self.steps:
+            raise ValueError(
+                f"record_every must be at most steps = {self.steps}, got {self.record_every}: "
+                "only the start would be recorded"
+            )
+        check_memory(self.steps, self.record_every, len(integrator._times) + 1, inputs.scene._model.size)
+        self.keep, self.memory_budget = getattr(_core.Keep, keep.what or "nothing"), int(keep.memory_budget)
+        self.given_time_step, self._outside = time_step, None
+        self.time_step: float = positive("time_step", "s", inputs.take("time_step", time_step))
+        self._mass = inputs.values.masses
+        self._damping = self._checked_damping(inputs.take("damping", damping))
+        law = self._viscosity(stiffness_damping, maxwell_modulus, maxwell_time)
+        self.start: MotionState = self._begin(start, velocities)
+        self.clock: Clock = clock_of(self.start).going_on(self.time_step)
+        self.knots: int = self.steps * (len(integrator._times) + 1)
+        self._knots = {name: self._controls(name, value) for name, value in controls.items()}
+        self._in_time = InTime(self, list(courses))
+        if self._outside is not None:
+            check_outside(inputs.scene, inputs.values, self._outside, 0.0)
+        self.core: _core.MotionInput = _core.MotionInput(
+            inputs.scene._model,
+            {
+                "state": self.start.state,
+                "velocity": self.start.velocity,
+                "turns": self.start.turns,
+                **self._history(law),
+                "rotations_given": self.start.rotations_known,
+                **law,
+                "mass": self._mass,
+                "damping": self._damping,
+                "integrator": integrator._name,
+                "time_step": self.time_step,
+                "steps": self.steps,
+                "controls": self._all_controls(),
+                "varying": self._in_time.entries,
+                "newton": solver._newton_options(),
+                "projective": getattr(integrator, "_projective", None),
+                "record_every": self.record_every,
+            },
+        )
+
+    def recorded(self, name: str, count: int) -> np.ndarray:
+        """A control at the first `count` recorded states, (count, *row): at the start, then at the ends of steps."""
+        return self._knots[name][self._recorded_knots(count)]
+
+    def varied(self, count: int) -> dict[tuple[Any, ...], np.ndarray]:
+        """Likewise {(actuator, shell or field, name): its values} of what varies."""
+        at = self._recorded_knots(count)
+        return {key: rows[at] for key, rows in self._in_time.varied.items()}
+
+    def _recorded_knots(self, count: int) -> np.ndarray:
+        a_step = len(self.integrator._times) + 1
+        ends = a_step * self.record_every * np.arange(1, count) - 1
+        return np.concatenate([[0], ends])
+
+    def _all_controls(self) -> np.ndarray:
+        """(knots, m), in the core's layout."""
+        layout, moving = self.inputs.scene._control_layout, {**self._poses(), **self._in_time.poses}
+        rows = {("scene", name): array for name, array in self._knots.items()}
+        rows |= {(f"obstacle {k}", "pose"): array for k, array in moving.items()}
+        return np.concatenate([layout.rows(rows, self.knots), self._in_time.rows], axis=1)
+
+    def _poses(self) -> dict[int, np.ndarray]:
+        """Of the obstacles that a motion of their own moves, by number, at all knots."""
+        values, obstacles = self.inputs.values, self.inputs.scene.obstacles
+        moving = {k: values.current(each) for k, each in enumerate(obstacles) if each.motion is not None}
+        if moving:
+            self.inputs.refuse("time_step", self.given_time_step, "obstacles move by a function of the time")
+        shares = np.array((0.0, *self.integrator._times))
+        times = self.clock.at(np.arange(self.steps)[:, None], shares).ravel()
+        return {k: poses(each, times) for k, each in moving.items()}
+
+    def _controls(self, name: str, value) -> np.ndarray:
+        unit, row = _CONTROLS[name]
+        if name == "applied_flux_density" and value is None:
+            if self.inputs.scene.has_uniform_field:
+                raise ValueError("the scene has a UniformField, so applied_flux_density [T] is needed")
+            value = np.zeros(3)
+        elif name == "applied_flux_density" and not self.inputs.scene.has_uniform_field:
+            raise ValueError("applied_flux_density was given, but the scene has no UniformField")
+        knots = self.at_knots(name, unit, value, row)
+        if name == "applied_flux_density":
+            warn_of_field(self.inputs.scene, np.asarray(detached(knots)))
+        return np.ascontiguousarray(self.inputs.take(name, knots), dtype=np.float64)
+
+    def at_knots(self, name: str, unit: str, value: Any, row: tuple[int, ...]) -> Any:
+        """A value in time, as in `scheduled`, at all knots: a tensor in its graph if it is one."""
+        time_step = self.given_time_step
+        knots = scheduled(name, unit, value, row, self.steps, self.integrator._times, self.clock, time_step)
+        if callable(value) and wants_gradient(time_step) and not _differentiable_in_time(knots, time_step):
+            why = f"{name} is a function of the time that torch cannot follow; make its values from the time by torch"
+            self.inputs.refuse("time_step", time_step, why)
+        return knots
+
+    def _checked_damping(self, given) -> np.ndarray:
+        n_v = self.inputs.scene.mesh.n_vertices
+        shape = shape_of("damping [N s/m]", given)
+        if shape not in ((), (n_v,)):
+            raise ValueError(f"damping [N s/m] must be a number or have shape (n_v,) = ({n_v},), got {shape}")
+        damping = quantity("damping", "N s/m", given, shape)
+        if (np.asarray(damping) < 0).any():
+            raise ValueError(f"damping [N s/m] must not be negative, but the smallest is {np.min(damping):g}")
+        on_vertices = np.broadcast_to(damping, (n_v,))
+        if not self.inputs.scene.rigid_parts:
+            return on_vertices
+        return np.concatenate([on_vertices, np.zeros(len(self._mass) - n_v)])
+
+    def _history(self, law: dict[str, float]) -> dict[str, np.ndarray]:
+        """What the start remembers of the motion that led to it, as far as this one can use it."""
+        start, nothing = self.start, np.zeros(0)
+        maxwell = law["maxwell_modulus"] > 0
+        viscous = maxwell or law["stiffness_damping"] > 0
+        rates_known = start.strain_rates.size > 0 or not viscous
+        known = rates_known and (start.maxwell_strain_rates.size > 0 or not maxwell)
+        return {
+            "maxwell_strains": start.maxwell_strains if maxwell else nothing,
+            "acceleration": start.acceleration if known else nothing,
+            "strain_rates": start.strain_rates,
+            "maxwell_strain_rates": start.maxwell_strain_rates,
+        }
+
+    def _viscosity(self, stiffness_damping, maxwell_modulus, maxwell_time) -> dict[str, float]:
+        given = {"stiffness_damping": ("s", stiffness_damping), "maxwell_modulus": ("1", maxwell_modulus)}
+        if maxwell_time is not None:
+            given["maxwell_time"] = ("s", maxwell_time)
+        law = {
+            name: (positive if name == "maxwell_time" else not_negative)(
+                name, unit, self.inputs.take(name, value)
+            )
+            for name, (unit, value) in given.items()
+        }
+        if law["maxwell_modulus"] and maxwell_time is None:
+            raise ValueError("maxwell_modulus needs the relaxation time of the branch, maxwell_time [s]")
+        return {"maxwell_time": 1.0, **law}
+
+    def _begin(self, start, velocities) -> MotionState:
+        inputs, model = self.inputs, self.inputs.scene._model
+        origin = self._origin(start)
+        if inputs.scene.joints:
+            check_joints(inputs, model.points(origin.state))
+        goes_on = isinstance(start, Trajectory | MotionState)
+        own = own_velocities(inputs, start, goes_on)
+        if goes_on and inputs.scene.rigid_parts:  # free bodies go on as they did, whatever the vertices do
+            own = model.points(origin.velocity)[inputs.scene.mesh.n_vertices :]
+        if velocities is None and (goes_on or not own.any()):
+            return origin
+        n_v = inputs.scene.mesh.n_vertices
+        given = inputs.take("velocities", np.zeros((n_v, 3)) if velocities is None else velocities)
+        shape = shape_of("velocities [m/s]", given)
+        if shape not in ((3,), (n_v, 3)):
+            raise ValueError(f"velocities [m/s] must have shape (n_v, 3) = ({n_v}, 3) or (3,), got {shape}")
+        rows = np.broadcast_to(quantity("velocities", "m/s", given, shape), (n_v, 3))
+        inputs.scene._bodies.check_welded("velocities", "m/s", rows)
+        velocity = model.full_vector(np.concatenate([rows, own]))
+        if inputs.scene.rigid_parts:
+            with inputs.in_core():
+                velocity = model.settled_velocity(origin.state, velocity)
+            fastest = np.abs(rows).max(initial=0.0)
+            check_rigid(inputs.scene, rows, model.positions(velocity), "velocities [m/s]", fastest)
+        return MotionState(
+            origin.time,
+            origin.state,
+            velocity,
+            origin.turns,
+            maxwell_strains=origin.maxwell_strains,
+            clock=origin.clock,
+            rotations_known=origin.rotations_known,
+        )
+
+    def _origin(self, start) -> MotionState:
+        inputs, model, mesh = self.inputs, self.inputs.scene._model, self.inputs.scene.mesh
+        still = np.zeros(model.size)
+        if start is None:
+            self._outside = mesh.rest_positions
+            return MotionState(0.0, model.rest_state(), still, [])
+        if isinstance(start, Equilibrium | Trajectory):
+            if start.scene is not inputs.scene:
+                raise ValueError("start is of another scene; hand over its positions instead")
+            if isinstance(start, Trajectory):
+                why = "it goes on from another motion, whose history has no gradient: start=first.end takes its numbers"
+                inputs.refuse("start", start.positions, why)
+                return start.end
+            if wants_gradient(start.positions):
+                inputs.take("positions", start.positions)
+                inputs.take("edge_rotations", start.edge_rotations)
+            return MotionState(0.0, start._state, still, start._turns)
+        if isinstance(start, MotionState):
+            return _checked_state(start, model.size, model.n_strains)
+        given = inputs.take("positions", start)
+        positions = quantity("start", "m", given, (mesh.n_vertices, 3))
+        inputs.scene._bodies.check_welded("start", "m", positions)
+        check_faces(inputs.scene, positions)
+        self._outside = positions
+        with inputs.in_core():
+            state = model.state(positions, np.zeros(inputs.scene._bodies.n_rotations))
+        check_rigid(inputs.scene, positions, model.positions(state), "start [m]", mesh.size)
+        return MotionState(0.0, state, still, rotations_known=False)
+
+
+def _checked_state(start: MotionState, size: int, n_strains: int) -> MotionState:
+    """A MotionState as it is. Its arrays come from a file, or from a caller who made it."""
+    if np.ndim(start.state) == 1 and len(start.state) != size:
+        raise ValueError(f"start is a state of {len(start.state)} unknowns, but the scene has {size}")
+    given = {name: getattr(start, name) for name in ("state", "velocity", "acceleration")}
+    for name, values in given.items():
+        optional = name == "acceleration" and np.shape(values) == (0,)
+        quantity(f"start.{name}", "SI", values, (0,) if optional else (size,))
+    for name in ("strain_rates", "maxwell_strains", "maxwell_strain_rates"):
+        values = getattr(start, name)
+        quantity(f"start.{name}", "SI", values, (0 if np.size(values) == 0 else n_strains,))
+    if not isinstance(start.turns, list | tuple):
+        raise ValueError(f"start.turns must be a list of lists of numbers, got {type(start.turns).__name__}")
+    for k, each in enumerate(start.turns):
+        quantity(f"start.turns[{k}]", "SI", each, ("n",))
+    quantity("start.time", "s", start.time, ())
+    if not isinstance(start.clock, Clock | None):
+        raise ValueError(f"start.clock must be that of a motion, or None, got {type(start.clock).__name__}")
+    return start
+
+
+def _differentiable_in_time(knots, time_step) -> bool:
+    """Whether a control that came as a function has its derivative by the time, or is the same at all times."""
+    from ..adjoint.autograd import depends_on
+
+    numbers = np.asarray(detached(knots))
+    return bool((numbers == numbers[0]).all()) or (is_tensor(knots) and depends_on(knots, time_step))

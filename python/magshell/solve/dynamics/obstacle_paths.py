@@ -1,0 +1,192 @@
+"""Moves obstacles and supports along their paths in time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..._input.quantity import shape_of
+from ..._input.tensors import detached, is_tensor, require_torch
+from ...model.contact.obstacles._motion import CENTRAL, FORWARD, STEP
+from ...model.supports import constraints
+from .schedule import scheduled
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Numbers
+    from .motion_inputs import MotionInputs
+
+
+class ObstaclePath:
+    """knots: center (m), rotation vector (rad), velocity (m/s) and spin (rad/s, world axes) at all knots of a motion,
+    (knots, 4, 3); a tensor if one of the courses is, or the time step. Called with a time [s], the center and the rotation
+    vector there, as an obstacle's motion returns them.
+
+    Between the ends of steps places and rotation vectors lie on straight lines, as all that is given there does, and
+    their rates on straight lines between the slopes that parabolas through three neighbouring ends have there: of second
+    order, as the places are. Functions are differentiated over 1e-4 s to fourth order, as an obstacle's motion is.
+    """
+
+    def __init__(self, asked: MotionInputs, obstacle: Any, courses: dict[str, object]):
+        self._clock, self._time_step = asked.clock, asked.given_time_step
+        self._given = {
+            "center": courses.get("center", obstacle.center),
+            "rotation": courses.get("rotation", obstacle.rotation),
+        }
+        rows = []
+        for (name, value), unit in zip(self._given.items(), ("m", "rad"), strict=True):
+            rows.append((asked.at_knots(name, unit, value, (3,)), self._rates(asked, name, unit, value)))
+        xp, ((center, velocity), (rotation, rate)) = alike(rows)
+        self.knots: Any = xp.stack((center, rotation, velocity, spin(xp, rotation, rate)), 1)
+
+    def __call__(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        return self._at("center", time), self._at("rotation", time)
+
+    def _at(self, name: str, time: float) -> np.ndarray:
+        value = self._given[name]
+        if callable(value):
+            return np.asarray(detached(value(self._as_given(time))), dtype=np.float64)
+        numbers = np.asarray(detached(value), dtype=np.float64)
+        if numbers.ndim == 1:
+            return numbers
+        ends = self._clock.at(np.arange(len(numbers)))
+        return np.array([np.interp(time, ends, column) for column in numbers.T])
+
+    def _as_given(self, time: float):
+        """A time as functions of it get it: a tensor where the time step is one."""
+        return self._time_step.new_tensor(time).double() if is_tensor(self._time_step) else time
+
+    @staticmethod
+    def _rates(asked, name: str, unit: str, value):
+        """Of the value at all knots."""
+        if callable(value):
+            return asked.at_knots(f"the rate of {name}", f"{unit}/s", lambda time: _slope(value, time), (3,))
+        if len(shape_of(name, value)) == 1:
+            return np.zeros((asked.knots, 3))
+        slopes = _slopes(value, asked.given_time_step)
+        return scheduled(
+            name, unit, slopes, (3,), asked.steps, asked.integrator._times, asked.clock, asked.given_time_step
+        )
+
+
+@dataclass(frozen=True)
+class ReadPath:
+    """A path as numbers, read at the times (n,) s of recorded states and at those that its rates are taken from there:
+    centers (n, 3) m, rotations (n, 3) rad. Between them it lies on straight lines."""
+
+    times: np.ndarray
+    centers: np.ndarray
+    rotations: np.ndarray
+
+    @classmethod
+    def of(cls, path: ObstaclePath, recorded: np.ndarray) -> ReadPath:
+        early = (recorded >= 0) & (recorded < 2 * STEP)  # as `rates` has it
+        ahead = recorded[early][:, None] + np.array(list(FORWARD)) * STEP
+        around = recorded[~early][:, None] + np.array([0, *CENTRAL]) * STEP
+        times = np.unique(np.concatenate([ahead.ravel(), around.ravel()]))
+        centers, rotations = zip(*(path(time) for time in times.tolist()), strict=True)
+        return cls(times, np.array(centers), np.array(rotations))
+
+    def __call__(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        center, rotation = (
+            np.array([np.interp(time, self.times, column) for column in rows.T])
+            for rows in (self.centers, self.rotations)
+        )
+        return center, rotation
+
+
+def _slopes(ends, time_step):
+    """(steps + 1, 3): at the ends of steps, those of the parabolas through three of them that lie next to each other."""
+    xp, (ends, time_step) = alike((ends, time_step))
+    if len(ends) == 2:
+        slope = (ends[1:] - ends[:-1]) / time_step
+        return xp.concatenate((slope, slope), 0)
+    first = -1.5 * ends[:1] + 2.0 * ends[1:2] - 0.5 * ends[2:3]
+    last = 1.5 * ends[-1:] - 2.0 * ends[-2:-1] + 0.5 * ends[-3:-2]
+    return xp.concatenate((first, 0.5 * (ends[2:] - ends[:-2]), last), 0) / time_step
+
+
+def _slope(function, time):
+    """The derivative of a function of the time, numbers or a tensor, from times that it may be asked for."""
+    weights = FORWARD if 0 <= float(detached(time)) < 2 * STEP else CENTRAL
+    found = [function(time + steps * STEP) for steps in weights]
+    _, found = alike([list(each) if isinstance(each, tuple) else each for each in found])
+    return sum(weight / STEP * each for weight, each in zip(weights.values(), found, strict=True))
+
+
+def spin(xp: ModuleType, vector: Any, rate: Numbers) -> Any:
+    """J(w) dw/dt (n, 3), J the left Jacobian of rotations: how fast R(w) turns, in world axes, as w changes."""
+    square = (vector * vector).sum(-1)[:, None]
+    small = square < 1e-4  # where the closed forms cancel, and have no derivative at zero
+    safe = xp.where(small, xp.ones_like(square), square)
+    angle = xp.sqrt(safe)
+    first = xp.where(small, 0.5 - square / 24.0 + square**2 / 720.0, 2.0 * xp.sin(0.5 * angle) ** 2 / safe)
+    second = xp.where(
+        small, 1.0 / 6.0 - square / 120.0 + square**2 / 5040.0, (angle - xp.sin(angle)) / (safe * angle)
+    )
+    across = _cross(xp, vector, rate)
+    return rate + first * across + second * _cross(xp, vector, across)
+
+
+def _cross(xp: ModuleType, a, b):
+    return xp.stack(
+        (
+            a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1],
+            a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2],
+            a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0],
+        ),
+        1,
+    )
+
+
+def alike(values: Any) -> tuple[ModuleType, Any]:
+    """numpy or torch, and the values as arrays or tensors of it, float64: tensors if one of them is."""
+    if any(is_tensor(each) for each in _flat(values)):
+        torch = require_torch("a path")
+        tensor = lambda each: each if is_tensor(each) else torch.tensor(np.array(each, dtype=np.float64))  # noqa: E731
+        return torch, _mapped(values, lambda each: tensor(each).double())
+    return np, _mapped(values, lambda each: np.asarray(each, dtype=np.float64))
+
+
+def _flat(values):
+    return [each for value in values for each in (_flat(value) if isinstance(value, tuple) else [value])]
+
+
+def _mapped(values, change):
+    return [_mapped(each, change) if isinstance(each, tuple) else change(each) for each in values]
+
+
+def check_supports(asked: MotionInputs, courses: list[Any]) -> None:
+    """Raises ValueError where a support is moved, at the end of a step, against another that holds the same vertex.
+
+    courses: (course, its value at all knots) of supports.
+    """
+    scene, values = asked.inputs.scene, asked.inputs.values
+    moving = {id(course.owner) for course, _ in courses}
+    if not moving or len(scene.supports) < 2:
+        return
+    held = {
+        id(each): np.unique(
+            np.concatenate(
+                [h.vertices for h in constraints.held_by(each, scene._bodies.of(each), scene._bodies)]
+            )
+        )
+        for each in scene.supports
+    }
+    every = np.concatenate(list(held.values()))
+    shared = np.flatnonzero(np.bincount(every) > 1)
+    if not any(np.isin(vertices, shared).any() for key, vertices in held.items() if key in moving):
+        return
+    a_step = len(asked.integrator._times) + 1
+    for knot in (0, *range(a_step - 1, asked.knots, a_step)):
+        now: dict[Any, Any] = {}
+        for course, knots in courses:
+            now.setdefault(course.owner, {})[course.name] = np.asarray(detached(knots))[knot]
+        supports = [values.current(each) for each in scene.supports]
+        supports = [
+            there.replaced(**now[each]) if each in now else there
+            for each, there in zip(scene.supports, supports, strict=True)
+        ]
+        constraints.check_shared(scene._bodies, supports, shared)

@@ -1,0 +1,339 @@
+"""Motions of a scene: ms.simulate."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ... import _core
+from ..._input.tensors import detached, dtype_like, like
+from ..._runtime.log import log
+from ..._runtime.progress import SolveBar
+from ..._runtime.solver_entry_point import grouped, solve_entry
+from ...errors import Interrupted, NotConverged
+from ...model.contact.contacts_to_core import check_apart
+from ...model.fields.magnet_overlap import told_inside
+from ...model.scene.field_sampling import warn_of_sampling
+from ...model.scene.replacements import requested
+from ...model.scene.scene import Scene
+from ...model.scene.solve_inputs import Inputs
+from ...model.scene.time_series import over_time
+from ...model.shells.obtuse_faces import warn_of_caps
+from ...model.shells.shell import Shell
+from ...model.shells.strains import StrainHistory, warn_if_large
+from ..adjoint.dynamic import MotionAdjoint
+from ..options import SDIRK2, SDIRK3, TRBDF2, ImplicitEuler, Integrator, Keep, MixedNewton, Newton, kept
+from .motion_inputs import MotionInputs
+from .trajectory import MotionState, Trajectory
+
+if TYPE_CHECKING:
+    from ..._input.kinds import InTime, Numbers
+    from ..statics.equilibrium import Equilibrium
+
+
+@grouped(solver=MixedNewton, keep=Keep)
+@solve_entry
+def simulate(
+    scene: Scene,
+    *,
+    steps: int,
+    time_step: Numbers,
+    remanent_magnetization: InTime | None = None,
+    applied_flux_density: InTime | None = None,
+    load_factor: Any = 1.0,
+    gravity_factor: Any = 1.0,
+    field_factor: Any = 1.0,
+    motion_factor: Any = 1.0,
+    damping: Any = 0.0,
+    stiffness_damping: Any = 0.0,
+    maxwell_modulus: Any = 0.0,
+    maxwell_time: InTime | None = None,
+    start: Numbers | Equilibrium | Trajectory | MotionState | None = None,
+    velocities: InTime | None = None,
+    thickness: InTime | None = None,
+    young_modulus: InTime | None = None,
+    poisson_ratio: InTime | None = None,
+    mass_density: InTime | None = None,
+    curvature_scale: InTime | None = None,
+    vertex_loads: InTime | None = None,
+    values: dict[Any, Any] | None = None,
+    integrator: Integrator | None = None,
+    record_every: int = 1,
+    keep: str | Keep | None = None,
+    solver: Newton | None = None,
+    progress: bool = True,
+) -> Trajectory:
+    """The motion of a scene in time.
+
+    steps, time_step: how many, and s.
+    applied_flux_density: T: constant (3,), one a step (steps, 3), at the ends of all steps (steps + 1, 3) with straight
+        lines between them, or a function of the time [s] that returns (3,). The time is the motion's own, as in `times`: 0
+        at its beginning, and where `start` is a motion it goes on. Arrays begin with the first step taken here.
+    load_factor, gravity_factor, field_factor, motion_factor: as in ms.equilibrium; numbers, or in time as above.
+    damping: N s/m, viscous, on every vertex or (n_v,).
+    stiffness_damping: s. The rate of the strains adds as much stress as this time of it would: for small motions the
+        damping matrix is this time the stiffness matrix.
+    maxwell_modulus, maxwell_time: a Maxwell branch beside the elastic stiffness: its modulus over the elastic one, and
+        its relaxation time, s. It begins relaxed.
+    start: positions (n_v, 3) m, an Equilibrium of this scene, a Trajectory or MotionState to go on from with the same
+        bits. By default the rest shape.
+    velocities: m/s, (n_v, 3), or (3,) for all; by default those of the motion that `start` is, or none.
+    remanent_magnetization, thickness, ..., values: as in ms.equilibrium. The shell needs a mass density. Controls, and the
+        damping, may stand in values={scene: {name: value}} as well: keywords are their short forms.
+    values in time: positions and moments of Dipoles, center and rotation of a PlacedField, an obstacle or a magnet, and
+        its magnetization, displacement, rotation and center of a Clamp or Pin that has one of them: a function of the time
+        [s], or an array with one more axis in front, at the ends of all steps (steps + 1, ...). As everything that is given
+        there, they lie on straight lines between (rotation vectors too), also at the stages within a step. Of field sources
+        one a step may be given, which lets them jump. The surface of an obstacle moves, for friction, with the slopes of
+        parabolas through three neighbouring ends, on straight lines between those: of second order, as its places are.
+    integrator: TRBDF2() by default, ImplicitEuler() where the scene has contacts; SDIRK2(), SDIRK3(), ProjectiveDynamics().
+        A method of higher order makes an impact bounce, and each of its steps there is much work, unless the steps resolve
+        it.
+    record_every: steps between the states that come back, the start first.
+    keep: for gradients; "stages" (all states), "checkpoints", "factors", or an ms.Keep, which says how many bytes it may
+        take. By default all states if they fit into 2 GB, else checkpoints.
+    solver: of a step; MixedNewton() by default, of which the load steps are not used. ProjectiveDynamics needs none.
+    progress: show a bar once the motion has taken two seconds.
+
+    A step that does not converge is taken in halves, down to 1/64 of it. Raises NotConverged and Interrupted with the
+    motion until then as `last_good`; ValueError on bad input. With torch tensors among the inputs, positions,
+    velocities and edge rotations come back as tensors, and gradients go back from them to every input that is
+    continuous, time_step, damping, start (positions or an Equilibrium) and velocities among them. Where an input has
+    none (a Trajectory as start; time_step where a function of the time leaves torch), they raise NoGradient; so do
+    second derivatives, as in ms.equilibrium.
+
+    They are exact where the motion is differentiable: through impact, stick and slip on smooth obstacles too. It is not
+    where a point touches a kink of an obstacle (Trajectory.kinks says where), where a little more makes a step fail or
+    be taken in other parts (Trajectory.halved), and in water whose tables have kinks (Water.is_smooth); gradients there
+    are those of one side.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.05, 0.01, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
+    >>> turning = lambda t: (0, 0, 2e-3 * t)
+    >>> move = ms.simulate(scene, steps=20, time_step=5e-3, remanent_magnetization=(4e4, 0, 0), applied_flux_density=turning)
+    >>> move.positions.shape, bool(move.positions[-1, :, 2].max() > 1e-4)
+    ((21, 33, 3), True)
+    """
+    solver = MixedNewton() if solver is None else solver
+    if integrator is not None and not isinstance(integrator, Integrator):
+        what = (
+            f"the class {integrator.__name__}: call it" if isinstance(integrator, type) else repr(integrator)
+        )
+        raise ValueError(
+            "integrator must be ms.TRBDF2(), ImplicitEuler(), SDIRK2(), SDIRK3() or ProjectiveDynamics(), "
+            f"got {what}"
+        )
+    if not isinstance(solver, Newton):
+        raise ValueError(f"solver must be a MixedNewton or a Newton, got {type(solver).__name__}")
+    if not isinstance(scene, Scene):
+        raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
+    replaced = requested(
+        scene,
+        vertex_loads,
+        values,
+        moving=True,
+        in_time=True,
+        thickness=thickness,
+        young_modulus=young_modulus,
+        poisson_ratio=poisson_ratio,
+        mass_density=mass_density,
+        curvature_scale=curvature_scale,
+    )
+    replaced, courses = over_time(scene, replaced)
+    uniform = np.zeros(3) if scene.has_uniform_field else None
+    if integrator is None:
+        integrator = ImplicitEuler() if scene.contacts else TRBDF2()
+    if scene.rigid_parts and isinstance(integrator, SDIRK2 | SDIRK3):
+        raise ValueError(
+            f"{type(integrator).__name__} falls to first order where rigid parts turn, as its first stage is of first order "
+            "only: take TRBDF2(), which keeps the second, or ImplicitEuler()"
+        )
+    inputs = Inputs(
+        scene, remanent_magnetization, uniform, replaced=replaced, differentiable=True, moving=True
+    )
+    asked = MotionInputs(
+        inputs,
+        steps=steps,
+        time_step=time_step,
+        record_every=record_every,
+        keep=kept(keep),
+        start=start,
+        velocities=velocities,
+        damping=damping,
+        stiffness_damping=stiffness_damping,
+        maxwell_modulus=maxwell_modulus,
+        maxwell_time=maxwell_time,
+        integrator=integrator,
+        solver=solver,
+        courses=courses,
+        applied_flux_density=applied_flux_density,
+        load_factor=load_factor,
+        gravity_factor=gravity_factor,
+        field_factor=field_factor,
+        motion_factor=motion_factor,
+    )
+    began = time.perf_counter()
+    with inputs.in_core(), SolveBar("simulate", progress) as bar:
+        check_apart(scene, asked.start.state)
+        found = _core.simulate(
+            scene._model, asked.core, bool(inputs.leaves), asked.memory_budget, asked.keep, _advance(bar)
+        )
+    result = _with_strains(_trajectory(asked, found, time.perf_counter() - began))
+    log.debug(
+        "simulate: %s, %d of %d steps, %d in parts, %d iterations, %d factorizations, %.3g s",
+        found.outcome.name,
+        found.steps_done,
+        asked.steps,
+        len(result.halved),
+        found.iterations,
+        found.factorizations,
+        result.wall_time,
+    )
+    if found.outcome == _core.Outcome.interrupted:
+        raise Interrupted(f"interrupted after {found.steps_done} of {steps} steps", result)
+    if found.outcome == _core.Outcome.failed:
+        raise NotConverged(
+            f"step {found.steps_done} of {steps}, at {result.end.time:.6g} s, failed even in parts of 1/64: "
+            f"{found.reason}. {_advice(result)} The motion until there is in `error.last_good`.",
+            result,
+        )
+    bending = result.energies.get("bending", np.zeros(len(result)))
+    most = int(np.argmax(bending))
+    positions = np.asarray(detached(result.positions[most]), dtype=np.float64)
+    where = f"the motion, at {result.times[most]:.4g} s,"
+    warn_of_caps(scene, positions, inputs.values.whole, bending[most], where)
+    _warn(result)
+    _warn_of_fields(result)
+    return result
+
+
+def _advice(result: Trajectory) -> str:
+    """What would help after a step that failed."""
+    fields = map(result._values_at(len(result) - 1).current, result.scene.fields)
+    positions = np.asarray(detached(result.positions[-1]), dtype=np.float64)
+    return told_inside(fields, positions, result.scene.mesh.edge_lengths) or "Take shorter steps."
+
+
+def _with_strains(result: Trajectory) -> Trajectory:
+    """With the largest strains of its states where sheets grew during the motion: each with its own growth."""
+    if not any(isinstance(owner, Shell) for owner, _ in result._varied):
+        return result
+    strain = StrainHistory.of_each(result.strains(k) for k in range(len(result)))
+    return replace(result, largest_membrane_strain=strain.membrane, largest_bending_strain=strain.bending)
+
+
+def _warn(result: Trajectory) -> None:
+    strain = StrainHistory(result.largest_membrane_strain, result.largest_bending_strain)
+    k = strain.worst
+    warn_if_large(
+        result, strain.at(k), f"the motion, in recorded state {k}, at {result.times[k]:.6g} s", (k,)
+    )
+
+
+def _warn_of_fields(result: Trajectory) -> None:
+    """Where the magnetic energy is largest, as the magnets are nearest there."""
+    if not result.scene.fields:
+        return
+    k = int(np.argmax(np.abs(result.energies.get("magnetic", np.zeros(len(result))))))
+    flux_density = result.applied_flux_density
+    warn_of_sampling(
+        result._values_at(k),
+        np.asarray(detached(result.positions[k]), dtype=np.float64),
+        float(result._field_factors[k]),
+        None if flux_density is None else np.reshape(detached(flux_density), (-1, 3))[k],
+        f"the motion, in recorded state {k}, at {result.times[k]:.6g} s",
+    )
+
+
+def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
+    scene, model, values = asked.inputs.scene, asked.inputs.scene._model, asked.inputs.values
+    points, edge_rotations, velocities, driving = _outputs(asked, found)
+    rigid, n_v = bool(scene.rigid_parts), scene.mesh.n_vertices
+    recorded = len(found.kinetic_energy)
+    ended = asked.clock.after(found.steps_done)
+    thickness = values.whole.thickness
+    with values.growth_in_core():
+        strain = StrainHistory.of(found.largest_strains(model, thickness))
+    by_term = np.array(found.energies).reshape(recorded, -1)
+    return Trajectory(
+        scene=scene,
+        integrator=asked.integrator,
+        times=asked.clock.at(asked.record_every * np.arange(recorded)),
+        positions=points[:, :n_v] if rigid else points,
+        velocities=velocities[:, :n_v] if rigid else velocities,
+        edge_rotations=edge_rotations,
+        remanent_magnetization=asked.inputs.given_magnetization,
+        applied_flux_density=asked.recorded("applied_flux_density", recorded),
+        kinetic_energy=np.array(found.kinetic_energy),
+        energies=_by_name(model.term_names, by_term),
+        largest_membrane_strain=strain.membrane,
+        largest_bending_strain=strain.bending,
+        steps=asked.steps,
+        steps_done=found.steps_done,
+        halved={step: len(parts) for step, parts in found.halved.items() if len(parts) > 1},
+        calmed=tuple(step for step, parts in found.halved.items() if any(calm for _, _, calm in parts)),
+        end=MotionState(
+            ended.time,
+            found.last_state,
+            found.last_velocity,
+            found.last_turns,
+            found.last_acceleration,
+            found.last_strain_rates(model),
+            found.last_maxwell_strains(model),
+            found.last_maxwell_strain_rates(model),
+            ended,
+            found.begun or asked.start.rotations_known,
+        ),
+        iterations=found.iterations,
+        factorizations=found.factorizations,
+        keep=found.keep.name,
+        bytes=found.bytes,
+        wall_time=wall_time,
+        linear_time=found.linear_time,
+        _field_factors=asked.recorded("field_factor", recorded),
+        _load_factors=asked.recorded("load_factor", recorded),
+        _varied=asked.varied(recorded),
+        _thickness=thickness,
+        _values=values,
+        _directions=found.directions(model),
+        _held_forces=found.held_forces(model),
+        _own_points=points[:, n_v:] if rigid else None,
+        _own_velocities=velocities[:, n_v:] if rigid else None,
+        _driving=driving,
+    )
+
+
+def _by_name(names: list[str], by_term: np.ndarray) -> dict[str, np.ndarray]:
+    """Of each (n, terms), (n,); those of one name, of several bodies, as one."""
+    sums: dict[str, np.ndarray] = {}
+    for name, each in zip(names, by_term.T, strict=True):
+        sums[name] = sums[name] + each if name in sums else each
+    return sums
+
+
+def _outputs(asked: MotionInputs, found):
+    """Positions, edge rotations, velocities, with the points of rigid parts; and what motors do."""
+    inputs, model = asked.inputs, asked.inputs.scene._model
+    arrays = (
+        found.positions(model),
+        found.edge_rotations(model),
+        found.velocities(model),
+        found.driving(),
+    )
+    if not inputs.leaves:
+        return tuple(like(array, *inputs.given) for array in arrays)
+    from ..adjoint.autograd import solved
+
+    return solved(MotionAdjoint(asked, found), arrays, dtype_like(*inputs.given), inputs.tensors)
+
+
+def _advance(bar):
+    def advance(share: float, residual: float) -> None:
+        bar.to(share)
+
+    return advance

@@ -1,0 +1,313 @@
+"""What a simulation computed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..._input.arrays import index_array
+from ..._input.quantity import quantity
+from ..._input.tensors import detached, plain_arrays
+from ..._runtime.files import replace_file
+from ..._runtime.frozen import immutable
+from ..._runtime.mixins import Filmed
+from ..._runtime.npz import open_npz
+from ...mesh.triangles.self_intersections import told
+from ...model.actuators.actuator import Actuator
+from ...model.contact.body_contact import BodyContact
+from ...model.contact.contact import Contact
+from ...model.contact.contacts_to_core import near_kinks
+from ...model.fields.field import AppliedField
+from ...model.results.result_lookup import OfOneBody, result_of
+from ...model.results.solid_result import told_strains
+from ...model.scene.contact_state import Touching, touching_in
+from ...model.scene.nonsmooth_contacts import near_body_kinks
+from ...model.scene.reactions import Reaction, reaction_in
+from ...model.scene.scene import Scene
+from ...model.scene.values import Values
+from ...model.shells.shell import Shell
+from ...model.shells.strains import StrainHistory, strains_of
+from ...model.supports.supports import Clamp, Pin, SymmetryPlane
+from ..options import Clock, Integrator, clock_of
+from .obstacle_paths import ObstaclePath, ReadPath
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Computed
+
+
+@immutable
+@dataclass(frozen=True)
+class MotionState:
+    """Where a sheet is and how fast it moves, exactly: what ms.simulate(..., start=...) goes on from with the same bits,
+    in steps of the same length.
+
+    time: s, since the start of the motion that led here; clock: how it was counted, in steps. Everything else is in the
+    core's order of unknowns and faces; what the motion had no need of is empty: accelerations and strain rates (TRBDF2),
+    strains of a Maxwell branch. rotations_known: False where the edge rotations are still to be put to rest.
+
+    state, velocity, acceleration: of all unknowns, (n,). turns: of folds that have gone round. strain_rates,
+    maxwell_strains, maxwell_strain_rates: of faces.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    >>> first = ms.simulate(scene, steps=2, time_step=1e-3)
+    >>> ms.simulate(scene, steps=2, time_step=1e-3, start=first.end).times.round(6)
+    array([0.002, 0.003, 0.004])
+    """
+
+    time: float
+    state: np.ndarray = field(repr=False)
+    velocity: np.ndarray = field(repr=False)
+    turns: Sequence[Any] = field(repr=False, default=())
+    acceleration: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
+    strain_rates: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
+    maxwell_strains: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
+    maxwell_strain_rates: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
+    clock: Clock | None = field(repr=False, default=None)
+    rotations_known: bool = field(repr=False, default=True)
+
+    def save(self, path: str | Path) -> None:
+        """Writes an .npz file."""
+        lengths = np.array([len(each) for each in self.turns], dtype=np.int64)
+        remembered = np.concatenate([np.zeros(0), *(np.asarray(each) for each in self.turns)])
+        arrays = {name: getattr(self, name) for name in _ARRAYS}
+        arrays |= {
+            "time": self.time,
+            "clock": astuple(clock_of(self)),
+            "rotations_known": self.rotations_known,
+            "turns": remembered,
+            "turn_lengths": lengths,
+        }
+        replace_file(path, lambda file: np.savez(file, **arrays))
+
+    @classmethod
+    def load(cls, path: str | Path) -> MotionState:
+        """Reads what `save` wrote. Raises ValueError if it is something else."""
+        try:
+            with open_npz(Path(path)) as file:
+                time = float(quantity("time", "s", file["time"], ()))
+                origin, time_step, steps = quantity("clock", "SI", file["clock"], (3,)).tolist()
+                remembered = quantity("turns", "SI", file["turns"], ("n",))
+                lengths = index_array("turn_lengths", file["turn_lengths"])
+                known = bool(file["rotations_known"])
+                arrays = {name: file[name] for name in _ARRAYS}
+            clock = Clock(origin, time_step, int(steps))
+            parts = np.split(remembered, np.cumsum(lengths)[:-1]) if len(lengths) else []
+        except (KeyError, ValueError, TypeError, EOFError) as error:
+            raise ValueError(f"{path} is not a saved MotionState: {error}") from error
+        return cls(
+            time,
+            turns=[part.tolist() for part in parts],
+            clock=clock,
+            rotations_known=known,
+            **arrays,
+        )
+
+
+_ARRAYS = ("state", "velocity", "acceleration", "strain_rates", "maxwell_strains", "maxwell_strain_rates")
+
+
+@immutable
+@dataclass(frozen=True, repr=False)
+class Trajectory(Filmed, OfOneBody):
+    """A motion. With several bodies, rows are those of one after another; `trajectory[body]` has those of one.
+
+    times: (n,) s, of the recorded states, the start among them. positions: (n, n_v, 3) m; velocities: (n, n_v, 3) m/s;
+    edge_rotations: (n, n_e) rad. kinetic_energy: (n,) J; energies: {term: (n,)} J, NaN where Ctrl-C came meanwhile.
+    remanent_magnetization: as given, A/m, or None; applied_flux_density: (n, 3) T, the uniform part at those times.
+    largest_membrane_strain, largest_bending_strain: (n,), magnitudes, 1, of what `strains` has. Beyond 0.2 the sheet
+        leaves the model, of which ms.LargeStrainWarning warns.
+    steps_done: all of those asked for, unless the simulation stopped early. halved: {step: in how many parts it was
+    taken}. calmed: the steps, or steps with parts, that implicit Euler took instead of the integrator, because bodies
+    touched and the step would have gained energy that nothing put in. end: the last state, from which another simulation
+    goes on. bytes: kept for gradients.
+    """
+
+    scene: Scene
+    integrator: Integrator
+    times: np.ndarray
+    positions: Any
+    velocities: Any
+    edge_rotations: Any
+    remanent_magnetization: Any
+    applied_flux_density: np.ndarray
+    kinetic_energy: np.ndarray
+    energies: dict[str, np.ndarray]
+    largest_membrane_strain: np.ndarray
+    largest_bending_strain: np.ndarray
+    steps: int
+    steps_done: int
+    halved: dict[int, int]
+    calmed: tuple[int, ...]
+    end: MotionState
+    iterations: int
+    factorizations: int
+    keep: str
+    bytes: int
+    wall_time: float
+    linear_time: float
+    _field_factors: np.ndarray = field(repr=False)
+    _load_factors: np.ndarray = field(repr=False)
+    _varied: dict[Any, Any] = field(
+        repr=False
+    )  # {(actuator, shell or field, name): (n, ...)}, of the recorded states
+    _thickness: np.ndarray = field(repr=False)
+    _values: Any = field(repr=False)
+    _directions: np.ndarray = field(repr=False)  # (n, 3 n_d), of what clamps and symmetry planes hold
+    _held_forces: np.ndarray = field(repr=False)  # (n, m, 3) N, of the constraints' held nodes
+    _own_points: Any = field(repr=False, default=None)  # (n, 10 a rigid part, 3)
+    _own_velocities: Any = field(repr=False, default=None)
+    _driving: Any = field(repr=False, default=None)  # (n, m) N m or N, of motors in joints
+
+    def __copy__(self) -> Trajectory:
+        return self  # nothing of it changes
+
+    def __getstate__(self) -> dict[Any, Any]:
+        """What a copy, another process or a file makes it from again: tensors as arrays, without their gradients, and paths
+        of obstacles as far as the recorded states need them."""
+        pairs = zip(self.scene.obstacles, self._obstacles, strict=True)
+        paths = {
+            each: ReadPath.of(now.motion, self.times)
+            for each, now in pairs
+            if isinstance(now.motion, ObstaclePath | ReadPath)
+        }
+        return {**plain_arrays(vars(self)), "_values": {**self._values.kept(), "paths": paths}}
+
+    def __setstate__(self, kept: dict[Any, Any]) -> None:
+        values = Values.again(kept["scene"], kept["_values"])
+        for obstacle, path in kept["_values"]["paths"].items():
+            values.move(obstacle, path)
+        Filmed.__setstate__(self, {**kept, "_values": values})
+
+    def __getitem__(self, body: Any) -> Any:
+        """What it says of one body of the scene."""
+        return result_of(self, body)
+
+    @property
+    def displacements(self) -> Computed:
+        """(n, n_v, 3) m, from the rest shape."""
+        rest = self.scene.mesh.rest_positions
+        if isinstance(self.positions, np.ndarray):
+            return self.positions - rest
+        return self.positions - self.positions.new_tensor(np.array(rest))
+
+    def _values_at(self, index: int):
+        """With actuators, growth and field sources as they were then."""
+        then: dict[Actuator | Shell | AppliedField, dict[Any, Any]] = {}
+        for (owner, name), rows in self._varied.items():
+            then.setdefault(owner, {})[name] = rows[index]
+        now = {each: self._values.current(each).replaced(**named) for each, named in then.items()}
+        return self._values.with_objects(now) if now else self._values
+
+    @property
+    def _obstacles(self) -> tuple[Any, ...]:
+        """Of the scene, where they were and went."""
+        return tuple(self._values.current(each) for each in self.scene.obstacles)
+
+    @property
+    def energy(self) -> np.ndarray:
+        """Kinetic and potential, (n,) J."""
+        return self.kinetic_energy + sum(self.energies.values())
+
+    @property
+    def kinks(self) -> dict[int, np.ndarray]:
+        """{recorded state: vertices} that touch where the motion is not differentiable, or within the smoothing of there: an
+        obstacle by the sharp edge of a box or a mesh, or in the middle of a body; of bodies in contact, the point or edge
+        whose closest point goes over a fold of the other surface by more than 0.3 rad, or over its border.
+
+        A small change may bring such a point to another side. A gradient is that of the side on which it is. Looked up
+        when asked for, in the recorded states only. What opens and closes, sticks and slips is none: the laws of contact
+        and friction are smooth there, and `touching` tells what does.
+
+        >>> import magshell as ms
+        >>> mesh = ms.meshes.rectangle(0.02, 0.02, cells=(2, 2))
+        >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+        >>> ridge = ms.obstacles.Box((0.1, 0.1, 0.1), rotation=(0, np.pi / 4, 0), center=(0.01, 0.01, -0.0707105))
+        >>> scene = ms.Scene(sheet, contacts=[ms.Contact(ridge)], allow_rigid_motions=True)
+        >>> ms.simulate(scene, steps=1, time_step=1e-3, velocities=(0, 0, -1e-4)).kinks
+        {0: array([3, 4, 5], dtype=int32), 1: array([3, 4, 5], dtype=int32)}
+        """
+        positions, now, bodies = detached(self.positions), self._values.current, self.scene._bodies
+        placed = [
+            (now(each), [now(obstacle) for obstacle in each.obstacles], self._values.touching(each), bodies)
+            for each in self.scene._obstacle_contacts
+        ]
+        found = {}
+        for k, time in enumerate(self.times):
+            near = [near_kinks(*each, positions[k], time) for each in placed]
+            near += [self._near_body_kinks(contact, k) for contact in self.scene._body_contacts]
+            if near and (every := np.unique(np.concatenate(near))).size:
+                found[k] = every
+        return found
+
+    def _near_body_kinks(self, contact: BodyContact, index: int) -> np.ndarray:
+        smoothing = self._values.current(contact).smoothing
+        positions = self.scene._model.points(self._state_at(index))
+        return near_body_kinks(self.scene, self.touching(contact, index), smoothing, positions)
+
+    def strains(self, index: int = -1) -> Any:
+        """The principal strains of every face of the sheets, Strains, in a recorded state, by default the last; where a
+        solid is alone, what result[solid] says."""
+        if (solid := self._one_solid()) is not None:
+            return solid.strains(index)
+        state = self._state_at(index)
+        with self._values_at(index).growth_in_core():
+            return strains_of(self.scene, state, self._thickness)
+
+    def _state_at(self, index: int) -> np.ndarray:
+        """Of the core."""
+        positions, rotations = (detached(each)[index] for each in (self.positions, self.edge_rotations))
+        model = self.scene._model
+        with self._values.in_core():
+            state = model.state(
+                np.asarray(positions, dtype=np.float64), np.asarray(rotations, dtype=np.float64)
+            )
+        before = 3 * self.scene._bodies.n_points
+        if self._own_points is not None:  # free parts are where no vertex tells
+            own = np.asarray(detached(self._own_points)[index], dtype=np.float64)
+            state[:before] = model.full_vector(np.concatenate([positions, own]))[:before]
+        state[before : before + self._directions.shape[1]] = self._directions[index]
+        return state
+
+    def touching(self, contact: BodyContact | Contact, index: int = -1) -> Touching:
+        """The pairs of a contact that touch in a recorded state, by default the last, and their forces."""
+        own = () if self._own_velocities is None else (self._own_velocities,)
+        velocities = np.concatenate(
+            [np.asarray(detached(each)[index], dtype=np.float64) for each in (self.velocities, *own)]
+        )
+        state, time = self._state_at(index), float(self.times[index])
+        return touching_in(self.scene, self._values, contact, state, velocities, time)
+
+    def reaction(self, support: Pin | Clamp | SymmetryPlane, index: int = -1) -> Reaction:
+        """With what forces a support of the scene held it in a recorded state, by default the last, inertia and damping
+        included: those at the end of the time step that led there, NaN at the start."""
+        return reaction_in(self.scene, support, self._state_at(index), self._held_forces[index])
+
+    def self_intersections(self, index: int = -1) -> np.ndarray:
+        """The faces that pass through each other in a recorded state, as in TriangleMesh.self_intersections, (k, 2)."""
+        return self.scene.mesh.self_intersections(detached(self.positions)[index])
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def __repr__(self) -> str:
+        stopped = "" if self.steps_done == self.steps else f" of {self.steps}"
+        halved = f", {len(self.halved)} of them in parts" if self.halved else ""
+        halved += f", {len(self.calmed)} by implicit Euler" if self.calmed else ""
+        strain = StrainHistory(self.largest_membrane_strain, self.largest_bending_strain)
+        crossings = told(self.scene.mesh, detached(self.positions))
+        a_step = 1e3 * self.wall_time / max(self.steps_done, 1)
+        return (
+            f"Trajectory: {self.steps_done}{stopped} steps{halved}, {self.times[-1]:.4g} s, {len(self)} states, "
+            f"{type(self.integrator).__name__}\n"
+            f"  {told_strains(self, strain)}\n"
+            f"  {crossings}\n"
+            f"  {self.iterations} iterations, {self.factorizations} factorizations\n"
+            f"  {self.wall_time:.3g} s, {a_step:.3g} ms a step; for gradients: {self.keep}, {self.bytes / 1e6:.3g} MB"
+        )

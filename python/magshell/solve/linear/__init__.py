@@ -1,0 +1,1 @@
+"""Answers linear questions: response, buckling, vibration."""

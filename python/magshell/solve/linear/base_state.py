@@ -1,0 +1,122 @@
+"""Linear theory about an equilibrium: what it is asked for, and the stiffness there."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..._input.tensors import wants_gradient
+from ...model.scene.scene import Scene
+from ...model.scene.solve_inputs import Inputs, plain_inputs
+from ..statics.equilibrium import Equilibrium
+from .stiffness import Stiffness
+
+
+def idle_inputs(scene: Scene, replaced: dict[Any, Any], flux_density: Any = None, **factors: Any) -> Inputs:
+    """By default no loads and no field, with a magnetization of zero for the sheets and skins that are given none."""
+    if scene.fields:
+        nothing = {"remanent_magnetization": np.zeros(3)}
+        magnetic = (*scene._bodies.sheets, *scene._bodies.skins)
+        replaced = {**replaced, **{each: {**nothing, **replaced.get(each, {})} for each in magnetic}}
+    if flux_density is None and scene.has_uniform_field and not factors:
+        flux_density = np.zeros(3)
+    return Inputs(scene, None, flux_density, replaced=replaced, **factors)
+
+
+def inputs_about(
+    scene: Scene,
+    equilibrium: Equilibrium,
+    *,
+    remanent_magnetization: Any = None,
+    applied_flux_density: Any = None,
+    values: dict[Any, Any] | None = None,
+    **factors: Any,
+) -> Inputs:
+    """Magnetization and values of an equilibrium, with other controls than it was found for, if any are given. Raises
+    ValueError where it is none of the scene's, or brings its own."""
+    if not isinstance(scene, Scene):
+        raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
+    if not isinstance(equilibrium, Equilibrium):
+        raise ValueError(f"equilibrium must be an Equilibrium, got {type(equilibrium).__name__}")
+    if equilibrium.scene is not scene:
+        raise ValueError("the equilibrium is of another scene")
+    own = (
+        ("values are those", "them", values),
+        ("remanent_magnetization is that", "it", remanent_magnetization),
+    )
+    for what, it, given in own:
+        if given is not None:
+            raise ValueError(
+                f"{what} of the equilibrium: give {it} to ms.equilibrium, or give no equilibrium"
+            )
+    inputs = idle_inputs(scene, {}, applied_flux_density, **factors)
+    return inputs.with_values(equilibrium._values)
+
+
+def asked_inputs(
+    function: str,
+    scene: Scene,
+    equilibrium: Equilibrium | None,
+    remanent_magnetization: Any,
+    applied_flux_density: Any,
+    values: dict[Any, Any] | None,
+    **factors: Any,
+) -> Inputs:
+    """Of a linear question, at rest or about an equilibrium. Raises ValueError on what does not fit."""
+    if equilibrium is None:
+        return plain_inputs(scene, remanent_magnetization, applied_flux_density, values, **factors)
+    inputs = inputs_about(
+        scene,
+        equilibrium,
+        remanent_magnetization=remanent_magnetization,
+        applied_flux_density=applied_flux_density,
+        values=values,
+        **factors,
+    )
+    refuse_what_cannot_be(function, equilibrium, inputs)
+    return inputs
+
+
+def set_state(equilibrium: Equilibrium) -> None:
+    """Evaluates the core there, with the full turns of angles that the state does not tell: what is evaluated next goes on
+    from them."""
+    model = equilibrium.scene._model
+    model.held_forces(equilibrium._state, equilibrium._turns, equilibrium._controls)
+
+
+class StiffnessAbout(Stiffness):
+    """The Hessian K at an equilibrium with its own controls. Raises ValueError, once something is factorized, where it is
+    not stable."""
+
+    def __init__(self, equilibrium: Equilibrium):
+        set_state(equilibrium)
+        model = equilibrium.scene._model
+        super().__init__(model, equilibrium._state, equilibrium._controls, "at the equilibrium")
+
+    def response(self, inputs: Inputs) -> np.ndarray:
+        """du of all unknowns, held ones included, as the controls go to those of the inputs: K du = g(c) - g(c1) - K dm."""
+        model, layout = self._model, inputs.scene._control_layout
+        further = inputs.controls - self.controls
+        moved = model.prescribed_rate(self.controls) * layout.of(further, "scene", "motion_factor")
+        forces = self.gradient - model.gradient(self.state, inputs.controls)
+        return self.answer(forces, moved)
+
+
+def refuse_what_cannot_be(function: str, equilibrium: Equilibrium, inputs: Inputs) -> None:
+    """Raises ValueError where nothing changes, where the equilibrium is not stable, or asks for a gradient."""
+    for name in ("positions", "edge_rotations"):
+        if wants_gradient(getattr(equilibrium, name)):
+            raise ValueError(
+                f"the equilibrium requires a gradient, and ms.{function} passes none back: find it under "
+                "torch.no_grad(), or of detached tensors"
+            )
+    if not equilibrium.stable:
+        raise ValueError(
+            "the equilibrium is not stable, so that nothing stays near it: linear theory needs one that is"
+        )
+    if np.array_equal(inputs.controls, equilibrium._controls):
+        raise ValueError(
+            "the controls are those of the equilibrium, so that nothing changes: give the load_factor, "
+            "applied_flux_density, ... towards which they go, as to ms.follow"
+        )

@@ -1,0 +1,213 @@
+"""Buckling loads from the Hessian: ms.linear_buckling."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy
+
+from ..._input.arrays import count
+from ..._runtime.frozen import immutable
+from ..._runtime.solver_entry_point import solve_entry
+from ...errors import NotConverged
+from ...model.scene.scene import Scene
+from ...model.scene.solve_inputs import Inputs
+from ..statics.equilibrium import Equilibrium
+from .base_state import StiffnessAbout, asked_inputs
+from .mode_shapes import mode_shapes
+from .rest import RestStiffness, pulling_joints, refuse_springs
+from .stiffness import Stiffness
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Numbers
+
+
+_LARGEST_CHANGE = 1e100  # over the stiffness itself: its square still is a number
+_ROUND_OFF = 1e-14  # of a length: what moves no more does not move
+_PRE_LOAD = 1e-4  # displacement at which the change of the Hessian is measured, over the mean edge length
+_LARGEST_DISPLACEMENT = 0.1  # before buckling, over the sheet's size: beyond, linear theory says nothing
+
+
+@immutable
+@dataclass(frozen=True, repr=False)
+class Buckling:
+    """The lowest buckling modes of a scene.
+
+    factors: (k,), ascending: what to multiply the controls by so that the sheet buckles in mode k; about an equilibrium,
+        what share of the way from its controls to those given.
+    modes: (k, n_v, 3), displacements of the vertices, the largest component 1.
+    edge_rotations: (k, n_e), rad, that go with them. equilibrium: that one, or None.
+    """
+
+    scene: Scene
+    factors: np.ndarray
+    modes: np.ndarray = field(repr=False)
+    edge_rotations: np.ndarray = field(repr=False)
+    factorizations: int
+    wall_time: float
+    equilibrium: Equilibrium | None = field(repr=False, default=None)
+
+    def __repr__(self) -> str:
+        factors = ", ".join(f"{factor:.6g}" for factor in self.factors)
+        of = "times the controls" if self.equilibrium is None else "of the way to the new controls"
+        return f"Buckling: at {factors} {of}; {self.wall_time:.3g} s"
+
+
+@solve_entry
+def linear_buckling(
+    scene: Scene,
+    equilibrium: Equilibrium | None = None,
+    *,
+    remanent_magnetization: Numbers | None = None,
+    applied_flux_density: Numbers | None = None,
+    load_factor: float = 1.0,
+    gravity_factor: float = 1.0,
+    field_factor: float = 1.0,
+    motion_factor: float = 1.0,
+    values: dict[Any, Any] | None = None,
+    modes: int = 1,
+) -> Buckling:
+    """The smallest positive multiples of the controls at which a scene buckles, by linear theory.
+
+    With K(q, c) the Hessian, c the controls and u the linear response to them,
+
+        (K + lambda dK) v = 0,     dK = d/dt K(rest + t u, t c) at t = 0, by a central difference     [Pa m]
+
+    so the state before buckling is assumed proportional to lambda, and K to change linearly along it. Exact
+    in the limit of small displacements before buckling: columns, plates loaded in their plane, closed shells.
+    A shallow arch that softens on its way needs ms.follow. Controls and values as in ms.equilibrium; a field's own
+    stiffness counts.
+
+    equilibrium: of this scene, a stable one: a grown or loaded sheet, one in a field. K is then that of the equilibrium, u
+        the response to controls that go from its own to those given here (`ms.linear_response`), and the factors are
+        shares of that way: the parameter of ms.follow(..., start=). Magnetization and values are its own.
+
+    modes: how many to find. Fewer come back where the others lie beyond what linear theory can tell: where
+        the sheet has moved by a tenth of its size, or at a thousand times the first factor of either sign.
+
+    Joints that pull at rest, or have motors, are refused, as they are no controls. Bodies in contact are refused: a contact
+    bears in one direction only, so that a mode and its opposite have different factors, and none of them is linear;
+    ms.follow passes where contacts open and close. So are actuators that are springs of their own.
+
+    Raises ValueError on bad input, about an equilibrium that is not stable, with its own controls, or one that requires a
+    gradient, as there is none here; in a scene with contact of bodies, where the supports leave the sheet a motion without
+    stiffness, where the controls do nothing, and where the sheet does not buckle under them (a column that is pulled);
+    Interrupted.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.01, cells=(20, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0)
+    >>> load = ms.EdgeLoad(mesh.edges_at(x=0.1), (-1.0, 0, 0))
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[load])
+    >>> round(float(ms.linear_buckling(scene).factors[0]), 3)  # pi^2 E h^3 / (48 L^2) = 0.0206 N/m
+    0.021
+    """
+    modes = count("modes", modes)
+    inputs = asked_inputs(
+        "linear_buckling",
+        scene,
+        equilibrium,
+        remanent_magnetization,
+        applied_flux_density,
+        values,
+        load_factor=load_factor,
+        gravity_factor=gravity_factor,
+        field_factor=field_factor,
+        motion_factor=motion_factor,
+    )
+    refuse_springs(inputs)
+    if scene._body_contacts:
+        raise ValueError(
+            "the scene has contact of bodies, which holds in one direction only, so that no linear mode buckles: ms.follow "
+            "follows it as it opens and closes, or leave it out"
+        )
+    driven = [joint for joint in map(inputs.values.current, scene.joints) if joint._driven]
+    if equilibrium is None and (acting := [*pulling_joints(inputs), *driven]):
+        raise ValueError(
+            f"linear buckling multiplies the controls, and {acting[0]!r:.80} acts whatever they are: ms.follow has it"
+        )
+    began = time.perf_counter()
+    model = scene._model
+    if modes >= model.free_size:
+        raise ValueError(f"modes must be below the {model.free_size} unknowns of the scene, got {modes}")
+    with inputs.in_core():
+        stiffness = RestStiffness(inputs) if equilibrium is None else StiffnessAbout(equilibrium)
+        stiffness.factorize()
+        response = stiffness.response(inputs)
+        displacement = float(np.abs(model.points(response)).max())
+        change = _stiffness_change(scene, stiffness, response, displacement, inputs)
+    factors, vectors = _lowest(stiffness, change, modes, _LARGEST_DISPLACEMENT * _size(scene), displacement)
+    shapes, edge_rotations = mode_shapes(model, vectors)
+    return Buckling(
+        scene=scene,
+        factors=factors,
+        modes=shapes,
+        edge_rotations=edge_rotations,
+        factorizations=2,
+        wall_time=time.perf_counter() - began,
+        equilibrium=equilibrium,
+    )
+
+
+def _size(scene: Scene) -> float:
+    """m, of its bodies; of its links, where there is nothing else."""
+    if scene._bodies.size > 0.0:
+        return scene._bodies.size
+    return float(np.ptp(scene._model.points(scene._model.rest_state()), axis=0).max())
+
+
+def _stiffness_change(
+    scene: Scene, stiffness: Stiffness, response: np.ndarray, displacement: float, inputs: Inputs
+) -> np.ndarray:
+    """The values of dK, in the pattern of K, as the controls go from those of K to the inputs'."""
+    # Where nothing moves before buckling, K is linear in the controls and any step is exact.
+    edges = scene.mesh.edge_lengths
+    length = float(edges.mean()) if len(edges) else _size(scene)
+    moves = displacement > _ROUND_OFF * length
+    step = _PRE_LOAD * length / displacement if moves else 1.0
+
+    def values(t: float) -> np.ndarray:
+        controls = (1.0 - t) * stiffness.controls + t * inputs.controls
+        return scene._model.hessian(stiffness.state + t * response, controls)[3]
+
+    change = (values(step) - values(-step)) / (2.0 * step)
+    if not change.any():
+        raise ValueError("the controls neither load the scene nor change its stiffness: nothing buckles")
+    largest = np.abs(change).max()
+    if not largest < _LARGEST_CHANGE * abs(stiffness.matrix).max():  # NaN too
+        raise ValueError(
+            f"the controls change the stiffness by {largest:g} N/m, beyond what numbers hold: are their units right?"
+        )
+    return change
+
+
+def _lowest(
+    stiffness: Stiffness, change: np.ndarray, count: int, reach: float, displacement: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positive factors (k,), ascending, and their modes (n, k), k <= count. It moves by `reach` at most."""
+    # -dK v = (1/lambda) K v, with K positive definite: the smallest positive lambda are the largest
+    # eigenvalues.
+    negative_change = -stiffness.with_values(change)
+    size = negative_change.shape[0]
+    inverse = scipy.sparse.linalg.LinearOperator((size, size), matvec=stiffness.solve, dtype=np.float64)
+    start = np.random.default_rng(0).standard_normal(size)  # one that no symmetry is orthogonal to
+    pencil = {"A": negative_change, "M": stiffness.matrix, "Minv": inverse, "v0": start}
+    try:
+        extreme = abs(scipy.sparse.linalg.eigsh(k=1, which="LM", return_eigenvectors=False, **pencil)[0])
+        # By Sylvester's law, K + lambda dK has as many negative directions as there are factors between 0 and
+        # lambda. Looked for no further than theory reaches: beyond are strains of order one, closely spaced
+        # and meaningless.
+        largest = min(1e3 / extreme, reach / displacement if displacement > 0.0 else np.inf)
+        available = stiffness.negative_directions(largest * change)
+        if available == 0:
+            raise ValueError(
+                "nothing buckles under these controls, as far as linear theory reaches; under reversed ones it may"
+            )
+        inverses, vectors = scipy.sparse.linalg.eigsh(k=min(count, available), which="LA", **pencil)
+    except scipy.sparse.linalg.ArpackError as error:
+        raise NotConverged(f"the buckling modes did not converge: {error}. Ask for fewer modes.") from error
+    order = np.argsort(-inverses)
+    return 1.0 / inverses[order], vectors[:, order]

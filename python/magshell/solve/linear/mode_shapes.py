@@ -1,0 +1,31 @@
+"""Eigenvectors of free unknowns as shapes of the sheet."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from ... import _core
+
+
+def mode_shapes(model: _core.Model, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Displacements (k, n_v, 3), the largest component of each mode 1, and edge rotations (k, n_e) of vectors (n, k)."""
+    shapes = [_normalized(model, vector) for vector in vectors.T]
+    return (
+        np.array([model.positions(shape) for shape in shapes]),
+        np.array([model.edge_rotations(shape) for shape in shapes]),
+    )
+
+
+def _normalized(model, vector: np.ndarray) -> np.ndarray:
+    """By the vertices; by the links of a skeleton where no vertex moves."""
+    shape = model.expand(vector)
+    vertices, links = model.positions(shape), model.points(shape)
+    moved = np.abs(vertices).max(initial=0.0) > _STILL * np.abs(links).max(initial=0.0)
+    displacements = vertices if moved else links
+    return shape / displacements.ravel()[np.argmax(np.abs(displacements))]
+
+
+_STILL = 1e-9

@@ -1,0 +1,125 @@
+"""Small deflections: ms.linear_response."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..._input.tensors import detached, like
+from ..._runtime.frozen import immutable
+from ..._runtime.mixins import Drawn
+from ..._runtime.solver_entry_point import solve_entry
+from ...model.scene.scene import Scene
+from ..statics.equilibrium import Equilibrium
+from .base_state import StiffnessAbout, asked_inputs
+from .rest import RestStiffness, forces_at_rest
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Computed, Numbers
+
+
+@immutable
+@dataclass(frozen=True, repr=False)
+class LinearResponse(Drawn):
+    """What linear theory says of a scene: the deflection in proportion to the controls. Not an equilibrium.
+
+    displacements: (n_v, 3) m, from the rest shape, or from the equilibrium that was given; edge_rotations: (n_e,) rad, zero
+        where an edge has none.
+    equilibrium: that one, or None. factorizations: one.
+    """
+
+    scene: Scene
+    displacements: Any
+    edge_rotations: Any
+    factorizations: int
+    wall_time: float
+    equilibrium: Equilibrium | None = None
+
+    @property
+    def positions(self) -> Computed:
+        """(n_v, 3) m. They mean something as long as the displacements are small."""
+        from_, of = self.scene.mesh.rest_positions, self.displacements
+        if self.equilibrium is not None:
+            from_ = detached(self.equilibrium.positions)
+        return from_ + of if isinstance(of, np.ndarray) else of + of.new_tensor(np.array(from_))
+
+    def __repr__(self) -> str:
+        moved = float(np.linalg.norm(np.asarray(self.displacements), axis=1).max(initial=0.0))
+        return f"LinearResponse: largest displacement {moved:.4g} m, {self.wall_time:.3g} s"
+
+
+@solve_entry
+def linear_response(
+    scene: Scene,
+    equilibrium: Equilibrium | None = None,
+    *,
+    remanent_magnetization: Numbers | None = None,
+    applied_flux_density: Numbers | None = None,
+    load_factor: float = 1.0,
+    gravity_factor: float = 1.0,
+    field_factor: float = 1.0,
+    motion_factor: float = 1.0,
+    values: dict[Any, Any] | None = None,
+) -> LinearResponse:
+    """The deflection to first order in the loads, by one factorization of the stiffness at the rest shape.
+
+    The stiffness is that of the unloaded sheet: loads and fields act as the forces they are at rest, without
+    the stiffness they add; supports that move do so at the rate they start with. Torques, springs, servos and limits that
+    pull in joints at rest are loads too, and motors move. Controls and values as in ms.equilibrium.
+
+    equilibrium: of this scene, a stable one: a grown or loaded sheet, one in a field. The deflection is then that from there
+        as the controls go from its own to those given here, to first order: the tangent of ms.follow(..., start=) at its
+        start. The stiffness is that of the equilibrium, with what loads, fields and actuators add to it; magnetization and
+        values are its own. Contacts stay as they are.
+
+    What no stiffness couples with a load stays at rest, and costs nothing: of a flat sheet in a coordinate plane, bending
+    where it is loaded across, stretching where it is loaded in its plane.
+
+    Raises ValueError on bad input, about an equilibrium that is not stable, with its own controls, under a pressure without
+    a potential, or one that requires a gradient, as there is none here; and where the supports leave a motion without
+    stiffness to what is loaded; Interrupted.
+
+    remanent_magnetization, applied_flux_density, load_factor, gravity_factor, field_factor, motion_factor: as in
+    `equilibrium`.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(20, 4))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0)
+    >>> load = ms.EdgeLoad(mesh.edges_at(x=0.1), (0, 0, 0.01))
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[load])
+    >>> tip = ms.linear_response(scene).displacements[mesh.vertices_at(x=0.1), 2].mean()
+    >>> round(float(tip), 3)  # p L^3 / (3 E I) = 0.04
+    0.04
+    """
+    began = time.perf_counter()
+    inputs = asked_inputs(
+        "linear_response",
+        scene,
+        equilibrium,
+        remanent_magnetization,
+        applied_flux_density,
+        values,
+        load_factor=load_factor,
+        gravity_factor=gravity_factor,
+        field_factor=field_factor,
+        motion_factor=motion_factor,
+    )
+    given = inputs.given if equilibrium is None else [*inputs.given, equilibrium.positions]
+    at_rest = forces_at_rest(inputs) if equilibrium is None else None
+    with inputs.in_core():
+        if equilibrium is None:
+            change = RestStiffness(inputs).response(inputs, at_rest)
+        else:
+            change = StiffnessAbout(equilibrium).response(inputs)
+    model = scene._model
+    return LinearResponse(
+        scene=scene,
+        displacements=like(model.positions(change), *given),
+        edge_rotations=like(model.edge_rotations(change), *given),
+        factorizations=1,
+        wall_time=time.perf_counter() - began,
+        equilibrium=equilibrium,
+    )

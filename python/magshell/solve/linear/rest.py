@@ -1,0 +1,89 @@
+"""A scene's stiffness at its rest shape, unloaded: what linear theory works with."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ... import _core
+from ...model.actuators.muscle import FibreStates, muscles_in
+from ...model.scene.solve_inputs import Inputs
+from .stiffness import Stiffness, refuse_indefinite
+
+_ROUND_OFF = 1e-9  # of a muscle's strength
+
+
+class RestStiffness(Stiffness):
+    """The Hessian K at the rest shape without controls.
+
+    Raises ValueError where actuators are springs of their own, which are no part of K, and as `refuse_what_acts`; once
+    something is factorized, where that is not positive definite: the scene is not held, or not stable at rest.
+    """
+
+    def __init__(self, inputs: Inputs):
+        scene = inputs.scene
+        refuse_springs(inputs)
+        refuse_what_acts(inputs)
+        super().__init__(scene._model, scene._model.rest_state(), scene._control_layout.zeros(), "at rest")
+
+    def response(self, inputs: Inputs, at_rest: np.ndarray | None = None) -> np.ndarray:
+        """du of all unknowns, held ones included: K du = g(0) - g(c) - K dm, with dm what supports and motors move. Where
+        the whole K is not factorized, only what is coupled with a load is, and the rest of K need not be regular.
+
+        at_rest: g(0) by `forces_at_rest`; by default with all that joints do, which is no load then.
+        """
+        model, layout = self._model, inputs.scene._control_layout
+        if not self.factorized:
+            found = model.small_deflection(self.state, self.controls, inputs.controls, at_rest)
+            if not len(motion := found.motion):
+                refuse_indefinite(found.report, found.unknowns, self._where)
+            return motion
+        moved = model.prescribed_rate(self.controls) * layout.of(inputs.controls, "scene", "motion_factor")
+        moved = moved + model.driven_increment(self.state, self.controls)
+        forces = (self.gradient if at_rest is None else at_rest) - model.gradient(self.state, inputs.controls)
+        return self.answer(forces, moved)
+
+
+def refuse_springs(inputs: Inputs) -> None:
+    """Raises ValueError where an actuator is a spring of its own."""
+    if springs := [each for each in map(inputs.values.current, inputs.scene.actuators) if each._is_spring]:
+        raise ValueError(
+            f"linear theory takes the stiffness at rest without what acts there, and {springs[0]!r} is a spring that "
+            "acts: ms.equilibrium, ms.follow, ms.vibration_modes and ms.linear_response about an equilibrium have it"
+        )
+
+
+def pulling_joints(inputs: Inputs) -> dict[Any, Any]:
+    """{joint of the scene: itself without what pulls at rest} of those in which something does."""
+    joints = {own: inputs.values.current(own) for own in inputs.scene.joints}
+    return {own: joint._resting for own, joint in joints.items() if joint._resting is not joint}
+
+
+def forces_at_rest(inputs: Inputs) -> np.ndarray | None:
+    """g(0) of all unknowns at the rest shape, without what pulls in joints: so that this is a load. None where nothing
+    pulls."""
+    if not (pulling := pulling_joints(inputs)):
+        return None
+    scene = inputs.scene
+    with inputs.values.with_objects(pulling).in_core():
+        return scene._model.gradient(scene._model.rest_state(), scene._control_layout.zeros())
+
+
+def refuse_what_acts(inputs: Inputs) -> None:
+    """Raises ValueError where a muscle pulls at the rest shape, or a sheet has grown, whatever the controls: it is no
+    equilibrium then."""
+    model = inputs.scene._model
+    for body in map(inputs.values.current, inputs.scene._bodies.sheets):
+        if body._has_grown:
+            raise ValueError(
+                f"{body!r} has grown or bent at rest, and its rest shape is no equilibrium then: find one with "
+                "ms.equilibrium, and hand it over as `equilibrium`"
+            )
+    for k, muscle in enumerate(muscles_in(inputs.scene)):
+        states = FibreStates(*_core.fibre_states(model, k, model.rest_state(), None))
+        if np.abs(states.tensions).max() > _ROUND_OFF * inputs.values.current(muscle).strength:
+            raise ValueError(
+                f"{muscle!r} pulls at the rest shape, which is no equilibrium then: find one with ms.equilibrium, and hand "
+                "it over as `equilibrium`; without activation its stiffness at rest counts"
+            )

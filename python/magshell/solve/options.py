@@ -1,0 +1,332 @@
+"""Holds the options of solves as objects: methods, integrators, and what a motion stores for its gradient."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from .. import _core
+from .._input.arrays import count
+from .._input.quantity import quantity
+from .._input.scalars import not_negative
+from .._input.tensors import detached, is_tensor
+from .._runtime.frozen import immutable
+
+if TYPE_CHECKING:
+    from .._input.kinds import Numbers
+    from ..model.scene.scene import Scene
+    from .dynamics.trajectory import MotionState
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Counts steps, so that a motion in parts has the times of one in one piece, to the last bit: sums would not.
+
+    origin: s; time_step: s; steps: that were taken since the origin.
+    """
+
+    origin: float
+    time_step: float = 0.0
+    steps: int = 0
+
+    @property
+    def time(self) -> float:
+        """s"""
+        return self.at(0)
+
+    def at(self, steps: Any, share: Any = 0.0) -> Any:
+        """The times [s] when so many more steps, and a share of another, have been taken: numbers or arrays."""
+        return self.origin + ((self.steps + steps) + share) * self.time_step
+
+    def after(self, steps: int) -> Clock:
+        return Clock(self.origin, self.time_step, self.steps + steps)
+
+    def going_on(self, time_step: float) -> Clock:
+        """With other steps counting begins again."""
+        return self if self.time_step == time_step else Clock(self.time, time_step)
+
+    def moment(self, steps: Any, share: float, time_step: Numbers) -> Any:
+        """As at(); where `time_step` is a tensor, another in its graph, with the time now as it is."""
+        time = self.at(steps, share)
+        if not is_tensor(time_step):
+            return time
+        time_step = time_step.double()
+        return time + (steps + share) * (time_step - time_step.detach())
+
+
+def clock_of(state: MotionState) -> Clock:
+    """A MotionState's. One whose time was set by hand begins to count there."""
+    clock = state.clock
+    return clock if clock is not None and clock.time == state.time else Clock(float(detached(state.time)))
+
+
+@immutable
+@dataclass(frozen=True)
+class Newton:
+    """Newton's method with the stresses of the trial state, in adaptive load steps. For comparison.
+
+    tolerance: of the residual, relative to the forces that cancel in it. Beyond what round-off of the positions makes of
+        these forces no solve goes: where parts are stiff, time steps short or chains of links long (angles of 200 links over
+        10 m are known to 1e-13), that is more than the tolerance, and results have fewer digits.
+    max_iterations: a load step that needs more is halved.
+    first_load_step: of the way from the old controls to the new ones, in (0, 1].
+    smallest_load_step: below it, the solve relaxes down the energy instead (implicit Euler steps of a gradient flow). Up
+        to 1/64 it is that of ways of usual length: where the whole way leads many extents far, shorter ones are tried.
+    max_relaxation_steps: how many of those before it gives up.
+    max_factorizations: how many of them before an equilibrium is given up, wherever it is then; 20 iterations without one
+        count as one. The dearest of the cases in tests/hard that end well takes half of the default.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    >>> ms.equilibrium(scene, solver=ms.Newton(max_iterations=500)).stable
+    True
+    """
+
+    tolerance: float = 1e-10
+    max_iterations: int = 20
+    first_load_step: float = 1.0
+    smallest_load_step: float = 1.0 / 64.0
+    max_relaxation_steps: int = 500
+    max_factorizations: int = 5000
+
+    _mixed = False
+
+    def __post_init__(self) -> None:
+        if not 0.0 < quantity("tolerance", "1", self.tolerance, ()) < 1.0:
+            raise ValueError(f"tolerance must be in (0, 1), got {self.tolerance}")
+        for name in ("first_load_step", "smallest_load_step"):
+            if not 0.0 < quantity(name, "1", getattr(self, name), ()) <= 1.0:
+                raise ValueError(f"{name} must be in (0, 1], got {getattr(self, name)}")
+        for name in ("max_iterations", "max_relaxation_steps", "max_factorizations"):
+            count(name, getattr(self, name))
+
+    def _newton_options(self) -> _core.NewtonOptions:
+        return _core.NewtonOptions(
+            mixed=self._mixed, tolerance=self.tolerance, max_iterations=self.max_iterations
+        )
+
+    def _options(self) -> _core.StaticsOptions:
+        options = _core.StaticsOptions()
+        options.newton = self._newton_options()
+        options.first_step = self.first_load_step
+        options.smallest_step = self.smallest_load_step
+        options.max_relaxation_steps = self.max_relaxation_steps
+        options.max_factorizations = self.max_factorizations
+        return options
+
+
+@immutable
+@dataclass(frozen=True)
+class MixedNewton(Newton):
+    """Newton's method with stresses of their own (mixed integration points), in adaptive load steps. The default.
+
+    Takes a thin shell to a large deflection in a handful of iterations where `Newton` takes dozens; same solution.
+    Options as for Newton.
+
+    tolerance, max_iterations, first_load_step, smallest_load_step, max_relaxation_steps, max_factorizations: as in `Newton`.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    >>> ms.equilibrium(scene, solver=ms.MixedNewton(max_iterations=100)).stable
+    True
+    """
+
+    _mixed = True
+
+
+@immutable
+@dataclass(frozen=True)
+class ProjectiveDynamics:
+    """Implicit Euler in local and global steps, with a matrix that stays factorized ([Qiao21] 3, Algorithm 1).
+
+    The matrix is M/dt^2 + L, L a constant in the place of the stiffness, the same along x, y, z: of `ms.Projective` solids
+    that of Bouaziz et al. 2014, of other solids with their modulus of waves at rest, 2 mu + lam (Liu, Bouaziz, Kavan 2017),
+    which is slower where they get much stiffer; of shells that of waves in their plane, and their bending as it is at rest,
+    edge rotations with it, along normals that turn with the sheet. It takes more rounds the thinner they are, and with
+    bending="midedge" as many as with "hinge". A round then is a quasi-Newton step on the residual of ms.ImplicitEuler,
+    corrected by the last few steps (L-BFGS); converged, a step is that of ms.ImplicitEuler. A muscle adds w m m^T to L, its
+    stiffness or peak stress along its fibres. Bodies that touch each other or themselves add the stiffness of the pairs
+    that touch to the solution with the matrix in every round; of more than 1000 such numbers, the stiffest. Loads, fields,
+    water, cells, cavities, tendons, joints and obstacles act as they do there, without a share in L; what is stiff among
+    them takes more rounds, and a history.
+
+    iterations: rounds of a step, at most.
+    tolerance: of the residual, relative to the forces that cancel in it, as Newton's. A step that does not reach it is taken
+        in halves. None: every step takes just `iterations` rounds, whatever is left; such steps have no gradient.
+    history: steps that L-BFGS goes by, and Anderson's acceleration with contact="coulomb"; 0: the rounds as they are.
+    contact: "penalty": as each ms.Contact and ms.SelfContact says, as in the other integrators. "coulomb": hard, by
+        Coulomb's law, in every round ([Qiao21] 5; Ly et al. 2020): of obstacles vertices keep just the `offset`; bodies keep
+        the reach and the minimal distance together from each other, by vertices and faces and by edges that cross.
+        Stiffness, smoothing and sticking speed do not count. Such motions have no gradient: forces jump where points touch,
+        stick or slip. It takes supports that hold vertices entirely, no rigid parts, no points on faces (`face_samples`)
+        and one coefficient of friction. Where fine surfaces lie flat on each other, a step takes hundreds of rounds.
+
+    Gradients are those of the solved step, by the exact Hessian: as of every integrator, and as exact as the tolerance.
+
+    >>> import magshell as ms
+    >>> bar = ms.meshes.box((0.1, 0.02, 0.02), cells=(10, 2, 2))
+    >>> soft = ms.Projective(young_modulus=1e5, poisson_ratio=0.4)
+    >>> solid = ms.Solid(bar, material=soft, mass_density=1e3, element="linear")
+    >>> scene = ms.Scene(solid, supports=[ms.Pin(bar.vertices_at(x=0.0))], gravity=(0, 0, -9.81))
+    >>> move = ms.simulate(scene, steps=5, time_step=5e-3, integrator=ms.ProjectiveDynamics())
+    >>> bool(move.positions[-1, :, 2].min() < -1e-4)
+    True
+    """
+
+    iterations: int = 500
+    tolerance: float | None = 1e-10
+    history: int = 8
+    contact: str = "penalty"
+
+    _name = "euler"
+    _times = (1.0,)
+
+    def __post_init__(self) -> None:
+        count("iterations", self.iterations)
+        count("history", self.history, least=0)
+        if self.contact not in ("penalty", "coulomb"):
+            raise ValueError(f'contact must be "penalty" or "coulomb", got {self.contact!r}')
+        if self.tolerance is not None and not 0.0 < quantity("tolerance", "1", self.tolerance, ()) < 1.0:
+            raise ValueError(f"tolerance must be in (0, 1), or None, got {self.tolerance}")
+
+    def without_gradient(self, scene: Scene) -> str:
+        """Why motions of a scene have no gradient; empty where they do."""
+        if self.tolerance is None:
+            return (
+                "ProjectiveDynamics(tolerance=None) stops before its steps are solved, so that they are no function of the "
+                "inputs alone; give it a tolerance"
+            )
+        if self.contact == "coulomb" and scene.contacts:
+            return 'forces jump with ProjectiveDynamics(contact="coulomb"); take contact="penalty"'
+        return ""
+
+    @property
+    def _projective(self) -> tuple[int, float, int, bool]:
+        tolerance = 0.0 if self.tolerance is None else self.tolerance
+        return self.iterations, tolerance, self.history, self.contact == "coulomb"
+
+
+@immutable
+@dataclass(frozen=True)
+class ImplicitEuler:
+    """First order, one solve a step, as in [Chen22] (26)-(28). Damps: a vibration of 40 steps a period keeps a share
+    of e^-1 of its energy for about 6.5 steps.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    >>> ms.simulate(scene, steps=2, time_step=1e-3, integrator=ms.ImplicitEuler()).steps_done
+    2
+    """
+
+    _name = "euler"
+    _times = (1.0,)  # of the stages, as shares of the step
+
+
+@immutable
+@dataclass(frozen=True)
+class TRBDF2:
+    """Second order, two solves a step, L-stable: the trapezoidal rule, then BDF2. The default.
+
+    At 40 steps a period, a vibration loses 0.36 % of its energy over 20 periods if it is small, about 1 % if it bends
+    a strip by a third of its length. A field that jumps between two steps is felt half over the first 0.59 of the step
+    after it. The first step is one of SDIRK2; with rigid parts, only the first 64th of it is.
+    R. E. Bank et al., IEEE Trans. Electron Devices 32 (1985); M. E. Hosea and L. F. Shampine, Appl. Numer. Math. 20 (1996).
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    >>> ms.simulate(scene, steps=2, time_step=1e-3, integrator=ms.TRBDF2()).steps_done
+    2
+    """
+
+    _name = "tr_bdf2"
+    _times = (2.0 - 2.0**0.5, 1.0)
+
+
+@immutable
+@dataclass(frozen=True)
+class SDIRK2:
+    """Second order, two solves a step, L-stable: R. Alexander, SIAM J. Numer. Anal. 14 (1977).
+
+    Small vibrations go as with TRBDF2, of which it has the stability function. One that bends a thin strip by a tenth
+    of its length loses 5 to 8 % of its energy over 20 periods of 40 steps, four times less with half the step: along a
+    curved motion its stages stretch the sheet, and that is damped. It needs nothing but positions and velocities of the
+    step before: for fields that jump often.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    >>> ms.simulate(scene, steps=2, time_step=1e-3, integrator=ms.SDIRK2()).steps_done
+    2
+    """
+
+    _name = "sdirk2"
+    _times = (1.0 - 0.5**0.5, 1.0)
+
+
+@immutable
+@dataclass(frozen=True)
+class SDIRK3:
+    """Third order, three solves a step, L-stable; same source as SDIRK2.
+
+    The order shows in small motions, and where steps resolve the waves of the membrane. Thin sheets that move far get
+    second order from it, as they do under stiffness-proportional damping.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    >>> ms.simulate(scene, steps=2, time_step=1e-3, integrator=ms.SDIRK3()).steps_done
+    2
+    """
+
+    _name = "sdirk3"
+    _times = (0.43586652150845899942, 0.5 * (1.0 + 0.43586652150845899942), 1.0)
+
+
+Integrator = ImplicitEuler | TRBDF2 | SDIRK2 | SDIRK3 | ProjectiveDynamics
+
+
+KINDS = ("stages", "checkpoints", "factors")
+
+
+@immutable
+@dataclass(frozen=True)
+class Keep:
+    """What a motion keeps for its gradients, and how much of it: `keep` of ms.simulate.
+
+    what: "stages", all states; "checkpoints", between which the steps are taken again on the way back, some of them several
+        times; "factors": all states with their factorizations, which pays where several gradients are taken of one motion.
+        None: all states if they fit into the budget, else checkpoints. `keep="factors"` is short for ms.Keep("factors").
+    memory_budget: bytes.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.05, 0.01, cells=(4, 1))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    >>> ms.simulate(scene, steps=2, time_step=5e-3, keep=ms.Keep("checkpoints", memory_budget=1e6)).keep
+    'nothing'
+    """
+
+    what: str | None = None
+    memory_budget: float = 2e9
+
+    def __post_init__(self) -> None:
+        if self.what not in (None, *KINDS):
+            raise ValueError(
+                f'keep must be "stages", "checkpoints", "factors" or None, got {self.what!r:.60}'
+            )
+        object.__setattr__(self, "memory_budget", not_negative("memory_budget", "bytes", self.memory_budget))
+
+
+def kept(keep: str | Keep | None) -> Keep:
+    """What a caller hands in, as a Keep. Raises ValueError."""
+    return keep if isinstance(keep, Keep) else Keep(keep)

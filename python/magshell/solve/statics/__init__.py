@@ -1,0 +1,1 @@
+"""Solves for equilibria: one, load cases, paths, several stable ones."""

@@ -1,0 +1,100 @@
+"""Values that move along a path of equilibria: on straight lines from those of its start to those that were asked for."""
+
+from __future__ import annotations
+
+import copy
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...model.contact.obstacles import Obstacle
+from ...model.scene.solve_inputs import Inputs
+from ...model.scene.time_series import names_in_time, values_between
+from ...model.scene.values import Values
+from ...model.supports.supports import Support
+
+if TYPE_CHECKING:
+    from .start import Origin
+
+
+class AlongPath:
+    """What of the values at `start` (an Equilibrium, or None: nothing) is elsewhere at the end of the path.
+
+    entries: of the core's values, those that vary; before, after: their numbers, which follow the other controls.
+    at_once: what cannot move, or is neither an obstacle nor a support, is at its end from the start on. Without it, raises
+    ValueError where anything differs that cannot move.
+    """
+
+    after: np.ndarray
+    before: np.ndarray
+
+    def __init__(self, inputs: Inputs, start: Origin, at_once: bool = False):
+        self._layout = inputs.scene._value_layout
+        self._after = inputs.values
+        self._before = inputs.values if start is None else start._values
+        differ = _differing(self._layout, self._before, self._after)
+        can = _keys_that_move(inputs)
+        if at_once:
+            differ = [key for key in differ if isinstance(can.get(key), Obstacle | Support)]
+        if fixed := [name for owner, name in differ if (owner, name) not in can]:
+            raise ValueError(
+                f"start has another {fixed[0]} than the path, which cannot change on its way; what can is the place of "
+                "field sources, obstacles and supports, pressures, what acts in joints, activations of muscles and growth"
+            )
+        self._keys = differ
+        every = list(self._layout)
+        self.entries: list[int] = [every.index(key) for key in differ]
+        self._owners = {id(can[key]): can[key] for key in differ}
+        self.before, self.after = (
+            np.concatenate([np.zeros(0), *(self._part(values, key).ravel() for key in differ)])
+            for values in (self._before, self._after)
+        )
+
+    def values(self, parameter: float) -> Values:
+        """Those of the scene there."""
+        if not self.entries or parameter == 1.0:
+            return self._after
+        there = copy.copy(self._after)
+        parts = [[self._part(values, key) for values in (self._before, self._after)] for key in self._keys]
+        there.numbers = self._layout.packed(
+            {
+                key: (1.0 - parameter) * before + parameter * after
+                for key, (before, after) in zip(self._keys, parts, strict=True)
+            },
+            self._after.numbers,
+        )
+        there._now, there.replaced = dict(self._after._now), dict(self._after.replaced)
+        for owner in self._owners.values():
+            ends = [values.current(owner) for values in (self._before, self._after)]
+            named = values_between(*ends, parameter)
+            there._now[owner] = ends[1].replaced(**named)
+            there.replaced[owner] = {**there.replaced.get(owner, {}), **named}
+        if any(isinstance(owner, Support) for owner in self._owners.values()):
+            there.constraints = there._moved()
+        return there
+
+    def _part(self, values: Values, key: tuple[str, str]) -> np.ndarray:
+        return self._layout.of(values.numbers, *key)
+
+
+def all_can_move(inputs: Inputs, start: Origin) -> bool:
+    """Whether all values that `start` has elsewhere can vary on the way from there."""
+    can = _keys_that_move(inputs)
+    return all(key in can for key in _differing(inputs.scene._value_layout, start._values, inputs.values))
+
+
+def _differing(layout, before: Values, after: Values) -> list[tuple[str, str]]:
+    return [
+        key
+        for key in layout
+        if not np.array_equal(layout.of(before.numbers, *key), layout.of(after.numbers, *key))
+    ]
+
+
+def _keys_that_move(inputs: Inputs) -> dict[tuple[str, str], object]:
+    """{(the core's name for an object, name of a value): the object} of all that can move."""
+    scene = inputs.scene
+    can = {(label, name): each for each, label in scene._labels for name in names_in_time(each)}
+    for k, move in enumerate(scene._constraints.moves):
+        can |= {(f"move {k}", name): move.support for name in names_in_time(move.support)}
+    return can

@@ -1,0 +1,189 @@
+"""Why a search for an equilibrium failed, as far as can be seen, and what would help."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...model.bodies.words import called
+from ...model.fields.magnet_overlap import told_inside
+from ...model.shells.obtuse_faces import describe_faces
+from ...model.supports.constraints import free_rigid_motions
+from .load_strain import strain_of_loads
+
+if TYPE_CHECKING:
+    from ... import _core
+    from ...model.scene.solve_inputs import Inputs
+
+# Of a face, over the usual length of an edge: below, round-off hides what is stiff less.
+SHORTEST_HEIGHT = 1e-4
+NEARLY_FLAT = np.radians(150.0)  # largest angle of a face that counts as almost flat
+_MOST_NAMED = 4  # places in a message
+LARGEST_STRAIN = 1.0  # of what acts at rest: beyond, a unit is likely to be wrong
+_SMALLEST_MOVE = 1e-6  # of the sheet's size, in one step of relaxation
+
+
+def why_not(inputs: Inputs, found: _core.StaticsResult, at_rest: bool) -> str:
+    """The text of a NotConverged. found: what the core handed back; at_rest: whether it started from an equilibrium."""
+    scene, failed = inputs.scene, found.failed
+    whole = found.progress >= 1.0
+    head = (
+        f"no stable equilibrium was found at the new controls, in {found.iterations} iterations"
+        if whole
+        else f"the solve stopped at {found.progress:.3g} of the way to the new controls, after {found.iterations} "
+        "iterations"
+    )
+    kept = (
+        "The unstable one is in `error.last_good`; require_stable=False accepts it."
+        if whole
+        else "The last converged state is in `error.last_good`."
+    )
+    sentences = [f"{head}: {found.reason}."]
+    near = np.zeros(0, dtype=int)  # vertices that have to do with it
+    if found.effort_spent:
+        sentences += _seen(inputs, found)
+    elif failed.state.size:
+        sentences += _attempts(found, at_rest and not whole, scene._bodies)
+        told, near = _places(inputs, found)
+        sentences += told
+        positions = scene._model.positions(failed.state)
+        fields = map(inputs.values.current, scene.fields)
+        if inside := told_inside(fields, positions, scene.mesh.edge_lengths):
+            return " ".join([*sentences, inside, kept])
+    return " ".join([*sentences, _advice(inputs, found, at_rest, near), kept])
+
+
+def _seen(inputs, found) -> list[str]:
+    """What of a search that cost too much."""
+    scene, failed = inputs.scene, found.failed
+    state = failed.state if failed.state.size else found.state
+    controls = failed.controls if failed.state.size else found.controls
+    with inputs.in_core():
+        energy = sum(energy for _, energy in scene._model.term_energies(state, found.turns, controls))
+    moved = np.linalg.norm(scene._model.positions(state) - scene.mesh.rest_positions, axis=1).max(initial=0.0)
+    return [
+        f"Then the energy was {energy:.3g} J, and the largest displacement {moved:.3g} m, "
+        f"{moved / scene._bodies.extent:.2g} of the extent."
+    ]
+
+
+def _attempts(found, in_steps: bool, bodies) -> list[str]:
+    told = []
+    if in_steps and found.failed.shortest_step < 1.0:
+        told.append(f"Load steps were shortened to {found.failed.shortest_step:.2g} of the way.")
+    steps = found.relaxation_steps
+    if steps == 0:
+        told.append("Relaxation found no step to take.")
+    else:
+        taken, last = ("1 step", "it") if steps == 1 else (f"{steps} steps", "its last one")
+        moved = f"; {last} still moved {called(bodies.listed)} by {found.failed.last_move:.2g} m"
+        stood = " and came to a standstill"
+        told.append(f"Relaxation took {taken}{moved if _still_moves(found.failed, bodies.size) else stood}.")
+    return told
+
+
+def _still_moves(failed, size: float) -> bool:
+    return failed.last_move > _SMALLEST_MOVE * size
+
+
+def _places(inputs, found) -> tuple[list[str], np.ndarray]:
+    """Where forces are out of balance and where the energy still falls, in words and as vertices."""
+    if found.relaxation_steps == 0:  # the forces are still those that the new controls began with
+        return [], np.zeros(0, dtype=int)
+    model, failed = inputs.scene._model, found.failed
+    with inputs.in_core():
+        gradient = model.gradient(failed.state, failed.controls)
+    told, near = [], []
+    for vector, text in (
+        (model.expand(model.reduce(gradient)), "The forces are out of balance most"),
+        (failed.falling, "The energy still falls along a motion"),
+    ):
+        sizes = np.linalg.norm(model.positions(vector), axis=1) if vector.size else np.zeros(0)
+        if not (np.isfinite(sizes).all() and sizes.any()):
+            continue
+        vertices = np.argsort(-sizes, kind="stable")[:_MOST_NAMED]
+        vertices = vertices[sizes[vertices] > 0.1 * sizes.max()]
+        share = np.linalg.norm(sizes[vertices]) / np.linalg.norm(sizes)
+        many = "vertices" if len(vertices) > 1 else "vertex"
+        told.append(f"{text} at {many} {_listed(vertices)} ({share:.0%} of it).")
+        near.append(vertices)
+    return told, np.concatenate(near) if near else np.zeros(0, dtype=int)
+
+
+def _advice(inputs, found, at_rest: bool, near: np.ndarray) -> str:
+    scene, shell = inputs.scene, inputs.values.whole
+    free = [f"rigid part {k}" for k, part in enumerate(scene.rigid_parts) if part.vertices is None]
+    if free and "singular" in found.reason:
+        return (
+            f"The scene has free bodies ({', '.join(free)}), and what acts on them holds them nowhere: an equilibrium of a "
+            "free body needs a field or a contact that does, or look at its motion by ms.simulate."
+        )
+    if not scene.bodies:
+        return "Start from a nearby equilibrium."
+    if "inside out" in found.reason:
+        return (
+            "Start from positions where no element is so, take smaller steps there, or a material that has an energy "
+            "there (StableNeoHookean)."
+        )
+    if not scene._bodies.flat_sheets_alone:
+        return _advice_of_any(inputs, found, at_rest)
+    mesh, quality = scene.mesh, shell.quality
+    tiny = np.flatnonzero(quality.heights < SHORTEST_HEIGHT * np.median(mesh.edge_lengths))
+    if tiny.size:
+        return (
+            f"{describe_faces(shell, tiny[np.argsort(quality.heights[tiny], kind='stable')])} nearly degenerate: "
+            "beside their stiffness, that of the rest is lost in round-off. Merge their vertices, or leave such faces "
+            "out of the mesh; `mesh.quality` has the shapes of all."
+        )
+    if free := _free(inputs, found):
+        return free
+    beside = np.flatnonzero(np.isin(mesh.faces, near).any(axis=1))
+    flat = beside[quality.largest_angles[beside] > NEARLY_FLAT]
+    if flat.size:
+        return (
+            f"{describe_faces(shell, flat[np.argsort(-quality.largest_angles[flat], kind='stable')])} beside that, and "
+            "almost flat: mend the mesh there first."
+        )
+    return _advice_of_any(inputs, found, at_rest)
+
+
+def _free(inputs, found) -> str:
+    scene = inputs.scene
+    free = free_rigid_motions(scene._bodies, scene._constraints) if "singular" in found.reason else []
+    if not free:
+        return ""
+    return (
+        f"The supports leave {called(scene._bodies.listed)} free ({'; '.join(free)}): add supports, unless a field or "
+        "gravity holds there."
+    )
+
+
+def _advice_of_any(inputs, found, at_rest: bool) -> str:
+    """Whatever the bodies are."""
+    scene = inputs.scene
+    if free := _free(inputs, found):
+        return free
+    if (strain := strain_of_loads(inputs)) > LARGEST_STRAIN:
+        return (
+            f"What acts on the bodies at rest would strain them by about {strain:.2g}: is a modulus [Pa], a thickness [m] "
+            "or a load in another unit?"
+        )
+    if "through an obstacle" in found.reason:
+        return (
+            "What presses a body onto an obstacle presses it through: take a larger contact_stiffness [N/m] of the Contact, "
+            "move the obstacle less in a solve, or a thicker obstacle."
+        )
+    if found.effort_spent and at_rest:
+        return "Start from a nearby equilibrium, or allow it more (max_factorizations of the solver)."
+    if _still_moves(found.failed, scene._bodies.size):
+        return "Allow it more steps (max_relaxation_steps of the solver), or start from a nearby equilibrium."
+    if not at_rest:
+        return "Start from positions closer to an equilibrium."
+    return (
+        "Start from a nearby equilibrium, or let load steps get shorter (smallest_load_step of the solver)."
+    )
+
+
+def _listed(numbers: np.ndarray) -> str:
+    return ", ".join(map(str, numbers.tolist()))

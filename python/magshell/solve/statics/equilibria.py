@@ -1,0 +1,114 @@
+"""Several equilibria of one scene: of load cases, or at the same controls."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..._input.checked_list import listed
+from ..._input.tensors import stacked
+from ..._runtime.mixins import Kept
+from ...model.bodies.bodies import BODIES
+from ...model.results.result_lookup import OfOneBody, result_of
+from .equilibrium import Equilibrium
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Computed
+    from ...model.scene.scene import Scene
+
+
+class Equilibria(Kept, OfOneBody, Sequence[Equilibrium]):
+    """A scene at rest in each of k load cases, or in k ways in one; a sequence of Equilibrium.
+
+    positions, displacements: (k, n_v, 3) m; edge_rotations: (k, n_e) rad. Tensors where those of the cases are.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    >>> ms.Equilibria([ms.equilibrium(scene), ms.equilibrium(scene, gravity_factor=0.5)]).positions.shape
+    (2, 33, 3)
+    """
+
+    def __init__(self, cases: Iterable[Equilibrium]):
+        self._cases = tuple(listed("cases", cases, lambda given: isinstance(given, Equilibrium)))
+        for case in self._cases:
+            if not isinstance(case, Equilibrium):
+                raise ValueError(f"cases must hold Equilibrium objects, got {type(case).__name__}")
+        self.positions: Any | np.ndarray = stacked([case.positions for case in self._cases])
+        self.edge_rotations: Any | np.ndarray = stacked([case.edge_rotations for case in self._cases])
+
+    def __getstate__(self) -> dict[Any, Any]:
+        return {"_cases": self._cases}
+
+    def __setstate__(self, kept: dict[Any, Any]) -> None:
+        self.__init__(kept["_cases"])
+
+    @property
+    def scene(self) -> Scene:
+        """Of all cases."""
+        return self._cases[0].scene
+
+    @property
+    def displacements(self) -> Computed:
+        """(k, n_v, 3) m, from the rest shape."""
+        return stacked([case.displacements for case in self._cases])
+
+    @property
+    def energy(self) -> np.ndarray:
+        """(k,) J, the potential energy of each."""
+        return np.array([case.energy for case in self._cases])
+
+    @property
+    def stable(self) -> bool:
+        """Whether all are."""
+        return all(case.stable for case in self._cases)
+
+    @property
+    def largest_membrane_strain(self) -> float:
+        """Of all cases."""
+        return max(case.largest_membrane_strain for case in self._cases)
+
+    @property
+    def largest_bending_strain(self) -> float:
+        """Of all cases."""
+        return max(case.largest_bending_strain for case in self._cases)
+
+    @property
+    def wall_time(self) -> float:
+        """s, in all."""
+        return sum(case.wall_time for case in self._cases)
+
+    @property
+    def factorizations(self) -> int:
+        """In all."""
+        return sum(case.factorizations for case in self._cases)
+
+    def strains(self, index: int = -1) -> Any:
+        """The strains that one of the cases, by default the last, says: `Equilibrium.strains`."""
+        return self._cases[index].strains()
+
+    def _values_at(self, index: int):
+        return self._cases[index]._values
+
+    @property
+    def _load_factors(self) -> np.ndarray:
+        return np.array([case._load_factors for case in self._cases])
+
+    def _state_at(self, index: int) -> np.ndarray:
+        return self._cases[index]._state
+
+    def __len__(self) -> int:
+        return len(self._cases)
+
+    def __getitem__(self, index: Any) -> Any:
+        """A case, some of them, or what all say of one body of the scene."""
+        if isinstance(index, BODIES) or hasattr(index, "_result_in"):
+            return result_of(self, index)
+        chosen = self._cases[index]
+        return Equilibria(chosen) if isinstance(index, slice) else chosen
+
+    def __repr__(self) -> str:
+        return "\n".join([f"Equilibria: {len(self)}", *(repr(case) for case in self._cases)])

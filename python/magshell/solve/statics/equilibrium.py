@@ -1,0 +1,174 @@
+"""The state of a scene at rest, and what it took to find it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..._input.tensors import detached, plain_arrays
+from ..._runtime.frozen import immutable
+from ..._runtime.mixins import Kept
+from ...mesh.triangles.self_intersections import told
+from ...model.contact.body_contact import BodyContact
+from ...model.contact.contact import Contact
+from ...model.results.result_lookup import OfOneBody, result_of
+from ...model.results.solid_result import told_strains
+from ...model.scene.contact_state import Touching, touching_in
+from ...model.scene.reactions import Reaction, reaction_in
+from ...model.scene.scene import Scene
+from ...model.scene.values import Values
+from ...model.shells.strains import Largest, strains_of
+from ...model.supports.supports import Clamp, Pin, SymmetryPlane
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Computed
+
+
+@immutable
+@dataclass(frozen=True, repr=False)
+class Equilibrium(Kept, OfOneBody):
+    """A scene at rest. With several bodies, rows are those of one after another; `equilibrium[body]` has those of one.
+
+    positions: (n_v, 3) m; edge_rotations: (n_e,) rad, zero where an edge has none.
+    remanent_magnetization: (n_f, 3) A/m, or None; applied_flux_density: (3,) T, the uniform part.
+    energies: J, by term. stable: no direction lowers the energy; unstable_directions: how many do.
+    residual: relative to the forces that cancel in it, and to their round-off. at_roundoff: whether round-off ended the
+        solve, above the solver's tolerance, as of very thin sheets and long chains.
+    progress: how far the controls got, 1 unless a solve failed.
+    largest_membrane_strain, largest_bending_strain: magnitudes, 1, of what `strains` has. Beyond 0.2 the sheet leaves
+        the model, of which ms.LargeStrainWarning warns.
+    wall_time, linear_time: s, in all and in factorizations and back-substitutions. memory: bytes, of the core.
+    """
+
+    scene: Scene
+    positions: Any
+    edge_rotations: Any
+    remanent_magnetization: Any
+    applied_flux_density: Any
+    energies: dict[str, float]
+    stable: bool
+    unstable_directions: int
+    iterations: int
+    factorizations: int
+    failed_factorizations: int
+    load_steps: int
+    relaxation_steps: int
+    saddles_left: int
+    residual: float
+    at_roundoff: bool
+    progress: float
+    largest_membrane_strain: float
+    largest_bending_strain: float
+    wall_time: float
+    linear_time: float
+    memory: int
+    factorization: str
+    _state: np.ndarray = field(repr=False)
+    _turns: list[Any] = field(repr=False)
+    _controls: Any = field(repr=False)
+    _values: Any = field(repr=False)
+    _own_points: Any = field(repr=False, default=None)  # (10 a rigid part, 3)
+    _driving: Any = field(repr=False, default=None)  # (m,) N m or N, of motors in joints, in the core's order
+
+    def __copy__(self) -> Equilibrium:
+        return self  # nothing of it changes
+
+    def __getstate__(self) -> dict[Any, Any]:
+        """What a copy, another process or a file makes it from again: tensors as arrays, without their gradients."""
+        return {**plain_arrays(vars(self)), "_values": self._values.kept()}
+
+    def __setstate__(self, kept: dict[Any, Any]) -> None:
+        values = Values.again(kept["scene"], kept["_values"])
+        Kept.__setstate__(self, {**kept, "_values": values})
+
+    def __getitem__(self, body: Any) -> Any:
+        """What it says of one body of the scene."""
+        return result_of(self, body)
+
+    @property
+    def displacements(self) -> Computed:
+        """(n_v, 3) m, from the rest shape."""
+        rest = self.scene.mesh.rest_positions
+        if isinstance(self.positions, np.ndarray):
+            return self.positions - rest
+        return self.positions - self.positions.new_tensor(np.array(rest))
+
+    def _values_at(self, index: int):
+        return self._values
+
+    @property
+    def _load_factors(self) -> np.ndarray:
+        """Of its one state, ()."""
+        return self.scene._control_layout.of(self._controls, "scene", "load_factor")[0]
+
+    def _state_at(self, index: int) -> np.ndarray:
+        return self._state
+
+    @property
+    def energy(self) -> float:
+        """The potential energy, J."""
+        return sum(self.energies.values())
+
+    def strains(self) -> Any:
+        """The principal strains of every face of the sheets, Strains; where a solid is alone, what result[solid] says.
+
+        >>> import magshell as ms
+        >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+        >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0)
+        >>> ends = [ms.Pin(mesh.vertices_at(x=0.0)), ms.Pin(mesh.vertices_at(x=0.1), displacement=(0.01, 0, 0))]
+        >>> rest = ms.equilibrium(ms.Scene(sheet, supports=ends))
+        >>> rest.strains().membrane[0].round(3)  # (1.1^2 - 1)/2 along, nothing across
+        array([0.105, 0.   ])
+        """
+        if (solid := self._one_solid()) is not None:
+            return solid.strains()
+        with self._values.growth_in_core():
+            return strains_of(self.scene, self._state, self._values.whole.thickness)
+
+    def touching(self, contact: BodyContact | Contact) -> Touching:
+        """The pairs of a contact that touch, and their forces."""
+        return touching_in(self.scene, self._values, contact, self._state)
+
+    def reaction(self, support: Pin | Clamp | SymmetryPlane) -> Reaction:
+        """With what forces a support of the scene holds it.
+
+        >>> import magshell as ms
+        >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+        >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+        >>> clamp = ms.Clamp(mesh.edges_at(x=0.0))
+        >>> rest = ms.equilibrium(ms.Scene(sheet, supports=[clamp], gravity=(0, 0, -9.81)))
+        >>> round(float(rest.reaction(clamp).force[2]), 5)  # the weight of 2 g
+        0.01962
+        """
+        with self._values.in_core():
+            held = self.scene._model.held_forces(self._state, self._turns, self._controls)
+        return reaction_in(self.scene, support, self._state, held.reshape(-1, 3))
+
+    def self_intersections(self) -> np.ndarray:
+        """The faces that pass through each other, as in TriangleMesh.self_intersections, (k, 2)."""
+        return self.scene.mesh.self_intersections(detached(self.positions))
+
+    def __repr__(self) -> str:
+        moved = float(np.linalg.norm(np.asarray(detached(self.displacements)), axis=1).max(initial=0.0))
+        kind = "stable" if self.stable else f"unstable in {self.unstable_directions} directions"
+        if not self.stable and self.unstable_directions == 0:
+            kind = "not known to be stable"
+        if self.progress < 1.0:
+            kind += f", {self.progress:.1%} of the way"
+        energies = ", ".join(f"{name} {value:.4g}" for name, value in self.energies.items())
+        strain = Largest(self.largest_membrane_strain, self.largest_bending_strain)
+        crossings = told(self.scene.mesh, np.asarray(detached(self.positions))[None])
+        extra = f", {self.saddles_left} saddles left" if self.saddles_left else ""
+        extra += f", {self.relaxation_steps} relaxation steps" if self.relaxation_steps else ""
+        ended = " at round-off" if self.at_roundoff else ""
+        return (
+            f"Equilibrium: {kind}; largest displacement {moved:.4g} m\n"
+            f"  {told_strains(self, strain)}\n"
+            f"  {crossings}\n"
+            f"  energy {self.energy:.6g} J ({energies})\n"
+            f"  {self.iterations} iterations, {self.factorizations} factorizations, {self.load_steps} load steps{extra}\n"
+            f"  residual {self.residual:.1e}{ended}, {self.wall_time:.3g} s, {self.memory / 1e6:.3g} MB, "
+            f"{self.factorization}"
+        )

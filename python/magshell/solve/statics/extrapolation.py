@@ -1,0 +1,215 @@
+"""Richardson extrapolation from nested meshes: ms.extrapolated."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..._input.quantity import real_numbers
+from ..._input.scalars import positive
+from ..._input.tensor_kinds import is_tensor
+from ..._input.tensors import detached
+from ..._runtime.frozen import immutable
+from ...errors import NotConverged
+from ...mesh.nesting import Nesting, nesting
+from ...mesh.tetrahedra.tet_mesh import TetMesh
+from ...mesh.triangles.six_node_mesh import SixNodeMesh
+from ...mesh.triangles.triangle_mesh import TriangleMesh
+
+_USUAL_ORDER, _OF_SIX_NODES = 2.0, 4.0
+_LEAST_ORDER = 0.5  # of three values that converge at all
+_ROUND_OFF = 1e-12  # of the values: differences below tell no order
+
+
+@immutable
+@dataclass(frozen=True)
+class Extrapolation:
+    """What nested meshes say of the exact solution; each a number, an array, or a dict of these, as `solve` returned.
+
+    value: extrapolated to infinitely fine meshes. Where values are by vertex, at the vertices of the coarsest mesh;
+        of six-node elements at their corners, mesh.corner_vertices.
+    error: how far the finest mesh's own value is from it. That of `value` itself is smaller, by one or two powers of the
+        mesh width where that is fine enough.
+    order: the power of the mesh width with which errors fall: the one assumed, or found from three meshes.
+    values: of each mesh, the coarsest first.
+    """
+
+    _as_given: ClassVar = ("values",)
+
+    value: Any
+    error: Any
+    order: Any
+    values: tuple[Any, ...]
+
+    def __repr__(self) -> str:
+        if isinstance(self.value, dict):
+            told = [
+                f"{name}: {_told(self.value[name], self.error[name], self.order[name])}"
+                for name in self.value
+            ]
+            return "\n  ".join([f"Extrapolation of {len(self.values)} meshes", *told])
+        return f"Extrapolation of {len(self.values)} meshes: {_told(self.value, self.error, self.order)}"
+
+
+def extrapolated(
+    solve: Callable[..., Any], meshes: Sequence[Any], *, order: float | None = None
+) -> Extrapolation:
+    """What `solve` tends to as the mesh becomes finer, and how far it still is from that.
+
+    With f at mesh width h, c at r h, and errors that fall as h^p (Richardson 1911):
+
+        value = f + (f - c) / (r^p - 1),     error = |value - f|
+
+    solve: called with each mesh; returns a number, an array, a tensor, or a dict of these, in whatever units: deflections,
+        reactions, energies, frequencies, critical fields, positions. Arrays have one shape on all meshes, or a row for
+        each vertex of the mesh: (n_v, ...). Gradients go back through tensors.
+    meshes: two or three TriangleMeshes, SixNodeMeshes or TetMeshes, the coarsest first, each dividing the cells of the one
+        before it alike: by mesh.refined(), or by a generator with twice its cells (never with irregular=...). refined() of
+        curved elements stays on their surface, and so does the limit; a generator's meshes come nearer to the true one.
+    order: p. By default 2 with two meshes, of six-node elements 4; with three what their values say, of an array by the
+        norms of its differences: p = log(|m - c| / |f - m|) / log r.
+
+    Works where errors are smooth in h: not beside cracks, reentrant corners and point supports that the mesh resolves
+    badly, nor where meshes find different equilibria. Three meshes tell. Six-node elements reach their order only where the
+    solution is smooth: under a point force it is 2 to 3, and two meshes that assume 4 then find `error` up to five times too
+    small, so take three.
+
+    Raises ValueError where the meshes are not nested, or what solve returns differs in shape; NotConverged where the
+    values of three meshes do not converge, with an Extrapolation in `last_good` that has the finest mesh's value and the
+    largest difference.
+
+    >>> import magshell as ms
+    >>> def tip(mesh):
+    ...     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+    ...     scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
+    ...     rest = ms.equilibrium(scene, remanent_magnetization=(4e4, 0, 0), applied_flux_density=(0, 0, 2e-3))
+    ...     return rest.positions[mesh.nearest_vertex((0.1, 0.01, 0)), 2]
+    >>> coarse = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> found = ms.extrapolated(tip, [coarse, coarse.refined()])
+    >>> bool(found.error < 0.01 * found.value)
+    True
+    """
+    meshes = _checked_meshes(meshes)
+    if not callable(solve):
+        raise ValueError(f"solve must be a function of a mesh, got {solve!r:.60}")
+    given = None if order is None else positive("order", "", order)
+    if given is None and len(meshes) == 2:
+        given = _OF_SIX_NODES if isinstance(meshes[0], SixNodeMesh) else _USUAL_ORDER
+    names = [f"meshes[{k}]" for k in range(len(meshes))]
+    nests = [
+        nesting(coarse, fine, (names[k], names[k + 1]))
+        for k, (coarse, fine) in enumerate(itertools.pairwise(meshes))
+    ]
+    if len({nest.ratio for nest in nests}) > 1:
+        raise ValueError(
+            f"meshes must be refined alike, got edges divided by {nests[0].ratio}, then by {nests[1].ratio}"
+        )
+    returned = [solve(mesh) for mesh in meshes]
+    kept = [{name: _checked(name, value) for name, value in _named(each).items()} for each in returned]
+    for each, mesh_name in zip(kept[1:], names[1:], strict=True):
+        if each.keys() != kept[0].keys():
+            raise ValueError(
+                f"solve returned {sorted(each)} for {mesh_name}, but {sorted(kept[0])} for {names[0]}"
+            )
+    found = {name: _of_one(name, [each[name] for each in kept], meshes, nests, given) for name in kept[0]}
+    plain = not isinstance(returned[0], dict)
+    value, error, orders = (
+        found[""][k] if plain else {name: each[k] for name, each in found.items()} for k in range(3)
+    )
+    result = Extrapolation(value, error, orders, tuple(returned))
+    for name, (*_, why) in found.items():
+        if why:
+            raise NotConverged(
+                f"{_the(name)} does not converge with the mesh: {why}, which tells no limit. Take finer meshes, or see "
+                "whether all find the same equilibrium; `error.last_good` has the values.",
+                result,
+            )
+    return result
+
+
+def _of_one(
+    name: str, values: list[Any], meshes: list[Any], nests: list[Nesting], order: float | None
+) -> tuple[Any, ...]:
+    """Value, error, order, and where it does not converge how it changes, in words."""
+    values = _at_same_points(name, values, meshes, nests)
+    fine, ratio = values[-1], nests[0].ratio
+    differences = [after - before for before, after in itertools.pairwise(values)]
+    if _norm(differences[-1]) <= _ROUND_OFF * _norm(fine):
+        return fine, abs(differences[-1]), math.nan if order is None else order, ""
+    if order is None:
+        order, why = _found_order(differences, ratio)
+        if why:
+            return fine, abs(max(differences, key=_norm)), order, why
+    change = differences[-1] / (ratio**order - 1.0)
+    return fine + change, abs(change), order, ""
+
+
+def _found_order(differences: list[Any], ratio: int) -> tuple[float, str]:
+    """The order, and where there is none how the values change."""
+    first, last = (_norm(each) for each in differences)
+    order = math.log(first / last) / math.log(ratio) if first > 0.0 else -math.inf
+    along = np.vdot(*(np.asarray(detached(each)) for each in differences))
+    if along > 0.0 and order >= _LEAST_ORDER:
+        return order, ""
+    back = " and turns back" if along < 0.0 else ""
+    return order, f"it changes by {first:.3g} and then by {last:.3g}{back}"
+
+
+def _at_same_points(name: str, values: list[Any], meshes: list[Any], nests: list[Nesting]) -> list[Any]:
+    shapes = [tuple(value.shape) for value in values]
+    if len(set(shapes)) == 1:
+        return values
+    by_vertex = all(shape[:1] == (mesh.n_vertices,) for shape, mesh in zip(shapes, meshes, strict=True))
+    if not by_vertex or len({shape[1:] for shape in shapes}) > 1:
+        raise ValueError(
+            f"{_the(name)} must have one shape on all meshes, or a row for each vertex, got {', '.join(map(str, shapes))}"
+        )
+    rows = np.flatnonzero(nests[0].vertices >= 0)
+    at_coarse = [values[0][rows]]
+    for value, nest in zip(values[1:], nests, strict=True):
+        rows = nest.vertices[rows]
+        at_coarse.append(value[rows])
+    return at_coarse
+
+
+def _checked_meshes(meshes) -> list[Any]:
+    listed = list(meshes) if isinstance(meshes, Sequence) else [meshes]
+    for k, mesh in enumerate(listed):
+        if not isinstance(mesh, TriangleMesh | SixNodeMesh | TetMesh):
+            raise ValueError(
+                f"meshes[{k}] must be a TriangleMesh, a SixNodeMesh or a TetMesh, got {type(mesh).__name__}"
+            )
+    if len(listed) not in (2, 3):
+        raise ValueError(f"meshes must be two or three, the coarsest first, got {len(listed)}")
+    return listed
+
+
+def _named(returned) -> dict[Any, Any]:
+    return returned if isinstance(returned, dict) else {"": returned}
+
+
+def _checked(name: str, value):
+    numbers = real_numbers(_the(name), detached(value))
+    if not np.isfinite(numbers).all():
+        raise ValueError(f"{_the(name)} is not finite")
+    return value if is_tensor(value) else numbers[()]  # a number stays one
+
+
+def _the(name) -> str:
+    return f"what solve returns as {name!r}" if name != "" else "what solve returns"
+
+
+def _norm(value) -> float:
+    return float(np.linalg.norm(np.asarray(detached(value)).ravel()))
+
+
+def _told(value, error, order: float) -> str:
+    if np.ndim(detached(value)):
+        off = f"the finest mesh is off by at most {float(np.max(np.asarray(detached(error)))):.2g}"
+        return f"{tuple(value.shape)}, {off}, order {order:.3g}"
+    return f"{float(value):.8g}, the finest mesh is off by {float(error):.2g}, order {order:.3g}"

@@ -1,0 +1,360 @@
+"""Paths of equilibria through limit points: ms.follow."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ... import _core
+from ..._input.arrays import count, number
+from ..._input.scalars import positive
+from ..._runtime.frozen import immutable
+from ..._runtime.log import log
+from ..._runtime.mixins import Filmed
+from ..._runtime.progress import SolveBar
+from ..._runtime.solver_entry_point import grouped, solve_entry
+from ...errors import Interrupted, NotConverged
+from ...mesh.triangles.self_intersections import told
+from ...model.results.result_lookup import OfOneBody, result_of
+from ...model.results.solid_result import told_strains
+from ...model.scene.scene import Scene
+from ...model.scene.solve_inputs import Inputs, plain_inputs
+from ...model.scene.values import Values
+from ...model.shells.obtuse_faces import warn_of_caps
+from ...model.shells.strains import StrainHistory, strains_of, warn_if_large
+from ..options import MixedNewton, Newton
+from .along_path import AlongPath
+from .equilibrium import Equilibrium
+from .single_solve import solve
+from .start import starting_point
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Numbers
+
+
+@immutable
+@dataclass(frozen=True)
+class CriticalPoint:
+    """Where a path gains or loses an unstable direction.
+
+    parameter: on the path. kind: "limit" (the path turns round here) or "bifurcation" (another branch crosses).
+    positions: (n_v, 3) m. mode: (n_v, 3), the displacement that costs nothing here, largest component 1.
+    after_point: index of the last point of the path before it.
+    """
+
+    parameter: float
+    kind: str
+    positions: np.ndarray = field(repr=False)
+    mode: np.ndarray = field(repr=False)
+    after_point: int
+
+
+@immutable
+@dataclass(frozen=True, repr=False)
+class Path(Filmed, OfOneBody):
+    """A path of equilibria, stable and unstable. `path[body]` has those of one body.
+
+    parameters: (n,), 0 at the controls of the start, 1 at the new ones. positions: (n, n_v, 3) m.
+    unstable_directions: (n,), zero where the equilibrium is stable. critical: CriticalPoints, in order.
+    remanent_magnetization: (n_f, 3) or (3,) A/m, or None.
+    largest_membrane_strain, largest_bending_strain: (n,), magnitudes, 1, of what `strains` has. Beyond 0.2 the sheet
+        leaves the model, of which ms.LargeStrainWarning warns.
+    """
+
+    scene: Scene
+    parameters: np.ndarray
+    positions: np.ndarray
+    unstable_directions: np.ndarray
+    critical: tuple[CriticalPoint, ...]
+    remanent_magnetization: Any
+    largest_membrane_strain: np.ndarray
+    largest_bending_strain: np.ndarray
+    iterations: int
+    factorizations: int
+    failed_factorizations: int
+    wall_time: float
+    reason: str
+    _points: list[Any] = field(repr=False)
+    _inputs: Inputs = field(repr=False)
+    _moving: AlongPath = field(repr=False)
+    _from: Any = field(repr=False)
+    _to: Any = field(repr=False)
+
+    def equilibrium(self, index: int) -> Equilibrium:
+        """One of the points, stable or not, as an Equilibrium: to look at, or to start another solve from."""
+        index = range(len(self))[index]
+        controls = self._controls[index]
+        options = MixedNewton()._options()
+        options.require_stable = False
+        point = self._points[index]
+        inputs = self._inputs.with_values(self._moving.values(self.parameters[index]))
+        return solve(inputs, point.state, point.turns, controls, controls, options).equilibrium
+
+    def strains(self, index: int = -1) -> Any:
+        """The principal strains of every face of the sheets, Strains, at one of the points, by default the last; where a
+        solid is alone, what result[solid] says."""
+        if (solid := self._one_solid()) is not None:
+            return solid.strains(index)
+        with self._values_at(index).growth_in_core():
+            return strains_of(self.scene, self._state_at(index), self._inputs.values.whole.thickness)
+
+    def __getitem__(self, body: Any) -> Any:
+        """What it says of one body of the scene, a row for each point; points themselves: `equilibrium`."""
+        return result_of(self, body)
+
+    @property
+    def displacements(self) -> np.ndarray:
+        """(n, n_v, 3) m, from the rest shape."""
+        return self.positions - self.scene.mesh.rest_positions
+
+    @property
+    def edge_rotations(self) -> np.ndarray:
+        """(n, n_e) rad, zero where an edge has none."""
+        return self._at_points(self.scene._model.edge_rotations)
+
+    @property
+    def _own_points(self) -> np.ndarray:
+        """(n, 10 a rigid part, 3) m, of the rigid parts."""
+        return self._at_points(self.scene._model.points)[:, self.scene.mesh.n_vertices :]
+
+    @property
+    def _driving(self) -> np.ndarray:
+        """(n, m) N m or N, of motors in joints."""
+        model, rows = self.scene._model, []
+        for k, (point, controls) in enumerate(zip(self._points, self._controls, strict=True)):
+            with self._values_at(k).in_core():
+                rows.append(model.driving(point.state, controls, point.turns))
+        return np.array(rows)
+
+    def _at_points(self, what: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """(n, ...), of each point's state."""
+        shape = what(self.scene._model.rest_state()).shape
+        return np.reshape([what(point.state) for point in self._points], (len(self), *shape))
+
+    def _state_at(self, index: int) -> np.ndarray:
+        return self._points[index].state
+
+    @property
+    def _load_factors(self) -> np.ndarray:
+        return self._control("load_factor")[:, 0]
+
+    def _values_at(self, index: int):
+        return self._moving.values(self.parameters[index])
+
+    @property
+    def applied_flux_densities(self) -> np.ndarray:
+        """The uniform field at each point, (n, 3), T."""
+        return self._control("applied_flux_density")[:, 0]
+
+    @property
+    def _controls(self) -> np.ndarray:
+        """All of them at each point, (n, m): on a straight line."""
+        along = self.parameters[:, None]
+        return (1.0 - along) * self._from + along * self._to
+
+    def _control(self, name: str) -> np.ndarray:
+        return self.scene._control_layout.of(self._controls, "scene", name)
+
+    @property
+    def stable(self) -> np.ndarray:
+        """(n,), bool."""
+        return self.unstable_directions == 0
+
+    def __len__(self) -> int:
+        return len(self.parameters)
+
+    def __repr__(self) -> str:
+        lines = [f"Path: {len(self)} equilibria"]
+        if len(self):
+            lowest, highest = self.parameters.min(), self.parameters.max()
+            lines[0] += f", {int(self.stable.sum())} of them stable, parameter {lowest:.4g} to {highest:.4g}"
+        lines += [
+            f"  {point.kind} at {point.parameter:.6g}, after point {point.after_point}"
+            for point in self.critical
+        ]
+        strain = StrainHistory(self.largest_membrane_strain, self.largest_bending_strain)
+        lines.append(f"  {told_strains(self, strain)}")
+        lines.append(f"  {told(self.scene.mesh, self.positions)}")
+        lines.append(
+            f"  {self.iterations} iterations, {self.factorizations} factorizations, {self.wall_time:.3g} s"
+        )
+        return "\n".join(lines)
+
+
+@grouped(solver=MixedNewton)
+@solve_entry
+def follow(
+    scene: Scene,
+    *,
+    remanent_magnetization: Numbers | None = None,
+    applied_flux_density: Numbers | None = None,
+    load_factor: float = 1.0,
+    gravity_factor: float = 1.0,
+    field_factor: float = 1.0,
+    motion_factor: float = 1.0,
+    values: dict[Any, Any] | None = None,
+    start: Equilibrium | None = None,
+    until: Callable[[float, np.ndarray], bool] | None = None,
+    first_step: float = 0.05,
+    largest_step: float = 0.02,
+    lowest_parameter: float = -np.inf,
+    max_points: int = 1000,
+    locate_critical: bool = True,
+    solver: Newton | None = None,
+    progress: bool = True,
+) -> Path:
+    """Follows a path of equilibria by arc length, from `start` as its controls go towards the new ones.
+
+    The path parameter is 0 at the controls of `start` (an Equilibrium of this scene; by default the rest shape,
+    unloaded) and 1 at those given here; it may turn back on the way, and the path with it. The path ends where the
+    parameter passes 1 or `lowest_parameter`, or where until(parameter, positions) says so. Controls as in ms.equilibrium.
+
+    values: as in ms.equilibrium. Where `start` was found with other places of field sources, obstacles or supports, or with
+        other activations of muscles, those move along the path, on straight lines from the start's to these; everything
+        else has to be the same.
+
+    first_step: of the parameter. largest_step: root mean square displacement between points, over the mesh's size.
+    locate_critical: find limit points and bifurcations between points whose numbers of unstable directions differ.
+    progress: show a bar once a path has taken two seconds.
+
+    Raises NotConverged and Interrupted with the path so far as `last_good`; ValueError on bad input.
+
+    max_points: where the path ends at the latest.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+    >>> load = ms.EdgeLoad(mesh.edges_at(x=0.1), (-0.4, 0, 0))
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[load])
+    >>> path = ms.follow(scene)  # straight, beyond where it buckles
+    >>> path.critical[0].kind
+    'bifurcation'
+    """
+    solver = MixedNewton() if solver is None else solver
+    if not isinstance(solver, Newton):
+        raise ValueError(f"solver must be a MixedNewton or a Newton, got {type(solver).__name__}")
+    first_step, largest_step = (
+        positive("first_step", "", first_step),
+        positive("largest_step", "", largest_step),
+    )
+    max_points = count("max_points", max_points, least=2)
+    lowest_parameter = number("lowest_parameter", lowest_parameter)
+    if not lowest_parameter < 0:
+        raise ValueError(f"lowest_parameter must be below 0, where the path starts, got {lowest_parameter}")
+    if until is not None and not callable(until):
+        raise ValueError(f"until must be a function of (parameter, positions), got {until!r}")
+    if start is not None and not isinstance(start, Equilibrium):
+        raise ValueError(f"start must be an Equilibrium of this scene, got {type(start).__name__}")
+    inputs = plain_inputs(
+        scene,
+        remanent_magnetization,
+        applied_flux_density,
+        values,
+        load_factor=load_factor,
+        gravity_factor=gravity_factor,
+        field_factor=field_factor,
+        motion_factor=motion_factor,
+    )
+    state, turns, from_, _ = starting_point(scene, start, inputs)
+    moving = AlongPath(inputs, start)
+    options = _core.PathOptions()
+    options.newton = solver._newton_options()
+    options.first_step, options.largest_step = first_step, largest_step
+    options.lowest_parameter, options.max_points = max(lowest_parameter, -1e300), max_points
+    options.locate_critical = locate_critical
+
+    began = time.perf_counter()
+    with inputs.in_core(), SolveBar("path", progress) as bar:
+        found = _core.follow_path(
+            scene._model,
+            state,
+            turns,
+            np.concatenate([from_, moving.before]),
+            np.concatenate([inputs.controls, moving.after]),
+            options,
+            moving.entries,
+            until,
+            _advance(bar),
+        )
+        bending = _bending_energies(scene, found, inputs.controls)
+    path = _path(inputs, moving, found, from_, time.perf_counter() - began)
+    log.debug("path: %s, %d points, %.3g s", found.outcome.name, len(path), path.wall_time)
+    if found.outcome == _core.Outcome.interrupted:
+        raise Interrupted(f"interrupted after {len(path)} points of the path", path)
+    if found.outcome == _core.Outcome.failed:
+        raise NotConverged(
+            f"the path ended after {len(path)} points, at parameter {path.parameters[-1] if len(path) else 0:.4g}: "
+            f"{found.reason}. What it has so far is in `error.last_good`.",
+            path,
+        )
+    if len(bending):
+        most = int(np.argmax(bending))
+        where = f"the path, at parameter {path.parameters[most]:.4g},"
+        warn_of_caps(scene, path.positions[most], inputs.values.whole, bending[most], where)
+    strain = StrainHistory(path.largest_membrane_strain, path.largest_bending_strain)
+    k = strain.worst
+    warn_if_large(path, strain.at(k), f"the path, at point {k}, parameter {path.parameters[k]:.4g}", (k,))
+    return path
+
+
+def _bending_energies(scene: Scene, found, controls) -> list[float]:
+    """Of its points, where faces are to be looked at for which that matters."""
+    if not scene._bodies.flat_sheets_alone or not scene._caps.faces.size:
+        return []
+    return [scene._model.energies(point.state, controls).get("bending", 0.0) for point in found.points]
+
+
+def _advance(bar):
+    def advance(parameter: float, residual: float) -> None:
+        bar.note(f"parameter {parameter:.4g}")
+        bar.to(parameter)
+
+    return advance
+
+
+def _path(inputs: Inputs, moving: AlongPath, found, from_, wall_time: float) -> Path:
+    scene = inputs.scene
+    model = scene._model
+    points = found.points
+    strain = StrainHistory.of([_largest(model, moving.values(point.parameter), point) for point in points])
+    return Path(
+        scene=scene,
+        parameters=np.array([point.parameter for point in points]),
+        positions=np.array([model.positions(point.state) for point in points]).reshape(
+            len(points), scene.mesh.n_vertices, 3
+        ),
+        unstable_directions=np.array([point.unstable_directions for point in points], dtype=int),
+        critical=tuple(_critical(model, point) for point in found.critical),
+        remanent_magnetization=inputs.given_magnetization,
+        largest_membrane_strain=strain.membrane,
+        largest_bending_strain=strain.bending,
+        iterations=found.iterations,
+        factorizations=found.factorizations,
+        failed_factorizations=found.failed_factorizations,
+        wall_time=wall_time,
+        reason=found.reason,
+        _points=points,
+        _inputs=inputs,
+        _moving=moving,
+        _from=from_,
+        _to=inputs.controls,
+    )
+
+
+def _largest(model, values: Values, point) -> tuple[Any, ...]:
+    with values.growth_in_core():
+        return model.largest_strains(point.state, values.whole.thickness)
+
+
+def _critical(model, found) -> CriticalPoint:
+    return CriticalPoint(
+        parameter=found.point.parameter,
+        kind="limit" if found.kind == _core.CriticalKind.limit else "bifurcation",
+        positions=model.positions(found.point.state),
+        mode=model.positions(found.mode),
+        after_point=found.after_point,
+    )

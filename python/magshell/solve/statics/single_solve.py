@@ -1,0 +1,243 @@
+"""One search for an equilibrium: from checked arguments to a result, or to an error that holds one."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ... import _core
+from ..._input.scalars import flag
+from ..._input.tensors import dtype_like, is_tensor, like
+from ..._runtime.keywords import FACTORS
+from ..._runtime.log import log
+from ...errors import Interrupted, NotConverged
+from ...model.contact.contacts_to_core import check_apart
+from ...model.scene.field_sampling import warn_of_sampling
+from ...model.scene.replacements import SHELL_NAMES, requested
+from ...model.scene.scene import Scene
+from ...model.scene.solve_inputs import Inputs
+from ...model.shells.obtuse_faces import warn_of_caps
+from ...model.shells.strains import Largest, largest_of, warn_if_large
+from ..adjoint.static import Adjoint
+from ..options import MixedNewton, Newton
+from .along_path import AlongPath, all_can_move
+from .diagnosis import why_not
+from .equilibrium import Equilibrium
+from .start import starting_point
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Starting
+    from .start import Origin
+
+
+class Solution(NamedTuple):
+    """An equilibrium, what the core found (with the factorization, where it was to be kept), and for what inputs."""
+
+    equilibrium: Equilibrium
+    found: Any
+    inputs: Inputs
+
+
+def _unnoted(text: str) -> None:
+    """Where nobody looks."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """How to look. Raises ValueError where an option is no such thing.
+
+    progress, note: what is called as it goes on. at_rest: without forces of motion.
+    """
+
+    solver: Newton = field(default_factory=MixedNewton)
+    require_stable: bool = True
+    progress: Callable[[float, float], None] | None = None
+    at_rest: bool = False
+    note: Callable[[str], None] = _unnoted
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.solver, Newton):
+            raise ValueError(f"solver must be a MixedNewton or a Newton, got {type(self.solver).__name__}")
+        if not isinstance(self.require_stable, bool):
+            raise ValueError(f"require_stable must be True or False, got {self.require_stable!r}")
+        flag("at_rest", self.at_rest)
+
+    def options(self) -> _core.StaticsOptions:
+        options = self.solver._options()
+        options.require_stable = self.require_stable
+        return options
+
+
+def find(
+    scene: Scene,
+    arguments: dict[Any, Any],
+    start: Starting | Origin | None = None,
+    search: Search | None = None,
+    keep_factor: bool = False,
+) -> Solution:
+    """The equilibrium at the arguments of ms.equilibrium, cases apart. Raises as it does."""
+    search = Search() if search is None else search
+    inputs = inputs_of(scene, arguments, search.at_rest)
+    state, turns, from_, at_rest = starting_point(scene, start, inputs)
+    moving = None
+    if isinstance(start, Equilibrium) and not at_rest:
+        at_rest = all_can_move(inputs, start)
+        # Obstacles and supports push bodies along, and pass through them where they jump.
+        moving = AlongPath(inputs, start, at_once=True) if scene.obstacles and not at_rest else None
+        moving = AlongPath(inputs, start) if at_rest else moving
+    options = search.options()
+    options.start_at_rest = at_rest
+    options.keep_factor = keep_factor
+    # A volume is filled by at least as small a share of that at rest as of the way to it.
+    filling = max((each._filling(scene) for each in map(inputs.values.current, scene.actuators)), default=0.0)
+    options.smallest_step /= max(filling, 1.0)
+    with inputs.in_core():
+        check_apart(scene, state)
+    return solve(inputs, state, turns, from_, inputs.controls, options, search.progress, moving)
+
+
+def inputs_of(scene: Scene, arguments: dict[Any, Any], at_rest: bool = False) -> Inputs:
+    """The arguments of ms.equilibrium, checked against the scene."""
+    given = dict(arguments)
+    shell = {name: given.pop(name, None) for name in SHELL_NAMES}
+    vertex_loads, values = given.pop("vertex_loads", None), given.pop("values", None)
+    replaced = requested(scene, vertex_loads, values, **shell) if isinstance(scene, Scene) else None
+    magnetization = given.pop("remanent_magnetization", None)
+    flux_density = given.pop("applied_flux_density", None)
+    factors = {name: given.pop(name, 1.0) for name in FACTORS}
+    if given:
+        raise TypeError(f"equilibrium() got an unexpected keyword argument {next(iter(given))!r}")
+    return Inputs(
+        scene,
+        magnetization,
+        flux_density,
+        replaced=replaced,
+        differentiable=True,
+        without_forces_of_motion=at_rest,
+        **factors,
+    )
+
+
+def solve(
+    inputs: Inputs,
+    state: np.ndarray,
+    turns: list[Any],
+    from_: np.ndarray,
+    to: np.ndarray,
+    options: _core.StaticsOptions,
+    progress: Callable[[float, float], None] | None = None,
+    moving: AlongPath | None = None,
+) -> Solution:
+    """The core's search for an equilibrium at the controls `to`, from a state at `from_`; moving: values that go along."""
+    scene, entries = inputs.scene, []
+    if moving is not None:
+        from_, to = np.concatenate([from_, moving.before]), np.concatenate([to, moving.after])
+        entries = moving.entries
+    options.keep_factor = options.keep_factor or bool(inputs.leaves)
+    began = time.perf_counter()
+    with inputs.in_core():
+        found = _core.find_equilibrium(scene._model, state, turns, from_, to, options, progress, entries)
+        if moving is not None and found.progress < 1.0:
+            inputs = inputs.with_values(moving.values(found.progress))
+    with inputs.in_core():
+        energies = _energies(scene, found)
+        result = _result(scene, inputs, found, energies, time.perf_counter() - began)
+    log.debug(
+        "equilibrium: %s, %.4g of the way, %d iterations, %d factorizations, residual %.2g, %.3g s",
+        found.outcome.name,
+        found.progress,
+        found.iterations,
+        found.factorizations,
+        found.residual,
+        result.wall_time,
+    )
+    if found.outcome == _core.Outcome.interrupted or energies is None:
+        raise Interrupted(f"interrupted at {found.progress:.3g} of the way to the new controls", result)
+    if found.outcome == _core.Outcome.failed:
+        raise NotConverged(why_not(inputs, found, options.start_at_rest), result)
+    positions = scene._model.positions(found.state)
+    warn_of_caps(
+        scene, positions, inputs.values.whole, result.energies.get("bending", 0.0), "this equilibrium"
+    )
+    warn_if_large(
+        result, Largest(result.largest_membrane_strain, result.largest_bending_strain), "the equilibrium"
+    )
+    layout = scene._control_layout
+    field_factor = float(layout.of(found.controls, "scene", "field_factor")[0])
+    flux_density = layout.of(found.controls, "scene", "applied_flux_density")[0]
+    warn_of_sampling(inputs.values, positions, field_factor, flux_density, "this equilibrium")
+    return Solution(result, found, inputs)
+
+
+def _energies(scene: Scene, found) -> dict[str, float] | None:
+    """By term; None where Ctrl-C came meanwhile, in a field of the caller's."""
+    try:
+        return scene._model.energies(found.state, found.controls)
+    except KeyboardInterrupt:
+        return None
+
+
+def _result(
+    scene: Scene, inputs: Inputs, found, energies: dict[Any, Any] | None, wall_time: float
+) -> Equilibrium:
+    points, edge_rotations, driving = _outputs(inputs, found)
+    n_v = scene.mesh.n_vertices
+    strain = largest_of(scene, found.state, inputs.values.whole.thickness)
+    return Equilibrium(
+        scene=scene,
+        positions=points[:n_v] if scene.rigid_parts else points,
+        edge_rotations=edge_rotations,
+        remanent_magnetization=inputs.given_magnetization,
+        applied_flux_density=_flux_density(inputs, found),
+        energies=dict.fromkeys(scene._model.term_names, np.nan) if energies is None else energies,
+        stable=found.stable,
+        unstable_directions=found.unstable_directions,
+        iterations=found.iterations,
+        factorizations=found.factorizations,
+        failed_factorizations=found.failed_factorizations,
+        load_steps=found.load_steps,
+        relaxation_steps=found.relaxation_steps,
+        saddles_left=found.saddles_left,
+        residual=found.residual,
+        at_roundoff=found.at_roundoff,
+        progress=found.progress,
+        largest_membrane_strain=strain.membrane,
+        largest_bending_strain=strain.bending,
+        wall_time=wall_time,
+        linear_time=found.linear_time,
+        memory=found.bytes,
+        factorization=found.factorization,
+        _state=found.state,
+        _turns=found.turns,
+        _controls=found.controls,
+        _values=inputs.values,
+        _own_points=points[n_v:] if scene.rigid_parts else None,
+        _driving=driving,
+    )
+
+
+def _outputs(inputs: Inputs, found):
+    """Positions, points of rigid parts among them, edge rotations, and what motors do; tensors where an input asks for a
+    gradient."""
+    model, driven = inputs.scene._model, any(joint._driven for joint in inputs.scene.joints)
+    arrays = (
+        np.ascontiguousarray(model.points(found.state)),
+        model.edge_rotations(found.state),
+        model.driving(found.state, found.controls, found.turns) if driven else np.zeros(0),
+    )
+    if not inputs.leaves:
+        return tuple(like(array, *inputs.given) for array in arrays)
+    from ..adjoint.autograd import solved
+
+    return solved(Adjoint(inputs, found), arrays, dtype_like(*inputs.given), inputs.tensors)
+
+
+def _flux_density(inputs: Inputs, found):
+    if found.progress == 1.0 and is_tensor(inputs.given_flux_density):
+        return inputs.given_flux_density
+    flux_density = inputs.scene._control_layout.of(found.controls, "scene", "applied_flux_density")
+    return like(flux_density[0].copy(), *inputs.given)

@@ -1,0 +1,107 @@
+"""Equilibria of a scene: ms.equilibrium."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..._runtime.progress import told
+from ..._runtime.solver_entry_point import grouped, solve_entry
+from ...model.scene.scene import Scene
+from ..options import MixedNewton, Newton
+from .cases import find_all, split, starts_of
+from .equilibria import Equilibria
+from .equilibrium import Equilibrium
+from .single_solve import Search, find
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Numbers
+
+
+@grouped(solver=MixedNewton)
+@solve_entry
+def equilibrium(
+    scene: Scene,
+    *,
+    remanent_magnetization: Numbers | None = None,
+    applied_flux_density: Numbers | None = None,
+    load_factor: Any = 1.0,
+    gravity_factor: Any = 1.0,
+    field_factor: Any = 1.0,
+    motion_factor: Any = 1.0,
+    thickness: Numbers | None = None,
+    young_modulus: Numbers | None = None,
+    poisson_ratio: Numbers | None = None,
+    mass_density: Numbers | None = None,
+    curvature_scale: Numbers | None = None,
+    vertex_loads: Numbers | None = None,
+    values: dict[Any, Any] | None = None,
+    start: Equilibrium | Equilibria | np.ndarray | None = None,
+    require_stable: bool = True,
+    at_rest: bool = False,
+    solver: Newton | None = None,
+    progress: bool | Callable[[float, float], None] = True,
+) -> Equilibrium | Any:  # Equilibria where there are load cases
+    """A stable equilibrium of a scene, or one for each of several load cases.
+
+    remanent_magnetization: A/m, rest frame, world axes: (n_f, 3), or (3,) on every face. Needed in a scene with a field.
+    applied_flux_density: T, (3,): the value of the scene's UniformField. (k, 3): k load cases, and so many equilibria.
+    load_factor, gravity_factor, field_factor, motion_factor: on the loads, gravity, the field sources, and on how far
+        supports with a prescribed motion have gone; (k,) with load cases.
+    thickness, young_modulus, poisson_ratio, mass_density, curvature_scale: stand in for the shell's own in this solve.
+    vertex_loads: N, (n_v, 3): stand in for all forces of the scene's loads.
+    values: {object of the scene: {name: value}}, stand in for what the objects were made with: the values of loads, the
+        displacement, rotation and center of supports that move, positions and moments of Dipoles, the sizes,
+        magnetization, center and rotation of a magnet, the flux_density of a SampledField, the center and rotation of a
+        PlacedField, the law of a Contact, the center and rotation of an obstacle, the numbers of Water, and
+        {scene: {"gravity": value}}. Of applied_flux_density and the factors, the keywords are short forms of
+        {scene: {name: value}}. The scene is not analysed again. `scene.objects` lists the objects.
+    start: an earlier Equilibrium of this scene, from whose controls the solve goes to the new ones; or positions
+        (n_v, 3) m. By default the rest shape, unloaded. Load cases may have Equilibria, one each. From an Equilibrium,
+        obstacles and supports go to their new places on straight ways, in load steps so short that no point of a body
+        passes through an obstacle; where that cannot be had, NotConverged says which vertex would.
+    require_stable: leave saddles downhill. False accepts any equilibrium; `stable` says which kind it is.
+    at_rest: of a scene with friction or water, the equilibrium without them, which act on what moves only. By default such
+        a scene is refused: with friction, where it comes to rest depends on how it got there, which ms.simulate tells.
+    solver: MixedNewton() by default.
+    progress: show a bar once it has taken two seconds; or a function, called now and then with how far the controls have
+        come (0 to 1, of all load cases) and the residual.
+
+    Raises NotConverged and Interrupted (on Ctrl-C), both with the last converged state as `last_good`, which on Ctrl-C may
+    be as rough as its residual says; ValueError on bad input. With torch tensors among the inputs, positions and edge
+    rotations come back as tensors, and gradients go back from them to every input above but `start`. Each costs one
+    back-substitution with the factorization at the solution, kept as long as the result is. Asked for where the solve did
+    not converge, or at an equilibrium that is not stable, they raise NoGradient. So do second derivatives: differences of
+    gradients are exact to some 1e-8, and (g(x + h v) - g(x - h v)) / 2h is the Hessian's product with v.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
+    >>> rest = ms.equilibrium(scene, remanent_magnetization=(4e4, 0, 0), applied_flux_density=(0, 0, 2e-3))
+    >>> rest.stable, bool(rest.positions[:, 2].max() > 0.01)
+    (True, True)
+    """
+    arguments = {
+        "remanent_magnetization": remanent_magnetization,
+        "applied_flux_density": applied_flux_density,
+        "load_factor": load_factor,
+        "gravity_factor": gravity_factor,
+        "field_factor": field_factor,
+        "motion_factor": motion_factor,
+        "thickness": thickness,
+        "young_modulus": young_modulus,
+        "poisson_ratio": poisson_ratio,
+        "mass_density": mass_density,
+        "curvature_scale": curvature_scale,
+        "vertex_loads": vertex_loads,
+        "values": values,
+    }
+    with told("equilibrium", progress) as (advance, note):
+        search = Search(MixedNewton() if solver is None else solver, require_stable, advance, at_rest, note)
+        cases = split(arguments)
+        if cases is None:
+            return find(scene, arguments, start, search).equilibrium
+        return find_all(scene, cases, starts_of(start, len(cases)), search)

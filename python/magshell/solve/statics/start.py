@@ -1,0 +1,69 @@
+"""Where a solve starts from."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..._input.quantity import quantity
+from ..._input.tensors import to_array
+from ...model.contact.contacts_to_core import check_outside
+from ...model.rigid.equimomental_points import check_rigid
+from ...model.scene.scene import Scene
+from ...model.scene.solve_inputs import Inputs
+from ...model.solids.solid import Solid
+from .equilibrium import Equilibrium
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Starting
+
+
+class Origin(NamedTuple):
+    """A state that is an equilibrium for these inputs, and the turns that its terms have made on the way."""
+
+    state: np.ndarray
+    turns: list[Any]
+    inputs: Inputs
+
+
+def starting_point(
+    scene: Scene, start: Starting | Origin, inputs: Inputs
+) -> tuple[np.ndarray, list[Any], np.ndarray, bool]:
+    """State, the turns its terms have made, controls at which it holds, and whether it is an equilibrium there."""
+    model = scene._model
+    if start is None:
+        check_outside(scene, inputs.values, scene.mesh.rest_positions, 0.0)
+        return model.rest_state(), [], scene._control_layout.zeros(), True
+    if isinstance(start, Origin):
+        return start.state, start.turns, start.inputs.controls, True
+    if isinstance(start, Equilibrium):
+        if start.scene is not scene:
+            raise ValueError("start is an equilibrium of another scene; hand over its positions instead")
+        return start._state, start._turns, start._controls, start._values.same_as(inputs.values)
+    positions = quantity("start", "m", to_array("start", start), ("n_v", 3))
+    n_v = scene.mesh.n_vertices
+    if len(positions) != n_v:
+        raise ValueError(f"start [m] must have shape (n_v, 3) = ({n_v}, 3), got {positions.shape}")
+    scene._bodies.check_welded("start", "m", positions)
+    check_faces(scene, positions)
+    check_outside(scene, inputs.values, positions, 0.0)
+    with inputs.in_core():
+        state = model.state(positions, np.zeros(scene._bodies.n_rotations))
+    check_rigid(scene, positions, model.positions(state), "start [m]", scene.mesh.size)
+    return state, [], inputs.controls, False
+
+
+def check_faces(scene: Scene, positions: np.ndarray) -> None:
+    """A face of a shell without area has no normal, and no forces either. Solids may be flat: their materials say."""
+    for body, span in zip(scene._bodies.shells, scene._bodies.spans, strict=True):
+        if isinstance(body, Solid):
+            continue
+        corners = positions[span.vertices][span.mesh.faces]
+        a1, a2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        area = 0.5 * np.linalg.norm(np.cross(a1, a2), axis=1)
+        flat = np.flatnonzero(area <= 1e-12 * span.mesh.face_areas)
+        if flat.size:
+            raise ValueError(
+                f"start [m] leaves face {span.first_face + flat[0]} without area: {area[flat[0]]:.3g} m2"
+            )

@@ -1,1 +1,0 @@
-"""The same optimization from many starts."""

@@ -1,1 +1,0 @@
-"""Results as states of sheets, to be drawn and written."""

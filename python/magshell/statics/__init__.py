@@ -1,1 +1,0 @@
-"""Equilibria of a scene: one, many load cases, paths, designs that change."""

@@ -1,1 +1,0 @@
-"""What holds bodies and acts on them: supports, loads, contact, water."""

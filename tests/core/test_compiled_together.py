@@ -1,0 +1,72 @@
+"""Files that are compiled as one: what is local to one has no name of what is local to another of its folder. Constants
+would not compile; of functions with other parameters, the wrong one might be taken without a word."""
+
+import re
+from collections import defaultdict
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+ASIDE = re.compile(r"//[^\n]*|/\*.*?\*/|\"(?:\\.|[^\"\\\n])*\"|^[ \t]*#[^\n]*", re.DOTALL | re.MULTILINE)
+TYPE = re.compile(r"\b(?:struct|class|enum(?:\s+class)?|using)\s+(\w+)")
+OTHER = re.compile(r"([A-Za-z_]\w*)\s*(?:\(|=|\{|\[|$)")
+
+
+def folders() -> dict[str, set[str]]:
+    """Folder -> its files that are compiled alone, as CMakeLists.txt says."""
+    build = (ROOT / "CMakeLists.txt").read_text()
+    found = {f"magshell/{name}": set() for name in re.search(r"foreach\(folder ([\w ]+)\)", build)[1].split()}
+    for call in re.findall(r"^compile_together\(\w+ (.+)\)", build, re.MULTILINE):
+        folder, _, *alone = call.split()
+        found[folder] = {Path(name).name for name in alone}
+    return found
+
+
+def outermost(text: str) -> str:
+    """What a namespace's text holds, without what is in braces within."""
+    depth, kept = 1, []
+    for sign in text:
+        depth += {"{": 1, "}": -1}.get(sign, 0)
+        if depth == 0:
+            break
+        if depth == 1:
+            kept.append("{};" if sign == "}" else sign)
+    return "".join(kept)
+
+
+def local_names(text: str) -> set[str]:
+    """Of nameless namespaces: types, constants, functions."""
+    text = ASIDE.sub(" ", text)
+    names = set()
+    for opened in re.finditer(r"\bnamespace\s*\{", text):
+        for statement in outermost(text[opened.end() :]).split(";"):
+            plain = re.sub(r"\btemplate\s*<[^;{]*?>(?=\s*[a-zA-Z])", " ", statement).strip()
+            if found := TYPE.search(plain) or OTHER.search(plain):
+                names.add(found[1])
+    return names
+
+
+def test_local_names_are_found() -> None:
+    text = """
+    namespace a { namespace {
+    constexpr double small = 1e-3;  // other = 4
+    struct Part { int inner = 0; };
+    template <typename T> T twice(T x) { const T mine = x; return 2 * mine; }
+    std::vector<int> rows{1, 2};
+    } void shared() {} }
+    """
+    assert local_names(text) == {"small", "Part", "twice", "rows"}
+
+
+def test_no_two_files_share_a_local_name() -> None:
+    compiled = folders()
+    assert {"magshell/scene", "magshell/solve", "bindings"} <= set(compiled)
+    found = 0
+    for folder, alone in compiled.items():
+        owners = defaultdict(list)
+        for path in sorted((ROOT / "cpp" / folder).glob("*.cpp")):
+            if path.name not in alone:
+                for name in local_names(path.read_text()):
+                    owners[name].append(path.name)
+        assert {name: files for name, files in owners.items() if len(files) > 1} == {}, folder
+        found += len(owners)
+    assert found > 150

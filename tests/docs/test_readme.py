@@ -1,0 +1,33 @@
+"""What the README promises: its quick start runs, and gives the number that stands beside it."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+README = Path(__file__).parents[2] / "README.md"
+
+
+def test_quick_start(tmp_path, monkeypatch) -> None:
+    section = README.read_text().split("## Quick start")[1].split("\n## ")[0]
+    monkeypatch.chdir(tmp_path)
+    names: dict = {}
+    for code in re.findall(r"```python\n(.*?)```", section, re.DOTALL):
+        exec(code, names)
+    risen, distance = (
+        float(re.search(rf"{words} ([\d.]+) m", section)[1]) for words in ("has risen:", "rms:")
+    )
+    assert names["rest"].positions[:, 2].max() == pytest.approx(risen, abs=5e-5)
+    assert names["best"].objective ** 0.5 == pytest.approx(distance, abs=0.05)  # mm
+    assert (tmp_path / "strip.png").stat().st_size > 10_000
+
+
+def test_links_lead_somewhere() -> None:
+    targets = re.findall(r"\]\(([^)#]+)\)", README.read_text())
+    missing = [target for target in targets if "://" not in target and not (README.parent / target).exists()]
+    assert len(targets) > 15 and missing == []
+
+
+def test_two_screens() -> None:
+    """What is longer belongs into the manual."""
+    assert len(README.read_text().splitlines()) < 170

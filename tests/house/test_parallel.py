@@ -1,0 +1,92 @@
+"""Test runs in several processes: a test that is marked `alone` has the machine to itself."""
+
+import importlib.util
+import shutil
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parents[1]
+BUSY = """
+import time
+from pathlib import Path
+import pytest
+
+@pytest.mark.parametrize("k", range(8))
+{mark}
+def test_sleeps(k):
+    began = time.monotonic()
+    time.sleep(0.05)
+    with open("times.txt", "a") as file:
+        print("{mark}", began, time.monotonic(), file=file)
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder of tests with the same hooks."""
+    for name in ("conftest.py", "parallel.py"):
+        shutil.copy(HERE / name, tmp_path)
+    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n    alone: as here\n    slow: as here\n")
+    return tmp_path
+
+
+def run(folder, *options):
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *options]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs flock")
+@pytest.mark.skipif(importlib.util.find_spec("xdist") is None, reason="needs pytest-xdist")
+def test_other_processes_wait_while_a_test_runs_alone(folder):
+    for number in range(3):
+        (folder / f"test_busy_{number}.py").write_text(BUSY.format(mark=""))
+    (folder / "test_alone.py").write_text(BUSY.format(mark="@pytest.mark.alone"))
+    run(folder, "-n", "3", "--dist", "loadfile")
+    lines = [line.split() for line in (folder / "times.txt").read_text().splitlines()]
+    alone = [(float(a), float(b)) for mark, a, b in (x for x in lines if len(x) == 3)]
+    others = [(float(a), float(b)) for a, b in (x for x in lines if len(x) == 2)]
+    assert len(alone) == 8 and len(others) == 24
+    assert all(end <= a or b <= began for began, end in alone for a, b in others)
+    assert any(a < d < b for a, b in others for _, d in others)  # the others did run at the same time
+
+
+def test_seconds_of_the_processor_are_written_for_all_parameters_together(folder):
+    busy = """
+    import time, pytest
+    @pytest.fixture(scope="module")
+    def dear():
+        spin(0.3)
+    def spin(seconds):
+        end = time.process_time() + seconds
+        while time.process_time() < end:
+            pass
+    @pytest.mark.parametrize("k", range(3))
+    def test_spins(k, dear):
+        spin(0.2)
+    def test_sleeps():
+        time.sleep(0.8)
+    """
+    (folder / "test_busy.py").write_text(textwrap.dedent(busy))
+    run(folder, "--junitxml=report.xml")
+    script = HERE.parent / "scripts" / "test_seconds.py"
+    subprocess.run([sys.executable, script, folder / "report.xml", folder / "seconds.txt"], check=True)
+    lines = [each for each in (folder / "seconds.txt").read_text().splitlines() if not each.startswith("#")]
+    (line,) = lines  # the sleep takes no processor
+    seconds, name = line.split()
+    assert name == "test_busy.py::test_spins" and 0.85 < float(seconds) < 3.0
+
+
+def test_tests_listed_with_their_seconds_are_slow_with_all_their_parameters(folder):
+    (folder / "test_busy.py").write_text(BUSY.format(mark=""))
+    (folder / "test_other.py").write_text("def test_quick(): pass\n")
+    (folder / "seconds.txt").write_text(
+        "# seconds, test\n3.5 test_busy.py::test_sleeps\n1.0 test_gone.py::test_gone\n"
+    )
+    assert "8 passed, 1 deselected" in run(folder, "-m", "slow")
+    assert "1 passed, 8 deselected" in run(folder, "-m", "not slow")

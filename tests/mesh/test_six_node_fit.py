@@ -1,0 +1,82 @@
+"""SixNodeMesh.fitted: middle nodes on a smooth surface through a finer mesh's vertices, and what is refused."""
+
+import numpy as np
+import pytest
+
+import magshell as ms
+from benchmarks.cases import linear_cylinders
+
+
+def on_cylinder(mesh) -> float:
+    return np.abs(np.linalg.norm(mesh.rest_positions[:, [0, 2]], axis=1) - 1.0).max()
+
+
+def strip(n: int) -> ms.TriangleMesh:
+    return ms.meshes.cylinder(1.0, 1.0, angle=1.0, cells=(n, n))
+
+
+@pytest.mark.parametrize("fine, error", [(4, 1e-3), (8, 1e-5), (32, 1e-8)])
+def test_the_finer_the_nearer(fine, error):
+    """Border and inside; straight elements are 8e-3 off."""
+    assert on_cylinder(ms.SixNodeMesh.of(strip(4))) > 7e-3
+    fitted = ms.SixNodeMesh.fitted(strip(4), to=strip(fine))
+    assert on_cylinder(fitted) < error
+    exact = ms.meshes.cylinder(1.0, 1.0, angle=1.0, cells=(4, 4), order=2)
+    assert np.abs(fitted.rest_positions - exact.rest_positions).max() < 2 * error
+
+
+def test_closed_surfaces_and_those_of_two_curvatures():
+    sphere = [ms.meshes.spherical_cap(1.0, 0.2, np.pi / 2, cells=cells) for cells in ((12, 4), (48, 16))]
+    fitted = ms.SixNodeMesh.fitted(sphere[0], to=sphere[1])
+    radii = np.linalg.norm(fitted.rest_positions, axis=1)
+    assert np.abs(radii - 1.0).max() < 2e-5
+
+
+def test_flat_sheets_stay_flat_and_corners_stay_sharp():
+    mesh = ms.meshes.rectangle(1.0, 1.0, cells=(4, 4), irregular=0.2)
+    fitted = ms.SixNodeMesh.fitted(mesh, to=mesh.refined())
+    assert np.abs(fitted.rest_positions - ms.SixNodeMesh.of(mesh).rest_positions).max() < 1e-12
+
+
+def test_a_rim_is_bent_in_its_plane():
+    disk = ms.SixNodeMesh.fitted(ms.meshes.disk(1.0, 3), to=ms.meshes.disk(1.0, 12))
+    rim = np.linalg.norm(disk.rest_positions[disk.boundary_vertices], axis=1)
+    assert np.abs(rim - 1.0).max() < 1e-5 and np.abs(disk.rest_positions[:, 2]).max() == 0.0
+
+
+def test_two_sheets_close_together_are_told_apart():
+    outer = strip(16)
+    inner = outer.flipped()
+    inner = ms.TriangleMesh(inner.rest_positions * [0.99, 1, 0.99], inner.faces)
+    both = ms.TriangleMesh(
+        np.concatenate([inner.rest_positions, outer.rest_positions]),
+        np.concatenate([inner.faces, outer.faces + inner.n_vertices]),
+    )
+    assert on_cylinder(ms.SixNodeMesh.fitted(strip(4), to=both)) < 1e-5
+
+
+def test_the_roof_on_a_fitted_mesh():
+    """B1: as good as on the cylinder itself, where straight elements are far off."""
+    size = linear_cylinders.ROOF_RADIUS, linear_cylinders.ROOF_LENGTH / 2
+    span = (0.0, linear_cylinders.ROOF_HALF_ANGLE)
+    flat, fine = (ms.meshes.cylinder(*size, span, cells=(n, n)) for n in (8, 32))
+
+    def sinks(mesh) -> float:
+        half = linear_cylinders.ROOF_HALF_ANGLE
+        edge = mesh.nearest_vertex((size[0] * np.sin(half), size[1], size[0] * np.cos(half)))
+        return -linear_cylinders.roof_response(mesh, "midedge2").displacements[edge, 2]
+
+    exact = sinks(ms.meshes.cylinder(*size, span, cells=(8, 8), order=2))
+    assert sinks(ms.SixNodeMesh.fitted(flat, to=fine)) == pytest.approx(exact, rel=1e-5)
+    assert abs(sinks(ms.SixNodeMesh.of(flat)) / exact - 1.0) > 1e-3
+
+
+def test_what_is_refused():
+    with pytest.raises(ValueError, match="to folds by 45 degrees at its edge"):
+        ms.SixNodeMesh.fitted(strip(4), to=ms.meshes.cylinder(1.0, 1.0, cells=(8, 2)))
+    with pytest.raises(ValueError, match="border of to has no vertex at"):
+        ms.SixNodeMesh.fitted(strip(4), to=strip(6))
+    with pytest.raises(ValueError, match="no surface that faces the same way"):
+        ms.SixNodeMesh.fitted(strip(4), to=strip(8).flipped())
+    with pytest.raises(ValueError, match="to must be a TriangleMesh, got SixNodeMesh"):
+        ms.SixNodeMesh.fitted(strip(4), to=ms.SixNodeMesh.of(strip(4)))

@@ -1,0 +1,108 @@
+"""ms.FieldSamplingWarning: where the field of a magnet changes over the faces of a sheet, which sample it once each."""
+
+import warnings
+from functools import cache
+
+import numpy as np
+import pytest
+
+import magshell as ms
+from magshell.model.scene.field_sampling import sampling_errors
+
+WIDTH, THICKNESS, MAGNETIZATION = 10e-3, 0.2e-3, 1e6
+
+
+def between_plates(cells, gap, *, width=WIDTH, more_field=(), **shell):
+    """Two parallel square plates, magnetized across: a magnet, and a sheet stiff beside the force."""
+    mesh = ms.meshes.rectangle(width, width, cells=(cells, cells))
+    mesh = mesh.transformed(translation=(-width / 2, -width / 2, gap + THICKNESS))
+    magnet = ms.CuboidMagnet((WIDTH, WIDTH, THICKNESS), remanent_magnetization=(0, 0, MAGNETIZATION))
+    given = {"remanent_magnetization": (0, 0, MAGNETIZATION), "young_modulus": 1e13, **shell}
+    sheet = ms.Shell(mesh, thickness=THICKNESS, **given)
+    clamp = ms.Clamp(mesh.edges_at(x=-width / 2))
+    return ms.Scene(sheet, supports=[clamp], field=[magnet, *more_field])
+
+
+def true_error(cells, gap) -> float:
+    """Of the force at one point of every face, beside that of a mesh of 128 by 128 cells."""
+    return abs(force_at_one_point(cells, gap) / force_at_one_point(128, gap) - 1.0)
+
+
+@cache
+def force_at_one_point(cells, gap) -> float:
+    mesh = between_plates(cells, gap).mesh
+    magnet = ms.CuboidMagnet((WIDTH, WIDTH, THICKNESS), remanent_magnetization=(0, 0, MAGNETIZATION))
+    gradient = magnet.gradient(mesh.rest_positions[mesh.faces].mean(axis=1))
+    return (mesh.face_areas * gradient[:, 2, 2]).sum()
+
+
+def warned(call) -> list[str]:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        call()
+    return [str(each.message) for each in caught if each.category is ms.FieldSamplingWarning]
+
+
+@pytest.mark.parametrize(("cells", "gap"), [(16, 0.2e-3), (32, 0.2e-3), (16, 0.5e-3), (8, 2e-3), (16, 2e-3)])
+def test_the_estimated_error_of_a_force_is_its_error_within_a_tenth(cells, gap):
+    scene = between_plates(cells, gap)
+    (found,) = sampling_errors(scene._values, scene.mesh.rest_positions, 1.0, None)
+    assert found.error == pytest.approx(true_error(cells, gap), rel=0.1)
+
+
+@pytest.mark.parametrize(("cells", "too_coarse"), [(11, True), (14, False)])
+def test_a_warning_comes_where_the_force_is_off_by_more_than_1_percent(cells, too_coarse):
+    """1.25 % and 0.77 % are the errors themselves."""
+    gap = 2e-3
+    assert (true_error(cells, gap) > 0.01) == too_coarse
+    told = warned(lambda: ms.equilibrium(between_plates(cells, gap)))
+    assert len(told) == too_coarse
+    if told:
+        assert "this equilibrium: the magnetic force on Shell(" in told[0]
+        assert "is off by about 1.2" in told[0] and "faces" in told[0]
+
+
+def test_a_uniform_field_is_never_warned_of():
+    mesh = ms.meshes.rectangle(WIDTH, WIDTH, cells=(1, 1))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, remanent_magnetization=(0, 0, 1e4))
+    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
+    assert not warned(lambda: ms.equilibrium(scene, applied_flux_density=(0.01, 0, 0)))
+
+
+def test_couples_of_a_uniform_field_count_beside_the_force_of_a_weak_source():
+    """Far beyond the force of the source, they bend the sheet alone."""
+    magnetized = {"remanent_magnetization": (MAGNETIZATION, 0, 0)}
+    scene = between_plates(6, 2e-3, more_field=[ms.UniformField()], **magnetized)
+    coarse, beside = (
+        next(sampling_errors(scene._values, scene.mesh.rest_positions, 1.0, flux)).error
+        for flux in (np.zeros(3), np.array([0.0, 0.0, 5.0]))
+    )
+    assert beside < 0.1 * coarse
+
+
+def test_a_motion_is_warned_of_once_where_it_came_nearest():
+    scene = between_plates(6, 1e-3, mass_density=1e3)
+    told = warned(lambda: ms.simulate(scene, steps=2, time_step=1e-4, progress=False))
+    assert len(told) == 1 and "the motion, in recorded state" in told[0]
+
+
+def test_the_faces_of_a_skin_are_looked_at_too():
+    mesh = ms.meshes.box((WIDTH, WIDTH, 2e-3), cells=(4, 4, 1))
+    skin = ms.Skin(thickness=1e-4, faces=mesh.faces_at(z=0.0), remanent_magnetization=(0, 0, MAGNETIZATION))
+    law = ms.NeoHookean(young_modulus=1e10, poisson_ratio=0.3)
+    body = ms.Solid(mesh, material=law, element="linear", skin=skin)
+    magnet = ms.CuboidMagnet(
+        (WIDTH, WIDTH, 1e-3), center=(WIDTH / 2, WIDTH / 2, -1.5e-3), remanent_magnetization=(0, 0, 1e5)
+    )
+    scene = ms.Scene(body, supports=[ms.Pin(body.mesh.vertices_at(z=2e-3))], field=magnet)
+    (told,) = warned(lambda: ms.equilibrium(scene))
+    assert "the magnetic force on Skin(" in told
+
+
+def test_six_node_elements_are_not_warned_of():
+    mesh = ms.meshes.rectangle(WIDTH, WIDTH, cells=(4, 4), order=2)
+    plate = {"thickness": THICKNESS, "young_modulus": 1e13, "remanent_magnetization": (0, 0, MAGNETIZATION)}
+    sheet = ms.Shell(mesh, **plate)
+    magnet = ms.CuboidMagnet((WIDTH, WIDTH, 1e-3), center=(0, 0, -3e-3), remanent_magnetization=(0, 0, 1e5))
+    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=magnet)
+    assert not warned(lambda: ms.equilibrium(scene))

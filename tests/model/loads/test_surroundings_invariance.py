@@ -1,0 +1,159 @@
+"""What must not change a motion in contact, with friction and in water: rotated frames, numbering, mirrors, threads."""
+
+import numpy as np
+import pytest
+
+import magshell as ms
+from magshell.model.supports.supports import rotation_matrix
+
+MESH = ms.meshes.rectangle(0.02, 0.01, cells=(4, 2), irregular=0.2, seed=3)
+MAGNETIZATION, FLUX_DENSITY = np.array([2e4, 3e3, 5e3]), np.array([1e-3, 2e-3, 4e-3])  # A/m, T
+VELOCITY, FLOW = np.array([0.05, -0.03, -0.1]), np.array([0.02, 0.03, 0.01])  # m/s
+GRAVITY = np.array([0.5, 0.3, -9.81])
+TURN = rotation_matrix(np.array([0.7, -1.1, 0.4]))
+MIRROR = np.diag([1.0, -1.0, 1.0])
+SHIFT = np.array([0.3, -0.2, 0.1])  # m
+TIME_STEP = 2.0**-10  # s, so that times add up without rounding
+INTEGRATORS = [ms.ImplicitEuler(), ms.TRBDF2()]
+
+
+def axial(turn, vector):
+    """A rotation vector in the turned or mirrored frame: mirrors reverse what they leave of it."""
+    return np.linalg.det(turn) * (turn @ vector)
+
+
+def swaying(turn):
+    return lambda t: (
+        turn @ [0.01 * t, 0.02 * t, 3e-4 * np.sin(50 * t)],
+        axial(turn, [0.3 * t, 0.2 * t, 0.5 * t]),
+    )
+
+
+def obstacles(turn, shift):
+    """An oblique plane and a ball, both moving: bodies that a mirror turns into others of their kind."""
+    return [
+        ms.obstacles.Plane(
+            turn @ [0.1, 0.05, 1.0], center=shift + turn @ [0, 0, -3e-4], motion=swaying(turn)
+        ),
+        ms.obstacles.Sphere(5e-3, center=shift + turn @ [0.01, 0.005, -5.1e-3], motion=swaying(turn)),
+    ]
+
+
+def scene_of(turn=None, shift=None, mesh=MESH, lagged=False):
+    """A sheet above them in water, all of it turned and shifted."""
+    turn, shift = np.eye(3) if turn is None else turn, np.zeros(3) if shift is None else shift
+    sheet = ms.Shell(mesh.transformed(turn, shift), thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    contact = ms.Contact(
+        obstacles(turn, shift),
+        friction_coefficient=0.4,
+        sticking_speed=1e-3,
+        smoothing=1e-4,
+        contact_stiffness=100.0,
+        lagged_friction=lagged,
+        face_samples=1,
+    )
+    return ms.Scene(
+        sheet,
+        contacts=[contact],
+        water=ms.Water(100.0, velocity=turn @ FLOW, added_mass=0.2),
+        gravity=turn @ GRAVITY,
+        field=ms.UniformField(),
+        allow_rigid_motions=True,
+    )
+
+
+def fall(scene, turn, integrator, steps=30, **options) -> ms.Trajectory:
+    """M . B is what counts in a mirror: both are turned like any vector."""
+    return ms.simulate(
+        scene,
+        steps=steps,
+        time_step=TIME_STEP,
+        remanent_magnetization=turn @ MAGNETIZATION,
+        applied_flux_density=turn @ FLUX_DENSITY,
+        integrator=integrator,
+        progress=False,
+        **options,
+    )
+
+
+def moved(turn=None, shift=None, mesh=MESH, integrator=INTEGRATORS[0], lagged=False):
+    """Positions and velocities as the sheet falls, turned and shifted back."""
+    turn, shift = np.eye(3) if turn is None else turn, np.zeros(3) if shift is None else shift
+    motion = fall(scene_of(turn, shift, mesh, lagged), turn, integrator, velocities=turn @ VELOCITY)
+    assert motion.energies["contact"].max() > 0
+    return (motion.positions - shift) @ turn, motion.velocities @ turn
+
+
+@pytest.fixture(
+    scope="module", params=[(i, lagged) for i in INTEGRATORS for lagged in (False, True)], ids=repr
+)
+def here(request):
+    integrator, lagged = request.param
+    options = {"integrator": integrator, "lagged": lagged}
+    return options, moved(**options)
+
+
+def agree(found, expected):
+    for each, there, scale in zip(found, expected, (0.02, 0.1), strict=True):
+        assert np.abs(each - there).max() < 1e-8 * scale
+
+
+def test_a_rotated_frame(here):
+    options, expected = here
+    agree(moved(TURN, **options), expected)
+
+
+def test_a_shifted_frame(here):
+    options, expected = here
+    agree(moved(shift=SHIFT, **options), expected)
+
+
+def test_a_mirrored_scene(here):
+    options, expected = here
+    agree(moved(MIRROR, **options), expected)
+    agree(moved(TURN @ MIRROR, **options), expected)
+
+
+def test_numbering(here, rng):
+    options, expected = here
+    vertices, faces = rng.permutation(MESH.n_vertices), rng.permutation(MESH.n_faces)
+    shuffled = ms.TriangleMesh(MESH.rest_positions[vertices], np.argsort(vertices)[MESH.faces[faces]])
+    agree(moved(mesh=shuffled, **options), [each[:, vertices] for each in expected])
+
+
+def test_the_side_of_the_normals(here):
+    options, expected = here
+    agree(moved(mesh=MESH.flipped(), **options), expected)
+
+
+@pytest.mark.parametrize("lagged", [False, True], ids=["exact", "lagged"])
+@pytest.mark.parametrize("integrator", INTEGRATORS, ids=repr)
+def test_a_motion_goes_on_where_it_stopped(integrator, lagged):
+    """To the bit; obstacles go on where they were at that time."""
+    scene = scene_of(lagged=lagged)
+    whole = fall(scene, np.eye(3), integrator, velocities=VELOCITY)
+    half = fall(scene, np.eye(3), integrator, steps=15, velocities=VELOCITY)
+    rest = fall(scene, np.eye(3), integrator, steps=15, start=half)
+    np.testing.assert_array_equal(rest.positions, whole.positions[15:])
+    np.testing.assert_array_equal(rest.velocities, whole.velocities[15:])
+    assert half.energies["contact"][-1] > 0 or rest.energies["contact"].max() > 0
+
+
+@pytest.fixture
+def thread_counts():
+    before = ms.num_threads()
+    yield (1, 2, 3)
+    ms.set_num_threads(before)
+
+
+def test_any_number_of_threads_gives_the_same_bits(thread_counts):
+    """Enough points on faces for several tasks."""
+    fine = ms.meshes.rectangle(0.02, 0.01, cells=(24, 12), irregular=0.2, seed=3)
+    scene = scene_of(mesh=fine)
+    seen = set()
+    for count in thread_counts:
+        ms.set_num_threads(count)
+        motion = fall(scene, np.eye(3), INTEGRATORS[0], steps=5, velocities=VELOCITY)
+        assert motion.energies["contact"][-1] > 0
+        seen.add((motion.positions.tobytes(), motion.velocities.tobytes(), motion.iterations))
+    assert len(seen) == 1

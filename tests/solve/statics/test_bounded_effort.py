@@ -1,0 +1,60 @@
+"""A search for an equilibrium gives up after a bounded effort, and says what it saw and what is likely to be wrong."""
+
+import pytest
+
+import magshell as ms
+from benchmarks.statics import oblique_field
+from magshell.solve.statics.load_strain import strain_of_loads
+from magshell.solve.statics.single_solve import inputs_of
+
+
+def cantilever(young_modulus, density=1e3):
+    mesh = ms.meshes.rectangle(0.1, 0.02, cells=(20, 4))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=young_modulus, mass_density=density)
+    return ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+
+
+@pytest.mark.parametrize("solver", [ms.MixedNewton, ms.Newton])
+def test_a_search_gives_up_at_its_number_of_factorizations_and_says_what_it_saw(solver):
+    scene, controls = oblique_field(150, 20.0)
+    with pytest.raises(ms.NotConverged) as caught:
+        ms.equilibrium(scene, **controls, solver=solver(max_factorizations=6))
+    text, last = str(caught.value), caught.value.last_good
+    assert last.factorizations <= 6 + 2  # what was reached is made exact
+    assert "it gave up after 6 factorizations (max_factorizations of the solver)" in text
+    assert "Then the energy was" in text and "of the extent" in text
+    assert "Start from a nearby equilibrium, or allow it more (max_factorizations of the solver)" in text
+
+
+def test_a_modulus_of_the_wrong_unit_is_told_as_the_likely_cause():
+    """E = 1e-10 Pa under gravity: it took 10,842 iterations to say that more of them were to be allowed."""
+    with pytest.raises(
+        ms.NotConverged, match=r"would strain them by about \d\S*e\+1\d: is a modulus \[Pa\]"
+    ) as caught:
+        ms.equilibrium(cantilever(1e-10), solver=ms.MixedNewton(max_factorizations=200))
+    assert caught.value.last_good.factorizations <= 202
+    assert caught.value.last_good.iterations < 5000
+
+
+@pytest.mark.parametrize(("young_modulus", "strain"), [(1e6, 1e-3), (1e3, 1.0), (1e-10, 1e13)])
+def test_the_strain_of_a_load_is_that_of_a_bar_under_its_weight_in_order_of_magnitude(young_modulus, strain):
+    """rho g L / E = 981 Pa / E; clamped at one end and flat, a sheet has a third to a tenth of that."""
+    found = strain_of_loads(inputs_of(cantilever(young_modulus), {}))
+    assert 0.02 * strain < found < strain
+
+
+def test_iterations_without_a_factorization_count_too():
+    with pytest.raises(ms.NotConverged, match="it gave up after") as caught:
+        ms.equilibrium(cantilever(1e-10), solver=ms.MixedNewton(max_factorizations=300))
+    assert caught.value.last_good.factorizations < 300
+
+
+def test_the_default_is_twice_what_the_dearest_hard_case_takes():
+    """A far bent strip with a face of 1e-5 times its neighbours' size takes 2,531."""
+    assert ms.MixedNewton().max_factorizations == ms.Newton().max_factorizations == 5000
+
+
+@pytest.mark.parametrize("wrong", [0, -1, 2.5, True, 2**31])
+def test_a_budget_that_is_no_positive_number_is_refused(wrong):
+    with pytest.raises(ValueError, match="max_factorizations"):
+        ms.MixedNewton(max_factorizations=wrong)

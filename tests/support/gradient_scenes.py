@@ -1,0 +1,230 @@
+"""What a kind of scene can be differentiated by: found, not listed.
+
+A new value of an object (`_replaceable`), or a new keyword of a solve, is an input by being there.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cache, cached_property
+
+import numpy as np
+
+import magshell as ms
+from magshell.model.solids.materials import SolidMaterial
+
+IN_TIME = ", in time"
+# Keywords of a solve that are no numbers to differentiate by.
+SETTINGS = {"scene", "values", "solver", "progress"}
+SETTINGS_OF = {
+    ms.equilibrium: SETTINGS
+    | {"require_stable", "at_rest", "start"},  # wherever the search began: a tensor is refused
+    ms.simulate: SETTINGS | {"steps", "integrator", "record_every", "keep"},
+}
+
+
+@cache
+def continuous(solve) -> set[str]:
+    """The keywords of ms.equilibrium or ms.simulate that are inputs."""
+    return set(inspect.signature(solve).parameters) - SETTINGS_OF[solve]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of scene, and how it is solved.
+
+    solve: (scene, start=None, **keywords) to what has positions; function: the one of magshell behind it.
+    controls: by keyword, the inputs that belong to no object. fixed: other keywords.
+    step: of differences, over the size of a value; reach: that size, where it is not the value's own. in_time: steps of
+    the motion over which everything goes somewhere that can, or 0.
+    """
+
+    scene: ms.Scene
+    controls: dict[str, object]
+    function: Callable = ms.equilibrium
+    solve: Callable | None = None
+    fixed: dict[str, object] = field(default_factory=dict)
+    step: float = 1e-4
+    reach: dict[str, float] = field(default_factory=dict)
+    in_time: int = 0
+
+    def found(self, given: dict[tuple, object], start=None):
+        """The solution with these inputs, {(object or None, name): value}, in place of those that it has."""
+        keywords, values = {**self.fixed, **self.controls}, {}
+        for (owner, name), value in given.items():
+            if owner is None:
+                keywords[name] = value
+            else:
+                values.setdefault(owner, {})[name] = value
+        if start is not None:
+            keywords["start"] = start
+        return (self.solve or self.function)(self.scene, values=values, **keywords)
+
+    @cached_property
+    def of_objects(self) -> dict[tuple, np.ndarray]:
+        """{(object, name): its value} of everything in the scene."""
+        owners = (self.scene, *self.scene.objects)
+        moving = self.function is ms.simulate
+        return {
+            (owner, name): self._over_time(owner, name, np.array(value, dtype=np.float64))
+            for owner in owners
+            for name, value in _values_of(self.scene, owner, moving).items()
+        }
+
+    def goes(self, owner, name: str) -> bool:
+        """Whether this value is another at each end of a step."""
+        return self.in_time > 0 and name in getattr(owner, "_in_time", ())
+
+    def _over_time(self, owner, name: str, value: np.ndarray) -> np.ndarray:
+        if not self.goes(owner, name):
+            return value
+        rng = np.random.default_rng(len(name))
+        way = self.reach.get(name, 0.1 * np.abs(value).max()) * admissible(
+            (owner, name), rng.standard_normal(value.shape)
+        )
+        share = np.linspace(0.0, 1.0, self.in_time + 1).reshape(-1, *(1 for _ in value.shape))
+        return value + 0.3 * share * (0.5 + share) * way
+
+    @cached_property
+    def of_solve(self) -> dict[tuple, np.ndarray]:
+        """{(None, keyword): its value}: controls, and what a keyword too can say of the objects, as one number."""
+        own = {(None, name): np.array(value, dtype=np.float64) for name, value in self.controls.items()}
+        for (owner, name), value in self.of_objects.items():
+            if owner is self.scene and name in continuous(self.function):
+                own[None, name] = value
+            inside = (
+                isinstance(owner, ms.Solid) and name == "remanent_magnetization"
+            )  # the keyword is of faces
+            # Of several bodies: by values only.
+            if self.scene.bodies == (owner,) and name in continuous(self.function) and not inside:
+                own[None, name] = value.mean()
+        return own
+
+    @cached_property
+    def together(self) -> dict[tuple, np.ndarray]:
+        """All inputs, each once and a little off what it was made with, so that nothing is left to a default."""
+        once = {key: value for key, value in self.entries.items() if self._once(key)}
+        rng = np.random.default_rng(23)
+        off = {key: admissible(key, 0.02 * rng.uniform(-1, 1, value.shape)) for key, value in once.items()}
+        moved = {
+            (owner, name): value + off[owner, name] * self.reach.get(name, value)
+            if self.goes(owner, name)
+            else value * (1.0 + off[owner, name])
+            for (owner, name), value in once.items()
+        }
+        if self.scene.rigid_parts:  # which a start must not bend
+            moved |= {key: value for key, value in once.items() if key[1] in ("start", "velocities")}
+        return moved
+
+    def _once(self, key: tuple) -> bool:
+        owner, name = key
+        return name in self.controls if owner is None else name != "vertex_loads"
+
+    @cached_property
+    def entries(self) -> dict[tuple, np.ndarray]:
+        return {**self.of_solve, **self.of_objects}
+
+
+def admissible(key: tuple, direction: np.ndarray) -> np.ndarray:
+    """A direction that a value may change along: its free components, and symmetric where it is."""
+    direction = free(key) * direction
+    if key[1] in ("growth", "rest_curvature") and direction.shape[-2:] == (3, 3):
+        return 0.5 * (direction + np.swapaxes(direction, -1, -2))
+    return direction
+
+
+def free(key: tuple) -> np.ndarray | float:
+    """1 for the components of a value that may change at all, and 0 for the others."""
+    owner, name = key
+    if isinstance(owner, ms.Pin) and name == "displacement":
+        return np.array([float(axis in owner.components) for axis in "xyz"])
+    return 1.0
+
+
+def label(kind: Kind, key: tuple) -> str:
+    """For people: what an input is called."""
+    owner, name = key
+    if owner is None:
+        return name
+    owners = [kind.scene, *kind.scene.objects]
+    number = next(k for k, each in enumerate(owners) if each is owner)
+    return f"{type(owner).__name__}[{number}].{name}"
+
+
+def subject(kind: Kind, key: tuple) -> tuple:
+    """(class or function, name) of an input: what coverage counts; one over time is told apart."""
+    owner, name = key
+    if owner is not None and kind.goes(owner, name):
+        name += IN_TIME
+    return (kind.function if owner is None else type(owner), name)
+
+
+def subjects() -> set[tuple]:
+    """All that there are: keywords of solves, and values of every class that a scene may hold."""
+    classes = [
+        each for module in (ms, ms.obstacles) for each in vars(module).values() if isinstance(each, type)
+    ]
+    of_classes = {
+        (each, name)
+        for each in classes
+        if not inspect.isabstract(each)
+        for name in (
+            *_names_of(each),
+            *(name + IN_TIME for name in getattr(each, "_in_time", ())),
+        )
+    }
+    return of_classes | {(solve, name) for solve in SETTINGS_OF for name in continuous(solve)}
+
+
+def _names_of(kind: type) -> tuple[str, ...]:
+    """Of the values of a class; a solid's are its materials'."""
+    if kind is not ms.Solid:
+        return getattr(kind, "_replaceable", ())
+    materials = [
+        each for each in vars(ms).values() if isinstance(each, type) and issubclass(each, SolidMaterial)
+    ]
+    return tuple(
+        {name for each in materials for name in each._ranges} | {"mass_density", "remanent_magnetization"}
+    )
+
+
+def _values_of(scene: ms.Scene, owner, moving: bool) -> dict[str, object]:
+    """The values of an object that a solve of this scene may replace, as they are. One that is new must be here."""
+    names = getattr(owner, "_replaceable", ())
+    if owner is scene:
+        layout, key = scene._value_layout, ("loads", "forces")
+        loads = layout.of(scene._values.numbers, *key) if key in layout else np.zeros(0)
+        loads = loads[: scene.mesh.n_vertices]
+        values = {"gravity": scene.gravity, "vertex_loads": loads}
+        absent = {name for name, value in values.items() if not np.any(value)}
+    elif isinstance(owner, ms.Contact):
+        values = dict(zip(names, owner._law(*scene._values.touching(owner)), strict=True))
+        absent = set() if scene.has_forces_of_motion else {"friction_coefficient"}
+    elif isinstance(owner, ms.BodyContact):
+        values = {name: getattr(owner, name) for name in names}
+        absent = {name for name in names if values[name] is None}
+        if owner.law == "barrier":
+            absent.add("smoothing")
+        if not moving:
+            absent |= {"friction_coefficient", "static_friction_coefficient", "sticking_speed"}
+    elif isinstance(owner, ms.Pin | ms.Clamp):
+        motion = owner._held(scene._bodies.of(owner).mesh)[0].move
+        values = {} if motion is None else {**motion._asdict(), "displacement": motion.translation}
+        absent = set(names) if motion is None else set()
+    elif isinstance(owner, ms.PlacedField):
+        values, absent = {**owner.field._made_from, **owner._made_from}, set()
+    elif isinstance(owner, ms.SampledField):
+        values, absent = owner._made_from, set()
+    else:
+        values = {name: getattr(owner, name) for name in names}
+        absent = set()
+        if isinstance(owner, ms.Rigid):
+            absent = {name for name in names if values[name] is None}
+        if isinstance(owner, ms.Shell):
+            weightless = not (moving or scene.gravity.any())
+            absent = {"mass_density"} if weightless else set()
+            if owner.remanent_magnetization is None:  # the solve says it
+                absent.add("remanent_magnetization")
+    return {name: values[name] for name in names if name not in absent}

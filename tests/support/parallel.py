@@ -1,0 +1,124 @@
+"""Hooks for test runs in several processes (pytest-xdist): how many there are, in which order files go to them, and which
+tests run while all others wait.
+
+A test that measures time, or counts threads, is marked `alone`. While it runs, the other processes wait between two tests.
+Tests that took long when they were last measured (tests/seconds.txt, written by `make seconds`) are marked `slow`;
+`make quick` leaves them out. They are measured in time of the processor, which depends little on what else it does.
+"""
+
+import contextlib
+import os
+import tempfile
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None
+
+MEMORY_A_PROCESS = 2.5e9  # bytes: the largest test, with torch and a picture in memory
+SECONDS = Path(__file__).parents[1] / "seconds.txt"
+BEGAN = pytest.StashKey[float]()
+PROCESSES = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """`-n auto`: a process for each processor that this one may use, as far as memory goes; 0 is this one alone."""
+    if fcntl is None:  # no test could run alone
+        return 0
+    processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    count = min(processors, int(memory / MEMORY_A_PROCESS))
+    return count if count > 1 else 0
+
+
+def name_of(item: pytest.Item) -> str:
+    """Return test_file.py::test_name, without folder and parameters, so that a moved file keeps its seconds."""
+    return f"{item.path.name}::{getattr(item, 'originalname', item.name)}"
+
+
+def measured() -> dict[str, float]:
+    """Return name_of -> seconds that all of its parameters took together, of the tests that are listed."""
+    if not SECONDS.exists():
+        return {}
+    lines = (line.split() for line in SECONDS.read_text().splitlines() if not line.startswith("#"))
+    return {name: float(seconds) for seconds, name in lines}
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Marks what is slow. For several processes, files that take longest come first, so that all end at the same time."""
+    seconds = measured()
+    of_file: dict[Path, float] = defaultdict(float)
+    seen = set()
+    for item in items:
+        name = name_of(item)
+        if name in seconds:
+            item.add_marker(pytest.mark.slow)
+        if name not in seen:
+            of_file[item.path] += seconds.get(name, 0.0)
+        seen.add(name)
+    if PROCESSES > 1:
+        items.sort(
+            key=lambda item: -of_file[item.path]
+        )  # stable: within a file, and among quick ones, as they were
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node) -> None:
+    """Tells a process that xdist starts where the locks are, which all of them share."""
+    config = node.config
+    if not hasattr(config, "_magshell_locks"):
+        config._magshell_locks = tempfile.TemporaryDirectory(prefix="magshell-tests-")
+        config.add_cleanup(config._magshell_locks.cleanup)
+    node.workerinput["locks"] = config._magshell_locks.name
+
+
+@contextlib.contextmanager
+def turn(folder: Path, alone: bool) -> Iterator[None]:
+    """Holds a lock together with others, or alone. Whoever waits to hold it alone keeps others from taking it meanwhile."""
+    with open(folder / "door", "w") as door, open(folder / "room", "w") as room:
+        fcntl.flock(door, fcntl.LOCK_EX)
+        fcntl.flock(room, fcntl.LOCK_EX if alone else fcntl.LOCK_SH)
+        fcntl.flock(door, fcntl.LOCK_UN)
+        try:
+            yield
+        finally:
+            fcntl.flock(
+                room, fcntl.LOCK_UN
+            )  # as a process that the test forked and left behind would hold it too
+
+
+def processor_time() -> float:
+    """Seconds of this process and of those that it has waited for."""
+    return sum(os.times()[:4])
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> Iterator[None]:
+    """Notes when the test's first fixture is made."""
+    item.stash[BEGAN] = processor_time()
+    return (yield)
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_teardown(item: pytest.Item) -> Iterator[None]:
+    """Adds the seconds to pytest's report, where scripts/test_seconds.py reads it."""
+    try:
+        return (yield)
+    finally:
+        item.user_properties.append(("processor_seconds", round(processor_time() - item.stash[BEGAN], 3)))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+    """Fixtures of files are made within the turn of the first test that wants them."""
+    shared = getattr(item.config, "workerinput", None)
+    if shared is None:
+        return (yield)
+    with turn(Path(shared["locks"]), alone=item.get_closest_marker("alone") is not None):
+        return (yield)

@@ -1,0 +1,374 @@
+"""One object of every public class, each made from arrays of the caller's that are known."""
+
+from __future__ import annotations
+
+import importlib.util
+import inspect
+import pkgutil
+
+import numpy as np
+from public_names import public_names
+
+import magshell as ms
+from magshell._runtime.frozen import Frozen
+
+# Classes whose objects change by their nature, with the reason.
+STATEFUL = {
+    **dict.fromkeys(("optim.MMA", "optim.GCMMA", "optim.LBFGS"), "optimizers of torch, with a state"),
+    "envs.Environment": "an environment of gymnasium, with an episode under way",
+}
+
+
+class Arrays:
+    """Arrays that a caller hands over, and keeps."""
+
+    def __init__(self):
+        self.made: list[np.ndarray] = []
+
+    def __call__(self, values, dtype=float) -> np.ndarray:
+        self.made.append(np.array(values, dtype=dtype))
+        return self.made[-1]
+
+    def numbers(self, *values: int) -> np.ndarray:
+        return self(values, np.int64)
+
+    def change(self) -> None:
+        """Writes other numbers into all of them; fails where one has become read-only."""
+        for array in self.made:
+            array[...] = array[::-1].copy() + 1 if array.ndim and array.dtype != bool else array * 0
+
+
+def _bodies(given: Arrays) -> dict[str, object]:
+    corners = [[0, 0, 0], [0.02, 0, 0], [0.02, 0.02, 0], [0, 0.02, 0], [0.04, 0, 0], [0.04, 0.02, 0]]
+    flat = ms.TriangleMesh(given(corners), given([[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2]], np.int64))
+    six = ms.SixNodeMesh.of(flat)
+    box = ms.meshes.box((0.04, 0.02, 0.02), cells=(2, 1, 1))
+    tets = ms.TetMesh(
+        given(box.rest_positions),
+        given(box.tetrahedra, np.int64),
+        given(np.zeros(box.n_tetrahedra), np.int64),
+        {"all": 0},
+    )
+    shell = ms.Shell(
+        flat,
+        thickness=given(np.full(4, 1e-3)),
+        young_modulus=given(np.full(4, 1e6)),
+        poisson_ratio=given(np.full(4, 0.3)),
+        mass_density=given(np.full(4, 1e3)),
+        curvature_scale=given(np.ones(flat.n_edges)),
+        remanent_magnetization=given(np.full((4, 3), 1e3)),
+        growth=given(np.ones(4)),
+        rest_curvature=given(np.zeros(4)),
+    )
+    skin = ms.Skin(
+        thickness=given([1e-3, 1e-3]),
+        mass_density=given([1e3, 1e3]),
+        faces=given.numbers(0, 1),
+        remanent_magnetization=given(np.full((2, 3), 1e3)),
+    )
+    material = ms.NeoHookean(young_modulus=given(np.full(box.n_tetrahedra, 1e6)), poisson_ratio=0.4)
+    solid = ms.Solid(
+        tets,
+        material=material,
+        element="linear",
+        mass_density=given(np.full(box.n_tetrahedra, 1e3)),
+        remanent_magnetization=given(np.full((box.n_tetrahedra, 3), 1e3)),
+    )
+    link = ms.Link(mass=1.0, inertia=given([1.0, 2.0, 2.5]), center=given([0, 0, -1.0]))
+    lower = ms.Link(mass=1.0, inertia=0.1, center=given([0, 0, -2.0]))
+    hinge = ms.Revolute(
+        link, origin=given([0, 0, 0]), axis=given([0, 1.0, 0]), torque=0.1, spring_stiffness=1.0
+    )
+    ball = ms.Ball(lower, link, origin=given([0, 0, -1.5]), torque=given([0, 0.1, 0]))
+    moduli = dict(young_modulus=1e6, poisson_ratio=0.3)
+    return {
+        "flat": flat,
+        "six": ms.SixNodeMesh(given(six.rest_positions), given(six.elements, np.int64)),
+        "tets": tets,
+        "quality": flat.quality,
+        "tet quality": tets.quality,
+        "shell": shell,
+        "skin": skin,
+        "solid": solid,
+        "balloon": ms.Shell(box.surface, thickness=1e-3, young_modulus=1e6),
+        "NeoHookean": material,
+        "StableNeoHookean": ms.StableNeoHookean(**moduli),
+        "StVenantKirchhoff": ms.StVenantKirchhoff(**moduli),
+        "Corotated": ms.Corotated(**moduli),
+        "Projective": ms.Projective(**moduli),
+        "Guccione": ms.Guccione(
+            stiffness=2e3,
+            fibre_exponent=8.0,
+            cross_fibre_exponent=2.0,
+            fibre_shear_exponent=4.0,
+            bulk_modulus=1e5,
+            fibres=given([1.0, 0, 0]),
+        ),
+        "rigid": ms.Rigid(
+            mass=1.0,
+            inertia=given(np.eye(3)),
+            center=given([0, 0, 1.0]),
+            magnetic_moment=given([0, 0, 1.0]),
+            velocity=given([0, 0, 0.1]),
+            angular_velocity=given([0, 0, 0.1]),
+        ),
+        "rigid vertices": ms.Rigid(given.numbers(0, 1, 2), mass=1.0, body=shell),
+        "link": link,
+        "hinge": hinge,
+        "ball": ball,
+        "fixed": ms.Fixed(link, lower, given([0, 0, -1.5])),
+        "slide": ms.Prismatic(link, origin=given([0, 0, 0]), axis=given([0, 1.0, 0]), force=0.1),
+        "closure": ms.Closure(link, lower, origin=given([0, 0, -1.5]), stiffness=10.0),
+        "skeleton": ms.Skeleton([link, lower], [hinge, ball]),
+        "tie": ms.Tie(
+            shell,
+            ms.Shell(flat.transformed(translation=given([0.04, 0, 0])), thickness=1e-3, young_modulus=1e6),
+            vertices=given.numbers(4, 5),
+        ),
+        "fibres": ms.Fibres(
+            given.numbers(0, 1), given([[1.0, 0, 0], [1.0, 0, 0]]), given([1.0, 0.5]), given([0.0, 0.01])
+        ),
+    }
+
+
+def _around(given: Arrays, bodies: dict[str, object]) -> dict[str, object]:
+    """Supports, loads, actuators, contacts, fields and obstacles."""
+    shell, solid, flat, balloon = (bodies[name] for name in ("shell", "solid", "flat", "balloon"))
+    other = ms.Shell(flat.transformed(translation=(0, 0, 0.01)), thickness=1e-3, young_modulus=1e6)
+    plane = ms.obstacles.Plane(given([0, 0, 1.0]), center=given([0, 0, -0.1]), rotation=given([0, 0.0, 0]))
+    sampled = ms.SampledField(given([-1.0, -1, -1]), given([2.0, 2, 2]), given(np.ones((2, 2, 2, 3))))
+    ball = ms.meshes.spherical_cap(0.1, 0.0, np.pi, cells=(8, 4))
+    place = {"center": given([0, 0, -0.1]), "rotation": given([0, 0.1, 0])}
+    found = {
+        "pin": ms.Pin(
+            given.numbers(0, 3),
+            displacement=given([0, 0, 1e-3]),
+            rotation=given([0, 0.1, 0]),
+            center=given([0.0, 0, 0]),
+        ),
+        "clamp": ms.Clamp(flat.edges_at(x=0.0).copy(), displacement=given([0, 0, 1e-3])),
+        "clamp by numbers": ms.Clamp(given(flat.edges_at(x=0.0), np.int64)),
+        "symmetry": ms.SymmetryPlane(given([1.0, 0, 0]), given([0.0, 0, 0])),
+        "point load": ms.PointLoad(given.numbers(4, 5), given([[0, 0, 1e-3], [0, 0, 2e-3]])),
+        "point load by mask": ms.PointLoad(given([0, 0, 0, 0, 1, 1], bool), given([0, 0, 1e-3])),
+        "edge load": ms.EdgeLoad(given(flat.edges_at(x=0.04), np.int64), given([0, 0, 1e-3])),
+        "area load": ms.AreaLoad(given([0, 0, 1e-3]), given.numbers(0, 1)),
+        "couple": ms.EdgeCouple(given(flat.edges_at(x=0.04), np.int64), given([0, 1e-3, 0])),
+        "pressure": ms.Pressure(given([1.0, 2.0]), faces=given.numbers(0, 1)),
+        "tension": ms.SurfaceTension(given([0.01, 0.02]), faces=given.numbers(0, 1)),
+        "muscle": ms.Muscle(
+            solid,
+            given([1.0, 0, 0]),
+            peak_stress=1e3,
+            activation=0.1,
+            force_length=given([[0.5, 0.0], [1.0, 1.0], [1.5, 0.0]]),
+            elements=given.numbers(0, 1),
+            weights=given([1.0, 0.5]),
+            segments=given.numbers(0, 1),
+        ),
+        "cavity": ms.Cavity(balloon, given(np.arange(balloon.mesh.n_faces), np.int64), pressure=10.0),
+        "cells": ms.Cells(solid, [given.numbers(0, 1), given.numbers(2, 3)], stiffness=given([1e3, 1e3])),
+        "tendon": ms.Tendon(given([[0.0, 0.0, 0.0], [0.04, 0.0, 0.0]]), solid, tension=0.1),
+        "contact": ms.Contact([plane], vertices=given.numbers(0, 1)),
+        "body contact": ms.Contact(shell, other),
+        "self contact": ms.SelfContact(shell),
+        "uniform": ms.UniformField(),
+        "dipoles": ms.Dipoles(given([[0, 0, -0.1]]), given([[0, 0, 1.0]])),
+        "sampled": sampled,
+        "custom": ms.CustomField(_same, length_scale=1.0),
+        "placed": ms.PlacedField(sampled, **place),
+        "cuboid": ms.CuboidMagnet(given([0.01, 0.01, 0.01]), given([0, 0, 1e6]), **place),
+        "cylinder": ms.CylinderMagnet(0.01, 0.02, given([0, 0, 1e6]), **place),
+        "water": ms.Water(
+            velocity=given([0.1, 0, 0]),
+            attack_table=(given([0, 0.5, np.pi / 2]), given([0, 1.0, 2.0])),
+        ),
+        "plane": plane,
+        "sphere": ms.obstacles.Sphere(0.1, **place),
+        "box": ms.obstacles.Box(given([0.1, 0.1, 0.1]), **place),
+        "capsule": ms.obstacles.Capsule(given([[0, 0, 0], [0.1, 0, 0]]), 0.01, **place),
+        "tube": ms.obstacles.Tube(given([[0, 0, 0], [0.1, 0, 0], [0.2, 0.1, 0]]), 0.05, **place),
+        "ground": ms.obstacles.HeightField(
+            given([0.0, 0.1, 0.2, 0.3]), given([0.0, 0.1, 0.2, 0.3]), given(np.zeros((4, 4))), **place
+        ),
+        "mesh obstacle": ms.obstacles.MeshObstacle(
+            given(ball.rest_positions), given(ball.faces, np.int64), 8, **place
+        ),
+    }
+    if importlib.util.find_spec("magpylib"):
+        import magpylib
+
+        source = magpylib.magnet.Sphere(polarization=(0, 0, 1), diameter=0.01, position=(0, 0, -0.05))
+        found["magpylib"] = ms.MagpylibField(source, length_scale=0.04)
+    return found
+
+
+def _same(points):
+    return 0.1 * points
+
+
+def _options(given: Arrays) -> dict[str, object]:
+    """What is handed to functions beside a scene."""
+    ball = ms.shapes.ball(0.1, given([0.0, 0, 0]))
+    found = {
+        **{cls.__name__: cls() for cls in (ms.Newton, ms.MixedNewton, ms.ProjectiveDynamics, ms.Keep)},
+        **{cls.__name__: cls() for cls in (ms.ImplicitEuler, ms.TRBDF2, ms.SDIRK2, ms.SDIRK3)},
+        "ink": ms.Ink(
+            5e4, given([[1.0, 0, 0], [0, 1.0, 0]]), levels=given([0.0, 1.0]), frames=given([np.eye(3)] * 4)
+        ),
+        "view": ms.View(30, -60, frame=given([[0.0, 0, 0], [0.1, 0.02, 0.01]])),
+        "style": ms.Style(),
+        "color": ms.Color(given([0.0, 1.0, 2.0])),
+        "primitive": ball,
+        "moved": ball.translated(given([0.1, 0, 0])),
+        "offset": ball.offset(0.01),
+        "named": ball.named("ball"),
+        "union": ball | ball.scaled(2.0),
+        "smooth union": ball.smooth_union(ball.scaled(2.0), radius=0.01),
+        "intersection": ball & ball.scaled(2.0),
+        "difference": ball - ball.scaled(0.5),
+    }
+    if importlib.util.find_spec("torch"):
+        line = ms.control.Polyline(given([[0, 0, 0], [1.0, 0, 0]]))
+        arc = ms.control.Arc(
+            given([1.0, 1, 0]), start=given([1.0, 0, 0]), axis=given([0, 0, 1.0]), angle=np.pi / 2
+        )
+        found |= {"polyline": line, "arc": arc, "chain": ms.control.Chain([line, arc])}
+    return found
+
+
+def made_objects(given: Arrays) -> dict[str, object]:
+    """What users make, with a scene of much of it."""
+    found = _bodies(given)
+    found |= _around(given, found)
+    found |= _options(given)
+    found["scene"] = scene = ms.Scene(
+        found["shell"],
+        supports=[found["clamp by numbers"]],
+        loads=[found["point load"], found["area load"], found["tension"], found["pressure"]],
+        field=[found["uniform"], found["dipoles"]],
+        gravity=given([0, 0, -9.81]),
+        contacts=[found["contact"]],
+        water=found["water"],
+    )
+    found["env actuator"] = ms.envs.Actuator(
+        scene, "applied_flux_density", lower=given([-1.0, -1, -1]), upper=given([1.0, 1, 1])
+    )
+    found["steered"] = ms.envs.Steered(found["hinge"], "torque", 1, _steered)
+    return found
+
+
+def _steered(share, time, before):
+    return before
+
+
+def _from_fields(cls) -> object:
+    """A result that takes long to find, with numbers in its place."""
+    return cls(**{name: np.zeros(3) for name, each in inspect.signature(cls).parameters.items()})
+
+
+def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
+    """What functions return."""
+    mesh = made["flat"]
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    tip = mesh.vertices_at(x=0.04)
+    clamp, load = ms.Clamp(mesh.edges_at(x=0.0)), ms.PointLoad(tip, (-1e-3, 0, 1e-4))
+    floor = ms.Contact(ms.obstacles.Plane(center=(0, 0, -0.1)))
+    scene = ms.Scene(sheet, supports=[clamp], loads=[load], field=ms.UniformField(), contacts=[floor])
+    asked = {
+        "remanent_magnetization": given(np.full((4, 3), 1e3)),
+        "applied_flux_density": given([0, 0, 1e-4]),
+    }
+    start = given(mesh.rest_positions)
+    values = {load: {"force": given([-1e-3, 0, 2e-4])}}
+    rest = ms.equilibrium(scene, start=start, values=values, **asked)
+    move = ms.simulate(
+        scene, steps=2, time_step=1e-3, velocities=given(np.zeros((6, 3))), values=values, **asked
+    )
+    path = ms.follow(scene, **asked)
+    solid, muscle = made["solid"], made["muscle"]
+    actuated = ms.Scene(
+        solid,
+        supports=[ms.Pin(solid.mesh.vertices_at(x=0.0))],
+        actuators=[muscle, made["cells"], made["tendon"]],
+        field=ms.UniformField(),
+    )
+    held = ms.Pin(made["balloon"].mesh.vertices_at(x=0.0))
+    blown = ms.Scene(made["balloon"], supports=[held], actuators=[made["cavity"]])
+    of_solid = ms.equilibrium(actuated, applied_flux_density=(0, 0, 0))
+    swing = ms.simulate(ms.Scene(made["skeleton"], gravity=(0, 0, -9.81)), steps=1, time_step=1e-3)
+    welded = ms.weld(mesh, mesh.transformed(translation=(0.04, 0, 0)))
+    joined = ms.weld(made["tets"], made["tets"].transformed(translation=(0.04, 0, 0)))
+    record = ms.Minimum([np.zeros(3)], 1.0, 0.0)
+    found = {
+        "equilibrium": rest,
+        "equilibria": ms.Equilibria([rest, rest]),
+        "trajectory": move,
+        "state of motion": move.end,
+        "path": path,
+        "body result": rest[sheet],
+        "solid result": of_solid[solid],
+        "muscle result": of_solid[muscle],
+        "cavity result": ms.equilibrium(blown)[made["cavity"]],
+        "cells result": of_solid[made["cells"]],
+        "tendon result": of_solid[made["tendon"]],
+        "rigid result": swing[made["link"]],
+        "joint result": swing[made["hinge"]],
+        "strains": rest.strains(),
+        "stresses": rest[sheet].stresses(),
+        "states of a solid": of_solid[solid].stresses(),
+        "states of fibres": of_solid[muscle].states(),
+        "touching": rest.touching(floor),
+        "reaction": rest.reaction(clamp),
+        "response": ms.linear_response(scene, **asked),
+        "modes": ms.vibration_modes(scene, rest, count=1),
+        "weld": welded,
+        "weld of solids": joined,
+        "mended": ms.TetMesh.mended(made["tets"].rest_positions, made["tets"].tetrahedra),
+        "warm start": ms.WarmStart(scene),
+        "picture": ms.plot(rest, width=400, style=ms.Style(backend="matplotlib")),
+        "snapshot": ms.envs.Snapshot(move, 0, given(np.zeros(3))),
+        "minimum": record,
+        "window": ms.control.Window(1, 0, 1.0),
+        "windows": ms.control.Windows(np.zeros(3), [(ms.control.Window(1, 0, 1.0), record)]),
+        "horizon": ms.control.Horizon(0, 1, 2),
+    }
+    rare = (
+        ms.Buckling,
+        ms.CriticalPoint,
+        ms.Extrapolation,
+        ms.Multistart,
+        ms.PrintableMinimum,
+        ms.PrintableStage,
+    )
+    return found | {cls.__name__: _from_fields(cls) for cls in (*rare, ms.control.Receding, ms.envs.Episode)}
+
+
+def public_classes() -> dict[str, type]:
+    """By their public names; errors and warnings are Python's own, which write into them."""
+    found = {name: _named(name) for name in public_names()}
+    return {
+        name: each
+        for name, each in found.items()
+        if isinstance(each, type) and not issubclass(each, BaseException)
+    }
+
+
+def frozen_classes() -> set[type]:
+    """All that are made immutable, once every module is loaded; those that are made within the package alone apart."""
+    for module in pkgutil.walk_packages(ms.__path__, "magshell."):
+        if ".bench" not in module.name and "__main__" not in module.name:
+            importlib.import_module(module.name)
+    every, found = [Frozen], set()
+    while every:
+        own = [each for each in every.pop().__subclasses__() if each.__module__.startswith("magshell")]
+        every += own
+        found.update(own)
+    return found
+
+
+def _named(name: str):
+    found = ms
+    for part in name.split("."):
+        found = getattr(found, part)
+    return found

@@ -1,0 +1,304 @@
+"""For tests: the core's model of solids alone, from plain arrays, and the same energies by torch."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from scipy.optimize import minimize
+
+from magshell import _core
+from magshell.model.scene.parameter_layout import Layout
+
+EDGES = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]
+
+# By the core's names. Those of the second list have an energy where elements are inverted.
+REFUSING = ["NeoHookean ln J", "NeoHookean J", "NeoHookean isochoric"]
+STABLE = [
+    "StableNeoHookean",
+    "StableNeoHookean barrier",
+    "StVenantKirchhoff",
+    "Corotated",
+    "Guccione",
+    "Projective",
+]
+MATERIALS = REFUSING + STABLE
+ELEMENTS = ["linear", "quadratic", "mean"]
+MADE = [
+    (m, e) for m in MATERIALS for e in ELEMENTS if (m, e) != ("Projective", "mean")
+]  # that one is refused
+
+LAME = {"young_modulus": 1.0e3, "poisson_ratio": 0.3}
+GUCCIONE = {
+    "stiffness": 2.0e3,
+    "fibre_exponent": 8.0,
+    "cross_fibre_exponent": 2.0,
+    "fibre_shear_exponent": 4.0,
+    "bulk_modulus": 5.0e3,
+    "fibres": (0.48, 0.6, 0.64),
+}
+
+
+def values_of(material: str) -> dict:
+    return GUCCIONE if material == "Guccione" else LAME
+
+
+def second_order(nodes, tetrahedra):
+    """Straight ten-node tetrahedra: (nodes, (n_t, 10))."""
+    middle: dict[tuple[int, int], int] = {}
+    points, rows = list(np.asarray(nodes, dtype=float)), []
+    for tet in np.asarray(tetrahedra):
+        row = list(tet)
+        for i, j in EDGES:
+            key = tuple(sorted((int(tet[i]), int(tet[j]))))
+            if key not in middle:
+                middle[key] = len(points)
+                points.append(0.5 * (points[key[0]] + points[key[1]]))
+            row.append(middle[key])
+        rows.append(row)
+    return np.array(points), np.array(rows)
+
+
+class SolidModel:
+    """nodes (n, 3) m, tetrahedra (n_t, 4 or 10); values by the core's names, a number or one an element.
+
+    held: nodes that are held entirely. muscles: as the core takes them; their numbers go into `others`, {(owner, name):
+    array}, before `set`.
+    """
+
+    def __init__(self, nodes, tetrahedra, material, mean=False, values=None, held=(), muscles=()):
+        self.nodes, self.tetrahedra = np.asarray(nodes, dtype=float), np.asarray(tetrahedra)
+        held = np.asarray(held, dtype=np.int32)
+        self.core = _core.Model(
+            n_vertices=len(self.nodes),
+            original=[],
+            sheets=[],
+            six_node_sheets=[],
+            skins=[],
+            rigid=[],
+            skeletons=[],
+            closures=[],
+            muscles=list(muscles),
+            face_energies=[],
+            pressures=[],
+            volumes=[],
+            tendons=[],
+            solids=[
+                {
+                    "owner": "body 0",
+                    "rest_positions": self.nodes,
+                    "elements": self.tetrahedra.astype(np.int32),
+                    "vertices": np.arange(len(self.nodes)),
+                    "surface": None,
+                    "surface_vertices": [],
+                    "material": material,
+                    "mean_volume": mean,
+                    "magnetic": False,
+                    "surface_acts": False,
+                }
+            ],
+            directions=np.zeros((0, 3)),
+            held_nodes=np.stack([held, np.full_like(held, 3), *[np.full_like(held, -1)] * 3], axis=1),
+            held_frames=np.broadcast_to(np.eye(3), (len(held), 3, 3)),
+            moves=0,
+            couples=np.zeros((0, 3), dtype=np.int32),
+            gravity=False,
+            loads=False,
+            field_sources=[],
+            contacts=[],
+            contact_surfaces=[],
+            body_contacts=[],
+            obstacles=[],
+            water=None,
+        )
+        self.layout = Layout(self.core.parameters)
+        self.others = {key: np.zeros(1) for key in self.layout if key[0] != "body 0"}
+        self.controls = np.zeros(sum(entry[4] * entry[5] for entry in self.core.controls))
+        self.set(values_of(material) if values is None else values)
+        marks = np.arange(3.0 * len(self.nodes)).reshape(-1, 3)
+        self.order = np.asarray(self.core.state(marks, np.zeros(0))).astype(int)  # of the core's unknowns
+
+    def set(self, values: dict) -> None:
+        self.values = {
+            name: np.broadcast_to(value, (len(self.tetrahedra), *np.shape(value)))
+            if np.ndim(value) == 0 or (name == "fibres" and np.ndim(value) == 1)
+            else np.asarray(value)
+            for name, value in values.items()
+        }
+        own = {("body 0", name): each for name, each in self.values.items()}
+        self.core.set_values(self.layout.packed({**own, **self.others}))
+
+    def state(self, x):
+        return self.core.state(np.asarray(x, dtype=float), np.zeros(0))
+
+    def energy(self, x) -> float:
+        return self.core.energy(self.state(x), self.controls)
+
+    def gradient(self, x) -> np.ndarray:
+        """(3 n,), in the caller's order."""
+        out = np.empty(self.nodes.size)
+        out[self.order] = self.core.gradient(self.state(x), self.controls)
+        return out
+
+    def hessian(self, x) -> np.ndarray:
+        size, starts, rows, numbers = self.core.hessian(self.state(x), self.controls, reduced=False)
+        lower = np.zeros((size, size))
+        lower[rows, np.repeat(np.arange(size), np.diff(starts))] = numbers
+        whole = np.empty_like(lower)
+        whole[np.ix_(self.order, self.order)] = lower + np.tril(lower, -1).T
+        return whole
+
+    def vjp(self, x, adjoint) -> dict[str, np.ndarray]:
+        """adjoint . dg/dk of every value k, by name; adjoint (n, 3)."""
+        found = self._vjp(x, adjoint)
+        return {name: self.layout.of(found, "body 0", name) for name in self.values}
+
+    def other_vjp(self, x, adjoint) -> dict[tuple[str, str], np.ndarray]:
+        """Likewise of the numbers in `others`."""
+        found = self._vjp(x, adjoint)
+        return {key: self.layout.of(found, *key) for key in self.others}
+
+    def _vjp(self, x, adjoint) -> np.ndarray:
+        return np.asarray(_core.vjp(self.core, self.state(x), self.controls, self.state(adjoint)))
+
+
+def shape_gradients(nodes, tetrahedra):
+    """(n_t, p, N, 3) gradients at the points of integration, and (n_t, p) volumes, from the textbook's formulas."""
+    nodes, tetrahedra = torch.tensor(np.array(nodes)), torch.tensor(np.array(tetrahedra))
+    if tetrahedra.shape[1] == 4:
+        points, weights = (
+            torch.full((1, 4), 0.25, dtype=torch.float64),
+            torch.tensor([1.0 / 6.0], dtype=torch.float64),
+        )
+    else:
+        a, b = (5 - np.sqrt(5)) / 20, (5 + 3 * np.sqrt(5)) / 20
+        points = torch.full((4, 4), a, dtype=torch.float64).fill_diagonal_(b)
+        weights = torch.full((4,), 1.0 / 24.0, dtype=torch.float64)
+
+    def shapes(xi):  # (3,) natural coordinates
+        bary = torch.cat([1 - xi.sum()[None], xi])
+        if tetrahedra.shape[1] == 4:
+            return bary
+        middle = [4 * bary[i] * bary[j] for i, j in EDGES]
+        return torch.cat([bary * (2 * bary - 1), torch.stack(middle)])
+
+    by_xi = torch.stack(
+        [torch.autograd.functional.jacobian(shapes, each[1:]) for each in points]
+    )  # (p, N, 3)
+    jacobian = torch.einsum("tni,pnj->tpij", nodes[tetrahedra], by_xi)
+    gradients = torch.einsum("pnj,tpji->tpni", by_xi, torch.linalg.inv(jacobian))
+    return gradients, weights * torch.linalg.det(jacobian)
+
+
+def torch_energy(model: SolidModel, material: str, mean: bool, values: dict | None = None):
+    """The energy as a function of positions (n, 3), a tensor; values: {name: tensor} in place of the model's."""
+    gradients, volumes = shape_gradients(model.nodes, model.tetrahedra)
+    tetrahedra = torch.tensor(np.array(model.tetrahedra))
+    given = {name: torch.tensor(np.array(each)) for name, each in model.values.items()}
+    given |= values or {}
+
+    def averaged(measure):
+        if not mean:
+            return measure
+        return ((volumes * measure).sum(1) / volumes.sum(1))[:, None].expand_as(measure)
+
+    def energy(x):
+        f = torch.einsum("tni,tpnj->tpij", x[tetrahedra], gradients)
+        return (volumes * density(material, f, given, averaged)).sum()
+
+    return energy
+
+
+def determinant(f):
+    """Return the determinant of matrices (..., 3, 3), written out as a polynomial whose derivatives hold everywhere.
+
+    Derivatives of torch.linalg.det divide by pivots, which are mere round-off where a matrix is singular."""
+    a, b, c = f.unbind(-2)
+    return (a * torch.linalg.cross(b, c)).sum(-1)
+
+
+def density(material, f, values, averaged):
+    """(n_t, p) J/m3, straight from the definitions."""
+    i1, j = (f * f).sum((-1, -2)), determinant(f)
+    strain = 0.5 * (f.transpose(-1, -2) @ f - torch.eye(3, dtype=torch.float64))
+    if material == "Guccione":
+        c, bf, bt, bfs, bulk = (values[name][:, None] for name in list(GUCCIONE)[:5])
+        m = values["fibres"]
+        helper = torch.tensor([0.3, -0.2, 0.9], dtype=torch.float64).expand_as(m)
+        s = torch.linalg.cross(m, helper)
+        s = s / s.norm(dim=-1, keepdim=True)
+        frame = torch.stack([m, s, torch.linalg.cross(m, s)], dim=-1)[:, None]
+        e = frame.transpose(-1, -2) @ strain @ frame
+        q = bf * e[..., 0, 0] ** 2 + bt * (e[..., 1, 1] ** 2 + e[..., 2, 2] ** 2 + 2 * e[..., 1, 2] ** 2)
+        q = q + 2 * bfs * (e[..., 0, 1] ** 2 + e[..., 0, 2] ** 2)
+        return 0.5 * c * (torch.exp(q) - 1) + 0.5 * bulk * (averaged(j) - 1) ** 2
+    young, nu = values["young_modulus"][:, None], values["poisson_ratio"][:, None]
+    lam, mu = young * nu / ((1 + nu) * (1 - 2 * nu)), young / (2 * (1 + nu))
+    if material == "NeoHookean ln J":
+        return mu / 2 * (i1 - 3) - mu * torch.log(j) + lam / 2 * torch.log(averaged(j)) ** 2
+    if material == "NeoHookean J":
+        return mu / 2 * (i1 - 3) - mu * torch.log(j) + lam / 2 * (averaged(j) - 1) ** 2
+    if material == "NeoHookean isochoric":
+        return mu / 2 * (j ** (-2 / 3) * i1 - 3) + (lam + 2 * mu / 3) / 2 * (averaged(j) - 1) ** 2
+    if material == "StableNeoHookean":
+        shear = mu / 2 * (i1 - 3) - mu * (j - 1) + mu / 2 * (j - 1) ** 2
+        return shear + lam / 2 * (averaged(j) - 1) ** 2
+    if material == "StableNeoHookean barrier":
+        m, ell = 4 / 3 * mu, lam + 5 / 6 * mu
+        a = 1 + m / ell - m / (4 * ell)
+        at_rest = ell / 2 * (1 - a) ** 2
+        own = m / 2 * (i1 - 3) + ell / 2 * (j - a) ** 2 - m / 2 * torch.log((i1 + 1) / 4) - at_rest
+        return own + lam / 2 * ((averaged(j) - 1) ** 2 - (j - 1) ** 2)
+    if material == "StVenantKirchhoff":
+        trace = strain.diagonal(dim1=-2, dim2=-1).sum(-1)
+        return mu * (strain * strain).sum((-1, -2)) + lam / 2 * averaged(trace) ** 2
+    u, s, vh = torch.linalg.svd(f)
+    sign = torch.sign(torch.linalg.det(u) * torch.linalg.det(vh))
+    s = torch.cat([s[..., :2], sign[..., None] * s[..., 2:]], dim=-1)
+    if material == "Projective":
+        return mu * ((s - 1) ** 2).sum(-1) + lam / 2 * ((s - nearest_of_product_one(s)) ** 2).sum(-1)
+    trace = s.sum(-1)  # tr(R^T F)
+    return mu * ((s - 1) ** 2).sum(-1) + lam / 2 * (averaged(trace) - 3) ** 2
+
+
+def nearest_of_product_one(s):
+    """The d with d1 d2 d3 = 1 that are nearest to s, (..., 3): by a search among positive ones, from many starts; two steps
+    of Newton on d - k/d = s with that product then carry the derivatives."""
+    rows = []
+    for row in s.detach().reshape(-1, 3).numpy():
+        away = lambda p, row=row: float(((np.array([*np.exp(p), np.exp(-p.sum())]) - row) ** 2).sum())  # noqa: E731
+        found = min(
+            (minimize(away, (a, b), method="BFGS") for a in (-1.0, 0.3, 1.5) for b in (-1.2, 0.2, 1.0)),
+            key=lambda each: each.fun,
+        )
+        rows.append([*np.exp(found.x), np.exp(-found.x.sum())])
+    d = torch.tensor(np.array(rows)).reshape(s.shape)
+    k = ((d - s) * d).mean(-1, keepdim=True).detach()
+    for _ in range(6):
+        # (1 + k/d^2) dd - dk/d = s - d + k/d,  sum dd/d = - ln(product)
+        b = 1 + k / d**2
+        rest = s - d + k / d
+        dk = (-torch.log(d.prod(-1, keepdim=True)) - (rest / (b * d)).sum(-1, keepdim=True)) / (
+            1 / (b * d**2)
+        ).sum(-1, keepdim=True)
+        d, k = d + (rest + dk / d) / b, k + dk
+    return d
+
+
+def sample_element(element: str, curved: bool = True):
+    """One tetrahedron in general position: (nodes, tetrahedra)."""
+    nodes = np.array([[0.1, 0.0, 0.05], [1.2, 0.1, -0.1], [0.2, 0.9, 0.1], [0.15, 0.2, 1.1]])
+    tetrahedra = np.array([[0, 1, 2, 3]])
+    if element == "linear":
+        return nodes, tetrahedra
+    nodes, tetrahedra = second_order(nodes, tetrahedra)
+    if curved:
+        nodes[4:] += 0.03 * np.random.default_rng(3).standard_normal((6, 3))
+    return nodes, tetrahedra
+
+
+def deformed(nodes, principal, noise=0.0, seed=1):
+    """x = R diag(principal) Q X, with noise of this size on each node."""
+    rng = np.random.default_rng(seed)
+    r, q = (np.linalg.qr(rng.standard_normal((3, 3)))[0] for _ in range(2))
+    r, q = r * np.sign(np.linalg.det(r)), q * np.sign(np.linalg.det(q))
+    return nodes @ (r @ np.diag(principal) @ q).T + noise * rng.standard_normal(nodes.shape)
