@@ -75,7 +75,7 @@ def _one(steps: int, keep: str, examples: str) -> dict[str, Any]:
     def gradient(count: int):
         task = Task(arch(), gravity=9.81, steps=count)
         x = torch.tensor(task.start, requires_grad=True)
-        motion = task.motion(x, keep=keep, record_every=count)
+        motion = task.motion(x, adjoint_storage=keep, record_every=count)
         task.distance(motion).backward()
         return motion
 

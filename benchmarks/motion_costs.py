@@ -139,7 +139,7 @@ def _forward_and_back(scene: ms.Scene, steps: int, integrator, keep: str) -> tup
         integrator=integrator,
         remanent_magnetization=magnetization,
         applied_flux_density=field,
-        keep=ms.Keep(keep, memory_budget=budget(scene, integrator, steps)),
+        adjoint_storage=ms.AdjointStorage(keep, memory_budget=budget(scene, integrator, steps)),
     )
     done = time.process_time()
     (move.positions[-1] ** 2).sum().backward()
@@ -186,7 +186,7 @@ def long_run(steps: int, parts: int = 10) -> dict[str, Any]:
             move = drive(scene, steps // parts, integrator=integrator, start=move)
             sizes.append(resident_memory())
             done += move.steps_done
-            halved += len(move.halved)
+            halved += len(move.substeps)
         grown = None if sizes[0] is None else sizes[-1] - sizes[0]
         name = type(integrator).__name__
         seconds = time.process_time() - began

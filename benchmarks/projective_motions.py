@@ -21,7 +21,7 @@ TIME_STEP, STEPS = 1e-2, 4
 ROUNDS = (1, 2, 5, 10, 20, 50, 100)
 MODULI = {"young_modulus": 1e5, "poisson_ratio": 0.4}
 MATERIALS = {
-    "Projective": ms.Projective(**MODULI),
+    "Projective": ms.ProjectiveMaterial(**MODULI),
     "Corotated": ms.Corotated(**MODULI),
     "NeoHookean": ms.NeoHookean(**MODULI),
 }
@@ -123,7 +123,7 @@ def arch(cells: tuple[int, int, int] = ARCH_CELLS) -> ms.Scene:
     mesh = ms.TetMesh(bent, flat.tetrahedra)
     solid = ms.Solid(
         mesh,
-        material=ms.Projective(young_modulus=3e5, poisson_ratio=0.3),
+        material=ms.ProjectiveMaterial(young_modulus=3e5, poisson_ratio=0.3),
         mass_density=1e3,
         element="linear",
     )
@@ -170,7 +170,7 @@ def _grown(cells, steps: int, keep: str) -> dict[str, Any]:
             values={solid: {"young_modulus": young}},
             integrator=ms.ProjectiveDynamics(tolerance=1e-8),
             record_every=count,
-            keep=ms.Keep(keep, memory_budget=2e6 if keep == "checkpoints" else 2e9),
+            adjoint_storage=ms.AdjointStorage(keep, memory_budget=2e6 if keep == "checkpoints" else 2e9),
             progress=False,
         )
         done = time.process_time()

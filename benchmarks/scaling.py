@@ -158,7 +158,7 @@ def costs(faces: int, threads: int, bending: str, rounds: int) -> dict[str, Any]
     }
     return {
         "faces": scene.mesh.n_faces,
-        "unknowns": scene.n_unknowns,
+        "unknowns": scene.n_dofs,
         "factorizations": found.factorizations,
         "operations": operations,
         "metis": metis,

@@ -164,7 +164,7 @@ def _forward_and_back(scene: ms.Scene, steps: int, keep: str) -> tuple[float, fl
     }
     field = torch.tensor(turning(steps), requires_grad=True)
     began = time.process_time()
-    move = drive(scene, steps, field=field, values={solid: values}, keep=keep)
+    move = drive(scene, steps, field=field, values={solid: values}, adjoint_storage=keep)
     done = time.process_time()
     (move.positions[-1] ** 2).sum().backward()
     return done - began, time.process_time() - done, move.bytes

@@ -67,7 +67,7 @@ def costs(cells: tuple[int, int, int], rounds: int) -> dict[str, Any]:
     times = {name: clocked(each, rounds=rounds).processor for name, each in work.items()}
     return {
         "tetrahedra": scene.bodies[0].mesh.n_tetrahedra,
-        "unknowns": scene.n_unknowns,
+        "unknowns": scene.n_dofs,
         "iterations": move.iterations,
         **times,
         "iteration": step.processor / move.iterations,

@@ -95,7 +95,7 @@ def _from_flat() -> dict[str, Any]:
                     found = error.last_good
                 bound = str(allowed) if (bending, solver_name) == ("midedge", "mixed") else ""
                 counts = [found.factorizations, found.load_steps, found.iterations]
-                failed = found.progress < 1.0
+                failed = found.load_fraction < 1.0
                 shown = ["failed", "", ""] if failed else [str(count) for count in counts]
                 if bound:
                     count = np.inf if failed else found.factorizations
@@ -155,7 +155,7 @@ def _to_stable(quick: bool) -> dict[str, Any]:
             warnings.simplefilter("ignore", ms.LargeStrainWarning)
             found = ms.equilibrium(scene, **controls)
         missed = note("count", f"factorizations of {name}, stable", found.factorizations, at_most=allowed)
-        counts = [found.load_steps, found.relaxation_steps, found.saddles_left]
+        counts = [found.load_steps, found.relaxation_steps, found.saddles_escaped]
         rows.append([name, "", f"{found.factorizations}{missed}", *map(str, counts), str(allowed)])
         results[name] = {"factorizations": found.factorizations, "energy": found.energy}
     headings = [
@@ -181,7 +181,7 @@ def _iteration(scene: ms.Scene, controls: dict[str, Any], rounds: int) -> dict[s
     note("count", "factorizations of the strongly bent sheet", best.factorizations)
     note("memory", "bytes a face of the solve", best.memory / scene.mesh.n_faces)
     print(
-        f"\nStrongly bent, {scene.mesh.n_faces} faces, {scene.n_unknowns} unknowns: {best.factorizations} factorizations, "
+        f"\nStrongly bent, {scene.mesh.n_faces} faces, {scene.n_dofs} unknowns: {best.factorizations} factorizations, "
         f"{best.wall_time:.2f} s; an iteration takes {ratio:.2f} times its factorization and solve (at most "
         f"{ALLOWED_RATIO}){missed}.\nModel and factorization: {best.memory / 1e6:.0f} MB"
         + ("." if memory is None else f"; peak of the process: {memory / 1e6:.0f} MB.")

@@ -96,6 +96,6 @@ def _motion(scene: ms.Scene, steps: int, rounds: int) -> dict[str, Any]:
     return {
         "step": best / steps,
         "iterations": move.iterations / steps,
-        "halved": len(move.halved),
+        "halved": len(move.substeps),
         "way": float(move.displacements[-1, :, 0].mean()),
     }

@@ -115,7 +115,7 @@ def _costs(
         whole = clocked(lambda: ms.equilibrium(scene, **solve), rounds=rounds)
         iteration = Clocked(*(seconds / found.factorizations for seconds in whole))
         of_rest = {
-            "unknowns": scene.n_unknowns,
+            "unknowns": scene.n_dofs,
             "assembly": _seconds(assembly),
             "iteration": _seconds(iteration),
             "factorizations": found.factorizations,

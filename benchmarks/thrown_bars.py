@@ -87,7 +87,7 @@ def measure(rounds: int, quick: bool) -> dict[str, Any]:
         }
         if name == "touching":
             contact = scene.contacts[0]
-            results["pairs"] = max(len(motion.touching(contact, k).pairs) for k in range(steps + 1))
+            results["pairs"] = max(len(motion.contact_state(contact, k).pairs) for k in range(steps + 1))
             results["same states"] = without_contact(scenes["free"], motion)
     over = results["touching"]["step"] / results["free"]["step"]
     results["share"] = 1.0 - 1.0 / over

@@ -76,7 +76,7 @@ def thrown(
     processor_time = time.process_time() - began
     ball = motion[scene.ball].positions
     extents = np.ptp(ball, axis=1) / (2 * RADIUS)
-    touching = [motion.touching(scene.touch, frame) for frame in range(len(motion))]
+    touching = [motion.contact_state(scene.touch, frame) for frame in range(len(motion))]
     return {
         "case": (cells, ball_cells, number),
         "scenery": scene,
@@ -86,7 +86,7 @@ def thrown(
         "penetrations": sum(len(motion.self_intersections(frame)) for frame in range(len(motion))),
         "gaps": np.array([each.smallest_distance for each in touching]),
         "forces": np.array([each.normal_force for each in touching]),
-        "least_gap": scene.touch.minimal_distance,
+        "least_gap": scene.touch.min_distance,
         "heights": extents[:, 2],
         "widths": extents[:, :2].max(axis=1),
         "center": ball.mean(axis=1),
@@ -94,7 +94,7 @@ def thrown(
         "stretching": float(extents[:, :2].max() - 1),
         "sheet_strain": float(motion.largest_membrane_strain.max()),
         "newton": motion.iterations / steps,
-        "halved": len(motion.halved),
+        "halved": len(motion.substeps),
         "seconds_a_step": processor_time / steps,
     }
 

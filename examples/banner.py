@@ -68,7 +68,7 @@ def summary(result: dict) -> str:
             *lines,
             "",
             f"Letters {1e3 * RELIEF:g} mm high, designed in {result['designing']:.0f} s. The banner: "
-            f"{rest.scene.mesh.n_faces} faces, {rest.scene.n_unknowns} unknowns, solved in {rest.wall_time:.1f} s "
+            f"{rest.scene.mesh.n_faces} faces, {rest.scene.n_dofs} unknowns, solved in {rest.wall_time:.1f} s "
             f"with {rest.factorizations} factorizations, {'stable' if rest.stable else 'unstable'}.",
         ]
     )

@@ -49,7 +49,7 @@ def main(cells=(96, 16), meshes=MESHES) -> dict:
     start = buckled(sheet)
     height = sheet.height(start.positions)
     # Up to the critical field, back over unstable states to the other side, on to the end of the ramp.
-    path = sheet.follow(HIGHEST_FIELD, start=start, largest_step=0.001, lowest_parameter=-1.0)
+    path = sheet.follow(HIGHEST_FIELD, start=start, max_step=0.001, min_parameter=-1.0)
     first = path.critical[0]
     critical_field = HIGHEST_FIELD * first.parameter
     curve = sections(sheet, path, HIGHEST_FIELD, height)
@@ -81,7 +81,7 @@ def main(cells=(96, 16), meshes=MESHES) -> dict:
     }
 
 
-def sections(sheet: Beam, path: ms.Path, field: float, height: float) -> list[dict]:
+def sections(sheet: Beam, path: ms.EquilibriumPath, field: float, height: float) -> list[dict]:
     """The path cut at its first and last critical points: fields [T], displacements [m], whether stable."""
     joints = (path.critical[0], path.critical[-1])
     cuts = [joint.after_point + 1 for joint in joints]

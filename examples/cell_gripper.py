@@ -20,7 +20,8 @@ What comes out:
   it does no harm here.
 - Arms end as high as the middle of the ball. While it rises, friction bears 4 to 6 of the ball's 10 N and the
   arms, which lean inwards, the rest; without friction the same controls leave it on the table.
-- A cell is the outer half of an arm at one of 14 levels, 18 tetrahedra whose common volume it sets (ms.Cells). Volumes come
+- A cell is the outer half of an arm at one of 14 levels, 18 tetrahedra whose common volume it sets
+(ms.PneumaticCells). Volumes come
   nearer to what is asked by a fifth a step, as air takes its time: cells that jump make random actions, as learners
   try them, take 300 ms a step instead of 30.
 - What the search changes is mostly the drone's way: cells blown up alike grip well enough.

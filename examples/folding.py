@@ -48,7 +48,7 @@ def measured(strip: Strip) -> dict:
     began = time.process_time()
     states = strip.states()
     processor_time = time.process_time() - began
-    touching = [state.touching(strip.touch) for state in states]
+    touching = [state.contact_state(strip.touch) for state in states]
     positions = np.array([state.positions for state in states])
     mesh = strip.scene.mesh
     end = positions[:, strip.end]
@@ -66,7 +66,7 @@ def measured(strip: Strip) -> dict:
         "forces": np.array([each.normal_force for each in touching]),
         "pairs": np.array([len(each.pairs) for each in touching]),
         "crossings": sum(len(state.self_intersections()) for state in states),
-        "least_gap": strip.touch.minimal_distance,
+        "least_gap": strip.touch.min_distance,
         "strain": max(state.largest_bending_strain for state in states),
         "iterations": np.array([state.iterations for state in states]),
         "processor_time": processor_time,

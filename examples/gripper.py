@@ -85,7 +85,7 @@ def designed(gripper: Gripper, iterations: int) -> dict:
 def printed(gripper: Gripper, begin: np.ndarray, iterations: int) -> ms.PrintableMinimum:
     """Every face in one of six directions, at full strength."""
     miss = Miss(gripper)
-    ink = ms.Ink(LIMIT, np.vstack([np.eye(3), -np.eye(3)]), levels=(1,))
+    ink = ms.PrintableSet(LIMIT, np.vstack([np.eye(3), -np.eye(3)]), levels=(1,))
     return ms.minimize_printable(
         miss,
         begin,

@@ -148,7 +148,7 @@ def measured(jump: Jump, unknowns: np.ndarray) -> dict:
         "clears": bool(over > BAR_HEIGHT and x[-1].min() > BAR),
         "rms": float(np.sqrt((field**2).sum(axis=1).mean())),
         "strongest": float(np.abs(field).max()),
-        "halved": len(move.halved),
+        "halved": len(move.substeps),
         "newton": move.iterations / jump.steps,
         "motion_time": spent,
     }

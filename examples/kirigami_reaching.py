@@ -92,7 +92,7 @@ def measured(task: Reaching, field: torch.Tensor, parts: int = 1) -> dict:
         "sum_of_squares": float((counted**2).sum()),
         "largest": float(counted.max()),
         "angles": np.arctan2(sines, cosines),
-        "halved": len(move.halved),
+        "halved": len(move.substeps),
     }
 
 

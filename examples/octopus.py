@@ -10,7 +10,8 @@ the axis is unstable. In a swing of 12 mT at 4 Hz, what a change of Bx does to t
 for horizons of 200 to 1200 steps; what a change of By does to the way aside grows from 0.2 to 4500 m/T in pipe II, tenfold
 in 0.2 s, and to 6100 in open water: contact is not the cause. At that rate noise of 1e-12 m would be a millimeter after
 2 s, the motion depends on rounding, and gradients over it tell nothing that a search can use.
-So `ms.control.receding` looks 0.4 s ahead, where noise grows a hundredfold, does 0.2 s of what it found, and begins again
+So `ms.control.receding_horizon` looks 0.4 s ahead, where noise grows a hundredfold, does 0.2 s of what it
+found, and begins again
 from where that led: what went aside is led back by By and Bz, the field found has feedback in it. As a field that is
 zero does nothing to first order, five more plans are tried before each search: swings of up to 12 mT, or earlier strokes
 once more. The gradient over such a horizon in the throat of pipe I agrees with differences to 2e-5 along itself.
@@ -131,7 +132,7 @@ def measured(swim: Swim, field: np.ndarray) -> dict:
         "deepest": float(-swim.channel.tube().signed_distance(move.positions).min()),
         "strongest": float(magnitudes.max()),
         "rms": float(np.sqrt((magnitudes**2).mean())),
-        "halved": len(move.halved),
+        "halved": len(move.substeps),
         "newton": move.iterations / swim.steps,
         "processor_time": processor_time,
     }

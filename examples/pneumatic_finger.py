@@ -1,7 +1,7 @@
 """A soft finger with a channel of air above its middle bends when that is blown up: pressure against bending angle.
 
 A bar of 48 x 12 x 16 mm of silicone (60 kPa), held at one end, with a closed channel of 40 x 4 x 4 mm in its upper half, an
-ms.Cavity: ms.follow follows it up to 14 kPa. Then the same finger with its channel closed off, blown up by
+ms.Cavity: ms.follow_path follows it up to 14 kPa. Then the same finger with its channel closed off, blown up by
 the air that is let in: as much as it takes is a value of the cavity too, and the pressure is what comes out.
 
 What comes out:
@@ -55,8 +55,8 @@ def main() -> dict:
     root = [ms.Pin(solid.mesh.vertices_at(x=0.0))]
     channel = ms.Cavity(solid, pressure=PRESSURE)
     scene = ms.Scene(solid, supports=root, actuators=[channel])
-    path = ms.follow(scene, largest_step=0.05, progress=False)
-    air = ms.Cavity(solid, filling_pressure=FILLED)
+    path = ms.follow_path(scene, max_step=0.05, progress=False)
+    air = ms.Cavity(solid, gas_pressure=FILLED)
     filled = ms.equilibrium(ms.Scene(solid, supports=root, actuators=[air]))
     return {
         "solid": solid,

@@ -39,7 +39,9 @@ def roof(cells: tuple[int, int], irregular: float | None, order: int) -> list[Fo
     return [Found(abs(-solved.displacements[edge, 2] / 0.3006 - 1.0), solved.seconds)]
 
 
-def roof_on(mesh: ms.TriangleMesh | ms.SixNodeMesh, order: int, onto: bool) -> ngsolve_linear.Solved:
+def roof_on(
+    mesh: ms.TriangleMesh | ms.QuadraticTriangleMesh, order: int, onto: bool
+) -> ngsolve_linear.Solved:
     """A quarter of B1. onto: whether flat elements are bent onto the cylinder."""
     middle = linear_cylinders.ROOF_LENGTH / 2
     names = {

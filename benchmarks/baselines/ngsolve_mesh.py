@@ -14,13 +14,14 @@ import magshell as ms
 Names = dict[str, Callable[[np.ndarray], bool]]
 
 
-def netgen_mesh(mesh: ms.TriangleMesh | ms.SixNodeMesh, names: Names, dim: int = 3) -> ng.Mesh:
+def netgen_mesh(mesh: ms.TriangleMesh | ms.QuadraticTriangleMesh, names: Names, dim: int = 3) -> ng.Mesh:
     """names: {name: of which edges on the border, a function of their middles (3,) m}, the last one for all others.
 
-    Vertices keep their numbers. The bent edges of a SixNodeMesh, whose corners must come first, are a deformation of the
+    Vertices keep their numbers. The bent edges of a QuadraticTriangleMesh, whose corners must come first, are
+    a deformation of the
     mesh: NGSolve integrates over elements of the same shape.
     """
-    corners = mesh.first_order() if isinstance(mesh, ms.SixNodeMesh) else mesh
+    corners = mesh.first_order() if isinstance(mesh, ms.QuadraticTriangleMesh) else mesh
     points = corners.rest_positions
     made = netgen.Mesh(dim=dim)
     nodes = [made.Add(netgen.MeshPoint(netgen.Pnt(*map(float, point)))) for point in points]
@@ -36,14 +37,14 @@ def netgen_mesh(mesh: ms.TriangleMesh | ms.SixNodeMesh, names: Names, dim: int =
     if dim == 2:
         made.SetMaterial(1, "sheet")
     other = ng.Mesh(made)
-    if isinstance(mesh, ms.SixNodeMesh):
+    if isinstance(mesh, ms.QuadraticTriangleMesh):
         _bend(other, mesh)
     return other
 
 
-def _bend(other: ng.Mesh, mesh: ms.SixNodeMesh) -> None:
+def _bend(other: ng.Mesh, mesh: ms.QuadraticTriangleMesh) -> None:
     if not np.array_equal(mesh.corner_vertices, np.arange(mesh.corners.n_vertices)):
-        raise ValueError("the corners of the SixNodeMesh must be its first vertices")
+        raise ValueError("the corners of the QuadraticTriangleMesh must be its first vertices")
     bows = mesh.edge_midpoints - mesh.rest_positions[mesh.edges].mean(axis=1)
     if not bows.any():
         return

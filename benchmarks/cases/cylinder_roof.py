@@ -58,7 +58,7 @@ BEYOND = 1.2  # times the full load: towards there the path is followed, past th
 
 def quarter(
     cells: tuple[int, int], bending: str = "midedge", irregular: float | None = None
-) -> ms.TriangleMesh | ms.SixNodeMesh:
+) -> ms.TriangleMesh | ms.QuadraticTriangleMesh:
     """A quarter of the roof, from its center at x = y = 0 to the hinge and to the free curved edge."""
     span = (0.0, HALF_ANGLE)
     return ms.meshes.cylinder(
@@ -82,7 +82,7 @@ def snap_through(
     bending: str = "midedge",
     *,
     irregular: float | None = None,
-    largest_step: float = 0.002,
+    max_step: float = 0.002,
     solver: ms.Newton | None = None,
 ) -> Outcome:
     """The load at each listed deflection, by arc length through both limit points.
@@ -98,11 +98,11 @@ def snap_through(
     def deflection(positions: np.ndarray) -> np.ndarray:
         return RADIUS - positions[..., center, 2]
 
-    path = ms.follow(
+    path = ms.follow_path(
         scene(mesh, bending),
         until=lambda _, positions: deflection(positions) > deflections[-1],
         first_step=0.05,
-        largest_step=largest_step,
+        max_step=max_step,
         locate_critical=False,
         solver=solver,
         progress=False,

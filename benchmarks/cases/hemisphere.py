@@ -14,7 +14,7 @@ HOLE = np.radians(18.0)
 
 def quarter(
     cells: tuple[int, int], bending: str, hole: float = HOLE, irregular: float | None = None
-) -> ms.TriangleMesh | ms.SixNodeMesh:
+) -> ms.TriangleMesh | ms.QuadraticTriangleMesh:
     """A quarter of the hemisphere, cells as those of the whole: around, along the meridian."""
     if cells[0] % 4:
         raise ValueError(f"a quarter needs a multiple of 4 cells around, got {cells[0]}")

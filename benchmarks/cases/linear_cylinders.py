@@ -33,7 +33,7 @@ def scordelis_lo(
     return outcome(f"{mesh_name(cells, irregular)} a quarter", mesh, [comparison], [response])
 
 
-def roof_response(mesh: ms.TriangleMesh | ms.SixNodeMesh, bending: str) -> ms.LinearResponse:
+def roof_response(mesh: ms.TriangleMesh | ms.QuadraticTriangleMesh, bending: str) -> ms.LinearResponse:
     """Of a quarter of B1 under its weight."""
     sheet = ms.Shell(mesh, thickness=0.25, young_modulus=4.32e8, poisson_ratio=0.0, bending=bending)
     middle = ROOF_LENGTH / 2
@@ -71,7 +71,7 @@ def pinched_cylinder(
 
 def eighth(
     cells: tuple[int, int], irregular: float | None, order: int, grading: float = 1.8
-) -> ms.TriangleMesh | ms.SixNodeMesh:
+) -> ms.TriangleMesh | ms.QuadraticTriangleMesh:
     """An eighth of the cylinder, its cells smaller towards the force, where the deflection is."""
     even = ms.meshes.cylinder(1.0, 1.0, (0.0, 1.0), cells=cells, irregular=irregular)
     x, y, z = even.rest_positions.T
@@ -79,7 +79,7 @@ def eighth(
     along = y**grading * PINCHED_LENGTH / 2
     points = np.stack([PINCHED_RADIUS * np.sin(angle), along, PINCHED_RADIUS * np.cos(angle)], axis=1)
     mesh = ms.TriangleMesh(points, even.faces)
-    return mesh if order == 1 else ms.SixNodeMesh.of(mesh, place=_onto_the_cylinder)
+    return mesh if order == 1 else ms.QuadraticTriangleMesh.of(mesh, place=_onto_the_cylinder)
 
 
 def _onto_the_cylinder(points: np.ndarray) -> np.ndarray:

@@ -62,7 +62,9 @@ def stretched_end(beta: float) -> np.ndarray:
     return end_of_strip(LENGTH, stiffness, bending, beta * bending / LENGTH**2) / LENGTH
 
 
-def _strip(cells, bending: str, irregular: float | None, seed: int) -> ms.TriangleMesh | ms.SixNodeMesh:
+def _strip(
+    cells, bending: str, irregular: float | None, seed: int
+) -> ms.TriangleMesh | ms.QuadraticTriangleMesh:
     return ms.meshes.rectangle(LENGTH, WIDTH, cells, irregular=irregular, seed=seed, order=order_of(bending))
 
 

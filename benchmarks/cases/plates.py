@@ -74,11 +74,11 @@ def circular_plate(rings: int = 48, bending: str = "midedge", *, irregular: floa
     return _middle_deflections(mesh, mesh.boundary_edges, [], 1, bending, CIRCULAR, name, 0.005)
 
 
-def _of_order(mesh: ms.TriangleMesh, bending: str) -> ms.TriangleMesh | ms.SixNodeMesh:
-    return mesh if order_of(bending) == 1 else ms.SixNodeMesh.of(mesh)
+def _of_order(mesh: ms.TriangleMesh, bending: str) -> ms.TriangleMesh | ms.QuadraticTriangleMesh:
+    return mesh if order_of(bending) == 1 else ms.QuadraticTriangleMesh.of(mesh)
 
 
-def _disk(rings: int, irregular: float | None, bending: str) -> ms.TriangleMesh | ms.SixNodeMesh:
+def _disk(rings: int, irregular: float | None, bending: str) -> ms.TriangleMesh | ms.QuadraticTriangleMesh:
     """Of radius 1. irregular: by which share of a ring's width its vertices move, but for the rim's and the middle."""
     mesh = ms.meshes.disk(1.0, rings)
     if irregular is None:
@@ -97,10 +97,10 @@ def _disk(rings: int, irregular: float | None, bending: str) -> ms.TriangleMesh 
         points[rim] /= np.linalg.norm(points[rim], axis=1, keepdims=True)
         return points
 
-    return ms.SixNodeMesh.of(moved, place=onto_the_rim)
+    return ms.QuadraticTriangleMesh.of(moved, place=onto_the_rim)
 
 
-def middle_deflection(mesh: ms.TriangleMesh | ms.SixNodeMesh, support: str, load: str) -> float:
+def middle_deflection(mesh: ms.TriangleMesh | ms.QuadraticTriangleMesh, support: str, load: str) -> float:
     """Of a quarter of the unit square, its middle at the origin."""
     bending = "midedge" if isinstance(mesh, ms.TriangleMesh) else "midedge2"
     response = _response(mesh, _rim(mesh), _symmetry(), 4, bending, support, load)

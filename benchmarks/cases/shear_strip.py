@@ -43,7 +43,7 @@ ELASTICA = {
 
 def strip(
     cells: tuple[int, int], bending: str, seed: int = 0, irregular: float | None = 0.25
-) -> ms.TriangleMesh | ms.SixNodeMesh:
+) -> ms.TriangleMesh | ms.QuadraticTriangleMesh:
     return ms.meshes.rectangle(LENGTH, WIDTH, cells, irregular=irregular, seed=seed, order=order_of(bending))
 
 

@@ -82,7 +82,7 @@ def outcome(
 ) -> SolidOutcome:
     name = "x".join(str(count) for count in cells)
     tetrahedra = scene.bodies[0].mesh.n_tetrahedra
-    return SolidOutcome(name, tetrahedra, scene.n_unknowns, iterations, seconds, tuple(comparisons))
+    return SolidOutcome(name, tetrahedra, scene.n_dofs, iterations, seconds, tuple(comparisons))
 
 
 def asked(element: str, allowed: float) -> float | None:

@@ -35,9 +35,9 @@ void register_continuation(py::module_& module) {
         .def(py::init<>())
         .def_readwrite("newton", &PathOptions::newton)
         .def_readwrite("first_step", &PathOptions::first_step)
-        .def_readwrite("largest_step", &PathOptions::largest_step)
+        .def_readwrite("max_step", &PathOptions::largest_step)
         .def_readwrite("max_points", &PathOptions::max_points)
-        .def_readwrite("lowest_parameter", &PathOptions::lowest_parameter)
+        .def_readwrite("min_parameter", &PathOptions::lowest_parameter)
         .def_readwrite("highest_parameter", &PathOptions::highest_parameter)
         .def_readwrite("locate_critical", &PathOptions::locate_critical);
 
@@ -45,7 +45,7 @@ void register_continuation(py::module_& module) {
         .def_readonly("state", &PathPoint::state)
         .def_readonly("parameter", &PathPoint::parameter)
         .def_readonly("turns", &PathPoint::angle_branches)
-        .def_readonly("unstable_directions", &PathPoint::unstable_directions);
+        .def_readonly("n_negative_eigenvalues", &PathPoint::unstable_directions);
 
     py::enum_<CriticalKind>(module, "CriticalKind")
         .value("limit", CriticalKind::limit)

@@ -135,10 +135,12 @@ Array directions_of(const MotionResult& motion, const Model& model) {
 
 // Returns the motor forces of the recorded states, (n, m); NaN in states that no step led to.
 Knots driving_of(const MotionResult& motion) {
-    const Eigen::Index n = static_cast<Eigen::Index>(motion.recorded.size()), m = motion.last.motor_forces.size();
+    const Eigen::Index n = static_cast<Eigen::Index>(motion.recorded.size()),
+                       m = motion.last.motor_forces.size();
     Knots rows = Knots::Constant(n, m, std::numeric_limits<double>::quiet_NaN());
     for (Eigen::Index k = 0; k < n; ++k)
-        if (motion.recorded[k].motor_forces.size() == m) rows.row(k) = motion.recorded[k].motor_forces.transpose();
+        if (motion.recorded[k].motor_forces.size() == m)
+            rows.row(k) = motion.recorded[k].motor_forces.transpose();
     return rows;
 }
 
@@ -173,8 +175,8 @@ py::list largest_strains(const MotionResult& motion, const Model& model, const V
     return rows;
 }
 
-MotionResult run(Model& model, const MotionInput& input, bool gradients, std::size_t budget, AdjointStorage keep,
-                 const py::object& progress) {
+MotionResult run(Model& model, const MotionInput& input, bool gradients, std::size_t budget,
+                 AdjointStorage keep, const py::object& progress) {
     const Watch watch(progress);
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());
@@ -251,7 +253,7 @@ void register_dynamics(py::module_& module) {
         .def_property_readonly("last_turns", [](const MotionResult& r) { return r.last.angle_branches; })
         .def_readonly("kinetic_energy", &MotionResult::kinetic_energy)
         .def_readonly("energies", &MotionResult::energies)
-        .def_property_readonly("halved",
+        .def_property_readonly("substeps",
                                [](const MotionResult& r) {
                                    std::map<Index, std::vector<std::tuple<double, double, bool>>> all;
                                    for (const auto& [step, substeps] : r.substeps)

@@ -59,7 +59,7 @@ def _warm_start() -> int:
 def _snap() -> float:
     """Follow a roof through both limit points under the force that snaps it, critical points found."""
     roof = cylinder_roof.scene(cylinder_roof.quarter((8, 8)), "midedge")
-    path = ms.follow(roof, progress=False)
+    path = ms.follow_path(roof, progress=False)
     return path.factorizations / len(path.positions)
 
 

@@ -33,8 +33,8 @@ class Beam:
     def equilibrium(self, field=0.0, **options) -> ms.Equilibrium:
         return ms.equilibrium(self.scene, **self._controls(field), **options)
 
-    def follow(self, field, **options) -> ms.Path:
-        return ms.follow(self.scene, **self._controls(field), progress=False, **options)
+    def follow(self, field, **options) -> ms.EquilibriumPath:
+        return ms.follow_path(self.scene, **self._controls(field), progress=False, **options)
 
     def _controls(self, field):
         return {"remanent_magnetization": self.remanent_magnetization, "applied_flux_density": (0, 0, field)}
@@ -75,14 +75,14 @@ def buckled(beam: Beam) -> ms.Equilibrium:
     return beam.equilibrium(field=0.0, start=pushed)
 
 
-def stability_loss(beam: Beam, *, field=8e-3, largest_step=0.006) -> dict:
+def stability_loss(beam: Beam, *, field=8e-3, max_step=0.006) -> dict:
     """Height [m], field [T] and height of the limit point and of the bifurcation, and which is the first."""
     start = buckled(beam)
     height = beam.height(start.positions)
     path = beam.follow(
         field,
         start=start,
-        largest_step=largest_step,
+        max_step=max_step,
         until=lambda _, positions: beam.height(positions) < 0.3 * height,
     )
     found = {"height": height, "first": path.critical[0].kind}

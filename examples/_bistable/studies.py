@@ -75,7 +75,7 @@ def beam_theory(
 
 def straight_buckling(beam: Beam) -> float:
     """The shortening [m] at which the straight beam buckles."""
-    path = beam.follow(0.0, first_step=0.02, largest_step=2e-5, until=lambda parameter, _: parameter > 0.6)
+    path = beam.follow(0.0, first_step=0.02, max_step=2e-5, until=lambda parameter, _: parameter > 0.6)
     return path.critical[0].parameter * beam.shortening
 
 
@@ -88,7 +88,7 @@ def differences(cells) -> dict:
     # Thinner by `scale`, shortened by scale^2: the same beam with smaller slopes; B goes with scale^3.
     scale = 1 / 8
     thin = beam(cells, thickness=scale * THICKNESS, shortening=scale**2 * SHORTENING, poisson_ratio=0.0)
-    found = stability_loss(thin, field=8e-3 * scale**3, largest_step=0.006 * scale)
+    found = stability_loss(thin, field=8e-3 * scale**3, max_step=0.006 * scale)
     rows.append(("shell, no Poisson's effect, small slopes", *_height_and_field(found, 1 / scale, scale**-3)))
     no_poisson = beam(cells, poisson_ratio=0.0)
     rows.append(("... its true slopes and strains", *_height_and_field(stability_loss(no_poisson))))

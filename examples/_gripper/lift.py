@@ -29,20 +29,20 @@ def closing_and_lift(gripper: Gripper, remanent_magnetization: np.ndarray, steps
         steps=steps,
         time_step=END / steps,
         applied_flux_density=np.clip(times / RISE, 0.0, 1.0)[:, None] * np.array(FIELD),
-        motion_factor=share**2 * (3 - 2 * share),
+        support_factor=share**2 * (3 - 2 * share),
         values={gripper.sheet: {"remanent_magnetization": remanent_magnetization}},
         stiffness_damping=2e-3,
         progress=False,
     )
     seconds = time.process_time() - began
-    touching = [motion.touching(scene.contacts[0], frame) for frame in range(len(motion))]
+    touching = [motion.contact_state(scene.contacts[0], frame) for frame in range(len(motion))]
     return {
         "motion": motion,
         "ball_height": motion[gripper.ball].positions[:, :, 2].mean(axis=1),
         "sheet_height": motion[gripper.sheet].positions[:, :, 2].max(axis=1),
         "forces": np.array([each.normal_force for each in touching]),
         "gaps": np.array([each.smallest_distance for each in touching]),
-        "least_gap": scene.contacts[0].minimal_distance,
+        "least_gap": scene.contacts[0].min_distance,
         "crossings": sum(len(motion.self_intersections(k)) for k in range(0, len(motion), 5)),
         "seconds": seconds,
     }

@@ -126,7 +126,7 @@ def designed(body: Body, gesture: str, iterations: int, progress: bool = False) 
     at_rest = ms.WarmStart(body.scene)
 
     def magnetization():
-        return (LARGEST_MAGNETIZATION * ms.parametrize.capped(shares, 1.0))[faces]
+        return (LARGEST_MAGNETIZATION * ms.parametrize.softly_limited(shares, 1.0))[faces]
 
     def objective(*_):
         rest = at_rest(
@@ -135,7 +135,7 @@ def designed(body: Body, gesture: str, iterations: int, progress: bool = False) 
         )
         squares = ms.objectives.shape_matching(rest.positions, targets, anchors.vertices)
         miss = squares / (len(targets) * REACH**2)
-        price = PRICE * ms.objectives.magnitude(ms.parametrize.capped(shares, 1.0), areas)
+        price = PRICE * ms.objectives.magnitude(ms.parametrize.softly_limited(shares, 1.0), areas)
         return miss + price, {"miss": miss.detach()}
 
     found = ms.minimize(

@@ -87,7 +87,7 @@ def designed(task: Task, iterations: int, progress: bool = False) -> Design:
 
 def capped(numbers: torch.Tensor) -> torch.Tensor:
     """(n, 3), each shorter than 1."""
-    return ms.parametrize.capped(numbers, 1.0)
+    return ms.parametrize.softly_limited(numbers, 1.0)
 
 
 def _edges_within(task: Task) -> tuple[torch.Tensor, torch.Tensor]:

@@ -44,14 +44,14 @@ class Design:
         alike. The brush, a cone filter (Bourdin 2001), leaves no features finer than itself.
         """
         vectors = torch.einsum("fk,fki->fi", variables, self.frames)
-        return CAP * ms.parametrize.capped(self.brush @ vectors, 1.0)
+        return CAP * ms.parametrize.softly_limited(self.brush @ vectors, 1.0)
 
     def misses(self, positions: torch.Tensor, weights: torch.Tensor | None = None) -> torch.Tensor:
         """Weighted sum of |x - x*|^2 over the vertices and both load cases, m2. positions: (2, n_v, 3)."""
         cases = zip(positions, self.targets, strict=True)
         return sum(ms.objectives.shape_matching(x, target, weights=weights) for x, target in cases)
 
-    def objective(self, rest: ms.Equilibria) -> torch.Tensor:
+    def objective(self, rest: ms.EquilibriumSet) -> torch.Tensor:
         """Mean square distance from the targets, by mass, in squares of the arm length; both cases' sum."""
         return self.misses(rest.positions, self.mass_shares) / ARM_LENGTH**2
 
@@ -104,7 +104,7 @@ def from_beam_theory(mesh: ms.TriangleMesh) -> torch.Tensor:
     variables = np.zeros((mesh.n_faces, 3))
     variables[:, 0] = np.where(
         s > 0.0, -shares / np.sqrt(1.0 - shares**2), 0.0
-    )  # the inverse of ms.parametrize.capped
+    )  # the inverse of ms.parametrize.softly_limited
     return torch.from_numpy(variables)
 
 

@@ -59,8 +59,8 @@ def switched_on(magnetization: np.ndarray) -> dict:
         rest = solve(sheet, magnetization, share, start=rest)
         heights.append(float(sheet.height(rest.positions)))
         lowest.append(float(rest.positions[:, 2].min()))
-        on_floor.append(rest.touching(floor).normal_force)
-        on_itself.append(rest.touching(own).normal_force)
+        on_floor.append(rest.contact_state(floor).normal_force)
+        on_itself.append(rest.contact_state(own).normal_force)
     return {
         "fields": fields * FIELD[2],
         "heights": np.array(heights),
@@ -83,7 +83,7 @@ def disturbed(
     rng, gains = np.random.default_rng(4), []
     for _ in range(trials):
         moved = magnetization + size * LIMIT * rng.standard_normal(magnetization.shape)
-        within = ms.parametrize.project_to_cap(torch.from_numpy(moved), LIMIT).numpy()
+        within = ms.parametrize.clip_to_limit(torch.from_numpy(moved), LIMIT).numpy()
         there = solve(sheet, within, start=rest)
         gains.append(float(sheet.height(there.positions) - sheet.height(rest.positions)))
     return np.array(gains)

@@ -42,7 +42,7 @@ class Tower:
 
     def magnetization(self, design: torch.Tensor) -> torch.Tensor:
         """(n_f, 3) A/m."""
-        of_faces = ms.parametrize.capped(LIMIT * design, LIMIT)[self._twins]
+        of_faces = ms.parametrize.softly_limited(LIMIT * design, LIMIT)[self._twins]
         return (self._turns @ of_faces[:, :, None])[:, :, 0]
 
     def __call__(self, design: torch.Tensor) -> torch.Tensor:

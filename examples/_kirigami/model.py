@@ -70,7 +70,7 @@ def kirigami(refined: int = 1, touching: bool = False) -> Kirigami:
     floor = ms.obstacles.Plane(center=(0, 0, -0.5 * THICKNESS))
     contacts = [
         ms.Contact(floor, offset=0.5 * THICKNESS, contact_stiffness=20.0),
-        ms.SelfContact(shell, minimal_distance=0.5 * KERF, reach=0.25 * KERF),
+        ms.SelfContact(shell, min_distance=0.5 * KERF, activation_distance=0.25 * KERF),
     ]
     scene = ms.Scene(
         shell,

@@ -139,7 +139,7 @@ class Reaching:
         number = round(duration / CONTROL_SPACING) + 1
         return ms.control.fit_spline(self.pointing(), self.control_times, number, duration, limit=FIELD_LIMIT)
 
-    def solve(self, iterations: int, progress: bool = False) -> tuple[torch.Tensor, ms.Minimum]:
+    def solve(self, iterations: int, progress: bool = False) -> tuple[torch.Tensor, ms.MinimizeResult]:
         """The control points found, and how."""
         points = self.first_control_points().requires_grad_()
         optimizer = ms.optim.LBFGS([points], lower=-FIELD_LIMIT, upper=FIELD_LIMIT, first_step=0.1)

@@ -38,7 +38,7 @@ class Design:
     young_modulus: np.ndarray
     curvature_scale: np.ndarray
     positions: np.ndarray
-    history: list  # records, as in ms.Minimum
+    history: list  # records, as in ms.MinimizeResult
 
     @property
     def errors(self) -> np.ndarray:
@@ -94,7 +94,8 @@ class Search:
     def properties(self) -> dict[str, torch.Tensor]:
         """The sheet's, from the variables as they stand."""
         given = {
-            "remanent_magnetization": LARGEST_MAGNETIZATION * ms.parametrize.capped(self.magnetization, 1.0)
+            "remanent_magnetization": LARGEST_MAGNETIZATION
+            * ms.parametrize.softly_limited(self.magnetization, 1.0)
         }
         if len(self.variables) > 1:
             given["young_modulus"] = ms.parametrize.log_scaled(self.modulus, *MODULI)

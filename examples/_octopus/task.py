@@ -94,7 +94,7 @@ class Swim:
             applied_flux_density=field,
             integrator=ms.ImplicitEuler(),
             solver=ms.MixedNewton(tolerance=self.precision),
-            keep="stages",
+            adjoint_storage="stages",
             progress=False,
         )
 
@@ -142,14 +142,14 @@ class Swim:
             [-EVEN * np.sin(2 * np.pi * EVEN_FREQUENCY * self.times), *np.zeros((2, self.steps))], axis=1
         )
 
-    def solve(self, progress: bool = False) -> ms.control.Receding:
+    def solve(self, progress: bool = False) -> ms.control.RecedingHorizonResult:
         """The field of every step, from none, until the channel is passed."""
-        return ms.control.receding(
+        return ms.control.receding_horizon(
             self.objective,
             self.advance,
             torch.zeros(self.steps, 3, dtype=torch.float64),
-            horizon=HORIZON,
-            stride=STRIDE,
+            prediction_horizon=HORIZON,
+            control_horizon=STRIDE,
             lower=-FIELD_LIMIT,
             upper=FIELD_LIMIT,
             trials=TRIALS if self.gradients else ONLY_TRIALS,

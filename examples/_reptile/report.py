@@ -132,7 +132,7 @@ def _walks(result: dict) -> str:
         lines.append(f"  {name:<7}{ways}")
         lines.append(
             f"         {motion.iterations / motion.steps_done:.2f} iterations a step, "
-            f"{len(motion.halved)} of {motion.steps_done} in parts, "
+            f"{len(motion.substeps)} of {motion.steps_done} in parts, "
             f"{1e3 * motion.wall_time / motion.steps_done:.2f} ms of wall time a step"
         )
     back = 1e3 * advances(*result["back"])[0, 0]

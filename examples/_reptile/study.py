@@ -54,5 +54,5 @@ def _row(what: str, who: Crawler, time_step: float, cycles: int, **options) -> R
         None if who.ground is None else float(advances(who, motion)[-1, 0]),
         motion.iterations / motion.steps_done,
         spent / motion.steps_done,
-        len(motion.halved),
+        len(motion.substeps),
     )

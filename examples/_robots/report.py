@@ -24,7 +24,7 @@ def summary(result: dict, meshes) -> str:
         sum(getattr(each, name) for each in meshes) for name in ("n_vertices", "n_tetrahedra")
     )
     way = np.array2string(first.robot.way(motion), precision=4)
-    halved = f", {len(motion.halved)} of them in parts" if motion.halved else ""
+    halved = f", {len(motion.substeps)} of them in parts" if motion.substeps else ""
     lines = [
         f"{nodes} nodes, {tetrahedra} tetrahedra, {first.controls.size} unknowns; way {way} m",
         f"a step {result['forward']:.1f} ms of the processor, backwards {result['backward']:.1f}; "

@@ -120,13 +120,13 @@ class Jump:
         """Terms in m2."""
         field = blurred(unknowns)
         return {
-            "miss": self.miss(self.center(self.move(field, keep="stages").positions)),
+            "miss": self.miss(self.center(self.move(field, adjoint_storage="stages").positions)),
             "strength": self.design.cost * ms.control.field_strength(field),
         }
 
     def solve(
         self, start: np.ndarray, iterations: int, progress: bool = False
-    ) -> tuple[np.ndarray, ms.Minimum]:
+    ) -> tuple[np.ndarray, ms.MinimizeResult]:
         """Unknowns to begin with, and found, (steps, 3) T; and how."""
         unknowns = torch.tensor(start, requires_grad=True)
         optimizer = ms.optim.LBFGS(

@@ -8,7 +8,7 @@ import numpy as np
 
 from magshell.mesh import generate as meshes
 from magshell.mesh.tetrahedra.tet_mesh import TetMesh
-from magshell.model.actuators.cells import Cells
+from magshell.model.actuators.cells import PneumaticCells
 from magshell.model.contact import obstacles
 from magshell.model.contact.body_contact import BodyContact
 from magshell.model.contact.contact import Contact
@@ -67,7 +67,7 @@ class CellGripper(Robot):
             for each, mass in ((mesh, MASS), (round_mesh, BALL_MASS))
         )
         self.traveller: Solid = self.ball
-        self.cells: Cells = Cells(self.arms, groups, stiffness=STIFFNESS)
+        self.cells: PneumaticCells = PneumaticCells(self.arms, groups, stiffness=STIFFNESS)
         top = mesh.rest_positions[:, 1].max()
         plate = mesh.vertices_where(lambda x: x[:, 1] > top - 1e-6)
         self.drone: Pin = Pin(plate, displacement=(0, 0, 0), body=self.arms)

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from magshell.envs.actuator import Actuator
+from magshell.envs.actuator import Action
 from magshell.envs.environment import Environment
 from magshell.envs.library import require_gymnasium
-from magshell.envs.steered import Steered
+from magshell.envs.steered import ParametricAction
 from magshell.solve.options import ImplicitEuler
 from robots.cell_gripper import SPEED, CellGripper
 from robots.fish import TARGET, TETRAHEDRA, TORQUES, Fish
@@ -42,7 +42,7 @@ def fish(
     """
     swimmer = Fish(n_tetrahedra)
     torques = [
-        Actuator(joint, "torque", lower=-most, upper=most)
+        Action(joint, "torque", lower=-most, upper=most)
         for joint, most in zip(swimmer.joints, TORQUES, strict=True)
     ]
 
@@ -70,7 +70,7 @@ def muscle_octopus(
     (64,)
     """
     swimmer = MuscleOctopus(cells)
-    waves = Steered(swimmer.muscles, "activation", NUMBERS * len(swimmer.muscles), _Waves(swimmer))
+    waves = ParametricAction(swimmer.muscles, "activation", NUMBERS * len(swimmer.muscles), _Waves(swimmer))
 
     def posture(now):
         phase = 2.0 * np.pi * FREQUENCY * now.time
@@ -103,8 +103,8 @@ def cell_gripper(
     """
     gripper = CellGripper(**changes)
     actuators = [
-        Steered(gripper.cells, "volume_ratio", len(gripper.cells.groups), _filled),
-        Steered(gripper.drone, "displacement", 3, _Speed(SPEED * gripper.time_step)),
+        ParametricAction(gripper.cells, "volume_ratio", len(gripper.cells.groups), _filled),
+        ParametricAction(gripper.drone, "displacement", 3, _Speed(SPEED * gripper.time_step)),
     ]
 
     def grasp(now):

@@ -56,7 +56,7 @@ class Robot:
             integrator=ImplicitEuler(),
             solver=self.solver if solver is None else solver,
             stiffness_damping=self.stiffness_damping,
-            keep=self.keep,
+            adjoint_storage=self.keep,
             progress=False,
         )
 

@@ -9,12 +9,12 @@ from . import envs
 from ._core import __version__
 from ._runtime.threads import num_threads, set_num_threads, show_config
 from .design import control, objectives, optim, parametrize
-from .design.ink import Ink
+from .design.ink import PrintableSet
 from .design.minimize import minimize
-from .design.minimum import Minimum
+from .design.minimum import MinimizeResult
 from .design.multistart.multistart import multistart
 from .design.multistart.sampling import random_starts
-from .design.multistart.starts import Multistart
+from .design.multistart.starts import MultistartResult
 from .design.printable_minimum import PrintableMinimum, PrintableStage
 from .design.printing import minimize_printable
 from .errors import (
@@ -34,11 +34,11 @@ from .mesh import generate as meshes
 from .mesh import shapes
 from .mesh.io.read_write import read_fields, read_mesh, write_mesh
 from .mesh.tetrahedra.tet_mesh import TetMesh
-from .mesh.triangles.six_node_mesh import SixNodeMesh
+from .mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 from .mesh.triangles.triangle_mesh import TriangleMesh
 from .mesh.welding import Weld, weld
 from .model.actuators.cavity import Cavity
-from .model.actuators.cells import Cells
+from .model.actuators.cells import PneumaticCells
 from .model.actuators.muscle import Muscle, MuscleResult
 from .model.actuators.tendon import Tendon
 from .model.bodies.ties import Tie
@@ -55,11 +55,11 @@ from .model.loads.pressure import Pressure
 from .model.loads.water import Water
 from .model.results.body_result import BodyResult
 from .model.results.joint_result import JointResult
-from .model.rigid.joints import Ball, Closure, Fixed, Joint, Prismatic, Revolute
+from .model.rigid.joints import Ball, Fixed, Joint, LoopClosure, Prismatic, Revolute
 from .model.rigid.link import Link
-from .model.rigid.rigid import Rigid, RigidResult
+from .model.rigid.rigid import RigidBody, RigidBodyResult
 from .model.rigid.skeleton import Skeleton
-from .model.scene.contact_state import Touching
+from .model.scene.contact_state import ContactState
 from .model.scene.reactions import Reaction
 from .model.scene.scene import Scene
 from .model.shells.shell import Shell
@@ -69,7 +69,7 @@ from .model.solids.materials import (
     Corotated,
     Guccione,
     NeoHookean,
-    Projective,
+    ProjectiveMaterial,
     StableNeoHookean,
     StVenantKirchhoff,
 )
@@ -90,18 +90,18 @@ from .solve.options import (
     SDIRK2,
     SDIRK3,
     TRBDF2,
+    AdjointStorage,
     ImplicitEuler,
-    Keep,
     MixedNewton,
     Newton,
     ProjectiveDynamics,
 )
 from .solve.statics.energies_at import energies
-from .solve.statics.equilibria import Equilibria
+from .solve.statics.equilibria import EquilibriumSet
 from .solve.statics.equilibrium import Equilibrium
-from .solve.statics.extrapolation import Extrapolation, extrapolated
-from .solve.statics.multistable import equilibria
-from .solve.statics.path import CriticalPoint, Path, follow
+from .solve.statics.extrapolation import Extrapolation, richardson_extrapolation
+from .solve.statics.multistable import find_equilibria
+from .solve.statics.path import CriticalPoint, EquilibriumPath, follow_path
 from .solve.statics.solve import equilibrium
 from .solve.statics.warm_start import WarmStart
 
@@ -109,6 +109,7 @@ __all__ = [
     "SDIRK2",
     "SDIRK3",
     "TRBDF2",
+    "AdjointStorage",
     "AppliedField",
     "AreaLoad",
     "Ball",
@@ -116,11 +117,10 @@ __all__ = [
     "BodyResult",
     "Buckling",
     "Cavity",
-    "Cells",
     "Clamp",
-    "Closure",
     "Color",
     "Contact",
+    "ContactState",
     "Corotated",
     "CriticalPoint",
     "CuboidMagnet",
@@ -130,30 +130,30 @@ __all__ = [
     "Dipoles",
     "EdgeCouple",
     "EdgeLoad",
-    "Equilibria",
     "Equilibrium",
     "EquilibriumJumped",
+    "EquilibriumPath",
+    "EquilibriumSet",
     "Extrapolation",
     "Fibres",
     "FieldSamplingWarning",
     "Fixed",
     "Guccione",
     "ImplicitEuler",
-    "Ink",
     "Interrupted",
     "Joint",
     "JointResult",
-    "Keep",
     "LargeStrainWarning",
     "LinearResponse",
     "Link",
+    "LoopClosure",
     "MagpylibField",
     "MeshQualityWarning",
-    "Minimum",
+    "MinimizeResult",
     "MixedNewton",
     "MotionState",
-    "Multistart",
     "MultistartFailed",
+    "MultistartResult",
     "Muscle",
     "MuscleResult",
     "NeoHookean",
@@ -161,26 +161,27 @@ __all__ = [
     "NoGradient",
     "NotConverged",
     "ObjectiveFailed",
-    "Path",
     "Picture",
     "Pin",
     "PlacedField",
+    "PneumaticCells",
     "PointLoad",
     "Pressure",
     "PrintableMinimum",
+    "PrintableSet",
     "PrintableStage",
     "Prismatic",
-    "Projective",
     "ProjectiveDynamics",
+    "ProjectiveMaterial",
+    "QuadraticTriangleMesh",
     "Reaction",
     "Revolute",
-    "Rigid",
-    "RigidResult",
+    "RigidBody",
+    "RigidBodyResult",
     "SampledField",
     "Scene",
     "SelfContact",
     "Shell",
-    "SixNodeMesh",
     "Skeleton",
     "Skin",
     "Solid",
@@ -193,7 +194,6 @@ __all__ = [
     "Tendon",
     "TetMesh",
     "Tie",
-    "Touching",
     "Trajectory",
     "TriangleMesh",
     "UniformField",
@@ -208,11 +208,10 @@ __all__ = [
     "control",
     "energies",
     "envs",
-    "equilibria",
     "equilibrium",
-    "extrapolated",
     "fibres_along",
-    "follow",
+    "find_equilibria",
+    "follow_path",
     "linear_buckling",
     "linear_response",
     "load",
@@ -230,6 +229,7 @@ __all__ = [
     "read_fields",
     "read_mesh",
     "residual_to_remanent",
+    "richardson_extrapolation",
     "save",
     "set_num_threads",
     "shapes",

@@ -706,7 +706,7 @@ class StaticsResult:
     @property
     def outcome(self) -> Outcome: ...
     @property
-    def progress(self) -> float: ...
+    def load_fraction(self) -> float: ...
     @property
     def reason(self) -> str: ...
     @property
@@ -714,7 +714,7 @@ class StaticsResult:
     @property
     def residual(self) -> float: ...
     @property
-    def saddles_left(self) -> int: ...
+    def saddles_escaped(self) -> int: ...
     @property
     def stable(self) -> bool: ...
     @property
@@ -722,7 +722,7 @@ class StaticsResult:
     @property
     def turns(self) -> list[list[float]]: ...
     @property
-    def unstable_directions(self) -> int: ...
+    def n_negative_eigenvalues(self) -> int: ...
 
 class PathOptions:
     locate_critical: bool
@@ -737,13 +737,13 @@ class PathOptions:
     @highest_parameter.setter
     def highest_parameter(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     @property
-    def largest_step(self) -> float: ...
-    @largest_step.setter
-    def largest_step(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def max_step(self) -> float: ...
+    @max_step.setter
+    def max_step(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     @property
-    def lowest_parameter(self) -> float: ...
-    @lowest_parameter.setter
-    def lowest_parameter(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def min_parameter(self) -> float: ...
+    @min_parameter.setter
+    def min_parameter(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     @property
     def max_points(self) -> int: ...
     @max_points.setter
@@ -757,7 +757,7 @@ class PathPoint:
     @property
     def turns(self) -> list[list[float]]: ...
     @property
-    def unstable_directions(self) -> int: ...
+    def n_negative_eigenvalues(self) -> int: ...
 
 class CriticalKind:
     """
@@ -891,7 +891,7 @@ class MotionResult:
     @property
     def factorizations(self) -> int: ...
     @property
-    def halved(self) -> dict[int, list[tuple[float, float, bool]]]: ...
+    def substeps(self) -> dict[int, list[tuple[float, float, bool]]]: ...
     @property
     def iterations(self) -> int: ...
     @property
@@ -986,7 +986,7 @@ def find_equilibrium(
     from_: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     to: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     options: StaticsOptions,
-    progress: typing.Any = None,
+    load_fraction: typing.Any = None,
     varying: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = [],
 ) -> StaticsResult: ...
 def lowest_modes(
@@ -995,7 +995,7 @@ def lowest_modes(
     turns: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
     controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     count: typing.SupportsInt | typing.SupportsIndex,
-    progress: typing.Any = None,
+    load_fraction: typing.Any = None,
 ) -> tuple[typing.Any, ...]:
     """
     Eigenvalues, shapes of all unknowns (largest displacement 1) nearest to zero, and the number of unstable directions of an equilibrium; none where it is neutral.
@@ -1028,7 +1028,7 @@ def follow_path(
     options: PathOptions,
     varying: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
     until: typing.Any = None,
-    progress: typing.Any = None,
+    load_fraction: typing.Any = None,
 ) -> PathResult: ...
 def lane_logarithms(numbers: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
     """
@@ -1133,7 +1133,7 @@ def pull_back_motion(
     by_edge_rotations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     by_velocities: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     by_driving: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"] = ...,
-    progress: typing.Any = None,
+    load_fraction: typing.Any = None,
 ) -> dict[str, typing.Any]: ...
 def sample_fields(
     fields: collections.abc.Sequence[AppliedField],
@@ -1162,7 +1162,7 @@ def simulate(
     gradients: bool,
     budget: typing.SupportsInt | typing.SupportsIndex,
     keep: Keep,
-    progress: typing.Any = None,
+    load_fraction: typing.Any = None,
 ) -> MotionResult: ...
 def solid_point_states(
     model: Model,

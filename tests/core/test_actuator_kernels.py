@@ -36,7 +36,7 @@ def in_the_hollow(element, **inside):
 
 def capped_tube(element):
     body = tube(element)
-    return loose(body, ms.Cavity(body, inside_of(body), filling_pressure=3e5, cap_rims=True))
+    return loose(body, ms.Cavity(body, inside_of(body), gas_pressure=3e5, close_rims=True))
 
 
 def in_a_sheet(element):
@@ -47,15 +47,15 @@ def in_a_sheet(element):
 def single_cells(element):
     body = beam(element)
     target = np.linspace(0.8, 1.3, body.mesh.n_tetrahedra)
-    return loose(body, ms.Cells(body, stiffness=2e5, volume_ratio=target))
+    return loose(body, ms.PneumaticCells(body, stiffness=2e5, volume_ratio=target))
 
 
 def few_and_large_cells(element):
     """One of them small enough to be coupled in the matrix alone; all are coupled or none."""
     body = beam(element)
     groups = np.where(body.mesh.tetrahedron_barycenters[:, 0] < 0.02, 0, -1)
-    small = ms.Cells(body, [np.arange(3), np.arange(5, 7)], stiffness=[1e5, 3e5], volume_ratio=1.4)
-    return loose(body, ms.Cells(body, groups, stiffness=4e5, volume_ratio=1.2), small)
+    small = ms.PneumaticCells(body, [np.arange(3), np.arange(5, 7)], stiffness=[1e5, 3e5], volume_ratio=1.4)
+    return loose(body, ms.PneumaticCells(body, groups, stiffness=4e5, volume_ratio=1.2), small)
 
 
 def tendons(element):
@@ -71,7 +71,7 @@ def tendons(element):
 
 KINDS = {
     "pressure": lambda element: in_the_hollow(element, pressure=2e4),
-    "gas": lambda element: in_the_hollow(element, filling_pressure=2e5),
+    "gas": lambda element: in_the_hollow(element, gas_pressure=2e5),
     "liquid": lambda element: in_the_hollow(element, volume=1.3e-6, bulk_modulus=1e6),
     "gas under lids": capped_tube,
     "liquid in a sheet": in_a_sheet,
@@ -156,7 +156,7 @@ def test_large_cells_are_bordered_and_small_ones_are_not():
     model = scene._model
     model.hessian(model.rest_state(), controls(scene, 1.0))
     columns, stiffness = model.low_rank()
-    assert columns.shape == (scene.n_unknowns, 1) and stiffness.shape == (1,)
+    assert columns.shape == (scene.n_dofs, 1) and stiffness.shape == (1,)
 
 
 def test_a_pressure_in_a_closed_solid_is_that_of_ms_pressure():

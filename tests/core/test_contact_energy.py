@@ -45,9 +45,9 @@ def test_steps_that_implicit_euler_took_are_told() -> None:
     scene, velocities = thrown()
     options = {"steps": 12, "velocities": velocities, "progress": False}
     coarse = ms.simulate(scene, time_step=5e-4, integrator=ms.TRBDF2(), **options)
-    assert coarse.calmed and "by implicit Euler" in repr(coarse)
+    assert coarse.fallback_steps and "by implicit Euler" in repr(coarse)
     euler = ms.simulate(scene, time_step=5e-4, integrator=ms.ImplicitEuler(), **options)
-    assert euler.calmed == ()
+    assert euler.fallback_steps == ()
 
 
 @pytest.mark.parametrize("keep", ["stages", "checkpoints"])
@@ -64,12 +64,12 @@ def test_gradients_go_through_steps_that_implicit_euler_took(keep) -> None:
         return ms.simulate(scene, velocities=velocities + by * along, **options, **tight)
 
     given = torch.tensor(velocities, requires_grad=True)
-    motion = ms.simulate(scene, velocities=given, keep=keep, **options, **tight)
-    assert motion.calmed
+    motion = ms.simulate(scene, velocities=given, adjoint_storage=keep, **options, **tight)
+    assert motion.fallback_steps
     (motion.positions[-1] ** 2).sum().backward()
     change = 1e-5
     ends = [end(sign * change) for sign in (1.0, -1.0)]
-    assert all(each.calmed == motion.calmed for each in ends)
+    assert all(each.fallback_steps == motion.fallback_steps for each in ends)
     expected = np.subtract(*[(each.positions[-1] ** 2).sum() for each in ends]) / (2 * change)
     assert float((given.grad.numpy() * along).sum()) == pytest.approx(expected, rel=1e-5)
 
@@ -90,9 +90,9 @@ def test_what_supports_put_in_is_no_gain() -> None:
         pushed,
         steps=steps,
         time_step=1e-3,
-        motion_factor=slowly,
+        support_factor=slowly,
         integrator=ms.TRBDF2(),
         stiffness_damping=1e-4,
         progress=False,
     )
-    assert motion.energy[-1] > 1e-3 and len(motion.calmed) < steps / 4
+    assert motion.energy[-1] > 1e-3 and len(motion.fallback_steps) < steps / 4

@@ -145,7 +145,7 @@ def clamped(size):
     inner = mesh.edges_between(mesh.vertices_where(lambda x: np.abs(x[:, 0] - 0.5 * size) < 0.13 * size))
     supports = [ms.Clamp(mesh.edges_at(x=0.0), rotation=(0.0, 1.0, 0.0)), ms.Clamp(inner[:1])]
     scene = ms.Scene(shell(mesh, 10.0), supports=supports)
-    return Problem(scene, Controls(motion_factor=0.5))
+    return Problem(scene, Controls(support_factor=0.5))
 
 
 def turned(mesh):
@@ -360,7 +360,7 @@ def test_the_free_hessian_is_the_whole_one_turned_and_cut(term, rng):
     build, _ = TERMS[term]
     problem = build(1.0)
     q = bent(problem, rng)
-    free = np.stack([problem.model.expand(row) for row in np.eye(problem.scene.n_unknowns)])
+    free = np.stack([problem.model.expand(row) for row in np.eye(problem.scene.n_dofs)])
     expected = free @ problem.hessian(q) @ free.T
     assert np.abs(problem.hessian(q, reduced=True) - expected).max() <= 1e-13 * np.abs(expected).max()
     np.testing.assert_allclose(free @ free.T, np.eye(len(free)), atol=1e-14)

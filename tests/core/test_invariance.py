@@ -343,7 +343,7 @@ def test_a_pin_takes_its_vertices_along():
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
     supports = [ms.Clamp(clamped_edges(mesh, x)), ms.Pin(tip, "z", displacement=(0, 0, 0.02))]
     scene = ms.Scene(sheet, supports=supports)
-    half, full = (ms.equilibrium(scene, motion_factor=factor) for factor in (0.5, 1.0))
+    half, full = (ms.equilibrium(scene, support_factor=factor) for factor in (0.5, 1.0))
     np.testing.assert_allclose(half.displacements[tip, 2], 0.01, atol=1e-15)
     np.testing.assert_allclose(full.displacements[tip, 2], 0.02, atol=1e-15)
     assert np.abs(full.displacements[tip, 0]).max() > 1e-4  # free to shorten

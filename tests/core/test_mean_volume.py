@@ -23,7 +23,7 @@ def fin(cells):
     mesh = ms.meshes.box((1.0, 0.4, 0.5), cells=(20, 8, 10))
     x, _, z = mesh.tetrahedron_barycenters.T
     kept = (x < 0.5) | ((z > 0.2) & (z < 0.2 + 0.05 * cells))
-    return ms.TetMesh.mended(mesh.rest_positions, mesh.tetrahedra[kept]).mesh
+    return ms.TetMesh.repaired(mesh.rest_positions, mesh.tetrahedra[kept]).mesh
 
 
 def wedge():
@@ -34,7 +34,7 @@ def wedge():
 
 
 def few(n):
-    return ms.TetMesh.mended(0.1 * CORNERS[: 3 + n], FEW[:n]).mesh
+    return ms.TetMesh.repaired(0.1 * CORNERS[: 3 + n], FEW[:n]).mesh
 
 
 def capsule():

@@ -30,13 +30,13 @@ def test_a_state_says_whether_round_off_ended_its_solve() -> None:
 def test_fine_roof_takes_small_steps() -> None:
     mesh = cylinder_roof.quarter((32, 32))
     center = mesh.nearest_vertex((0, 0, cylinder_roof.RADIUS))
-    path = ms.follow(
+    path = ms.follow_path(
         cylinder_roof.scene(mesh, "midedge"),
         until=lambda _, positions: positions[center, 2] < cylinder_roof.RADIUS - 2.0,
         first_step=0.005,
         progress=False,
     )
-    assert path.unstable_directions[-1] == 0 and len(path) > 2
+    assert path.n_negative_eigenvalues[-1] == 0 and len(path) > 2
 
 
 @pytest.mark.parametrize("links", [50, 200])
@@ -55,7 +55,7 @@ def test_long_chains_of_links_move_at_the_usual_tolerance(links: int, integrator
         )
         for tolerance in (1e-10, 1e-7)
     ]
-    assert all(parts == 7 for parts in moves[0].halved.values())  # as the method begins
+    assert all(parts == 7 for parts in moves[0].substeps.values())  # as the method begins
     for joint in scene.joints[:: links // 5]:
         angles, rough = (move[joint].angle[-1] for move in moves)
         assert angles == pytest.approx(rough, abs=1e-10)

@@ -41,7 +41,7 @@ def materials():
         "barrier": ms.StableNeoHookean(log_barrier=True, **moduli),
         "StVK": ms.StVenantKirchhoff(**moduli),
         "corotated": ms.Corotated(**moduli),
-        "projective": ms.Projective(**moduli),
+        "projective": ms.ProjectiveMaterial(**moduli),
         "Guccione": ms.Guccione(**{**GUCCIONE, "bulk_modulus": 1e4}),
     }
 

@@ -92,12 +92,12 @@ def test_curves_by_hand():
         (lambda b: control.field_rate(b, 0.1), FIELD),
         (lambda dt: control.field_rate(FIELD, dt), torch.tensor(0.1, dtype=torch.float64)),
         (lambda b: control.field_excess(b, 0.5), FIELD),
-        (lambda b: control.field_cap(b, 0.5), FIELD),
-        (lambda b: control.field_cap(b, 0.5, sharpness=8), FIELD),
-        (lambda b: control.dmp(b, TIMES, OMEGA, ALPHA, BETA), FIELD),
-        (lambda w: control.dmp(FIELD, TIMES, w, ALPHA, BETA), OMEGA),
-        (lambda a: control.dmp(FIELD, TIMES, OMEGA, a, BETA), ALPHA),
-        (lambda b: control.dmp(FIELD, TIMES, OMEGA, ALPHA[:, 0], b), BETA[:, 0].clone()),
+        (lambda b: control.field_limit(b, 0.5), FIELD),
+        (lambda b: control.field_limit(b, 0.5, sharpness=8), FIELD),
+        (lambda b: control.low_frequency_penalty(b, TIMES, OMEGA, ALPHA, BETA), FIELD),
+        (lambda w: control.low_frequency_penalty(FIELD, TIMES, w, ALPHA, BETA), OMEGA),
+        (lambda a: control.low_frequency_penalty(FIELD, TIMES, OMEGA, a, BETA), ALPHA),
+        (lambda b: control.low_frequency_penalty(FIELD, TIMES, OMEGA, ALPHA[:, 0], b), BETA[:, 0].clone()),
     ],
 )
 def test_derivatives(function, at):
@@ -154,8 +154,8 @@ def test_field_penalties_by_hand():
     assert control.field_rate(field, 0.5).item() == pytest.approx((0 + 5 / 0.25) / 2)
     assert control.field_excess(-field, 2.0).item() == pytest.approx((1 + 4 + 1 + 4 + 1) / 3)
     assert control.field_excess(field, 4.0).item() == 0
-    np.testing.assert_allclose(control.field_cap(field, 2.0).reshape(3, 3)[2], [-0.75, 1.25, 0])
-    (single,) = control.field_cap(field, 4.0, sharpness=50)
+    np.testing.assert_allclose(control.field_limit(field, 2.0).reshape(3, 3)[2], [-0.75, 1.25, 0])
+    (single,) = control.field_limit(field, 4.0, sharpness=50)
     assert 0 <= single < 0.05
 
 
@@ -170,7 +170,9 @@ def test_dmp_is_the_printed_sum(printed):
                 a_j, b_j = (float(x[j]) if printed else float(x[j, i]) for x in (alpha, beta))
                 signal += a_j * np.cos(omega * t) + b_j * np.sin(omega * t)
             expected += (b[i] - signal) ** 2 / len(TIMES)
-    assert control.dmp(FIELD, TIMES, OMEGA, alpha, beta).item() == pytest.approx(expected, rel=1e-13)
+    assert control.low_frequency_penalty(FIELD, TIMES, OMEGA, alpha, beta).item() == pytest.approx(
+        expected, rel=1e-13
+    )
 
 
 def test_dmp_finds_the_frequencies_of_a_field():
@@ -181,7 +183,7 @@ def test_dmp_finds_the_frequencies_of_a_field():
     parameters = [p.requires_grad_() for p in (omega, alpha, beta)]
     optimizer = ms.optim.LBFGS(parameters, scale=[5.0, 0.02, 0.02])
     found = ms.minimize(
-        lambda *p: 1e4 * control.dmp(field, times, *p),
+        lambda *p: 1e4 * control.low_frequency_penalty(field, times, *p),
         parameters,
         optimizer,
         max_iterations=60,
@@ -223,10 +225,13 @@ def test_dmp_finds_the_frequencies_of_a_field():
         (lambda: control.field_rate(FIELD[:1], 0.1), "at least 2 rows"),
         (lambda: control.field_rate(FIELD, 0.0), r"time_step \[s\] must be positive"),
         (lambda: control.field_excess(FIELD, -1.0), r"limit \[T\] must be positive"),
-        (lambda: control.field_cap(FIELD[0], 1.0), r"flux_density \[T\] must have shape \(n, 3\)"),
-        (lambda: control.dmp(FIELD, TIMES[1:], OMEGA, ALPHA, BETA), r"times \[s\] must have shape \(7,\)"),
+        (lambda: control.field_limit(FIELD[0], 1.0), r"flux_density \[T\] must have shape \(n, 3\)"),
         (
-            lambda: control.dmp(FIELD, TIMES, OMEGA, ALPHA, BETA[:, 0]),
+            lambda: control.low_frequency_penalty(FIELD, TIMES[1:], OMEGA, ALPHA, BETA),
+            r"times \[s\] must have shape \(7,\)",
+        ),
+        (
+            lambda: control.low_frequency_penalty(FIELD, TIMES, OMEGA, ALPHA, BETA[:, 0]),
             r"sine_amplitudes \[T\] must have shape \(2, 3\)",
         ),
     ],

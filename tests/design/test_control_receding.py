@@ -1,4 +1,5 @@
-"""ms.control.receding: unstable motions that one search loses, the same bits again, what is tried, and what goes wrong."""
+"""ms.control.receding_horizon: unstable motions that one search loses, the same bits again, what is tried, and
+what goes wrong."""
 
 import numpy as np
 import pytest
@@ -40,16 +41,18 @@ def test_what_noise_overthrows_stays_upright() -> None:
     """Over 160 steps noise grows 4e6-fold; one search of the whole, with as many steps in all, lets the stick fall."""
     stick, start = Stick(), upright(1e-3)
     limits = {"lower": -1.0, "upper": 1.0, "start": start, **QUIET}
-    found = ms.control.receding(stick.objective, stick.advance, zeros(160), horizon=32, stride=16, **limits)
+    found = ms.control.receding_horizon(
+        stick.objective, stick.advance, zeros(160), prediction_horizon=32, control_horizon=16, **limits
+    )
     angles, end = stick.moved(found.controls, start)
     assert angles.abs()[32:].max() < 1e-3 and found.reached == 160
     assert torch.equal(torch.stack(end), torch.stack(found.state))  # once more, the same
-    direct = ms.control.receding(
+    direct = ms.control.receding_horizon(
         stick.objective,
         stick.advance,
         zeros(160),
-        horizon=160,
-        stride=160,
+        prediction_horizon=160,
+        control_horizon=160,
         max_iterations=found.evaluations * 32 // 160,
         tolerance=0.0,
         **limits,
@@ -68,7 +71,9 @@ def test_parts_begin_where_the_one_before_led() -> None:
         assert len(rows) == part.settled - part.first
         return (state or 0) + len(rows)
 
-    found = ms.control.receding(objective, advance, zeros(7, 1), horizon=4, stride=3, **QUIET)
+    found = ms.control.receding_horizon(
+        objective, advance, zeros(7, 1), prediction_horizon=4, control_horizon=3, **QUIET
+    )
     assert list(dict.fromkeys(seen)) == [(0, 3, 4, 4, None), (3, 6, 7, 4, 3), (6, 7, 7, 1, 6)]
     assert found.state == 7 and found.evaluations == len(seen) and not found.failures and not found.trials
     assert [part for part, _ in found.searches] == [
@@ -106,7 +111,7 @@ def test_a_motion_by_simulate_is_held_and_repeated_with_the_same_bits() -> None:
     def objective(rows, part, before):
         return turned(torch.as_tensor(moved(rows, before).positions)[1:]).mean() + 1e-3 * (rows**2).mean()
 
-    found = ms.control.receding(
+    found = ms.control.receding_horizon(
         objective,
         lambda rows, part, before: ms.simulate(
             scene,
@@ -117,8 +122,8 @@ def test_a_motion_by_simulate_is_held_and_repeated_with_the_same_bits() -> None:
             **QUIET,
         ),
         zeros(steps, 2),
-        horizon=40,
-        stride=20,
+        prediction_horizon=40,
+        control_horizon=20,
         start=start,
         lower=-5e-3,
         upper=5e-3,
@@ -141,14 +146,14 @@ def squared_swim(rows, part=None, state=None):
 
 
 def test_trials_begin_where_the_gradient_says_nothing() -> None:
-    options = {"horizon": 20, "stride": 10, "lower": -1.0, "upper": 1.0, **QUIET}
+    options = {"prediction_horizon": 20, "control_horizon": 10, "lower": -1.0, "upper": 1.0, **QUIET}
 
     def nothing(rows, part, state):
         return None
 
-    still = ms.control.receding(squared_swim, nothing, zeros(40, 2), **options)
+    still = ms.control.receding_horizon(squared_swim, nothing, zeros(40, 2), **options)
     assert not still.controls.any()
-    tried = ms.control.receding(
+    tried = ms.control.receding_horizon(
         squared_swim, nothing, zeros(40, 2), trials=4, spread=(0.5, 0.0), periods=(4, 8), **options
     )
     assert float(squared_swim(tried.controls)) < -1.0 and tried.trials == 4 * 5
@@ -161,12 +166,12 @@ def test_without_iterations_the_best_trial_is_done_and_no_gradient_asked_for() -
         assert not rows.requires_grad
         return squared_swim(rows)
 
-    found = ms.control.receding(
+    found = ms.control.receding_horizon(
         objective,
         lambda *_: None,
         zeros(40, 1),
-        horizon=20,
-        stride=10,
+        prediction_horizon=20,
+        control_horizon=10,
         max_iterations=0,
         trials=8,
         spread=0.5,
@@ -185,12 +190,12 @@ def test_what_is_tried_is_as_planned_then_swings_or_repeats_within_bounds() -> N
             seen.append((part, rows.clone()))
         return ((rows - torch.arange(len(rows))[:, None] % 5) ** 2).sum()
 
-    found = ms.control.receding(
+    found = ms.control.receding_horizon(
         objective,
         lambda rows, part, state: None,
         zeros(60, 1) + 1.0,
-        horizon=20,
-        stride=20,
+        prediction_horizon=20,
+        control_horizon=20,
         trials=6,
         spread=0.7,
         periods=(5, 5),
@@ -213,12 +218,12 @@ def test_what_is_tried_is_as_planned_then_swings_or_repeats_within_bounds() -> N
 
 
 def test_it_ends_where_it_is_told_and_the_rest_stays_as_given() -> None:
-    found = ms.control.receding(
+    found = ms.control.receding_horizon(
         lambda rows, part, state: ((rows - 2) ** 2).sum(),
         lambda rows, part, state: part.settled,
         zeros(30, 1),
-        horizon=6,
-        stride=3,
+        prediction_horizon=6,
+        control_horizon=3,
         until=lambda state: state >= 9,
         **QUIET,
     )
@@ -232,7 +237,9 @@ def test_a_search_that_fails_is_told_and_the_plan_is_done() -> None:
             raise ms.DesignRejected("it broke")
         return ((rows - 1) ** 2).sum()
 
-    found = ms.control.receding(fragile, lambda *_: None, zeros(6, 1), horizon=2, stride=2, **QUIET)
+    found = ms.control.receding_horizon(
+        fragile, lambda *_: None, zeros(6, 1), prediction_horizon=2, control_horizon=2, **QUIET
+    )
     [(part, why)] = found.failures
     assert part.first == 2 and "it broke" in why and found.reached == 6
     assert found.controls[:, 0].round().tolist() == [1, 1, 0, 0, 1, 1]
@@ -244,8 +251,15 @@ def test_trials_that_cannot_be_evaluated_are_not_taken() -> None:
             raise ms.DesignRejected("too far")
         return ((rows - 1) ** 2).sum()
 
-    options = {"horizon": 2, "stride": 2, "trials": 3, "spread": 1.0, "periods": (2, 3), **QUIET}
-    found = ms.control.receding(fragile, lambda *_: None, zeros(2, 1), **options)
+    options = {
+        "prediction_horizon": 2,
+        "control_horizon": 2,
+        "trials": 3,
+        "spread": 1.0,
+        "periods": (2, 3),
+        **QUIET,
+    }
+    found = ms.control.receding_horizon(fragile, lambda *_: None, zeros(2, 1), **options)
     assert (found.controls - 1).abs().max() < 1e-6
 
 
@@ -270,7 +284,9 @@ def test_errors_and_interrupts_hand_back_what_was_settled(where) -> None:
                 raise error
             return False
 
-        return ms.control.receding(objective, advance, zeros(6, 1), horizon=2, stride=2, until=until, **QUIET)
+        return ms.control.receding_horizon(
+            objective, advance, zeros(6, 1), prediction_horizon=2, control_horizon=2, until=until, **QUIET
+        )
 
     with pytest.raises(ms.Interrupted, match="of 6 rows") as caught:
         run(KeyboardInterrupt(), 2)
@@ -287,8 +303,8 @@ def test_errors_and_interrupts_hand_back_what_was_settled(where) -> None:
 @pytest.mark.parametrize(
     ("changes", "complaint"),
     [
-        ({"horizon": 0}, "horizon must be an integer"),
-        ({"stride": 5}, "stride must be no more than the horizon"),
+        ({"prediction_horizon": 0}, "prediction_horizon must be an integer"),
+        ({"control_horizon": 5}, "control_horizon must be no more than the prediction_horizon"),
         ({"trials": 2}, "2 trials need a spread and periods"),
         ({"trials": 2, "spread": 0.0, "periods": (2, 3)}, "spread must be finite, not negative"),
         ({"trials": 2, "spread": -1.0, "periods": (2, 3)}, "spread must be finite, not negative"),
@@ -311,6 +327,12 @@ def test_bad_input(changes, complaint) -> None:
     def unasked(*_):
         raise AssertionError("work began")
 
-    given = {"objective": unasked, "advance": unasked, "controls": zeros(8, 1), "horizon": 4, "stride": 2}
+    given = {
+        "objective": unasked,
+        "advance": unasked,
+        "controls": zeros(8, 1),
+        "prediction_horizon": 4,
+        "control_horizon": 2,
+    }
     with pytest.raises(ValueError, match=complaint):
-        ms.control.receding(**{**given, **QUIET, **changes})
+        ms.control.receding_horizon(**{**given, **QUIET, **changes})

@@ -23,8 +23,8 @@ def test_step_times_are_those_of_a_simulation():
 
 def test_held_values_last_equally_long():
     values = np.diag([1.0, 2.0, 3.0])
-    np.testing.assert_array_equal(control.held(values, 7).sum(1), [1, 1, 1, 2, 2, 3, 3])
-    np.testing.assert_array_equal(control.held(values, 3), values)
+    np.testing.assert_array_equal(control.zero_order_hold(values, 7).sum(1), [1, 1, 1, 2, 2, 3, 3])
+    np.testing.assert_array_equal(control.zero_order_hold(values, 3), values)
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3, 4])
@@ -93,7 +93,7 @@ def test_one_time_gives_one_vector(field):
 @pytest.mark.parametrize(
     ("function", "at"),
     [
-        (lambda v: control.held(v, 11), POINTS),
+        (lambda v: control.zero_order_hold(v, 11), POINTS),
         (lambda p: control.spline(TIMES, p, 0.3), POINTS),
         (lambda p: control.spline(TIMES, p, 0.3, periodic=True), POINTS),
         (lambda t: control.spline(t, POINTS, 0.3), torch.tensor([0.01, 0.17])),
@@ -188,7 +188,7 @@ def test_gradients_reach_the_frequencies_through_a_simulation(strip):
     [
         (lambda: control.step_times(0, 1e-3), "steps must be an integer of at least 1"),
         (lambda: control.step_times(5, 0.0), r"time_step \[s\] must be positive"),
-        (lambda: control.held(POINTS, 7), "1 to 7 rows"),
+        (lambda: control.zero_order_hold(POINTS, 7), "1 to 7 rows"),
         (lambda: control.spline(TIMES, POINTS[:3], 0.3), "at least 4, got 3"),
         (lambda: control.spline(TIMES, POINTS[:, 0], 0.3), r"control_points \[T\] must have shape \(k, 3\)"),
         (lambda: control.spline(TIMES, POINTS, 0.2), r"within 0 ... duration, got 0 ... 1.5"),

@@ -1,4 +1,4 @@
-"""ms.control.in_windows: what each window changes, a walker that a direct search leaves behind, and what goes wrong."""
+"""ms.control.time_windows: what each window changes, a walker that a direct search leaves behind, and what goes wrong."""
 
 import functools
 
@@ -28,7 +28,7 @@ def sum_to_one(seen=None):
 
 def test_windows_and_smoothings_come_in_turn() -> None:
     seen = []
-    found = ms.control.in_windows(sum_to_one(seen), zeros(6, 1), lengths=(2, 6), smoothings=(3, 1), **QUIET)
+    found = ms.control.time_windows(sum_to_one(seen), zeros(6, 1), lengths=(2, 6), smoothings=(3, 1), **QUIET)
     asked = [(window.steps, window.first, window.smoothing) for window, _ in found.searches]
     assert asked == [(2, 0, 3.0), (2, 0, 1.0), (6, 0, 3.0), (6, 0, 1.0)]
     assert list(dict.fromkeys(window for window, _ in seen)) == [window for window, _ in found.searches]
@@ -40,7 +40,7 @@ def test_new_rows_hold_the_last_one_or_are_those_given() -> None:
     given = torch.arange(6.0, dtype=torch.float64)[:, None]
     for hold in (True, False):
         seen = []
-        ms.control.in_windows(sum_to_one(seen), given, lengths=(2, 6), hold=hold, **QUIET)
+        ms.control.time_windows(sum_to_one(seen), given, lengths=(2, 6), hold=hold, **QUIET)
         before = next(controls for window, controls in seen[::-1] if window.steps == 2)
         first = next(controls for window, controls in seen if window.steps == 6)
         assert hold == bool((first[2:] == first[1]).all())
@@ -51,7 +51,7 @@ def test_new_rows_hold_the_last_one_or_are_those_given() -> None:
 
 def test_a_horizon_that_recedes_leaves_what_lies_before_it() -> None:
     seen = []
-    found = ms.control.in_windows(sum_to_one(seen), zeros(6, 2), lengths=(2, 4, 6), depth=2, **QUIET)
+    found = ms.control.time_windows(sum_to_one(seen), zeros(6, 2), lengths=(2, 4, 6), depth=2, **QUIET)
     assert [window.first for window, _ in found.searches] == [0, 2, 4]
     for last in (4, 6):
         rows = [controls[: last - 2] for window, controls in seen if window.steps == last]
@@ -61,7 +61,7 @@ def test_a_horizon_that_recedes_leaves_what_lies_before_it() -> None:
 
 def test_bounds_hold_row_by_row() -> None:
     bounds = {"lower": (-1.0, -0.01), "upper": (0.05, 0.01)}
-    found = ms.control.in_windows(sum_to_one(), zeros(6, 2), lengths=(3, 6), **bounds, **QUIET)
+    found = ms.control.time_windows(sum_to_one(), zeros(6, 2), lengths=(3, 6), **bounds, **QUIET)
     assert found.controls[:, 0].max() == 0.05 and found.controls[:, 1].max() == 0.01
 
 
@@ -129,7 +129,7 @@ def test_windows_take_a_walker_farther_than_one_search_of_as_many_steps() -> Non
         return objective
 
     options = {"lower": -1.0, "upper": 1.0, "hold": False, **QUIET}
-    windows = ms.control.in_windows(
+    windows = ms.control.time_windows(
         counting("windows"),
         start,
         lengths=(20, 40, 60, 80),
@@ -137,7 +137,9 @@ def test_windows_take_a_walker_farther_than_one_search_of_as_many_steps() -> Non
         max_iterations=5,
         **options,
     )
-    direct = ms.control.in_windows(counting("direct"), start, lengths=(STEPS,), max_iterations=45, **options)
+    direct = ms.control.time_windows(
+        counting("direct"), start, lengths=(STEPS,), max_iterations=45, **options
+    )
     assert simulated["direct"] >= 0.9 * simulated["windows"]
     whole = ms.control.Window(STEPS, 0, 1.0)
     far, near = (-float(walked(found.controls, whole)) for found in (windows, direct))
@@ -151,12 +153,12 @@ def test_a_search_that_fails_hands_on_what_it_had() -> None:
             raise ms.DesignRejected("it broke")
         return (controls.sum() - 1) ** 2
 
-    found = ms.control.in_windows(fragile, zeros(6, 1), lengths=(2, 4, 6), **QUIET)
+    found = ms.control.time_windows(fragile, zeros(6, 1), lengths=(2, 4, 6), **QUIET)
     assert [window.steps for window, _ in found.searches] == [2, 6]
     [(window, why)] = found.failures
     assert window.steps == 4 and "it broke" in why
     with pytest.raises(ms.DesignRejected, match="it broke"):
-        ms.control.in_windows(fragile, zeros(4, 1), lengths=(4,), **QUIET)
+        ms.control.time_windows(fragile, zeros(4, 1), lengths=(4,), **QUIET)
 
 
 def test_errors_and_interrupts_come_through_with_what_was_found() -> None:
@@ -166,14 +168,14 @@ def test_errors_and_interrupts_come_through_with_what_was_found() -> None:
         return (controls.sum() - 1) ** 2
 
     with pytest.raises(ms.Interrupted, match="window 2 of 2") as caught:
-        ms.control.in_windows(stopped, zeros(4, 1), lengths=(2, 4), **QUIET)
+        ms.control.time_windows(stopped, zeros(4, 1), lengths=(2, 4), **QUIET)
     assert float(caught.value.last_good.controls[:2].sum()) == pytest.approx(1.0, abs=1e-3)
 
     def wrong(controls, window):
         raise TypeError("no such thing")
 
     with pytest.raises(TypeError, match="no such thing"):
-        ms.control.in_windows(wrong, zeros(4, 1), lengths=(4,), **QUIET)
+        ms.control.time_windows(wrong, zeros(4, 1), lengths=(4,), **QUIET)
 
 
 @pytest.mark.parametrize(
@@ -199,4 +201,4 @@ def test_errors_and_interrupts_come_through_with_what_was_found() -> None:
 def test_bad_input(changes, complaint) -> None:
     given = {"objective": sum_to_one(), "controls": zeros(4, 1), "lengths": (2, 4), **QUIET}
     with pytest.raises(ValueError, match=complaint):
-        ms.control.in_windows(**{**given, **changes})
+        ms.control.time_windows(**{**given, **changes})

@@ -43,7 +43,7 @@ def torchs(kind, **options):
         ),
         (lbfgs(), lbfgs(scale=0.1), "scale of entry 0 .* was nan and is 0.1"),
         (lbfgs(), lbfgs(memory=3), "memory was 10 and is 3"),
-        (lbfgs(), lbfgs(max_shortenings=3), "max_shortenings was 6 and is 3"),
+        (lbfgs(), lbfgs(max_backtracks=3), "max_backtracks was 6 and is 3"),
         (mma(), mma(move=0.1), "move of group 0 was 1 and is 0.1"),
         (mma(), mma(penalty=10.0), "penalty was 1000 and is 10"),
         (torchs("SGD", lr=0.1), torchs("SGD", lr=0.2), "lr of group 0 was 0.1 and is 0.2"),

@@ -27,10 +27,10 @@ def test_the_best_comes_first(here):
 
 def test_feasible_designs_come_before_all_others(here):
     minima = [
-        ms.Minimum([], 1.0, 0.5),
-        ms.Minimum([], 3.0, 0.0),
-        ms.Minimum([], 0.0, 0.7),
-        ms.Minimum([], 2.0, 1e-9),
+        ms.MinimizeResult([], 1.0, 0.5),
+        ms.MinimizeResult([], 3.0, 0.0),
+        ms.MinimizeResult([], 0.0, 0.7),
+        ms.MinimizeResult([], 2.0, 1e-9),
     ]
     assert [one.number for one in quiet(lambda start: start, minima, here)] == [3, 1, 0, 2]
     assert [one.number for one in quiet(lambda start: (start, 0), minima, here, feasibility=0.6)] == [

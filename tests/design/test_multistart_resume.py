@@ -60,7 +60,7 @@ def test_resumed_gives_the_same_bits(here, tmp_path):
     assert bits(again) == bits(whole)
     for one, other in zip(again, whole, strict=True):
         mine, theirs = one.result, other.result
-        assert type(mine) is ms.Minimum and mine.reason == theirs.reason
+        assert type(mine) is ms.MinimizeResult and mine.reason == theirs.reason
         assert [vars(r) | {"seconds": 0} for r in mine.history] == [
             vars(r) | {"seconds": 0} for r in theirs.history
         ]
@@ -85,7 +85,7 @@ RESULTS = {
         torch.tensor([True]),
     ),
     "records": (
-        ms.Minimum([torch.ones(2)], 1.0, 0.0, [Record(0, 1.0, {"a": 1.0}, 0.0, 1.0, 0.1, 1)], "why"),
+        ms.MinimizeResult([torch.ones(2)], 1.0, 0.0, [Record(0, 1.0, {"a": 1.0}, 0.0, 1.0, 0.1, 1)], "why"),
         1,
     ),
 }

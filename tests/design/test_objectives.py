@@ -17,8 +17,8 @@ AMPLITUDE = torch.randn(6, dtype=torch.float64)
 EDGE_FACES = np.array([[0, 1], [1, 2], [3, -1], [2, 5], [-1, 4]], dtype=np.int32)
 IMAGE = torch.rand(4, 5, dtype=torch.float64)
 REST = torch.rand(6, 3, dtype=torch.float64)
-INK = ms.Ink(2.0, [[1.0, 0, 0], [0, 2.0, 0], [-1.0, 0, 0], [0, 0, 1.0]])
-TWO_LEVELS = ms.Ink(2.0, INK.directions, levels=(0.5, 1.0))
+INK = ms.PrintableSet(2.0, [[1.0, 0, 0], [0, 2.0, 0], [-1.0, 0, 0], [0, 0, 1.0]])
+TWO_LEVELS = ms.PrintableSet(2.0, INK.directions, levels=(0.5, 1.0))
 
 
 @pytest.mark.parametrize(
@@ -38,8 +38,8 @@ TWO_LEVELS = ms.Ink(2.0, INK.directions, levels=(0.5, 1.0))
         (lambda m: objectives.magnitude(m, areas=REST[:, 0]), VECTORS),
         (lambda m: objectives.total_variation(m, EDGE_FACES, np.arange(1.0, 6.0), smoothing=0.1), VECTORS),
         (lambda y: objectives.total_variation(y, EDGE_FACES), AMPLITUDE),
-        (lambda m: objectives.cap(m, 0.8), VECTORS),
-        (lambda m: objectives.cap(m, 0.8, sharpness=8), VECTORS),
+        (lambda m: objectives.limit(m, 0.8), VECTORS),
+        (lambda m: objectives.limit(m, 0.8, sharpness=8), VECTORS),
         (lambda m: objectives.printable(m, INK), VECTORS),
         (lambda m: objectives.printable(m, INK, areas=REST[:, 0], sharpness=3.0), VECTORS),
         (lambda m: objectives.printable(m, TWO_LEVELS), VECTORS),
@@ -47,8 +47,8 @@ TWO_LEVELS = ms.Ink(2.0, INK.directions, levels=(0.5, 1.0))
         (lambda a: parametrize.along(a, VECTORS), AMPLITUDE),
         (lambda s: parametrize.log_scaled(s, 1.0, 100.0), AMPLITUDE.sigmoid()),
         (lambda y: parametrize.log_shares(y, 1.0, 100.0), AMPLITUDE.exp()),
-        (lambda v: parametrize.capped(v, 0.7), VECTORS),
-        (lambda v: parametrize.project_to_cap(v, 1.3), VECTORS),
+        (lambda v: parametrize.softly_limited(v, 0.7), VECTORS),
+        (lambda v: parametrize.clip_to_limit(v, 1.3), VECTORS),
     ],
 )
 def test_derivatives(function, at):
@@ -59,11 +59,11 @@ def test_derivatives(function, at):
     "function",
     [
         lambda m: objectives.total_variation(m, EDGE_FACES),
-        lambda m: objectives.cap(m, 1e5, sharpness=8).sum(),
+        lambda m: objectives.limit(m, 1e5, sharpness=8).sum(),
         lambda m: objectives.printable(m, INK),
         lambda m: objectives.magnitude(m),
-        lambda m: parametrize.capped(m, 1e5).sum(),
-        lambda m: parametrize.project_to_cap(m, 1e5).sum(),
+        lambda m: parametrize.softly_limited(m, 1e5).sum(),
+        lambda m: parametrize.clip_to_limit(m, 1e5).sum(),
     ],
 )
 def test_no_magnetization_has_a_finite_gradient(function):
@@ -148,12 +148,12 @@ def test_total_variation_of_a_step_is_its_height_times_its_length():
 
 def test_cap_and_its_aggregate():
     m = torch.tensor([[3.0, 4.0, 0.0], [0.0, 0.0, 1.0]], dtype=torch.float64) * 1e5
-    np.testing.assert_allclose(objectives.cap(m, 5e5), [0.0, -0.96], atol=1e-12)
-    aggregate = objectives.cap(m, 4e5, sharpness=20)
+    np.testing.assert_allclose(objectives.limit(m, 5e5), [0.0, -0.96], atol=1e-12)
+    aggregate = objectives.limit(m, 4e5, sharpness=20)
     assert aggregate.shape == (1,) and 25 / 16 - 1 <= aggregate.item() < 25 / 16 - 1 + 1e-3
-    norms = parametrize.project_to_cap(m, 4e5).norm(dim=1)
+    norms = parametrize.clip_to_limit(m, 4e5).norm(dim=1)
     np.testing.assert_allclose(norms, [4e5, 1e5])
-    assert (parametrize.capped(1e3 * m, 4e5).norm(dim=1) <= 4e5).all()
+    assert (parametrize.softly_limited(1e3 * m, 4e5).norm(dim=1) <= 4e5).all()
 
 
 def test_parametrisations():
@@ -180,14 +180,14 @@ def test_parametrisations():
         (lambda: objectives.height_map(VECTORS, REST, IMAGE, (1, 0, 0, 1)), "extent"),
         (lambda: objectives.extension(VECTORS, 0, (0.0, 0, 0)), "direction must not be zero"),
         (lambda: objectives.total_variation(VECTORS, EDGE_FACES, smoothing=0), "smoothing"),
-        (lambda: objectives.cap(VECTORS, -1.0), "limit"),
-        (lambda: objectives.cap(VECTORS, 1.0, sharpness=1), "sharpness"),
-        (lambda: objectives.printable(VECTORS, [[1.0, 0, 0]]), "ink must be an ms.Ink, got list"),
+        (lambda: objectives.limit(VECTORS, -1.0), "limit"),
+        (lambda: objectives.limit(VECTORS, 1.0, sharpness=1), "sharpness"),
+        (lambda: objectives.printable(VECTORS, [[1.0, 0, 0]]), "ink must be an ms.PrintableSet, got list"),
         (lambda: objectives.printable(VECTORS, INK, areas=np.zeros(6)), "areas must not be negative"),
         (lambda: parametrize.from_regions(VECTORS, [0, 6]), "regions must lie in 0 ... 5"),
         (lambda: parametrize.along(AMPLITUDE, VECTORS[:2]), "directions must have shape"),
         (lambda: parametrize.log_scaled(AMPLITUDE, 0.0, 1.0), "positive and in order"),
-        (lambda: parametrize.capped(VECTORS, math.nan), "limit"),
+        (lambda: parametrize.softly_limited(VECTORS, math.nan), "limit"),
     ],
 )
 def test_bad_input_is_refused(call, message):

@@ -15,7 +15,7 @@ rng = np.random.default_rng(0)
 
 
 def test_distances_are_to_rays_that_end_at_the_strength():
-    ink = ms.Ink(5.0, [(2, 0, 0), (-1, 0, 0)])
+    ink = ms.PrintableSet(5.0, [(2, 0, 0), (-1, 0, 0)])
     m = np.array([(3.0, 4, 0), (0, 0, -2), (-5, 0, 0), (8, 4, 0)])
     np.testing.assert_allclose(ink.distances(m), [4 / 5, 2 / 5, 0, 1])
     np.testing.assert_allclose(ink.nearest(m), [(3, 0, 0), (0, 0, 0), (-5, 0, 0), (5, 0, 0)], atol=1e-15)
@@ -27,7 +27,7 @@ def test_distances_are_to_rays_that_end_at_the_strength():
 def test_what_is_nearest_is_nearest_of_all(levels):
     """Against every candidate, one by one; in frames that are turned on every face."""
     frames = np.linalg.qr(rng.normal(size=(7, 3, 3)))[0]
-    ink = ms.Ink(3e4, [(1, 1, 0), (0, -1, 2), (0, 0, -1)], levels=levels, frames=frames)
+    ink = ms.PrintableSet(3e4, [(1, 1, 0), (0, -1, 2), (0, 0, -1)], levels=levels, frames=frames)
     m = 4e4 * rng.normal(size=(7, 3))
     found = ink.nearest(m)
     shares = np.linspace(0, 1, 2001) if levels is None else np.array(levels)
@@ -47,10 +47,12 @@ def test_what_is_nearest_is_nearest_of_all(levels):
 def test_the_pull_has_no_unit():
     """The same number for another strength, in other units, on a finer mesh."""
     m = rng.normal(size=(5, 3))
-    at_first = objectives.printable(m, ms.Ink(1.0, SIX)).item()
-    assert objectives.printable(5e4 * m, ms.Ink(5e4, SIX)).item() == pytest.approx(at_first)
-    assert objectives.printable(np.repeat(m, 4, axis=0), ms.Ink(1.0, SIX)).item() == pytest.approx(at_first)
-    smooth = objectives.printable(m, ms.Ink(1.0, SIX), sharpness=1e4).item()
+    at_first = objectives.printable(m, ms.PrintableSet(1.0, SIX)).item()
+    assert objectives.printable(5e4 * m, ms.PrintableSet(5e4, SIX)).item() == pytest.approx(at_first)
+    assert objectives.printable(np.repeat(m, 4, axis=0), ms.PrintableSet(1.0, SIX)).item() == pytest.approx(
+        at_first
+    )
+    smooth = objectives.printable(m, ms.PrintableSet(1.0, SIX), sharpness=1e4).item()
     assert smooth == pytest.approx(at_first, abs=1e-3)
 
 
@@ -77,23 +79,32 @@ def test_frames_follow_the_faces():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: ms.Ink(0.0, SIX), r"strength \[A/m\] must be positive"),
-        (lambda: ms.Ink(1.0, [(0, 0, 0)]), "directions must not be zero"),
-        (lambda: ms.Ink(1.0, np.zeros((0, 3))), "directions must hold at least one"),
-        (lambda: ms.Ink(1.0, [1, 0]), r"directions \[1\] must have shape \(k, 3\), got \(2,\)"),
-        (lambda: ms.Ink(1.0, [SIX]), r"directions \[1\] must have shape \(k, 3\), got \(1, 6, 3\)"),
-        (lambda: ms.Ink(1.0, [(1, 0, 0), (1, 0)]), r"directions \[1\] must be an array of real numbers: "),
-        (lambda: ms.Ink(1.0, SIX, levels=[0, (1,)]), r"levels \[1\] must be an array of real numbers: "),
-        (lambda: ms.Ink(1.0, SIX, levels=(0,)), "levels must be shares"),
-        (lambda: ms.Ink(1.0, SIX, levels=(1, 2)), "levels must be shares"),
-        (lambda: ms.Ink(1.0, SIX, frames=[2 * np.eye(3)]), r"frames\[0\] are not"),
-        (lambda: ms.Ink(1.0, SIX, frames=[np.eye(3)]).nearest(np.ones((2, 3))), "frames for 1 faces"),
+        (lambda: ms.PrintableSet(0.0, SIX), r"strength \[A/m\] must be positive"),
+        (lambda: ms.PrintableSet(1.0, [(0, 0, 0)]), "directions must not be zero"),
+        (lambda: ms.PrintableSet(1.0, np.zeros((0, 3))), "directions must hold at least one"),
+        (lambda: ms.PrintableSet(1.0, [1, 0]), r"directions \[1\] must have shape \(k, 3\), got \(2,\)"),
+        (lambda: ms.PrintableSet(1.0, [SIX]), r"directions \[1\] must have shape \(k, 3\), got \(1, 6, 3\)"),
+        (
+            lambda: ms.PrintableSet(1.0, [(1, 0, 0), (1, 0)]),
+            r"directions \[1\] must be an array of real numbers: ",
+        ),
+        (
+            lambda: ms.PrintableSet(1.0, SIX, levels=[0, (1,)]),
+            r"levels \[1\] must be an array of real numbers: ",
+        ),
+        (lambda: ms.PrintableSet(1.0, SIX, levels=(0,)), "levels must be shares"),
+        (lambda: ms.PrintableSet(1.0, SIX, levels=(1, 2)), "levels must be shares"),
+        (lambda: ms.PrintableSet(1.0, SIX, frames=[2 * np.eye(3)]), r"frames\[0\] are not"),
+        (
+            lambda: ms.PrintableSet(1.0, SIX, frames=[np.eye(3)]).nearest(np.ones((2, 3))),
+            "frames for 1 faces",
+        ),
         (lambda: parametrize.frames_along(FLAT, (0, 0, 1)), "no part in the plane of face 0"),
         (lambda: parametrize.frames_along(FLAT, np.ones((3, 3))), "direction must have shape"),
         (lambda: parametrize.radial_frames(FLAT, axis=(0, 0, 0)), "axis must not be zero"),
         (lambda: parametrize.radial_frames([0]), "mesh must be a TriangleMesh, got list"),
         (lambda: ms.minimize_printable(None, np.ones((2, 3)), INK), "objective must be a function"),
-        (lambda: ms.minimize_printable(total, np.ones((2, 3)), SIX), "ink must be an ms.Ink"),
+        (lambda: ms.minimize_printable(total, np.ones((2, 3)), SIX), "ink must be an ms.PrintableSet"),
         (lambda: ms.minimize_printable(total, np.ones(3), INK), "must have shape"),
         (lambda: ms.minimize_printable(total, np.zeros((0, 3)), INK), "has no faces"),
         (
@@ -110,7 +121,7 @@ def test_bad_input_is_refused(call, message):
 
 
 FLAT = ms.meshes.rectangle(1, 1, cells=(1, 1))
-INK = ms.Ink(1.0, SIX, levels=(1,))
+INK = ms.PrintableSet(1.0, SIX, levels=(1,))
 
 
 def total(m):
@@ -133,7 +144,7 @@ def mixed(m):
 
 @pytest.mark.parametrize(("levels", "share"), [(None, 0.1), ((1,), 0.15), ((0, 1), 0.3)])
 def test_rounding_makes_up_for_itself(levels, share):
-    ink = ms.Ink(1.0, SIX, levels=levels)
+    ink = ms.PrintableSet(1.0, SIX, levels=levels)
     found = ms.minimize_printable(mixed, np.full((24, 3), 0.1), ink, progress=False)
     assert found.free_objective < 1e-3
     assert found.objective < share * found.rounded_at_once
@@ -148,7 +159,7 @@ def test_rounding_makes_up_for_itself(levels, share):
 
 def test_the_best_of_few_faces_is_found():
     """Of 4^5 designs, all of which are evaluated."""
-    ink = ms.Ink(1.0, [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)], levels=(1,))
+    ink = ms.PrintableSet(1.0, [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)], levels=(1,))
 
     def objective(m):
         return ((MIX[:2, :5] @ m - WANTED[:2]) ** 2).sum()
@@ -162,7 +173,7 @@ def test_the_best_of_few_faces_is_found():
 
 def test_the_weight_pulls():
     """A stage with a large weight ends nearer to what can be printed than the free one, and none does not move."""
-    ink = ms.Ink(1.0, SIX, levels=(1,))
+    ink = ms.PrintableSet(1.0, SIX, levels=(1,))
     stages = {"blocks": 1, "exchanges": 0, "stage_iterations": 40, "progress": False}
     pulled = ms.minimize_printable(mixed, np.full((24, 3), 0.1), ink, weights=(0.01, 0.1, 1.0), **stages)
     distances = [stage.distance for stage in pulled.history[:4]]
@@ -173,7 +184,7 @@ def test_the_weight_pulls():
 
 def test_radial_ink_prints_in_and_out_only():
     disk = ms.meshes.disk(1.0, cells=4)
-    ink = ms.Ink(2.0, [(1, 0, 0), (-1, 0, 0)], levels=(1,), frames=parametrize.radial_frames(disk))
+    ink = ms.PrintableSet(2.0, [(1, 0, 0), (-1, 0, 0)], levels=(1,), frames=parametrize.radial_frames(disk))
     goal = torch.from_numpy(2.0 * np.sign(rng.normal(size=(disk.n_faces, 1))) * ink.frames[:, 0])
     found = ms.minimize_printable(
         lambda m: ((m - goal) ** 2).mean(), np.zeros((disk.n_faces, 3)), ink, progress=False
@@ -193,7 +204,7 @@ def test_blocks_that_jump_are_halved():
         last[0] = m.detach().clone()
         return mixed(m)
 
-    ink = ms.Ink(1.0, SIX, levels=(1,))
+    ink = ms.PrintableSet(1.0, SIX, levels=(1,))
     found = ms.minimize_printable(cautious, np.full((24, 3), 0.1), ink, exchanges=5, progress=False)
     assert refused and found.not_printable == 0 and found.rounded_at_once is None
     assert "cannot be evaluated" in repr(found)
@@ -212,7 +223,9 @@ def test_what_was_found_is_handed_back(error, raised):
         return mixed(m)
 
     with pytest.raises(raised) as told:
-        ms.minimize_printable(failing, np.full((24, 3), 0.1), ms.Ink(1.0, SIX, levels=(1,)), progress=False)
+        ms.minimize_printable(
+            failing, np.full((24, 3), 0.1), ms.PrintableSet(1.0, SIX, levels=(1,)), progress=False
+        )
     left = told.value.last_good
     assert isinstance(left, ms.PrintableMinimum)
     assert mixed(left.remanent_magnetization).item() == pytest.approx(left.objective)
@@ -242,7 +255,7 @@ def test_the_way_back_may_jump():
             return ((m - self.side * torch.tensor([0.6, 0, 0])) ** 2).sum() + 0.1 * (m[0, 0] + 0.45) ** 2
 
     memory = Memory()
-    ink = ms.Ink(1.0, [(-1, 0, 0), (0, 1, 0)], levels=(1,))
+    ink = ms.PrintableSet(1.0, [(-1, 0, 0), (0, 1, 0)], levels=(1,))
     start = np.tile((-0.1, 0.0, 0.0), (6, 1))
     found = ms.minimize_printable(memory, start, ink, stateful=[memory], progress=False)
     assert found.not_printable == 0

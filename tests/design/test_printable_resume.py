@@ -7,7 +7,7 @@ import torch
 import magshell as ms
 
 SIX = np.vstack([np.eye(3), -np.eye(3)])
-INK = ms.Ink(1.0, SIX, levels=(1,))
+INK = ms.PrintableSet(1.0, SIX, levels=(1,))
 numbers = np.random.default_rng(0)
 MIX = torch.from_numpy(numbers.normal(size=(6, 12)))
 WANTED = torch.from_numpy(numbers.normal(size=(6, 3)))
@@ -47,7 +47,7 @@ def searched(objective, ink=INK, **options):
 @pytest.mark.parametrize("levels", [(1,), None])
 def test_it_goes_on_with_the_same_bits(levels, tmp_path):
     """Stopped at evaluations all over the search: in stages, between them, among the exchanges."""
-    ink = ms.Ink(1.0, SIX, levels=levels)
+    ink = ms.PrintableSet(1.0, SIX, levels=levels)
     whole = searched(counted := StoppedAt(), ink)
     total = counted.calls
     assert whole.not_printable == 0 and total > 60
@@ -94,7 +94,7 @@ def test_begun_anew_it_takes_nothing_from_an_old_file(tmp_path):
     with pytest.raises(ms.Interrupted):
         searched(StoppedAt(30), checkpoint=file)
     with pytest.raises(ms.Interrupted):  # the file is of this one now, which has nothing yet
-        searched(StoppedAt(1), ms.Ink(2.0, SIX, levels=(1,)), checkpoint=file)
+        searched(StoppedAt(1), ms.PrintableSet(2.0, SIX, levels=(1,)), checkpoint=file)
     with pytest.raises(ValueError, match="strength was 2 and is 1"):
         searched(mixed, checkpoint=file, resume=True)
     assert searched(mixed, checkpoint=file).objective == searched(mixed).objective
@@ -123,7 +123,7 @@ def test_other_searches_are_refused(tmp_path):
         searched(StoppedAt(40), checkpoint=file)
     begun = file.read_bytes()
     for change, message in (
-        ({"ink": ms.Ink(1.0, SIX, levels=(0, 1))}, "levels .*was"),
+        ({"ink": ms.PrintableSet(1.0, SIX, levels=(0, 1))}, "levels .*was"),
         ({"blocks": 5}, "blocks was 4 and is 5"),
         ({"exchanges": 13}, "exchanges was 12 and is 13"),
     ):

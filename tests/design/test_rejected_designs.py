@@ -77,7 +77,7 @@ def test_mma_halves_the_step():
 @pytest.mark.parametrize("method", METHODS)
 def test_a_step_rejected_at_every_length_changes_nothing(method):
     x = design(-3.0, 4.0)
-    optimizer = method([x], lower=-5.0, upper=5.0, max_shortenings=3)
+    optimizer = method([x], lower=-5.0, upper=5.0, max_backtracks=3)
     closure_calls = []
 
     def closure():
@@ -205,7 +205,7 @@ def test_resumed_after_a_crossing_gives_the_same_bits(tmp_path):
 
 def test_unknown_limits_are_refused():
     for method in METHODS:
-        with pytest.raises(ValueError, match="max_shortenings"):
-            method([design(0.0)], lower=-1.0, upper=1.0, max_shortenings=-1)
+        with pytest.raises(ValueError, match="max_backtracks"):
+            method([design(0.0)], lower=-1.0, upper=1.0, max_backtracks=-1)
     with pytest.raises(ValueError, match="first_step"):
         ms.optim.LBFGS([design(0.0)], first_step=0)

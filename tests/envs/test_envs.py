@@ -28,7 +28,7 @@ def pendulum(torque=0.0):
 def environment(**changes):
     scene, hinge = pendulum()
     given = {
-        "actuators": [ms.envs.Actuator(hinge, "torque", lower=-1.0, upper=3.0)],
+        "actuators": [ms.envs.Action(hinge, "torque", lower=-1.0, upper=3.0)],
         "observation": lambda now: [now[hinge].angle, now[hinge].rate],
         "reward": lambda now: -abs(float(now[hinge].angle) - 0.2),
         "time_step": 1e-2,
@@ -85,7 +85,7 @@ def test_a_support_moves_in_straight_lines():
     held = mesh.vertices_at(x=0.0)
     one = ms.envs.Environment(
         ms.Scene(sheet, supports=[clamp]),
-        actuators=[ms.envs.Actuator(clamp, "displacement", lower=-1e-3, upper=1e-3)],
+        actuators=[ms.envs.Action(clamp, "displacement", lower=-1e-3, upper=1e-3)],
         observation=lambda now: [*now.displacements[held].mean(axis=0), *now.velocities[held].mean(axis=0)],
         reward=lambda now: now.time,
         time_step=1e-3,
@@ -186,7 +186,7 @@ def test_frames_take_a_view_and_a_style():
     ):
         one = environment(
             scene=scene,
-            actuators=[ms.envs.Actuator(scene, "applied_flux_density", lower=[-1e-3] * 3, upper=[1e-3] * 3)],
+            actuators=[ms.envs.Action(scene, "applied_flux_density", lower=[-1e-3] * 3, upper=[1e-3] * 3)],
             observation=lambda now: now.positions[-1],
             reward=lambda now: 0.0,
             render_mode="rgb_array",
@@ -212,7 +212,7 @@ def test_a_motion_that_fails_ends_the_episode():
     scene, hinge = pendulum()
     options = {
         "scene": scene,
-        "actuators": [ms.envs.Actuator(hinge, "torque", lower=-1.0, upper=1e6)],
+        "actuators": [ms.envs.Action(hinge, "torque", lower=-1.0, upper=1e6)],
         "simulate": {"solver": ms.Newton(max_iterations=1)},
         "observation": lambda now: [now[hinge].angle],
         "reward": lambda now: 0.0,
@@ -245,12 +245,12 @@ def test_a_motion_that_fails_ends_the_episode():
             "observation must be finite, but 1 of 2 numbers are not",
         ),
         ({"observation": 3}, "observation must be a function"),
-        ({"actuators": []}, "at least one ms.envs.Actuator"),
-        ({"actuators": ["torque"]}, "actuators must hold Actuator"),
+        ({"actuators": []}, "at least one ms.envs.Action"),
+        ({"actuators": ["torque"]}, "actuators must hold Action"),
         ({"scene": 1}, "scene must be a Scene"),
         ({"simulate": {"steps": 3}}, "must not hold 'steps'"),
         ({"simulate": {"dampin": 3}}, "must not hold 'dampin', but damping"),
-        ({"actuators": np.array(3.0)}, "actuators must hold Actuator"),
+        ({"actuators": np.array(3.0)}, "actuators must hold Action"),
         ({"render_mode": "human"}, "render_mode must be"),
         ({"view": "below"}, "view must be .elevation, azimuth."),
         ({"style": "dark"}, "style must be an ms.Style"),
@@ -284,8 +284,8 @@ def test_bad_actions_are_refused(action, complaint):
 
 def test_two_actuators_of_one_value_are_refused():
     scene, hinge = pendulum()
-    twice = [ms.envs.Actuator(hinge, "torque", lower=-1, upper=1) for _ in range(2)]
-    with pytest.raises(ValueError, match="two actuators set one value: Actuator"):
+    twice = [ms.envs.Action(hinge, "torque", lower=-1, upper=1) for _ in range(2)]
+    with pytest.raises(ValueError, match="two actuators set one value: Action"):
         environment(scene=scene, actuators=twice)
 
 
@@ -315,18 +315,18 @@ def test_answers_that_change_are_refused():
 @pytest.mark.parametrize(
     ("make", "complaint"),
     [
-        (lambda hinge: ms.envs.Actuator(hinge, "mass", lower=0, upper=1), "no value 'mass' that may change"),
+        (lambda hinge: ms.envs.Action(hinge, "mass", lower=0, upper=1), "no value 'mass' that may change"),
         (
-            lambda hinge: ms.envs.Actuator(hinge, "torque", lower=1, upper=1),
-            "lower of an Actuator must be below",
+            lambda hinge: ms.envs.Action(hinge, "torque", lower=1, upper=1),
+            "lower of an Action must be below",
         ),
         (
-            lambda hinge: ms.envs.Actuator(hinge, "torque", lower=[0, 0], upper=1),
+            lambda hinge: ms.envs.Action(hinge, "torque", lower=[0, 0], upper=1),
             r"must be a number or have shape \(\)",
         ),
-        (lambda hinge: ms.envs.Actuator(hinge, "target_angle", lower=0, upper=1), "no value 'target_angle'"),
+        (lambda hinge: ms.envs.Action(hinge, "target_angle", lower=0, upper=1), "no value 'target_angle'"),
         (
-            lambda hinge: ms.envs.Actuator(ms.Pin([0]), "displacement", lower=-1, upper=1),
+            lambda hinge: ms.envs.Action(ms.Pin([0]), "displacement", lower=-1, upper=1),
             "was made without displacement",
         ),
     ],

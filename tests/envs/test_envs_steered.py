@@ -15,7 +15,7 @@ def pendulum(steered_by):
     scene = ms.Scene(ms.Skeleton([bob], [hinge]), gravity=(0, 0, -9.81))
     one = ms.envs.Environment(
         scene,
-        actuators=[ms.envs.Steered(hinge, "torque", *steered_by)],
+        actuators=[ms.envs.ParametricAction(hinge, "torque", *steered_by)],
         observation=lambda now: [now[hinge].angle],
         reward=lambda now: 0.0,
         time_step=1e-2,
@@ -30,7 +30,7 @@ def test_a_value_that_a_function_of_the_action_sets():
     """A speed instead of a place, and a function of the time: as one motion with the same courses."""
     one, scene, hinge = pendulum((2, lambda two, time, before: before + two[0] + time * two[1]))
     assert one.action_space.shape == (2,)
-    assert repr(one.actuators[0]) == "Steered(torque of Revolute, by 2 numbers)"
+    assert repr(one.actuators[0]) == "ParametricAction(torque of Revolute, by 2 numbers)"
     first, _ = one.reset(seed=0)
     seen = np.array([first, *(one.step(two)[0] for two in ((0.5, 1.0), (0.5, 1.0), (-1.0, 1.0)))])
     torques = np.repeat([0.5, 0.5 + 0.54, 1.04 - 1.0 + 0.08], 4)
@@ -72,28 +72,38 @@ def test_several_owners_at_once_move_as_each_by_itself():
         return before + numbers
 
     each = [lambda share, time, before: before + share[0]]
-    one, together = swinging(lambda _, hinges: [ms.envs.Steered(hinges, "torque", 2, add)])
-    _, apart = swinging(lambda _, hinges: [ms.envs.Steered(hinge, "torque", 1, *each) for hinge in hinges])
+    one, together = swinging(lambda _, hinges: [ms.envs.ParametricAction(hinges, "torque", 2, add)])
+    _, apart = swinging(
+        lambda _, hinges: [ms.envs.ParametricAction(hinge, "torque", 1, *each) for hinge in hinges]
+    )
     assert np.array_equal(together, apart) and np.abs(together[-1]).min() > 0
     np.testing.assert_allclose(seen, [(0, 0), (0.5, 1.0), (1.0, 0.0)], atol=1e-15)
-    assert repr(one.actuators[0]) == "Steered(torque of 2 Revolute, by 2 numbers)"
+    assert repr(one.actuators[0]) == "ParametricAction(torque of 2 Revolute, by 2 numbers)"
 
 
 @pytest.mark.parametrize(
     ("actuators", "complaint"),
     [
-        (lambda _, hinges: [ms.envs.Steered([], "torque", 2, max)], "at least one"),
-        (lambda scene, hinges: [ms.envs.Steered([hinges[0], scene], "torque", 2, max)], "no value 'torque'"),
+        (lambda _, hinges: [ms.envs.ParametricAction([], "torque", 2, max)], "at least one"),
+        (
+            lambda scene, hinges: [ms.envs.ParametricAction([hinges[0], scene], "torque", 2, max)],
+            "no value 'torque'",
+        ),
         (
             lambda _, hinges: [
-                ms.envs.Steered(hinges, "torque", 2, max),
-                ms.envs.Actuator(hinges[1], "torque", lower=-1.0, upper=1.0),
+                ms.envs.ParametricAction(hinges, "torque", 2, max),
+                ms.envs.Action(hinges[1], "torque", lower=-1.0, upper=1.0),
             ],
             "two actuators set one value",
         ),
-        (lambda _, hinges: [ms.envs.Steered([hinges[0]] * 2, "torque", 2, max)], "two actuators set one"),
         (
-            lambda _, hinges: [ms.envs.Steered(hinges[:1] + two_pendulums()[1][:1], "torque", 2, max)],
+            lambda _, hinges: [ms.envs.ParametricAction([hinges[0]] * 2, "torque", 2, max)],
+            "two actuators set one",
+        ),
+        (
+            lambda _, hinges: [
+                ms.envs.ParametricAction(hinges[:1] + two_pendulums()[1][:1], "torque", 2, max)
+            ],
             "neither",
         ),
     ],
@@ -106,7 +116,7 @@ def test_bad_owners_are_refused(actuators, complaint):
 @pytest.mark.parametrize(
     ("steered_by", "complaint"),
     [
-        ((1, 3.0), "value of a Steered must be a function"),
+        ((1, 3.0), "value of a ParametricAction must be a function"),
         ((0, lambda *_: 0.0), "numbers must be an integer"),
     ],
 )

@@ -54,7 +54,7 @@ def test_friction_holds_it(carried) -> None:
     """With the same controls and no friction it stays on the table, and no arm passes into the ball."""
     assert carried["slips"][1] < 0.2 * TARGET[1]
     gripper, motion = carried["found"][0].robot, carried["motion"]
-    touching = motion.touching(gripper.grip, len(motion) - 1)
+    touching = motion.contact_state(gripper.grip, len(motion) - 1)
     assert touching.smallest_distance > 0 and touching.normal_force > 5.0
 
 

@@ -61,7 +61,7 @@ def test_longer_arms_meet_and_do_not_pass(example, monkeypatch) -> None:
     found = lift.closing_and_lift(gripper, model.LIMIT * share, 60)
     own = gripper.lifting.contacts[2]
     assert found["crossings"] == 0
-    assert max(len(found["motion"].touching(own, k).pairs) for k in range(61)) > 10
+    assert max(len(found["motion"].contact_state(own, k).pairs) for k in range(61)) > 10
 
 
 def test_picture_and_summary(example, result, tmp_path) -> None:

@@ -96,7 +96,7 @@ def test_the_gradient_of_the_whole_motion_is_that_of_differences(parts, element)
 
     def objective(unknowns):
         field = jump.blurred(unknowns)
-        return ((task.center(task.move(field, keep="stages").positions)[-1] - place) ** 2).sum()
+        return ((task.center(task.move(field, adjoint_storage="stages").positions)[-1] - place) ** 2).sum()
 
     start = torch.tensor(task.design.guess(60), requires_grad=True)
     objective(start).backward()

@@ -129,7 +129,7 @@ def test_an_oblique_symmetry_plane(bending):
         return ms.equilibrium(scene, **given, young_modulus=value, start=start, solver=EXACT)
 
     def pushed(value, start=None):
-        return ms.equilibrium(scene, **given, motion_factor=value, start=start, solver=EXACT)
+        return ms.equilibrium(scene, **given, support_factor=value, start=start, solver=EXACT)
 
     check(stiff, YOUNG)
     check(pushed, 0.8)

@@ -35,7 +35,7 @@ def test_an_unstable_equilibrium_has_no_gradient():
 
 
 def test_a_state_on_the_way_has_no_gradient():
-    hasty = ms.MixedNewton(max_iterations=1, smallest_load_step=0.5, max_relaxation_steps=1)
+    hasty = ms.MixedNewton(max_iterations=1, min_load_step=0.5, max_relaxation_steps=1)
     with pytest.raises(ms.NotConverged) as caught:
         solve(scene(loads=[TIP]), young_modulus=young(), load_factor=1e3, solver=hasty)
     with pytest.raises(ms.NoGradient, match=r"did not converge, it got .* of the way"):

@@ -44,7 +44,7 @@ def loss_of(found):
 def at(name):
     """Where searches of equilibria begin, so that differences stay on one branch."""
     found = kind(name).found({})
-    return found if isinstance(found, ms.Equilibrium | ms.Equilibria) else None
+    return found if isinstance(found, ms.Equilibrium | ms.EquilibriumSet) else None
 
 
 def loss(name, given) -> float:

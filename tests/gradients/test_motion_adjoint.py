@@ -28,7 +28,7 @@ INPUTS = {
     "load_factor": RNG.uniform(0, 1, STEPS),
     "gravity_factor": np.array(0.8),
     "field_factor": RNG.uniform(0.5, 1, STEPS + 1),
-    "motion_factor": np.linspace(0, 0.7, STEPS + 1),
+    "support_factor": np.linspace(0, 0.7, STEPS + 1),
     "damping": RNG.uniform(1e-3, 2e-3, N_V),
     "stiffness_damping": np.array(2e-3),
     "maxwell_modulus": np.array(0.5),
@@ -85,7 +85,9 @@ def test_gradient(differentiated, name):
 def test_gradient_by_what_moves_a_support(name, value):
     scene = everything()
     clamp, value = scene.supports[0], np.array(value)
-    inputs = {key: INPUTS[key] for key in ("remanent_magnetization", "applied_flux_density", "motion_factor")}
+    inputs = {
+        key: INPUTS[key] for key in ("remanent_magnetization", "applied_flux_density", "support_factor")
+    }
 
     def at(given):
         return loss(scene, {**inputs, "time_step": 3e-3, "values": {clamp: {name: given}}})
@@ -154,12 +156,12 @@ def test_what_is_kept_does_not_matter(record_every, extra):
     found = {}
     for keep, budget in budgets.items():
         move, _, found[keep] = driven(
-            60, keep=ms.Keep(memory_budget=budget), record_every=record_every, **extra
+            60, adjoint_storage=ms.AdjointStorage(memory_budget=budget), record_every=record_every, **extra
         )
-        assert move.keep == keep
+        assert move.adjoint_storage == keep
         assert move.bytes <= budget
-    move, _, found["factors"] = driven(60, keep="factors", record_every=record_every, **extra)
-    assert move.keep == "factors"
+    move, _, found["factors"] = driven(60, adjoint_storage="factors", record_every=record_every, **extra)
+    assert move.adjoint_storage == "factors"
     np.testing.assert_array_equal(found["stages"], found["checkpoints"])
     np.testing.assert_allclose(found["factors"], found["stages"], rtol=1e-9)
 
@@ -176,9 +178,9 @@ def test_kept_factors_serve_all_the_way_back(monkeypatch, integrator):
 
     monkeypatch.setattr(_core, "pull_back_motion", counted)
     options = {"integrator": INTEGRATORS[integrator]}
-    move, _, _ = driven(30, keep="factors", **options)
+    move, _, _ = driven(30, adjoint_storage="factors", **options)
     assert move.iterations > 1.5 * move.factorizations
-    driven(30, keep="stages", **options)
+    driven(30, adjoint_storage="stages", **options)
     stages = 30 * {"euler": 1, "tr_bdf2": 2, "sdirk2": 2, "sdirk3": 3}[integrator]
     assert counts == [0, stages]
 
@@ -195,7 +197,7 @@ def test_kept_factors_share_their_work_space():
         remanent_magnetization=magnetization,
         applied_flux_density=(0, 0, 3e-3),
         integrator=ms.ImplicitEuler(),
-        keep="factors",
+        adjoint_storage="factors",
         progress=False,
     )
     n, starts, rows, values = scene._model.hessian(scene._model.rest_state(), scene._control_layout.zeros())
@@ -225,7 +227,7 @@ def test_a_step_in_parts_has_its_gradient():
 
     tensor = torch.tensor(field, requires_grad=True)
     move = tip(tensor)
-    assert move.halved
+    assert move.substeps
     move.positions[-1].sum().backward()
     direction = 1e-7 * np.ones_like(field)
     above, below = (tip(field + sign * direction).positions[-1].sum() for sign in (1, -1))

@@ -116,7 +116,7 @@ def test_what_motors_do_in_time_by_their_signals(integrator, keep):
 
     def solve(angles):
         values = {hinge: {"motor_angle": angles}}
-        return told(motion(scene, hinge, ball, integrator, values, keep=keep), slide, hinge, ball)
+        return told(motion(scene, hinge, ball, integrator, values, adjoint_storage=keep), slide, hinge, ball)
 
     found, by_hand = varied(solve, given, 1e-5)
     np.testing.assert_allclose(found, by_hand, rtol=1e-6, atol=1e-7 * np.abs(by_hand).max())
@@ -221,8 +221,8 @@ def test_power_of_a_motor(budget):
 
     def solve(given):
         angles = 0.3 + given[0] * shape**2 + given[1] * shape**3
-        keep = ms.Keep(memory_budget=budget)
-        move = motion(scene, hinge, ball, ms.TRBDF2(), {hinge: {"motor_angle": angles}}, keep=keep)
+        keep = ms.AdjointStorage(memory_budget=budget)
+        move = motion(scene, hinge, ball, ms.TRBDF2(), {hinge: {"motor_angle": angles}}, adjoint_storage=keep)
         return (move[hinge].motor_torque[1:] ** 2).sum()
 
     given = torch.tensor([0.4, -0.2], dtype=torch.float64, requires_grad=True)

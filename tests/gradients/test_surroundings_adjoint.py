@@ -145,18 +145,25 @@ CASES = {
     "tr_bdf2, plane": Case(integrator=ms.TRBDF2()),
     "sdirk3, plane, points on faces": Case(integrator=ms.SDIRK3(), contact={"face_samples": 1}),
     "sdirk2, ball, points on faces": Case(ball, ms.SDIRK2(), contact={"face_samples": 3, "offset": 5e-5}),
-    "euler, ground, checkpoints": Case(ground, options={"keep": ms.Keep("checkpoints", memory_budget=1e4)}),
+    "euler, ground, checkpoints": Case(
+        ground, options={"adjoint_storage": ms.AdjointStorage("checkpoints", memory_budget=1e4)}
+    ),
     "tr_bdf2, moving box, checkpoints": Case(
-        box, ms.TRBDF2(), swaying, options={"keep": ms.Keep("checkpoints", memory_budget=3e4)}
+        box,
+        ms.TRBDF2(),
+        swaying,
+        options={"adjoint_storage": ms.AdjointStorage("checkpoints", memory_budget=3e4)},
     ),
     "sdirk2, moving box, lagged, factors": Case(
-        box, ms.SDIRK2(), swaying, {"lagged_friction": True}, options={"keep": "factors"}
+        box, ms.SDIRK2(), swaying, {"lagged_friction": True}, options={"adjoint_storage": "factors"}
     ),
-    "euler, moving ball, factors": Case(ball, motion=swaying, options={"keep": "factors"}),
+    "euler, moving ball, factors": Case(ball, motion=swaying, options={"adjoint_storage": "factors"}),
     "euler, water": Case(None, water=True),
-    "sdirk3, water": Case(None, ms.SDIRK3(), water=True, options={"keep": "factors"}),
+    "sdirk3, water": Case(None, ms.SDIRK3(), water=True, options={"adjoint_storage": "factors"}),
     "tr_bdf2, water and plane, checkpoints": Case(
-        integrator=ms.TRBDF2(), water=True, options={"keep": ms.Keep("checkpoints", memory_budget=3e4)}
+        integrator=ms.TRBDF2(),
+        water=True,
+        options={"adjoint_storage": ms.AdjointStorage("checkpoints", memory_budget=3e4)},
     ),
     "sdirk2, water and moving box, points on faces": Case(
         box, ms.SDIRK2(), swaying, {"face_samples": 1}, True
@@ -277,7 +284,7 @@ def test_by_a_support_that_presses_the_sheet_onto_the_ground(integrator, name):
         name,
         np.array(value),
         steps=20,
-        motion_factor=np.linspace(0, 1, 21),
+        support_factor=np.linspace(0, 1, 21),
         integrator=integrator,
     )
     assert found.energies["contact"][-1] > 0
@@ -327,4 +334,4 @@ def test_through_steps_that_are_taken_in_parts(name):
     owner = contact if name == "friction_coefficient" else None
     value = np.array(0.4) if owner else thrown.pop("velocities")
     found = against_differences(scene, owner, name, value, steps=6, time_step=1e-3, **thrown)
-    assert found.halved
+    assert found.substeps

@@ -59,7 +59,7 @@ def refused(act: Callable[[], object], words: str, error: type[Exception] = Valu
 
 def at_rest(found: ms.Equilibrium) -> Answer:
     """A stable equilibrium, its forces balanced as far as the solver promises."""
-    right = found.stable and found.progress == 1.0 and found.residual <= 1e-10
+    right = found.stable and found.load_fraction == 1.0 and found.residual <= 1e-10
     return Answer(
         "stable, in balance", f"{'stable' if found.stable else 'unstable'}, {found.residual:.0e}", right
     )

@@ -37,7 +37,7 @@ def filled(times):
 @case("a gas at {:g} times the pressure outside, from rest in one call", over=(0.0, 1e-6, 0.5, 30.0))
 def gas(times):
     body = hollow_ball()
-    inside = ms.Cavity(body, filling_pressure=0.3 * times, outside_pressure=0.3)
+    inside = ms.Cavity(body, gas_pressure=0.3 * times, outside_pressure=0.3)
     found = ms.equilibrium(scene_of(body, inside))
     volume, pressure = float(found[inside].volume), float(found[inside].pressure)
     rest = inside.rest_volume(found.scene)
@@ -54,7 +54,7 @@ def crushed():
     box = ms.meshes.box((0.03, 0.03, 0.03), cells=(2, 2, 1))
     mesh = ms.TriangleMesh(box.rest_positions, box.faces)
     sheet = ms.Shell(mesh, thickness=2e-4, young_modulus=1e4)
-    vacuum = ms.Cavity(sheet, filling_pressure=0.0)
+    vacuum = ms.Cavity(sheet, gas_pressure=0.0)
     scene = ms.Scene(sheet, supports=[ms.Pin(mesh.vertices_at(z=0.0))], actuators=[vacuum])
 
     def solve():
@@ -70,7 +70,7 @@ def grown(times):
     body = ms.Solid(mesh, material=material, element="linear")
     at = mesh.tetrahedron_barycenters
     number = (at[:, 0] / 0.02).astype(int) * 4 + 2 * (at[:, 1] > 0.05) + (at[:, 2] > 0.05)
-    cells = ms.Cells(body, number, stiffness=1e5, volume_ratio=times)
+    cells = ms.PneumaticCells(body, number, stiffness=1e5, volume_ratio=times)
     found = ms.equilibrium(ms.Scene(body, supports=[ms.Pin(mesh.vertices_at(x=0.0))], actuators=[cells]))
     ratios = found[cells].volume_ratios
     shear, lame = 1e4 / (2 * 1.3), 1e4 * 0.3 / (1.3 * 0.4)

@@ -109,7 +109,7 @@ def dragged():
         gravity=(0, 0, -GRAVITY),
         allow_rigid_motions=True,
     )
-    motion = moved(held, 100, 1e-3, motion_factor=lambda t: 10.0 * t, velocities=(10.0, 0, 0))
+    motion = moved(held, 100, 1e-3, support_factor=lambda t: 10.0 * t, velocities=(10.0, 0, 0))
     trailing = motion.positions[-1].mean(axis=0)
     return both(
         near("where it is, m", trailing[0], 1.0, rel=2e-2),

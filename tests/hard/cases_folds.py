@@ -39,7 +39,7 @@ def fold(bending: str, degrees: float):
     """
     scene = two_wings(bending)
     one_degree = ms.equilibrium(scene).energies["bending"]
-    found = ms.equilibrium(scene, motion_factor=degrees)
+    found = ms.equilibrium(scene, support_factor=degrees)
     angle = min(degrees, 360.0 - degrees)
     return near("energy of the fold", found.energies["bending"], angle**2 * one_degree, rel=1e-6)
 
@@ -53,7 +53,7 @@ def twisted_and_back():
     twist = ms.Clamp(far_end, rotation=(4.0 * np.pi, 0, 0))
     scene = ms.Scene(sheet, supports=[ms.Clamp(near_end), twist])
     there = ms.equilibrium(scene)
-    back = ms.equilibrium(scene, motion_factor=0.0, start=there)
+    back = ms.equilibrium(scene, support_factor=0.0, start=there)
     return both(
         below("energy left", back.energy / there.energy, 1e-12),
         near("positions", back.positions, mesh.rest_positions, rel=1e-7, scale=LENGTH),

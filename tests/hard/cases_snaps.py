@@ -65,7 +65,7 @@ def toggle_after_the_load():
 @case("the path of a truss through both limit points")
 def toggle_by_arc_length():
     scene, ridge = toggle()
-    path = ms.follow(scene, load_factor=1.5, largest_step=0.02, progress=False)
+    path = ms.follow_path(scene, load_factor=1.5, max_step=0.02, progress=False)
     limits = [point for point in path.critical if point.kind == "limit"]
     if len(limits) != 2:
         return holds("two limit points", False, str([point.kind for point in path.critical]))
@@ -120,8 +120,8 @@ def roof_snaps_back():
 def thin_roof_by_arc_length():
     """Limit loads of 590 and -380 N at half the thickness: Sze, Liu, Lo (2004) and others since."""
     scene = roof(cylinder_roof.THICKNESS / 2.0, 1000.0)
-    path = ms.follow(
-        scene, until=lambda _, positions: sunk(scene, positions) > 27.0, largest_step=0.001, progress=False
+    path = ms.follow_path(
+        scene, until=lambda _, positions: sunk(scene, positions) > 27.0, max_step=0.001, progress=False
     )
     turns = np.diff(np.sign(np.diff(sunk(scene, path.positions))))
     limits = [1000.0 * point.parameter for point in path.critical if point.kind == "limit"]

@@ -55,7 +55,7 @@ def _measured(words: list[str], earlier: dict) -> dict:
                 "factorizations": state.factorizations,
                 "energy": state.energy,
                 "stable": bool(state.stable),
-                "steps": [state.load_steps, state.relaxation_steps, state.saddles_left],
+                "steps": [state.load_steps, state.relaxation_steps, state.saddles_escaped],
             }
         )
         return state

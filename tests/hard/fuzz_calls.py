@@ -43,7 +43,7 @@ class Sample:
         self.field = np.array((0.0, 0.0, 1e-3))
         self.rest = ms.equilibrium(self.scene)
         self.state = ms.simulate(self.scene, steps=1, time_step=1e-3, progress=False).end
-        self.path = ms.follow(self.scene, progress=False, max_points=5, largest_step=1.0, first_step=1.0)
+        self.path = ms.follow_path(self.scene, progress=False, max_points=5, max_step=1.0, first_step=1.0)
         self.positions = np.array(self.rest.positions)
         self.track = 1e-2 * np.cumsum(np.ones((6, 3)), axis=0)
         self.times = np.linspace(0.0, 1.0, 6)
@@ -200,7 +200,7 @@ def _solves(s: Sample) -> Iterator[Call]:
         "load_factor": 0.5,
         "gravity_factor": 1.0,
         "field_factor": 0.5,
-        "motion_factor": 0.5,
+        "support_factor": 0.5,
     }
     replaced = {
         "thickness": np.full(n_f, 1.1e-3),
@@ -214,7 +214,9 @@ def _solves(s: Sample) -> Iterator[Call]:
     places = {"positions": s.positions, "edge_rotations": np.zeros(n_e), "body": None}
     yield Call("energies", ms.energies, {**magnetic, **replaced, **places})
     quick = ms.MixedNewton(max_iterations=10, max_relaxation_steps=5)
-    search = dict(start=s.positions, require_stable=True, at_rest=False, solver=quick, progress=False)
+    search = dict(
+        start=s.positions, require_stable=True, ignore_velocity_forces=False, solver=quick, progress=False
+    )
     yield Call("equilibrium", ms.equilibrium, {**magnetic, **replaced, **search})
     yield Call(
         "equilibrium of cases",
@@ -222,18 +224,26 @@ def _solves(s: Sample) -> Iterator[Call]:
         {**magnetic, "applied_flux_density": [s.field, -s.field], "solver": quick},
     )
     hunt = dict(
-        start=s.positions, unstable=True, attempts=1, same_within=1e-3, at_rest=False, seed=0, solver=quick
+        start=s.positions,
+        include_unstable=True,
+        attempts=1,
+        distinct_tolerance=1e-3,
+        ignore_velocity_forces=False,
+        seed=0,
+        solver=quick,
     )
-    yield Call("equilibria", ms.equilibria, {**magnetic, **replaced, **hunt}, cost=3)
+    yield Call("equilibria", ms.find_equilibria, {**magnetic, **replaced, **hunt}, cost=3)
     meshes = [s.mesh, s.mesh.refined()]
     yield Call(
-        "extrapolated", ms.extrapolated, {"solve": lambda mesh: mesh.size, "meshes": meshes, "order": 2.0}
+        "extrapolated",
+        ms.richardson_extrapolation,
+        {"solve": lambda mesh: mesh.size, "meshes": meshes, "order": 2.0},
     )
     yield Call("TriangleMesh.refined", s.mesh.refined, {"surface": ms.shapes.ball(1.0)})
-    options = {"start": None, "until": None, "first_step": 0.5, "largest_step": 0.5, "lowest_parameter": -1.0}
+    options = {"start": None, "until": None, "first_step": 0.5, "max_step": 0.5, "min_parameter": -1.0}
     yield Call(
         "follow",
-        ms.follow,
+        ms.follow_path,
         {**magnetic, **options, "max_points": 3, "locate_critical": True, "solver": quick, "progress": False},
         cost=2,
     )
@@ -253,7 +263,7 @@ def _solves(s: Sample) -> Iterator[Call]:
         **replaced,
         "integrator": ms.TRBDF2(),
         "record_every": 1,
-        "keep": ms.Keep("stages", memory_budget=1e6),
+        "adjoint_storage": ms.AdjointStorage("stages", memory_budget=1e6),
         "solver": quick,
         "progress": False,
     }
@@ -267,7 +277,7 @@ def _solves(s: Sample) -> Iterator[Call]:
         "tolerance": 1e-9,
         "max_iterations": 5,
         "first_load_step": 1.0,
-        "smallest_load_step": 0.1,
+        "min_load_step": 0.1,
         "max_relaxation_steps": 50,
         "max_factorizations": 1000,
     }
@@ -284,7 +294,7 @@ def _solves(s: Sample) -> Iterator[Call]:
         {"start": None, **{k: v for k, v in magnetic.items() if k != "scene"}},
     )
     yield Call("Path.equilibrium", s.path.equilibrium, {"index": 0})
-    yield Call("Equilibria", ms.Equilibria, {"cases": [s.rest, s.rest]})
+    yield Call("Equilibria", ms.EquilibriumSet, {"cases": [s.rest, s.rest]})
     state = {
         "time": 0.0,
         "state": s.state.state,

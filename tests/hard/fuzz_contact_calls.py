@@ -81,8 +81,8 @@ def _in_scenes(s: Sample) -> Iterator[Call]:
         s.mesh.transformed(translation=(0, 0, 5e-3)), thickness=1e-3, young_modulus=1e6, mass_density=1e3
     )
     law = {
-        "minimal_distance": 1e-3,
-        "reach": 1e-4,
+        "min_distance": 1e-3,
+        "activation_distance": 1e-4,
         "contact_stiffness": 1e5,
         "law": "penalty",
         "smoothing": 1e-5,

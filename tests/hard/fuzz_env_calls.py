@@ -15,7 +15,7 @@ def pendulum() -> ms.envs.Environment:
     hinge = ms.Revolute(bob, origin=(0, 0, 0), axis=(0, 1, 0), torque=0.0)
     return ms.envs.Environment(
         ms.Scene(ms.Skeleton([bob], [hinge])),
-        actuators=[ms.envs.Actuator(hinge, "torque", lower=-1.0, upper=1.0)],
+        actuators=[ms.envs.Action(hinge, "torque", lower=-1.0, upper=1.0)],
         observation=lambda now: [now[hinge].angle],
         reward=lambda now: 0.0,
         time_step=1e-2,
@@ -25,10 +25,10 @@ def pendulum() -> ms.envs.Environment:
 
 def env_calls(s: Sample) -> Iterator[Call]:
     bounds = {"lower": -1e-4, "upper": 1e-4}
-    yield Call("envs.Actuator", ms.envs.Actuator, {"owner": s.clamp, "name": "displacement", **bounds})
+    yield Call("envs.Action", ms.envs.Action, {"owner": s.clamp, "name": "displacement", **bounds})
     yield Call(
-        "envs.Steered",
-        ms.envs.Steered,
+        "envs.ParametricAction",
+        ms.envs.ParametricAction,
         {"owner": s.clamp, "name": "displacement", "numbers": 3, "value": lambda share, time, before: before},
     )
     yield Call(
@@ -41,7 +41,7 @@ def env_calls(s: Sample) -> Iterator[Call]:
         ms.envs.Environment,
         {
             "scene": s.scene,
-            "actuators": [ms.envs.Actuator(s.clamp, "displacement", **bounds)],
+            "actuators": [ms.envs.Action(s.clamp, "displacement", **bounds)],
             "observation": lambda now: now.positions[-1],
             "reward": lambda now: now.time,
             "time_step": 1e-3,

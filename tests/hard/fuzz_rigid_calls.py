@@ -19,13 +19,13 @@ def rigid_calls(s: Sample) -> Iterator[Call]:
     }
     yield Call(
         "Rigid",
-        lambda **a: ms.Scene([s.shell, ms.Rigid(**a)], field=s.dipoles, allow_rigid_motions=True),
+        lambda **a: ms.Scene([s.shell, ms.RigidBody(**a)], field=s.dipoles, allow_rigid_motions=True),
         {"vertices": mesh.vertices_where(lambda x: x[:, 0] > 0.05), "body": s.shell, **rigid},
     )
     spin = {"velocity": (0, 0, 1.0), "angular_velocity": (1.0, 0, 0)}
     yield Call(
         "Rigid, free",
-        lambda **a: ms.Scene(ms.Rigid(**a), field=s.dipoles, allow_rigid_motions=True),
+        lambda **a: ms.Scene(ms.RigidBody(**a), field=s.dipoles, allow_rigid_motions=True),
         {**rigid, **spin},
     )
 
@@ -50,7 +50,7 @@ def rigid_calls(s: Sample) -> Iterator[Call]:
         (ms.Revolute, {**place, "motor_angle": 0.1, "rate": 1.0}),
         (ms.Prismatic, {**place, "motor_displacement": 0.1, "rate": 1.0}),
         (ms.Fixed, {"origin": (0, 0, 0)}),
-        (ms.Closure, {"origin": (0, 0, 0), "stiffness": 1.0}),
+        (ms.LoopClosure, {"origin": (0, 0, 0), "stiffness": 1.0}),
     ):
         yield Call(
             joint.__name__,

@@ -24,20 +24,30 @@ def solid_calls(s: Sample) -> Iterator[Call]:
     given = {"rest_positions": block.rest_positions, "tetrahedra": block.tetrahedra, "parts": parts}
     given["part_names"] = {"odd": 1}
     flat = ms.meshes.rectangle(0.1, 0.05, cells=(3, 2))
-    six = ms.SixNodeMesh.of(flat)
+    six = ms.QuadraticTriangleMesh.of(flat)
     yield Call(
-        "SixNodeMesh", ms.SixNodeMesh, {"rest_positions": six.rest_positions, "elements": six.elements}
+        "QuadraticTriangleMesh",
+        ms.QuadraticTriangleMesh,
+        {"rest_positions": six.rest_positions, "elements": six.elements},
     )
-    yield Call("SixNodeMesh.of", ms.SixNodeMesh.of, {"mesh": flat, "place": lambda points: points})
-    yield Call("SixNodeMesh.fitted", ms.SixNodeMesh.fitted, {"mesh": flat, "to": flat})
-    yield Call("SixNodeMesh.refined", six.refined, {"place": lambda points: points})
-    yield Call("SixNodeMesh.transformed", six.transformed, {"rotation": np.eye(3), "translation": (1, 0, 0)})
+    yield Call(
+        "QuadraticTriangleMesh.of",
+        ms.QuadraticTriangleMesh.of,
+        {"mesh": flat, "place": lambda points: points},
+    )
+    yield Call("QuadraticTriangleMesh.fitted", ms.QuadraticTriangleMesh.fitted, {"mesh": flat, "to": flat})
+    yield Call("QuadraticTriangleMesh.refined", six.refined, {"place": lambda points: points})
+    yield Call(
+        "QuadraticTriangleMesh.transformed",
+        six.transformed,
+        {"rotation": np.eye(3), "translation": (1, 0, 0)},
+    )
     yield Call("TetMesh", ms.TetMesh, given)
     ten = block.second_order()
     yield Call(
         "TetMesh of ten", ms.TetMesh, {"rest_positions": ten.rest_positions, "tetrahedra": ten.tetrahedra}
     )
-    yield Call("TetMesh.mended", ms.TetMesh.mended, {**given, "merge_tolerance": 1e-6})
+    yield Call("TetMesh.repaired", ms.TetMesh.repaired, {**given, "merge_tolerance": 1e-6})
     yield Call("TetMesh.with_parts", block.with_parts, {"parts": parts, "names": {"odd": 1}})
     yield Call("TetMesh.transformed", block.transformed, {"rotation": np.eye(3), "translation": (1, 0, 0)})
     yield Call("TetMesh.scaled", block.scaled, {"factor": 2.0})
@@ -94,14 +104,16 @@ def _actuators() -> Iterator[Call]:
     def acting(body, kind):
         return lambda **a: ms.Scene(body, actuators=[kind(body, **a)], allow_rigid_motions=True)
 
-    around = {"faces": np.arange(mesh.n_faces), "cap_rims": False}
-    gas = {"filling_pressure": 1e5, "outside_pressure": 1e5}
+    around = {"faces": np.arange(mesh.n_faces), "close_rims": False}
+    gas = {"gas_pressure": 1e5, "outside_pressure": 1e5}
     yield Call("Cavity", acting(sheet, ms.Cavity), {**around, "pressure": 1e3})
     yield Call("Cavity of gas", acting(sheet, ms.Cavity), {**around, **gas})
     yield Call("Cavity of liquid", acting(sheet, ms.Cavity), {**around, "volume": 1e-4, "bulk_modulus": 1e5})
     groups = np.arange(mesh.n_tetrahedra) % 2
     yield Call(
-        "Cells", acting(solid, ms.Cells), {"groups": groups, "stiffness": 1e4, "volume_ratio": [1.1, 0.9]}
+        "Cells",
+        acting(solid, ms.PneumaticCells),
+        {"groups": groups, "stiffness": 1e4, "volume_ratio": [1.1, 0.9]},
     )
     path = [(0.01, 0.01, 0.01), (0.05, 0.01, 0.015), (0.09, 0.01, 0.01)]
     spring = {"tension": 1.0, "stiffness": 10.0, "rest_length": 0.05, "smoothing": 1e-3, "sliding": True}
@@ -166,7 +178,7 @@ def _solids() -> Iterator[Call]:
     yield Call("StableNeoHookean", ms.StableNeoHookean, {"log_barrier": True, **moduli})
     yield Call("StVenantKirchhoff", ms.StVenantKirchhoff, moduli)
     yield Call("Corotated", ms.Corotated, moduli)
-    yield Call("Projective", ms.Projective, moduli)
+    yield Call("Projective", ms.ProjectiveMaterial, moduli)
     exponents = dict.fromkeys(("fibre_exponent", "cross_fibre_exponent", "fibre_shear_exponent"), 2.0)
     fibres = {"stiffness": 1e3, "bulk_modulus": 1e5, "fibres": (1.0, 0.0, 0.0)}
     yield Call("Guccione", ms.Guccione, {**exponents, **fibres})

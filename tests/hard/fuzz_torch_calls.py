@@ -53,21 +53,23 @@ def _objectives(s: Sample) -> Iterator[Call]:
     }
     yield Call("objectives.total_variation", objectives.total_variation, variation)
     yield Call(
-        "objectives.cap", objectives.cap, {"remanent_magnetization": vectors, "limit": 1.0, "sharpness": 4.0}
+        "objectives.limit",
+        objectives.limit,
+        {"remanent_magnetization": vectors, "limit": 1.0, "sharpness": 4.0},
     )
     yield Call(
         "objectives.printable",
         objectives.printable,
         {
             "remanent_magnetization": vectors,
-            "ink": ms.Ink(1.0, np.eye(3)),
+            "ink": ms.PrintableSet(1.0, np.eye(3)),
             "areas": np.ones(n_f),
             "sharpness": 4.0,
         },
     )
     yield Call(
         "Ink",
-        ms.Ink,
+        ms.PrintableSet,
         {
             "strength": 1.0,
             "directions": np.eye(3),
@@ -89,7 +91,7 @@ def _objectives(s: Sample) -> Iterator[Call]:
         {
             "objective": lambda m: (m**2).sum(),
             "remanent_magnetization": vectors,
-            "ink": ms.Ink(1.0, np.eye(3)),
+            "ink": ms.PrintableSet(1.0, np.eye(3)),
             "max_iterations": 2,
             "weights": (0.1,),
             "blocks": 2,
@@ -119,8 +121,8 @@ def _objectives(s: Sample) -> Iterator[Call]:
         parametrize.log_shares,
         {"values": np.full(n_f, 2.0), "lower": 1.0, "upper": 10.0},
     )
-    yield Call("parametrize.capped", parametrize.capped, {"vectors": vectors, "limit": 1.0})
-    yield Call("parametrize.project_to_cap", parametrize.project_to_cap, {"vectors": vectors, "limit": 1.0})
+    yield Call("parametrize.softly_limited", parametrize.softly_limited, {"vectors": vectors, "limit": 1.0})
+    yield Call("parametrize.clip_to_limit", parametrize.clip_to_limit, {"vectors": vectors, "limit": 1.0})
 
 
 def _controls(s: Sample) -> Iterator[Call]:
@@ -148,9 +150,13 @@ def _controls(s: Sample) -> Iterator[Call]:
     yield Call(
         "control.curve_distance", control.curve_distance, {"track": track, "curve": line, "smoothing": 1e-3}
     )
-    yield Call("control.dmp", control.dmp, {"flux_density": fields, "times": times, **waves})
     yield Call(
-        "control.field_cap", control.field_cap, {"flux_density": fields, "limit": 1.0, "sharpness": 4.0}
+        "control.low_frequency_penalty",
+        control.low_frequency_penalty,
+        {"flux_density": fields, "times": times, **waves},
+    )
+    yield Call(
+        "control.field_limit", control.field_limit, {"flux_density": fields, "limit": 1.0, "sharpness": 4.0}
     )
     yield Call("control.field_excess", control.field_excess, {"flux_density": fields, "limit": 1.0})
     yield Call("control.field_rate", control.field_rate, {"flux_density": fields, "time_step": 0.1})
@@ -185,15 +191,21 @@ def _controls(s: Sample) -> Iterator[Call]:
     }
     windows |= {"smoothings": (2.0, 1.0), "max_iterations": 2, "tolerance": 1e-3, "hold": True}
     yield Call(
-        "control.in_windows",
-        lambda **a: control.in_windows(lambda rows, window: ((rows - 0.5) ** 2).sum(), progress=False, **a),
+        "control.time_windows",
+        lambda **a: control.time_windows(lambda rows, window: ((rows - 0.5) ** 2).sum(), progress=False, **a),
         windows,
     )
-    receding = {"controls": np.zeros((6, 2)), "horizon": 4, "stride": 2, "lower": -1.0, "upper": (1.0, 2.0)}
+    receding = {
+        "controls": np.zeros((6, 2)),
+        "prediction_horizon": 4,
+        "control_horizon": 2,
+        "lower": -1.0,
+        "upper": (1.0, 2.0),
+    }
     receding |= {"trials": 2, "spread": (0.1, 0.2), "periods": (2, 3), "max_iterations": 2, "tolerance": 1e-3}
     yield Call(
-        "control.receding",
-        lambda **a: control.receding(
+        "control.receding_horizon",
+        lambda **a: control.receding_horizon(
             lambda rows, part, state: ((rows - 0.5) ** 2).sum(),
             lambda rows, part, state: None,
             progress=False,
@@ -201,7 +213,7 @@ def _controls(s: Sample) -> Iterator[Call]:
         ),
         {**receding, "seed": 1},
     )
-    yield Call("control.held", control.held, {"values": fields, "steps": 12})
+    yield Call("control.zero_order_hold", control.zero_order_hold, {"values": fields, "steps": 12})
     frames = {
         "positions": np.ones((6, 4, 3)),
         "frames": (1, 5),
@@ -255,7 +267,7 @@ def _optimizers() -> Iterator[Call]:
         "asymptote_shrink": 0.7,
         "asymptote_grow": 1.2,
         "penalty": 1e3,
-        "max_shortenings": 2,
+        "max_backtracks": 2,
     }
 
     def stepped(kind):
@@ -267,7 +279,7 @@ def _optimizers() -> Iterator[Call]:
 
     yield Call("optim.MMA", stepped(optim.MMA), {**box, **asymptotes})
     yield Call("optim.GCMMA", stepped(optim.GCMMA), {**box, **asymptotes})
-    limits = {"memory": 3, "first_step": 1.0, "max_evaluations": 5, "max_shortenings": 2}
+    limits = {"memory": 3, "first_step": 1.0, "max_evaluations": 5, "max_backtracks": 2}
     yield Call("optim.LBFGS", stepped(optim.LBFGS), {**box, **limits})
 
     x = torch.ones(3, dtype=torch.float64, requires_grad=True)

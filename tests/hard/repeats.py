@@ -69,7 +69,7 @@ def modes(on: ms.Scene):
 
 def failing(on: ms.Scene):
     """Far too little time for it; what it hands back is a result all the same."""
-    hasty = ms.MixedNewton(max_iterations=2, smallest_load_step=1.0, max_relaxation_steps=1)
+    hasty = ms.MixedNewton(max_iterations=2, min_load_step=1.0, max_relaxation_steps=1)
     try:
         ms.equilibrium(
             on, remanent_magnetization=MAGNETIZATION, applied_flux_density=(0, 0, 1.0), solver=hasty

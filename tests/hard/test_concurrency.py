@@ -32,7 +32,7 @@ def rest(scene):
 
 def path(scene):
     given = {"remanent_magnetization": MAGNETIZATION, "applied_flux_density": FLUX_DENSITY}
-    found = ms.follow(scene, **given, until=lambda parameter, _: parameter > 0.05)
+    found = ms.follow_path(scene, **given, until=lambda parameter, _: parameter > 0.05)
     return found.positions, found.parameters
 
 

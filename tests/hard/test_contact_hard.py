@@ -62,11 +62,11 @@ def test_a_sheet_folded_to_zero_gap():
     mesh = ms.meshes.rectangle(0.06, 0.01, cells=(20, 2))
     strip = shell(mesh, thickness=5e-4)
     gap = 5e-7
-    touch = ms.SelfContact(strip, minimal_distance=1e-7, reach=1e-6)
+    touch = ms.SelfContact(strip, min_distance=1e-7, activation_distance=1e-6)
     over = ms.Clamp(mesh.edges_at(x=0.06), rotation=(0, -np.pi, 0), center=(0.03, 0.005, gap / 2))
     scene = ms.Scene(strip, supports=[ms.Clamp(mesh.edges_at(x=0.0)), over], contacts=[touch])
-    motion = moved(scene, 40, 1e-2, motion_factor=np.linspace(0, 1, 41), damping=1e-4)
-    assert 1e-7 < motion.touching(touch).smallest_distance < 1e-6
+    motion = moved(scene, 40, 1e-2, support_factor=np.linspace(0, 1, 41), damping=1e-4)
+    assert 1e-7 < motion.contact_state(touch).smallest_distance < 1e-6
 
 
 def test_twenty_layers_stacked():
@@ -82,7 +82,7 @@ def test_twenty_layers_stacked():
     )
     motion = moved(scene, 30, 5e-3, integrator=ms.ImplicitEuler())
     weight = DENSITY * 1e-3 * 0.02**2 * GRAVITY
-    borne = [motion.touching(touch).normal_force for touch in contacts]
+    borne = [motion.contact_state(touch).normal_force for touch in contacts]
     np.testing.assert_allclose(borne, weight * np.arange(19, 0, -1), rtol=1e-3)
 
 
@@ -131,9 +131,9 @@ def test_an_edge_slides_over_an_edge(friction):
         allow_rigid_motions=True,
     )
     motion = moved(scene, 30, 1e-3, velocities=of_body(scene, upper, (0.3, 0.0, 0.0)))
-    touched = [motion.touching(touch, k) for k in range(len(motion))]
+    touched = [motion.contact_state(touch, k) for k in range(len(motion))]
     assert sum(len(each.pairs) > 0 for each in touched) > 5
-    assert all(each.smallest_distance > touch.minimal_distance for each in touched)
+    assert all(each.smallest_distance > touch.min_distance for each in touched)
 
 
 @pytest.mark.parametrize(
@@ -152,7 +152,7 @@ def test_a_ball_on_a_sheet_of_another_fineness(ball_cells, sheet_cells):
         allow_rigid_motions=True,
     )
     motion = moved(scene, 6, 1e-3, velocities=of_body(scene, ball, (0.0, 0.0, -1.0)))
-    assert len(motion.touching(touch).pairs) and motion[floor].positions[-1][:, 2].min() < -1e-3
+    assert len(motion.contact_state(touch).pairs) and motion[floor].positions[-1][:, 2].min() < -1e-3
 
 
 @pytest.mark.parametrize("law", ["barrier", "penalty"])
@@ -172,9 +172,11 @@ def test_sheets_pressed_together_by_a_thousand_times_their_weight(law):
     pressed = ms.equilibrium(scene)
     assert Watch(scene).complaint(pressed.positions) is None
     weight = 1e3 * DENSITY * 1e-3 * 0.02**2 * GRAVITY
-    assert pressed.touching(touch).forces[lower.mesh.n_vertices :, 2].sum() == pytest.approx(weight, rel=1e-6)
+    assert pressed.contact_state(touch).forces[lower.mesh.n_vertices :, 2].sum() == pytest.approx(
+        weight, rel=1e-6
+    )
     motion = moved(scene, 10, 1e-3)
-    assert motion.touching(touch).smallest_distance > 0.5 * touch.minimal_distance
+    assert motion.contact_state(touch).smallest_distance > 0.5 * touch.min_distance
 
 
 def knotted(width, cells) -> ms.TetMesh:
@@ -212,9 +214,9 @@ def test_a_knot_pulled_tight():
     ]
     scene = ms.Scene(cord, supports=pulls, contacts=[touch])
     motion = moved(
-        scene, 40, 1e-2, motion_factor=np.linspace(0, 1, 41), damping=1e-4, integrator=ms.ImplicitEuler()
+        scene, 40, 1e-2, support_factor=np.linspace(0, 1, 41), damping=1e-4, integrator=ms.ImplicitEuler()
     )
-    assert len(motion.touching(touch).pairs) > 10
+    assert len(motion.contact_state(touch).pairs) > 10
 
 
 def squeezed(advance, axes=range(3)) -> ms.Scene:
@@ -233,7 +235,7 @@ def squeezed(advance, axes=range(3)) -> ms.Scene:
     return ms.Scene([block, *plates], supports=supports, contacts=contacts, allow_rigid_motions=True)
 
 
-PRESSING = {"motion_factor": np.linspace(0, 1, 11), "integrator": ms.ImplicitEuler()}
+PRESSING = {"support_factor": np.linspace(0, 1, 11), "integrator": ms.ImplicitEuler()}
 
 
 def test_a_body_squeezed_until_it_cannot_move():
@@ -241,7 +243,7 @@ def test_a_body_squeezed_until_it_cannot_move():
     scene = squeezed(1.2e-3)
     motion = moved(scene, 10, 1e-3, **PRESSING)
     block = motion[scene.bodies[0]].positions[-1]
-    assert all(len(motion.touching(touch).pairs) for touch in scene.contacts[:6])
+    assert all(len(motion.contact_state(touch).pairs) for touch in scene.contacts[:6])
     np.testing.assert_allclose(np.ptp(block, axis=0), 8.1e-3, rtol=1e-3)
 
 
@@ -272,6 +274,6 @@ def test_contact_that_opens_and_closes_in_every_step(integrator):
         contacts=[touch],
     )
     down = np.arange(21) % 2
-    motion = moved(scene, 20, 1e-3, motion_factor=down, stiffness_damping=2e-3, integrator=integrator)
-    touched = np.array([len(motion.touching(touch, k).pairs) > 0 for k in range(21)])
+    motion = moved(scene, 20, 1e-3, support_factor=down, stiffness_damping=2e-3, integrator=integrator)
+    touched = np.array([len(motion.contact_state(touch, k).pairs) > 0 for k in range(21)])
     np.testing.assert_array_equal(touched, down == 1)

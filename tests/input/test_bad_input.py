@@ -81,7 +81,7 @@ test_shell_is_refused = refused(
         (
             "mesh",
             lambda: ms.Shell("mesh", thickness=1, young_modulus=1),
-            "mesh must be a TriangleMesh or a SixNodeMesh, got str",
+            "mesh must be a TriangleMesh or a QuadraticTriangleMesh, got str",
         ),
     ]
 )

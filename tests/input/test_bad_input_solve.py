@@ -78,8 +78,8 @@ test_solve_is_refused = refused(
         ("factor nan", lambda: solve(load_factor=np.nan), "load_factor is nan"),
         (
             "factors",
-            lambda: solve(motion_factor=((1, 2),)),
-            r"motion_factor \[1\] must be a number, or have shape \(k,\) for k load cases, got \(1, 2\)",
+            lambda: solve(support_factor=((1, 2),)),
+            r"support_factor \[1\] must be a number, or have shape \(k,\) for k load cases, got \(1, 2\)",
         ),
         ("factor bool", lambda: solve(load_factor=True), rf"load_factor \[1\] {NOT_NUMBERS}, got True"),
         ("scene", lambda: solve(shell()), "scene must be a Scene, got Shell"),
@@ -123,7 +123,7 @@ test_solve_is_refused = refused(
             r"max_relaxation_steps must be below 2\^31",
         ),
         ("load step", lambda: ms.Newton(first_load_step=2), r"first_load_step must be in \(0, 1\], got 2"),
-        ("path's end", lambda: ms.follow(scene(), until=True), "until must be a function of"),
+        ("path's end", lambda: ms.follow_path(scene(), until=True), "until must be a function of"),
     ]
 )
 
@@ -131,7 +131,7 @@ GRADIENTS = {
     "thickness": lambda t: shell(thickness=t((N_F,))),
     "young_modulus": lambda t: shell(young_modulus=t(())),
     "curvature_scale": lambda t: shell(curvature_scale=t((N_E,))),
-    "load_factor": lambda t: ms.follow(scene(), load_factor=t(())),
+    "load_factor": lambda t: ms.follow_path(scene(), load_factor=t(())),
     "applied_flux_density": lambda t: ms.linear_response(
         scene(field=ms.UniformField()), remanent_magnetization=(1, 0, 0), applied_flux_density=t((3,))
     ),

@@ -92,7 +92,7 @@ def refusal(call, name, bad) -> str | None:
     return "was taken"
 
 
-@pytest.mark.parametrize("name", ["first_step", "largest_step", "lowest_parameter", "max_points"])
+@pytest.mark.parametrize("name", ["first_step", "max_step", "min_parameter", "max_points"])
 @pytest.mark.parametrize("value", [1j, "1", None, [1.0, 2.0], object()])
 def test_options_of_a_path(name, value):
     mesh = ms.meshes.rectangle(0.1, 0.05, cells=(2, 1))
@@ -100,7 +100,7 @@ def test_options_of_a_path(name, value):
         ms.Shell(mesh, thickness=1e-3, young_modulus=1e6), supports=[ms.Clamp(mesh.edges_at(x=0.0))]
     )
     with pytest.raises(ValueError, match=name):
-        ms.follow(scene, **{name: value})
+        ms.follow_path(scene, **{name: value})
 
 
 def nothing(parameters):

@@ -32,11 +32,11 @@ def limits(picture) -> np.ndarray:
         (lambda: ms.animate(MESH, "a.gif", backend="matplotlib"), r"style=ms.Style\(backend=...\)"),
         (lambda: ms.write_page(MESH, "a.html", arrows=3), r"style=ms.Style\(arrows=...\)"),
         (lambda: ms.equilibrium(SCENE, tolerance=1e-8), r"solver=ms.MixedNewton\(tolerance=...\)"),
-        (lambda: ms.follow(SCENE, max_iterations=9), r"solver=ms.MixedNewton\(max_iterations=...\)"),
-        (lambda: ms.equilibria(SCENE, tolerance=1e-8), r"solver=ms.MixedNewton\(tolerance=...\)"),
+        (lambda: ms.follow_path(SCENE, max_iterations=9), r"solver=ms.MixedNewton\(max_iterations=...\)"),
+        (lambda: ms.find_equilibria(SCENE, tolerance=1e-8), r"solver=ms.MixedNewton\(tolerance=...\)"),
         (
             lambda: ms.simulate(SCENE, steps=1, time_step=1e-3, memory_budget=1e6),
-            r"keep=ms.Keep\(memory_budget=...\)",
+            r"adjoint_storage=ms.AdjointStorage\(memory_budget=...\)",
         ),
         (
             lambda: ms.simulate(SCENE, steps=1, timestep=1e-3),
@@ -65,8 +65,11 @@ def test_a_keyword_that_is_elsewhere_is_told_where(call, words):
         (lambda: ms.View(1, np.nan), r"azimuth \[degrees\] must be finite"),
         (lambda: ms.View(1, 2, frame=np.zeros((2, 3))), "two opposite corners of a box, got one place twice"),
         (lambda: ms.View(1, 2, frame=(0, 1)), r"frame \[m\] must have shape"),
-        (lambda: ms.Keep("all"), 'keep must be "stages", "checkpoints", "factors" or None'),
-        (lambda: ms.Keep(memory_budget=-1), r"memory_budget \[bytes\] must not be negative"),
+        (
+            lambda: ms.AdjointStorage("all"),
+            'adjoint_storage must be "stages", "checkpoints", "factors" or None',
+        ),
+        (lambda: ms.AdjointStorage(memory_budget=-1), r"memory_budget \[bytes\] must not be negative"),
     ],
 )
 def test_bad_groups_are_refused_as_they_are_made(make, words):
@@ -172,8 +175,8 @@ def test_what_is_kept_may_be_a_word_or_a_group():
     young = torch.tensor(1e6, dtype=torch.float64, requires_grad=True)
     for keep, word in (
         ("factors", "factors"),
-        (ms.Keep("factors"), "factors"),
-        (ms.Keep(memory_budget=1.0), "checkpoints"),
+        (ms.AdjointStorage("factors"), "factors"),
+        (ms.AdjointStorage(memory_budget=1.0), "checkpoints"),
     ):
-        move = ms.simulate(SCENE, steps=8, time_step=1e-3, young_modulus=young, keep=keep)
-        assert move.keep == word
+        move = ms.simulate(SCENE, steps=8, time_step=1e-3, young_modulus=young, adjoint_storage=keep)
+        assert move.adjoint_storage == word

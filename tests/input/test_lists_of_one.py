@@ -49,7 +49,7 @@ def test_one_support_load_contact_field_and_case() -> None:
     scene = ms.Scene(SHEET, supports=CLAMP, loads=load, contacts=ms.Contact(floor), field=field)
     assert (scene.supports, scene.loads, scene.obstacles) == ((CLAMP,), (load,), (floor,))
     rest = ms.equilibrium(ms.Scene(SHEET, supports=CLAMP, loads=load))
-    assert len(ms.Equilibria(rest)) == 1 and ms.Equilibria(rest)[0] is rest
+    assert len(ms.EquilibriumSet(rest)) == 1 and ms.EquilibriumSet(rest)[0] is rest
 
 
 def test_one_tensor_one_state_one_direction() -> None:
@@ -66,7 +66,7 @@ def test_one_tensor_one_state_one_direction() -> None:
         ms.minimize(lambda x: x.sum(), x, ms.optim.LBFGS(x), stateful=3, progress=False)
     with pytest.raises(ValueError, match="params must be one or a list of them, got 3"):
         ms.optim.LBFGS(3)
-    ink = ms.Ink(1.0, (1, 0, 0), levels=1)
+    ink = ms.PrintableSet(1.0, (1, 0, 0), levels=1)
     assert ink.levels == (1.0,) and ink.directions.tolist() == [[1, 0, 0]]
     line = ms.control.Polyline([(0, 0, 0), (1, 0, 0)])
     assert ms.control.Chain(line).length == 1.0
@@ -138,7 +138,7 @@ def test_a_wrong_keyword_of_an_optimizer() -> None:
             "elements were given as faces: select tetrahedra",
         ),
         (
-            lambda: ms.Cells(CUBE, [BOX.vertices_at(x=0.0)], stiffness=1.0),
+            lambda: ms.PneumaticCells(CUBE, [BOX.vertices_at(x=0.0)], stiffness=1.0),
             "Cells groups were given as vertices: select tetrahedra",
         ),
     ],

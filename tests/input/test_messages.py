@@ -96,7 +96,7 @@ def test_a_field_of_wrong_shape_is_told_that_it_may_be_one_or_one_a_load_case(sh
 
 def test_quantities_that_may_be_one_or_several_say_both_shapes():
     with pytest.raises(ValueError, match=r"directions \[1\] must have shape \(3,\) or \(k, 3\), got \(2,\)"):
-        ms.Ink(1e4, [1.0, 0.0])
+        ms.PrintableSet(1e4, [1.0, 0.0])
 
 
 def test_a_magnetized_solid_is_told_where_its_magnetization_goes():

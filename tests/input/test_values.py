@@ -17,13 +17,13 @@ CLAMP = ms.Clamp(MESH.edges_at(x=0.0), displacement=(0, 0, 1e-3))
 LOAD = ms.EdgeLoad(MESH.edges_at(x=0.05), (0, 0, 0.05))
 SCENE = ms.Scene(SHEET, supports=[CLAMP], loads=[LOAD], field=[UNIFORM, CUBE], gravity=(0, 0, -9.81))
 MAGNETIZATION, FIELD = (2e4, 0.0, 1e3), np.array((1e-3, 0, 2e-3))
-FACTORS = {"load_factor": 0.7, "gravity_factor": 0.6, "field_factor": 0.9, "motion_factor": 0.8}
+FACTORS = {"load_factor": 0.7, "gravity_factor": 0.6, "field_factor": 0.9, "support_factor": 0.8}
 MOTION = {"steps": 3, "time_step": 2e-3, "progress": False}
 RAMP = np.linspace(0.0, 1.0, 4)
 SOLVES = {
     "equilibrium": lambda **given: ms.equilibrium(SCENE, **given).positions,
     "warm start": lambda **given: ms.WarmStart(SCENE)(**given).positions,
-    "follow": lambda **given: ms.follow(SCENE, progress=False, largest_step=0.1, **given).positions,
+    "follow": lambda **given: ms.follow_path(SCENE, progress=False, max_step=0.1, **given).positions,
     "linear response": lambda **given: ms.linear_response(SCENE, **given).positions,
     "buckling": lambda **given: ms.linear_buckling(SCENE, **given).modes,
     "simulate": lambda **given: ms.simulate(SCENE, **MOTION, **given).positions,
@@ -58,7 +58,7 @@ def test_controls_in_time_and_damping_are_values_of_the_scene():
     given = {
         "applied_flux_density": lambda t: (0, 0, t),
         "load_factor": RAMP,
-        "motion_factor": RAMP[:-1],
+        "support_factor": RAMP[:-1],
         "damping": 1e-3,
         "stiffness_damping": 1e-3,
         "maxwell_modulus": 0.5,
@@ -95,7 +95,7 @@ def test_linear_theory_and_vibrations_take_values_of_objects():
     for solve in (
         lambda scene, **given: ms.linear_response(scene, **given).displacements,
         lambda scene, **given: ms.linear_buckling(scene, **given).factors,
-        lambda scene, **given: ms.follow(scene, progress=False, **given).positions[-1],
+        lambda scene, **given: ms.follow_path(scene, progress=False, **given).positions[-1],
     ):
         assert np.array_equal(solve(scene, values=values), solve(made))
     of_thick = ms.vibration_modes(made, count=3).squares

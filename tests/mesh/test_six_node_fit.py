@@ -1,4 +1,4 @@
-"""SixNodeMesh.fitted: middle nodes on a smooth surface through a finer mesh's vertices, and what is refused."""
+"""QuadraticTriangleMesh.fitted: middle nodes on a smooth surface through a finer mesh's vertices, and what is refused."""
 
 import numpy as np
 import pytest
@@ -18,8 +18,8 @@ def strip(n: int) -> ms.TriangleMesh:
 @pytest.mark.parametrize("fine, error", [(4, 1e-3), (8, 1e-5), (32, 1e-8)])
 def test_the_finer_the_nearer(fine, error):
     """Border and inside; straight elements are 8e-3 off."""
-    assert on_cylinder(ms.SixNodeMesh.of(strip(4))) > 7e-3
-    fitted = ms.SixNodeMesh.fitted(strip(4), to=strip(fine))
+    assert on_cylinder(ms.QuadraticTriangleMesh.of(strip(4))) > 7e-3
+    fitted = ms.QuadraticTriangleMesh.fitted(strip(4), to=strip(fine))
     assert on_cylinder(fitted) < error
     exact = ms.meshes.cylinder(1.0, 1.0, angle=1.0, cells=(4, 4), order=2)
     assert np.abs(fitted.rest_positions - exact.rest_positions).max() < 2 * error
@@ -27,19 +27,19 @@ def test_the_finer_the_nearer(fine, error):
 
 def test_closed_surfaces_and_those_of_two_curvatures():
     sphere = [ms.meshes.spherical_cap(1.0, 0.2, np.pi / 2, cells=cells) for cells in ((12, 4), (48, 16))]
-    fitted = ms.SixNodeMesh.fitted(sphere[0], to=sphere[1])
+    fitted = ms.QuadraticTriangleMesh.fitted(sphere[0], to=sphere[1])
     radii = np.linalg.norm(fitted.rest_positions, axis=1)
     assert np.abs(radii - 1.0).max() < 2e-5
 
 
 def test_flat_sheets_stay_flat_and_corners_stay_sharp():
     mesh = ms.meshes.rectangle(1.0, 1.0, cells=(4, 4), irregular=0.2)
-    fitted = ms.SixNodeMesh.fitted(mesh, to=mesh.refined())
-    assert np.abs(fitted.rest_positions - ms.SixNodeMesh.of(mesh).rest_positions).max() < 1e-12
+    fitted = ms.QuadraticTriangleMesh.fitted(mesh, to=mesh.refined())
+    assert np.abs(fitted.rest_positions - ms.QuadraticTriangleMesh.of(mesh).rest_positions).max() < 1e-12
 
 
 def test_a_rim_is_bent_in_its_plane():
-    disk = ms.SixNodeMesh.fitted(ms.meshes.disk(1.0, 3), to=ms.meshes.disk(1.0, 12))
+    disk = ms.QuadraticTriangleMesh.fitted(ms.meshes.disk(1.0, 3), to=ms.meshes.disk(1.0, 12))
     rim = np.linalg.norm(disk.rest_positions[disk.boundary_vertices], axis=1)
     assert np.abs(rim - 1.0).max() < 1e-5 and np.abs(disk.rest_positions[:, 2]).max() == 0.0
 
@@ -52,7 +52,7 @@ def test_two_sheets_close_together_are_told_apart():
         np.concatenate([inner.rest_positions, outer.rest_positions]),
         np.concatenate([inner.faces, outer.faces + inner.n_vertices]),
     )
-    assert on_cylinder(ms.SixNodeMesh.fitted(strip(4), to=both)) < 1e-5
+    assert on_cylinder(ms.QuadraticTriangleMesh.fitted(strip(4), to=both)) < 1e-5
 
 
 def test_the_roof_on_a_fitted_mesh():
@@ -67,16 +67,16 @@ def test_the_roof_on_a_fitted_mesh():
         return -linear_cylinders.roof_response(mesh, "midedge2").displacements[edge, 2]
 
     exact = sinks(ms.meshes.cylinder(*size, span, cells=(8, 8), order=2))
-    assert sinks(ms.SixNodeMesh.fitted(flat, to=fine)) == pytest.approx(exact, rel=1e-5)
-    assert abs(sinks(ms.SixNodeMesh.of(flat)) / exact - 1.0) > 1e-3
+    assert sinks(ms.QuadraticTriangleMesh.fitted(flat, to=fine)) == pytest.approx(exact, rel=1e-5)
+    assert abs(sinks(ms.QuadraticTriangleMesh.of(flat)) / exact - 1.0) > 1e-3
 
 
 def test_what_is_refused():
     with pytest.raises(ValueError, match="to folds by 45 degrees at its edge"):
-        ms.SixNodeMesh.fitted(strip(4), to=ms.meshes.cylinder(1.0, 1.0, cells=(8, 2)))
+        ms.QuadraticTriangleMesh.fitted(strip(4), to=ms.meshes.cylinder(1.0, 1.0, cells=(8, 2)))
     with pytest.raises(ValueError, match="border of to has no vertex at"):
-        ms.SixNodeMesh.fitted(strip(4), to=strip(6))
+        ms.QuadraticTriangleMesh.fitted(strip(4), to=strip(6))
     with pytest.raises(ValueError, match="no surface that faces the same way"):
-        ms.SixNodeMesh.fitted(strip(4), to=strip(8).flipped())
-    with pytest.raises(ValueError, match="to must be a TriangleMesh, got SixNodeMesh"):
-        ms.SixNodeMesh.fitted(strip(4), to=ms.SixNodeMesh.of(strip(4)))
+        ms.QuadraticTriangleMesh.fitted(strip(4), to=strip(8).flipped())
+    with pytest.raises(ValueError, match="to must be a TriangleMesh, got QuadraticTriangleMesh"):
+        ms.QuadraticTriangleMesh.fitted(strip(4), to=ms.QuadraticTriangleMesh.of(strip(4)))

@@ -121,7 +121,7 @@ def test_outlines_with_slits():
     flat, sheet = (
         ms.meshes.outline(square, slits=[[(0.3, 0.5), (0.7, 0.5)]], size=0.2, order=order) for order in (1, 2)
     )
-    assert isinstance(sheet, ms.SixNodeMesh) and sheet.n_elements == flat.n_faces
+    assert isinstance(sheet, ms.QuadraticTriangleMesh) and sheet.n_elements == flat.n_faces
     assert sheet.element_areas.sum() == pytest.approx(1.0)
     # the two sides of the slit have nodes of their own
     nodes = sheet.rest_positions[sheet.edge_nodes[sheet.boundary_edges]]
@@ -165,17 +165,17 @@ BAD = [
 @pytest.mark.parametrize("message, make", BAD, ids=[message for message, _ in BAD])
 def test_is_refused(message, make):
     with pytest.raises(ValueError, match=message):
-        ms.SixNodeMesh(*make())
+        ms.QuadraticTriangleMesh(*make())
 
 
 def test_place_is_checked():
     flat = ms.meshes.rectangle(1.0, 1.0, cells=(1, 1))
     with pytest.raises(ValueError, match="must have shape"):
-        ms.SixNodeMesh.of(flat, place=lambda x: x[:2])
+        ms.QuadraticTriangleMesh.of(flat, place=lambda x: x[:2])
     with pytest.raises(ValueError, match="finite"):
-        ms.SixNodeMesh.of(flat, place=lambda x: x * np.nan)
+        ms.QuadraticTriangleMesh.of(flat, place=lambda x: x * np.nan)
     with pytest.raises(ValueError, match="TriangleMesh"):
-        ms.SixNodeMesh.of(ms.meshes.box((1, 1, 1), cells=(1, 1, 1)))
+        ms.QuadraticTriangleMesh.of(ms.meshes.box((1, 1, 1), cells=(1, 1, 1)))
     with pytest.raises(ValueError, match="order must be 1"):
         ms.meshes.rectangle(1.0, 1.0, cells=(1, 1), order=3)
 
@@ -207,7 +207,7 @@ def test_gmsh_meshes_of_second_order(tmp_path):
     finally:
         gmsh.finalize()
     mesh = ms.read_mesh(tmp_path / "disk.msh", drop_unused=True)
-    assert isinstance(mesh, ms.SixNodeMesh)
+    assert isinstance(mesh, ms.QuadraticTriangleMesh)
     rim = np.linalg.norm(mesh.rest_positions[mesh.boundary_vertices], axis=1)
     assert rim == pytest.approx(1.0, abs=1e-6)
     assert mesh.element_areas.sum() == pytest.approx(np.pi, rel=1e-4)

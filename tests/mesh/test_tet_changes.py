@@ -18,7 +18,7 @@ def test_mended_says_what_it_did():
     apart[::4] = apart[::4][:, [1, 0, 2, 3]]
     doubled = np.concatenate([apart, apart[[5, 7]]])
     order = rng.permutation(len(doubled))
-    mesh, vertex_map, tetrahedron_map, report = ms.TetMesh.mended(
+    mesh, vertex_map, tetrahedron_map, report = ms.TetMesh.repaired(
         points, doubled[order], merge_tolerance=1e-9
     )
     assert (mesh.n_vertices, mesh.n_tetrahedra, mesh.volume) == (36, 72, pytest.approx(6.0))
@@ -39,7 +39,7 @@ def test_mended_says_what_it_did():
 
 def test_mended_ten_nodes_and_parts():
     turned = BENT.tetrahedra[:, [1, 0, 2, 3, 4, 6, 5, 8, 7, 9]]
-    mended = ms.TetMesh.mended(
+    mended = ms.TetMesh.repaired(
         BENT.rest_positions, turned, parts=np.arange(BENT.n_tetrahedra), part_names={"last": 159}
     )
     assert mended.mesh.volume == pytest.approx(BENT.volume, rel=1e-14)
@@ -49,7 +49,7 @@ def test_mended_ten_nodes_and_parts():
 
 
 def test_nothing_to_mend():
-    mended = ms.TetMesh.mended(BLOCK.rest_positions, BLOCK.tetrahedra)
+    mended = ms.TetMesh.repaired(BLOCK.rest_positions, BLOCK.tetrahedra)
     assert str(mended.report) == "nothing to mend"
     assert np.array_equal(mended.mesh.tetrahedra, BLOCK.tetrahedra)
 
@@ -57,7 +57,7 @@ def test_nothing_to_mend():
 def test_merging_drops_what_collapses():
     points = np.concatenate([CORNERS, [[0.0, 0, 1 + 1e-10]]])
     tetrahedra = positive_each(points, np.array([[0, 1, 2, 3], [1, 2, 3, 4]]))
-    mended = ms.TetMesh.mended(points, tetrahedra, merge_tolerance=1e-9)
+    mended = ms.TetMesh.repaired(points, tetrahedra, merge_tolerance=1e-9)
     assert str(mended.report) == "1 vertex merged with another, 1 collapsed tetrahedron dropped"
     assert mended.tetrahedron_map.tolist() == [0, -1]
 
@@ -74,7 +74,7 @@ def test_merging_drops_what_collapses():
 )
 def test_what_cannot_be_mended(arguments, message):
     with pytest.raises(ValueError, match=message):
-        ms.TetMesh.mended(**{"rest_positions": CORNERS, "tetrahedra": [[0, 1, 2, 3]], **arguments})
+        ms.TetMesh.repaired(**{"rest_positions": CORNERS, "tetrahedra": [[0, 1, 2, 3]], **arguments})
 
 
 # Order and division
@@ -125,7 +125,7 @@ def test_refined_keeps_curved_surfaces():
 
 def test_repeated_division_makes_three_shapes():
     rng = np.random.default_rng(8)
-    mesh = ms.TetMesh.mended(rng.normal(size=(4, 3)), [[0, 1, 2, 3]]).mesh
+    mesh = ms.TetMesh.repaired(rng.normal(size=(4, 3)), [[0, 1, 2, 3]]).mesh
     for _ in range(4):
         mesh = mesh.refined()
     shapes = np.round(np.sort(mesh.quality.dihedral_angles, axis=1), 8)

@@ -21,8 +21,8 @@ MOTION = ms.simulate(SCENE, steps=3, time_step=1e-2, progress=False)
         ms.meshes.box((1, 1, 1), cells=(1, 1, 1)),
         SCENE,
         REST,
-        ms.Equilibria([REST, REST]),
-        ms.follow(SCENE, until=lambda way, _: way > 0.05, progress=False),
+        ms.EquilibriumSet([REST, REST]),
+        ms.follow_path(SCENE, until=lambda way, _: way > 0.05, progress=False),
         MOTION,
         ms.linear_response(SCENE),
     ],
@@ -41,13 +41,13 @@ def test_a_wrong_keyword_is_told() -> None:
 
 
 def test_save_and_animate(tmp_path) -> None:
-    for name, result in (("rest", REST), ("cases", ms.Equilibria([REST])), ("motion", MOTION)):
+    for name, result in (("rest", REST), ("cases", ms.EquilibriumSet([REST])), ("motion", MOTION)):
         result.save(tmp_path / f"{name}.npz")
         again = ms.load(tmp_path / f"{name}.npz", SCENE)
         assert type(again) is type(result)
         np.testing.assert_array_equal(again.positions, result.positions)
-    path = ms.follow(SCENE, until=lambda way, _: way > 0.05, progress=False)
-    with pytest.raises(ValueError, match=r"save its points, ms.Equilibria"):
+    path = ms.follow_path(SCENE, until=lambda way, _: way > 0.05, progress=False)
+    with pytest.raises(ValueError, match=r"save its points, ms.EquilibriumSet"):
         path.save(tmp_path / "path.npz")
     for k, each in enumerate((MOTION, path)):
         assert each.animate(tmp_path / f"{k}.gif", width=400, style=PLAIN, fps=5).stat().st_size > 1000

@@ -34,7 +34,7 @@ def same(one, other):
 def facts(result):
     """What a result says, apart from its arrays."""
     found = [repr(result), result.positions, result.edge_rotations]
-    if isinstance(result, ms.Equilibria):
+    if isinstance(result, ms.EquilibriumSet):
         return [*found, *(facts(case) for case in result)]
     found += [
         result.energies,
@@ -44,7 +44,7 @@ def facts(result):
     if all(isinstance(body, ms.Shell) for body in result.scene.bodies) and result.scene.bodies:
         found += [result.strains().membrane]
     for contact in result.scene.contacts:
-        touching = result.touching(contact)
+        touching = result.contact_state(contact)
         found += [touching.normal_forces, touching.friction]
     return found
 
@@ -91,8 +91,8 @@ def test_points_of_a_path(tmp_path):
     pin = ms.Pin(end, "z", displacement=(0, 0, 0))
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6)
     scene = ms.Scene(sheet, supports=[ms.Clamp(MESH.edges_at(x=0.0)), pin])
-    path = ms.follow(scene, start=ms.equilibrium(scene), values={pin: {"displacement": (0, 0, 5e-3)}})
-    points = ms.Equilibria(path.equilibrium(k) for k in range(len(path)))
+    path = ms.follow_path(scene, start=ms.equilibrium(scene), values={pin: {"displacement": (0, 0, 5e-3)}})
+    points = ms.EquilibriumSet(path.equilibrium(k) for k in range(len(path)))
     assert len(points) > 2
     assert same(facts(reloaded(points, tmp_path)), facts(points))
     with pytest.raises(ValueError, match=r"got Path: save its points"):
@@ -108,7 +108,7 @@ def test_obstacles_on_paths_stand_where_they_stood(tmp_path):
     move = ms.simulate(scene, **STEPS, values=swaying)
     for again in (reloaded(move, tmp_path), copy.deepcopy(reloaded(move, tmp_path))):
         for k in range(len(move)):
-            there = [each.touching(each.scene.contacts[0], k) for each in (move, again)]
+            there = [each.contact_state(each.scene.contacts[0], k) for each in (move, again)]
             assert same(there[0].friction, there[1].friction) and len(there[0].friction)
         assert same(*([each._obstacles[0].motion(time) for time in move.times] for each in (move, again)))
 

@@ -17,7 +17,7 @@ MAGNETIZED = {"remanent_magnetization": (4e4, 0, 0)}
 def results():
     rest = ms.equilibrium(SCENE, **MAGNETIZED, applied_flux_density=(0, 0, 1e-3))
     cases = ms.equilibrium(SCENE, **MAGNETIZED, applied_flux_density=[(0, 0, 1e-3), (0, 0, 2e-3)])
-    path = ms.follow(SCENE, **MAGNETIZED, start=rest, applied_flux_density=(0, 0, 3e-3))
+    path = ms.follow_path(SCENE, **MAGNETIZED, start=rest, applied_flux_density=(0, 0, 3e-3))
     move = ms.simulate(SCENE, **MAGNETIZED, steps=3, time_step=1e-3, applied_flux_density=(0, 0, 2e-3))
     return {"rest": rest, "cases": cases, "path": path, "move": move}
 

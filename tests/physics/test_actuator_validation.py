@@ -16,7 +16,7 @@ def tube_as_cavity(
     solid = ms.Solid(mesh, material=density(**moduli))
     x = solid.mesh.rest_positions
     inner = np.flatnonzero((np.hypot(x[..., 0], x[..., 1]) < 1 + TINY)[solid.mesh.faces].all(axis=1))
-    cavity = ms.Cavity(solid, inner, cap_rims=True, **inside)
+    cavity = ms.Cavity(solid, inner, close_rims=True, **inside)
     flat = np.union1d(at(solid, z=0.0), at(solid, z=0.5))
     pins = [
         ms.Pin(flat, components="z"),
@@ -86,7 +86,7 @@ def bilayer_of_cells(ratio: float, moduli: float, mismatch: float) -> float:
     )
     solid = ms.Solid(half, material=material)
     target = ((1.0 + mismatch) ** 3 - share) / (1.0 - share)
-    cells = ms.Cells(
+    cells = ms.PneumaticCells(
         solid,
         [np.array([k]) for k in np.flatnonzero(swells)],
         stiffness=(1.0 - share) * moduli / 3.0,
@@ -125,7 +125,7 @@ def test_a_free_block_of_cells_rests_at_their_volume():
     block = ms.meshes.box((1, 1, 1), cells=(1, 1, 1))
     solid = ms.Solid(block, material=ms.NeoHookean("isochoric", young_modulus=1.0, poisson_ratio=-0.9))
     bulk = 1.0 / (3 * (1 + 1.8))
-    cells = ms.Cells(solid, [np.arange(solid.mesh.n_tetrahedra)], stiffness=1e3, volume_ratio=1.5)
+    cells = ms.PneumaticCells(solid, [np.arange(solid.mesh.n_tetrahedra)], stiffness=1e3, volume_ratio=1.5)
     held = [ms.SymmetryPlane(normal) for normal in np.eye(3)]
     rest = ms.equilibrium(ms.Scene(solid, supports=held, actuators=[cells]))
     ratio = (1e3 * 1.5 + bulk) / (1e3 + bulk)

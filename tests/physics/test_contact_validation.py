@@ -48,11 +48,11 @@ def squeeze_force(cells: int, advance: float, reach=1e-3) -> float:
     mesh = octant(cells)
     ball = ms.Solid(mesh, material=ms.NeoHookean("isochoric", young_modulus=1.0, poisson_ratio=0.45))
     plate = flat(3.0, (0.1, 0.2, 1 + reach))
-    touch = ms.Contact(plate, ball, minimal_distance=0.0, reach=reach, contact_stiffness=1.0)
+    touch = ms.Contact(plate, ball, min_distance=0.0, activation_distance=reach, contact_stiffness=1.0)
     mirrors = [ms.Pin(mesh.vertices_at(**{axis: 0.0}), axis, body=ball) for axis in "xyz"]
     down = held(plate, displacement=(0, 0, -advance - 0.3 * reach))
     found = ms.equilibrium(ms.Scene([plate, ball], supports=[down, *mirrors], contacts=[touch]))
-    return 4 * found.touching(touch).forces[: plate.mesh.n_vertices, 2].sum()
+    return 4 * found.contact_state(touch).forces[: plate.mesh.n_vertices, 2].sum()
 
 
 @pytest.mark.parametrize("advance, cells", [(0.05, 6), (0.1, 6), (0.3, 6)])
@@ -73,7 +73,7 @@ def bar_and_wall(cells, gap, reach):
     mesh = mesh.transformed(translation=(gap, -SIDE / 2, -SIDE / 2))
     bar = ms.Solid(mesh, material=ms.NeoHookean(**BAR), mass_density=1e3, element="linear")
     wall = ms.Shell(flat(0.2).mesh.transformed(rotation=UPRIGHT), **RIGID)
-    touch = ms.Contact(wall, bar, minimal_distance=0.0, reach=reach)
+    touch = ms.Contact(wall, bar, min_distance=0.0, activation_distance=reach)
     scene = ms.Scene([wall, bar], supports=[held(wall)], contacts=[touch], allow_rigid_motions=True)
     forwards = np.zeros((scene.mesh.n_vertices, 3))
     forwards[wall.mesh.n_vertices :, 0] = -1.0
@@ -96,7 +96,7 @@ def test_bar_against_a_wall(cells, restitution):
         progress=False,
     )
     of_wall = slice(0, scene.bodies[0].mesh.n_vertices)
-    forces = np.array([-move.touching(touch, k).forces[of_wall, 0].sum() for k in range(len(move))])
+    forces = np.array([-move.contact_state(touch, k).forces[of_wall, 0].sum() for k in range(len(move))])
     impulse, stress = forces.sum() * time_step, 1e3 * SOUND * speed
     pressed = forces > 0.05 * forces.max()
     assert pressed.sum() * time_step == pytest.approx(2 * LENGTH / SOUND, rel=0.02, abs=2 * time_step)
@@ -161,10 +161,15 @@ def ball_on_a_slope(slope: float, friction: float):
     ball = ms.Shell(
         surface.transformed(translation=(0, 0, up)), thickness=1e-3, young_modulus=1e7, mass_density=1e-3
     )
-    rigid = ms.Rigid(everywhere(ball), mass=1.0, inertia=0.4 * radius**2, center=(0, 0, up), body=ball)
+    rigid = ms.RigidBody(everywhere(ball), mass=1.0, inertia=0.4 * radius**2, center=(0, 0, up), body=ball)
     floor = flat(1.2, (0.35, 0.013, 0.0))
     touch = ms.Contact(
-        floor, rigid, friction_coefficient=friction, sticking_speed=1e-3, reach=4e-3, contact_stiffness=2e4
+        floor,
+        rigid,
+        friction_coefficient=friction,
+        sticking_speed=1e-3,
+        activation_distance=4e-3,
+        contact_stiffness=2e4,
     )
     scene = ms.Scene(
         [floor, ball, rigid],
@@ -202,7 +207,7 @@ def test_stack_of_blocks():
     ground = flat(0.2, (0.001, 0.002, -6e-4))
     blocks = [cube((1e-3 * (k % 2), 2e-3 * (k % 3), k * 0.0503)) for k in range(4)]
     below = [ground, *blocks]
-    touches = [ms.Contact(a, b, reach=4e-4) for a, b in zip(below, blocks, strict=False)]
+    touches = [ms.Contact(a, b, activation_distance=4e-4) for a, b in zip(below, blocks, strict=False)]
     guided = [ms.Pin(everywhere(block), "xy", body=block) for block in blocks]
     scene = ms.Scene(
         [ground, *blocks],
@@ -213,7 +218,7 @@ def test_stack_of_blocks():
     )
     rest = ms.equilibrium(scene)
     borne = [
-        -rest.touching(touch).forces[scene._bodies.spans[k].vertices, 2].sum()
+        -rest.contact_state(touch).forces[scene._bodies.spans[k].vertices, 2].sum()
         for k, touch in enumerate(touches)
     ]
     np.testing.assert_allclose(borne, WEIGHT * np.array([4, 3, 2, 1]), rtol=1e-9)
@@ -226,7 +231,7 @@ def slid(ground, slope, friction, lagged=False, speed=0.0, time=0.2) -> tuple[fl
     """A cube at rest on a plate or a larger cube, which gravity then pulls aside: speed at last [m/s] and acceleration."""
     base = flat(0.4, (0, 0, -5e-4)) if ground == "plate" else cube((-0.05, -0.05, -0.1), 1e9, side=0.1)
     block = cube((-0.024, -0.023, 2e-4))
-    law = {"reach": 2.5e-4, "contact_stiffness": 1e6}
+    law = {"activation_distance": 2.5e-4, "contact_stiffness": 1e6}
 
     def scene(gravity, pins, **rubbing):
         return ms.Scene(

@@ -88,7 +88,7 @@ def test_columns_buckle():
 
 def test_snap_through_is_followed():
     """A7a: both limit points; Sze, Liu, Lo 2004, whose shells shear under the force (2.6 % of the full load at the end)."""
-    snap = cylinder_roof.snap_through((4, 4), "midedge2", largest_step=0.02)
+    snap = cylinder_roof.snap_through((4, 4), "midedge2", max_step=0.02)
     assert snap.comparisons[0].error < 0.03
 
 

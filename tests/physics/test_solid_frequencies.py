@@ -93,6 +93,6 @@ def test_consistent_masses_of_a_shell_are_as_good_as_lumped_ones():
         assert ms.vibration_modes(scene, count=1, mass=mass).frequencies[0] == pytest.approx(exact, rel=0.01)
     with pytest.raises(ValueError, match="mass must be one of"):
         ms.vibration_modes(scene, mass="heavy")
-    rigid = ms.Rigid(mesh.vertices_where(lambda x: x[:, 0] > 0.094), mass=1e-3, inertia=1e-8, body=sheet)
+    rigid = ms.RigidBody(mesh.vertices_where(lambda x: x[:, 0] > 0.094), mass=1e-3, inertia=1e-8, body=sheet)
     with pytest.raises(ValueError, match="without rigid parts"):
         ms.vibration_modes(ms.Scene([sheet, rigid], supports=scene.supports), mass="consistent")

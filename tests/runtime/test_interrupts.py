@@ -52,10 +52,10 @@ SOLVES = {
     "equilibrium": (ms.Equilibrium, still),
     "progress": (ms.Equilibrium, lambda c: still(c, progress=lambda *_: c.answer())),
     "positions": (ms.Equilibrium, lambda c: still(c, start=MESH.rest_positions)),
-    "cases": (ms.Equilibria, lambda c: still(c, load_factor=[0.5, 1.0])),
+    "cases": (ms.EquilibriumSet, lambda c: still(c, load_factor=[0.5, 1.0])),
     "path": (
-        ms.Path,
-        lambda c: still(c, ms.follow, until=lambda t, _: c.answer(t > 0.1), progress=False),
+        ms.EquilibriumPath,
+        lambda c: still(c, ms.follow_path, until=lambda t, _: c.answer(t > 0.1), progress=False),
     ),
     "motion": (ms.Trajectory, moving),
     "motion from positions": (ms.Trajectory, lambda c: moving(c, start=MESH.rest_positions, **LAW)),

@@ -34,8 +34,8 @@ def test_the_bars_of_solves(at_once, monkeypatch, capsys, tmp_path):
     monkeypatch.setattr("tqdm.tqdm.set_postfix_str", lambda bar, text, *_, **__: notes.append(text))
     field = {**MAGNETIZED, "applied_flux_density": (0, 0, 1e-3)}
     motion = ms.simulate(SCENE, steps=5, time_step=1e-3, **field)
-    ms.follow(SCENE, **field)
-    ms.equilibria(SCENE, **field, attempts=2)
+    ms.follow_path(SCENE, **field)
+    ms.find_equilibria(SCENE, **field, attempts=2)
     ms.write_series(tmp_path / "motion.pvd", motion)
     told = capsys.readouterr().err
     for title in ("simulate", "path", "equilibria", "write_series"):
@@ -86,7 +86,7 @@ def test_solves_are_logged_in_detail(caplog):
     with caplog.at_level(logging.DEBUG, "magshell"):
         ms.equilibrium(SCENE, **MAGNETIZED, applied_flux_density=FIELDS)
         ms.simulate(SCENE, steps=5, time_step=1e-3, **MAGNETIZED, applied_flux_density=(0, 0, 1e-3))
-        ms.follow(SCENE, **MAGNETIZED, applied_flux_density=(0, 0, 1e-3))
+        ms.follow_path(SCENE, **MAGNETIZED, applied_flux_density=(0, 0, 1e-3))
     told = lines(caplog, logging.DEBUG)
     assert [line.split(":")[0] for line in told] == ["equilibrium"] * 4 + ["simulate", "path"]
     assert (

@@ -37,7 +37,7 @@ def gauge_pressure_of(cavity: ms.Cavity, volume, rest: float):
     if cavity.law == "pressure":
         return float(cavity.pressure)
     if cavity.law == "gas":
-        return float(cavity.filling_pressure) * rest / volume - float(cavity.outside_pressure)
+        return float(cavity.gas_pressure) * rest / volume - float(cavity.outside_pressure)
     return -float(cavity.bulk_modulus) * (volume - float(cavity.volume)) / rest
 
 
@@ -47,7 +47,7 @@ def energy_by_torch(scene: ms.Scene, x: torch.Tensor, factor: float = 1.0) -> to
     for each in scene.actuators:
         if isinstance(each, ms.Cavity):
             total = total + _of_cavity(scene, each, x, factor)
-        elif isinstance(each, ms.Cells):
+        elif isinstance(each, ms.PneumaticCells):
             total = total + _of_cells(each, x, factor)
         else:
             total = total + factor * _of_tendon(scene, each, x)
@@ -60,7 +60,7 @@ def _of_cavity(scene, cavity, x, factor):
     if cavity.law == "pressure":
         return -factor * float(cavity.pressure) * volume
     if cavity.law == "gas":
-        gas = float(cavity.filling_pressure) * rest
+        gas = float(cavity.gas_pressure) * rest
         outside = float(cavity.outside_pressure) * (volume - rest)
         return factor * (outside - gas * torch.log(volume / rest))
     wanted = rest + factor * (float(cavity.volume) - rest)

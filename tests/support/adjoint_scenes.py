@@ -62,7 +62,7 @@ SOLVE_INPUTS = {
     "load_factor": 0.9,
     "gravity_factor": 0.8,
     "field_factor": 1.1,
-    "motion_factor": 0.7,
+    "support_factor": 0.7,
 }
 VALUES = {
     "point load": (POINT, "force", RNG.uniform(-4e-3, 4e-3, (len(FREE), 3))),

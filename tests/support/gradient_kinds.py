@@ -69,7 +69,7 @@ def pinned() -> Kind:
     right = ms.Pin(MESH.vertices_at(x=0.1), "yz", rotation=(0.0, -0.1, 0.0), center=(0.1, 0.03, 0.001))
     couple = ms.EdgeCouple(MESH.edges_at(x=0.1), (1e-4, 2e-3, 0))
     scene = ms.Scene(sheet, supports=[left, right], loads=[couple], allow_rigid_motions=True)
-    return Kind(scene, {"load_factor": 0.9, "motion_factor": 0.8}, fixed=EXACT, reach=REACH)
+    return Kind(scene, {"load_factor": 0.9, "support_factor": 0.8}, fixed=EXACT, reach=REACH)
 
 
 def among_magnets() -> Kind:
@@ -271,24 +271,30 @@ MAKERS = {
     "a six-node sheet in motion": six_nodes_in_motion,
     "in motion, euler": lambda: moving(ms.ImplicitEuler(), "hinge"),
     "in motion, tr_bdf2": lambda: moving(ms.TRBDF2()),
-    "in motion, sdirk2": lambda: moving(ms.SDIRK2(), record_every=2, keep="factors"),
-    "in motion, sdirk3": lambda: moving(ms.SDIRK3(), "hinge", keep=ms.Keep("checkpoints", memory_budget=2e4)),
+    "in motion, sdirk2": lambda: moving(ms.SDIRK2(), record_every=2, adjoint_storage="factors"),
+    "in motion, sdirk3": lambda: moving(
+        ms.SDIRK3(), "hinge", adjoint_storage=ms.AdjointStorage("checkpoints", memory_budget=2e4)
+    ),
     "from an equilibrium": let_go,
     "actuated at rest": actuated_at_rest,
-    "actuated in motion": lambda: actuated_in_motion(ms.TRBDF2(), keep="factors"),
+    "actuated in motion": lambda: actuated_in_motion(ms.TRBDF2(), adjoint_storage="factors"),
     "at rest, with a rigid part": rigid_at_rest,
     "in motion, with rigid parts, euler": lambda: rigid_in_motion(ms.ImplicitEuler(), {"inertia": 1.1e-6}),
     "in motion, with rigid parts, tr_bdf2": lambda: rigid_in_motion(
-        ms.TRBDF2(), keep=ms.Keep("checkpoints", memory_budget=2e4), stiffness_damping=1e-3
+        ms.TRBDF2(),
+        adjoint_storage=ms.AdjointStorage("checkpoints", memory_budget=2e4),
+        stiffness_damping=1e-3,
     ),
     "at rest, with a skeleton": skeleton_at_rest,
     "in motion, with a skeleton": lambda: skeleton_in_motion(
-        ms.TRBDF2(), keep=ms.Keep("checkpoints", memory_budget=2e4)
+        ms.TRBDF2(), adjoint_storage=ms.AdjointStorage("checkpoints", memory_budget=2e4)
     ),
     "a thrown skeleton": thrown_skeleton,
     "at rest, with a driven skeleton": driven_skeleton_at_rest,
     "in motion, with a driven skeleton, euler": lambda: driven_skeleton_in_motion(ms.ImplicitEuler()),
-    "in motion, with a driven skeleton": lambda: driven_skeleton_in_motion(ms.TRBDF2(), keep="stages"),
+    "in motion, with a driven skeleton": lambda: driven_skeleton_in_motion(
+        ms.TRBDF2(), adjoint_storage="stages"
+    ),
     "in motion, with a skeleton, euler": lambda: skeleton_in_motion(ms.ImplicitEuler()),
     "onto a Plane": lambda: thrown(ob.Plane),
     "onto a Plane, rubbing": lambda: thrown(ob.Plane, **RUBS),
@@ -296,7 +302,9 @@ MAKERS = {
     "onto a Sphere, its law given": lambda: thrown(
         ob.Sphere, ms.SDIRK2(), smoothing=2e-4, sticking_speed=0.3, face_samples=3, **RUBS
     ),
-    "onto a Box that sways": lambda: thrown(ob.Box, motion=swaying, options={"keep": "factors"}, **RUBS),
+    "onto a Box that sways": lambda: thrown(
+        ob.Box, motion=swaying, options={"adjoint_storage": "factors"}, **RUBS
+    ),
     "at rest in a placed grid": in_a_placed_grid,
     "among fields that move": among_fields_that_move,
     "in motion, everything moves": lambda: moving(ms.TRBDF2(), in_time=STEPS),

@@ -16,11 +16,13 @@ def _actuated() -> tuple[list, list, list]:
     tetrahedra = np.arange(block.mesh.n_tetrahedra)
     pins = [ms.Pin(body.mesh.vertices_at(z=0.0), body=body) for body in (block, box)]
     actuators = [
-        ms.Cavity(block, filling_pressure=1.2e5),
+        ms.Cavity(block, gas_pressure=1.2e5),
         ms.Cavity(block, pressure=3e3),
         ms.Cavity(box, volume=2.9e-5, bulk_modulus=2e4),
-        ms.Cells(block, [tetrahedra[:90], tetrahedra[90:120]], stiffness=5e4, volume_ratio=[1.1, 0.9]),
-        ms.Cells(block, [tetrahedra[3:5]], stiffness=[4e4], volume_ratio=1.2),
+        ms.PneumaticCells(
+            block, [tetrahedra[:90], tetrahedra[90:120]], stiffness=5e4, volume_ratio=[1.1, 0.9]
+        ),
+        ms.PneumaticCells(block, [tetrahedra[3:5]], stiffness=[4e4], volume_ratio=1.2),
         ms.Tendon(PATH, block, tension=0.4, stiffness=60.0, rest_length=0.03),
         ms.Tendon(
             PATH[1:], block, tension=0.1, stiffness=40.0, rest_length=0.02, sliding=False, smoothing=4e-3

@@ -20,11 +20,11 @@ def with_rigid_parts(free: bool, **own):
         "center": MESH.rest_positions[CORNER].mean(axis=0) + np.array([1e-3, 2e-3, 4e-3]),
         "magnetic_moment": (4e-3, 2e-3, 1e-2),
     }
-    parts = [ms.Rigid(CORNER, **{**carried, **own})]
+    parts = [ms.RigidBody(CORNER, **{**carried, **own})]
     if free:
         spin = {"velocity": (0.01, -0.02, 0.1), "angular_velocity": (3.0, 40.0, -5.0)}
         place = {"center": (0.05, 0.03, 0.04), "magnetic_moment": (2e-3, 1e-3, -1e-3)}
-        parts.append(ms.Rigid(mass=2e-3, inertia=(0.7e-6, 1.0e-6, 1.4e-6), **place, **spin))
+        parts.append(ms.RigidBody(mass=2e-3, inertia=(0.7e-6, 1.0e-6, 1.4e-6), **place, **spin))
     return ms.Scene(
         [sheet, *parts],
         supports=[ms.Clamp(MESH.edges_at(x=0.0))],
@@ -123,7 +123,7 @@ def two_sheets_in_motion() -> Kind:
     n_v = scene.mesh.n_vertices
     controls = {
         "applied_flux_density": (1e-3, 0.0, 4e-3),
-        "motion_factor": np.linspace(0, 0.7, 7),
+        "support_factor": np.linspace(0, 0.7, 7),
         "velocities": np.array([0.05, 0.03, -0.3]) + 1e-2 * RNG.standard_normal((n_v, 3)),
         "damping": RNG.uniform(1e-4, 2e-4, n_v),
         "stiffness_damping": 1e-3,
@@ -171,7 +171,7 @@ def tied(moves: bool) -> Kind:
         field=[ms.UniformField(), DIPOLES],
         gravity=(0.2, 0.1, -9.81),
     )
-    controls = {"applied_flux_density": (1e-3, -5e-4, 2e-3), "motion_factor": 0.7, "gravity_factor": 0.8}
+    controls = {"applied_flux_density": (1e-3, -5e-4, 2e-3), "support_factor": 0.7, "gravity_factor": 0.8}
     if not moves:
         return Kind(scene, controls, fixed=EXACT, step=1e-5, reach=REACH)
     controls |= {
@@ -202,7 +202,7 @@ def solid_at_rest(material=None, element="quadratic", **more) -> Kind:
     turned = ms.Pin(left, displacement=(1e-3, 0, 2e-4), rotation=(0.0, 0.1, 0.05))
     load = ms.PointLoad(right, force=(0.01, 0.002, -0.01))
     scene = ms.Scene(body, supports=[turned], loads=[load], gravity=(0.2, 0.1, -9.81), **more)
-    factors = {"load_factor": 0.9, "motion_factor": 0.8, "gravity_factor": 1.1}
+    factors = {"load_factor": 0.9, "support_factor": 0.8, "gravity_factor": 1.1}
     return Kind(scene, factors, fixed=EXACT, reach=REACH)
 
 
@@ -274,7 +274,7 @@ def solid_in_motion() -> Kind:
 
 
 def solid_by_projective_dynamics() -> Kind:
-    still = solid_at_rest(ms.Projective(young_modulus=1e5, poisson_ratio=0.3), "linear")
+    still = solid_at_rest(ms.ProjectiveMaterial(young_modulus=1e5, poisson_ratio=0.3), "linear")
     tight = ms.ProjectiveDynamics(tolerance=1e-12, iterations=5000)
     controls = {"time_step": 2e-3, "gravity_factor": 1.1, **VISCOUS}
     return Kind(
@@ -298,7 +298,9 @@ def solid_with_company(moves: bool) -> Kind:
         remanent_magnetization=(2e4, 1e4, 5e3),
     )
     glued = mesh.vertices_where(lambda x: x[:, 0] > 0.06)
-    magnet = ms.Rigid(glued, mass=2e-2, inertia=(2e-6, 3e-6, 4e-6), magnetic_moment=(0.1, 0, 0.3), body=bar)
+    magnet = ms.RigidBody(
+        glued, mass=2e-2, inertia=(2e-6, 3e-6, 4e-6), magnetic_moment=(0.1, 0, 0.3), body=bar
+    )
     scene = ms.Scene(
         [sheet, bar, magnet],
         ties=[ms.Tie(bar, sheet)],

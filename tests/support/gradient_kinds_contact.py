@@ -14,7 +14,7 @@ RUBS = {"friction_coefficient": 0.3, "static_friction_coefficient": 0.4, "sticki
 def _two_sheets(modulus, **contact):
     lower = ms.Shell(MESH, thickness=1e-3, young_modulus=2 * modulus, poisson_ratio=0.4, mass_density=300.0)
     upper = ms.Shell(ABOVE, thickness=1e-3, young_modulus=modulus, poisson_ratio=0.3, mass_density=900.0)
-    touch = ms.Contact(lower, upper, **{"contact_stiffness": 1e5, "reach": 4e-4, **contact})
+    touch = ms.Contact(lower, upper, **{"contact_stiffness": 1e5, "activation_distance": 4e-4, **contact})
     return lower, upper, touch
 
 
@@ -30,7 +30,7 @@ def sheets_at_rest_on_each_other(**contact) -> Kind:
         contacts=[touch],
         gravity=(0.2, 0.1, -9.81),
     )
-    return Kind(scene, {"gravity_factor": 0.9, "motion_factor": 0.8}, fixed=EXACT, step=5e-5, reach=REACH)
+    return Kind(scene, {"gravity_factor": 0.9, "support_factor": 0.8}, fixed=EXACT, step=5e-5, reach=REACH)
 
 
 def sheets_rubbing(integrator, **contact) -> Kind:
@@ -47,7 +47,7 @@ def sheets_rubbing(integrator, **contact) -> Kind:
     )
     velocities = np.zeros((scene.mesh.n_vertices, 3))
     velocities[MESH.n_vertices :] = (0.1, 0.05, -0.15)
-    controls = {"velocities": velocities, "time_step": 1e-3, "motion_factor": np.linspace(0, 0.7, 6)}
+    controls = {"velocities": velocities, "time_step": 1e-3, "support_factor": np.linspace(0, 0.7, 6)}
     fixed = {**EXACT, "steps": 6, "integrator": integrator, "progress": False}
     return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-6, reach=REACH)
 
@@ -70,7 +70,7 @@ def onto_itself(**contact) -> tuple[ms.Scene, dict]:
     """A strip that comes back over itself, pressed down."""
     mesh = _hairpin()
     strip = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.3, mass_density=1e3)
-    touch = ms.SelfContact(strip, **{"contact_stiffness": 1e5, "reach": 4e-4, **contact})
+    touch = ms.SelfContact(strip, **{"contact_stiffness": 1e5, "activation_distance": 4e-4, **contact})
     load = ms.PointLoad(FLAT.vertices_at(x=0.12), force=(0.0, 1e-4, -2e-2))
     clamp = ms.Clamp(FLAT.edges_at(x=0.0))
     return ms.Scene(strip, supports=[clamp], loads=[load], contacts=[touch]), {"load_factor": 0.9}

@@ -92,7 +92,7 @@ GROWTH_MAKERS = {
     "a grown sheet at rest, evenly": grown_evenly,
     "a grown six-node sheet at rest": grown_six_nodes,
     "a grown sheet in motion, tr_bdf2": lambda: growing(
-        ms.TRBDF2(), keep=ms.Keep("checkpoints", memory_budget=2e4)
+        ms.TRBDF2(), adjoint_storage=ms.AdjointStorage("checkpoints", memory_budget=2e4)
     ),
     "a growing sheet in motion, euler": lambda: growing(ms.ImplicitEuler(), in_time=3),
     "a growing six-node sheet in motion": lambda: growing(ms.TRBDF2(), in_time=3, six_nodes=True),

@@ -29,7 +29,7 @@ def pressed_solid(moves: bool) -> Kind:
     supports = [ms.Pin(left, **place)]
     if not moves:
         scene = ms.Scene(body, supports=supports, loads=loads, gravity=(0.2, 0.1, -9.81))
-        factors = {"load_factor": 0.9, "motion_factor": 0.8, "gravity_factor": 1.1}
+        factors = {"load_factor": 0.9, "support_factor": 0.8, "gravity_factor": 1.1}
         return Kind(scene, factors, fixed=EXACT, reach=REACH)
     floor = ms.Contact(
         ob.Plane((-0.02, 0.01, 1.0), center=(0.05, 0, body.mesh.rest_positions[:, 2].min() - 2e-4)),
@@ -51,9 +51,9 @@ def pressed_sheet(moves: bool) -> Kind:
     loads = [ms.Pressure(RNG.uniform(-0.8, -0.4, 3), faces=[1, 4, 7]), ms.Pressure(-0.3)]
     if not moves:
         scene = ms.Scene(sheet, supports=supports, loads=loads)
-        return Kind(scene, {"load_factor": 0.9, "motion_factor": 0.8}, fixed=EXACT, reach=REACH)
+        return Kind(scene, {"load_factor": 0.9, "support_factor": 0.8}, fixed=EXACT, reach=REACH)
     touching = [ms.Contact(under(ob.Plane, -2e-3), contact_stiffness=50.0, offset=1e-4)]
     scene = ms.Scene(sheet, supports=supports, loads=loads, contacts=touching)
     fixed = {**EXACT, "steps": 3, "integrator": ms.SDIRK2(), "progress": False}
-    controls = {"time_step": 2e-3, "motion_factor": np.linspace(0, 0.7, 4)}
+    controls = {"time_step": 2e-3, "support_factor": np.linspace(0, 0.7, 4)}
     return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-4, reach=REACH)

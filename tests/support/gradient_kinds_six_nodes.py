@@ -19,8 +19,8 @@ def _magnetization(n: int) -> np.ndarray:
 
 def curved(own_magnetization: bool) -> ms.Shell:
     coarse = ms.meshes.rectangle(0.1, 0.06, cells=(2, 1), diagonals="aligned")
-    flat = ms.SixNodeMesh.of(coarse)
-    mesh = ms.SixNodeMesh(_bent(flat.rest_positions), flat.elements)
+    flat = ms.QuadraticTriangleMesh.of(coarse)
+    mesh = ms.QuadraticTriangleMesh(_bent(flat.rest_positions), flat.elements)
     n = mesh.n_elements
     return ms.Shell(
         mesh,

@@ -65,7 +65,7 @@ def _carried_skeleton(free: bool):
         limit_stiffness=1e-3,
         limit_smoothing=1e-2,
     )
-    loop = ms.Closure(bob, origin=np.add(base, (0.05, 0.001, 0.02)), stiffness=0.5)
+    loop = ms.LoopClosure(bob, origin=np.add(base, (0.05, 0.001, 0.02)), stiffness=0.5)
     turn = {"lower_limit": 0.05, "limit_stiffness": 1e-2, "limit_smoothing": 0.02, "spring_stiffness": 1e-3}
     lever = ms.Revolute(stone, arm, origin=np.add(base, (0.02, 0, 0.02)), axis=(0, 1, 0), **turn)
     push = {"lower_limit": 1e-3, "limit_stiffness": 5.0, "limit_smoothing": 1e-3, "spring_stiffness": 5.0}
@@ -159,7 +159,7 @@ def driven_skeleton_at_rest() -> Kind:
 def driven_skeleton_in_motion(integrator, **options) -> Kind:
     controls = {**IN_TIME, "time_step": 5e-3}
     fixed = {**EXACT, "steps": STEPS, "integrator": integrator, "progress": False, **options}
-    in_time = {"in_time": STEPS} if "keep" in options else {}
+    in_time = {"in_time": STEPS} if "adjoint_storage" in options else {}
     step = 3e-4 if in_time else 1e-5
     return Kind(
         _driven_skeleton(True), controls, ms.simulate, fixed=fixed, step=step, reach=_REACH, **in_time
@@ -177,7 +177,7 @@ def skeleton_in_motion(integrator, **options) -> Kind:
     moves[CORNER] = (np.array([0.02, 0.01, -0.1]) + turning)[CORNER]
     controls = {**IN_TIME, "velocities": moves, "time_step": 5e-3}
     fixed = {**EXACT, "steps": STEPS, "integrator": integrator, "progress": False, **options}
-    in_time = {"in_time": STEPS} if "keep" in options else {}
+    in_time = {"in_time": STEPS} if "adjoint_storage" in options else {}
     # The small first steps of TR-BDF2 leave their round-off in velocities: longer differences feel less of it.
     step = 1e-3 if in_time else 1e-5
     return Kind(scene, controls, ms.simulate, fixed=fixed, step=step, reach=REACH, **in_time)

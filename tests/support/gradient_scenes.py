@@ -20,8 +20,8 @@ IN_TIME = ", in time"
 SETTINGS = {"scene", "values", "solver", "progress"}
 SETTINGS_OF = {
     ms.equilibrium: SETTINGS
-    | {"require_stable", "at_rest", "start"},  # wherever the search began: a tensor is refused
-    ms.simulate: SETTINGS | {"steps", "integrator", "record_every", "keep"},
+    | {"require_stable", "ignore_velocity_forces", "start"},  # wherever the search began: a tensor is refused
+    ms.simulate: SETTINGS | {"steps", "integrator", "record_every", "adjoint_storage"},
 }
 
 
@@ -220,7 +220,7 @@ def _values_of(scene: ms.Scene, owner, moving: bool) -> dict[str, object]:
     else:
         values = {name: getattr(owner, name) for name in names}
         absent = set()
-        if isinstance(owner, ms.Rigid):
+        if isinstance(owner, ms.RigidBody):
             absent = {name for name in names if values[name] is None}
         if isinstance(owner, ms.Shell):
             weightless = not (moving or scene.gravity.any())

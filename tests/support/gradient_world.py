@@ -14,7 +14,7 @@ torch = pytest.importorskip("torch")
 RNG = np.random.default_rng(17)
 EXACT = {"solver": ms.MixedNewton(tolerance=1e-13)}
 STEPS = 4
-FACTORS = {"load_factor": 0.9, "gravity_factor": 0.8, "field_factor": 1.1, "motion_factor": 0.7}
+FACTORS = {"load_factor": 0.9, "gravity_factor": 0.8, "field_factor": 1.1, "support_factor": 0.7}
 # Of values that may be zero: m, rad, m/s.
 REACH = {
     "center": 1e-3,
@@ -34,7 +34,7 @@ IN_TIME = {
     "applied_flux_density": np.array((1e-3, -2e-3, 3e-3)) * RNG.uniform(0.5, 1.5, (STEPS + 1, 3)),
     "load_factor": RNG.uniform(0, 1, STEPS),
     "field_factor": RNG.uniform(0.5, 1, STEPS + 1),
-    "motion_factor": np.linspace(0, 0.7, STEPS + 1),
+    "support_factor": np.linspace(0, 0.7, STEPS + 1),
     "gravity_factor": 0.8,
     "remanent_magnetization": MAGNETIZATION,
 }

@@ -18,7 +18,7 @@ class Controls:
     field_factor: float = 0.0
     load_factor: float = 0.0
     gravity_factor: float = 0.0
-    motion_factor: float = 0.0
+    support_factor: float = 0.0
 
     def of(self, scene: ms.Scene) -> np.ndarray:
         """As the core takes them."""

@@ -62,7 +62,7 @@ def threads_here(start):
 
 def fails_at_two(start):
     if start == 2:
-        raise ms.ObjectiveFailed("two is too much", last_good=ms.Minimum([], 7.0, 0.0))
+        raise ms.ObjectiveFailed("two is too much", last_good=ms.MinimizeResult([], 7.0, 0.0))
     return float(start)
 
 

@@ -7,7 +7,7 @@ import magshell as ms
 SIZE = (0.04, 0.01, 0.01)
 MODULI = {"young_modulus": 2e4, "poisson_ratio": 0.35}
 MATERIALS = {
-    "Projective": ms.Projective(**MODULI),
+    "Projective": ms.ProjectiveMaterial(**MODULI),
     "Corotated": ms.Corotated(**MODULI),
     "ln J": ms.NeoHookean(**MODULI),
     "J": ms.NeoHookean("J", **MODULI),
@@ -44,7 +44,7 @@ def both(scene, steps=4, time_step=5e-3, **options):
     given = {"steps": steps, "time_step": time_step, "progress": False, **options}
     mine = ms.simulate(scene, integrator=TIGHT, **given)
     newton = ms.simulate(scene, integrator=ms.ImplicitEuler(), solver=NEWTON, **given)
-    assert not mine.halved and not newton.halved
+    assert not mine.substeps and not newton.substeps
     return mine.positions, newton.positions
 
 

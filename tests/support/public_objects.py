@@ -41,7 +41,7 @@ class Arrays:
 def _bodies(given: Arrays) -> dict[str, object]:
     corners = [[0, 0, 0], [0.02, 0, 0], [0.02, 0.02, 0], [0, 0.02, 0], [0.04, 0, 0], [0.04, 0.02, 0]]
     flat = ms.TriangleMesh(given(corners), given([[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2]], np.int64))
-    six = ms.SixNodeMesh.of(flat)
+    six = ms.QuadraticTriangleMesh.of(flat)
     box = ms.meshes.box((0.04, 0.02, 0.02), cells=(2, 1, 1))
     tets = ms.TetMesh(
         given(box.rest_positions),
@@ -83,7 +83,7 @@ def _bodies(given: Arrays) -> dict[str, object]:
     moduli = dict(young_modulus=1e6, poisson_ratio=0.3)
     return {
         "flat": flat,
-        "six": ms.SixNodeMesh(given(six.rest_positions), given(six.elements, np.int64)),
+        "six": ms.QuadraticTriangleMesh(given(six.rest_positions), given(six.elements, np.int64)),
         "tets": tets,
         "quality": flat.quality,
         "tet quality": tets.quality,
@@ -95,7 +95,7 @@ def _bodies(given: Arrays) -> dict[str, object]:
         "StableNeoHookean": ms.StableNeoHookean(**moduli),
         "StVenantKirchhoff": ms.StVenantKirchhoff(**moduli),
         "Corotated": ms.Corotated(**moduli),
-        "Projective": ms.Projective(**moduli),
+        "Projective": ms.ProjectiveMaterial(**moduli),
         "Guccione": ms.Guccione(
             stiffness=2e3,
             fibre_exponent=8.0,
@@ -104,7 +104,7 @@ def _bodies(given: Arrays) -> dict[str, object]:
             bulk_modulus=1e5,
             fibres=given([1.0, 0, 0]),
         ),
-        "rigid": ms.Rigid(
+        "rigid": ms.RigidBody(
             mass=1.0,
             inertia=given(np.eye(3)),
             center=given([0, 0, 1.0]),
@@ -112,13 +112,13 @@ def _bodies(given: Arrays) -> dict[str, object]:
             velocity=given([0, 0, 0.1]),
             angular_velocity=given([0, 0, 0.1]),
         ),
-        "rigid vertices": ms.Rigid(given.numbers(0, 1, 2), mass=1.0, body=shell),
+        "rigid vertices": ms.RigidBody(given.numbers(0, 1, 2), mass=1.0, body=shell),
         "link": link,
         "hinge": hinge,
         "ball": ball,
         "fixed": ms.Fixed(link, lower, given([0, 0, -1.5])),
         "slide": ms.Prismatic(link, origin=given([0, 0, 0]), axis=given([0, 1.0, 0]), force=0.1),
-        "closure": ms.Closure(link, lower, origin=given([0, 0, -1.5]), stiffness=10.0),
+        "closure": ms.LoopClosure(link, lower, origin=given([0, 0, -1.5]), stiffness=10.0),
         "skeleton": ms.Skeleton([link, lower], [hinge, ball]),
         "tie": ms.Tie(
             shell,
@@ -167,7 +167,9 @@ def _around(given: Arrays, bodies: dict[str, object]) -> dict[str, object]:
             segments=given.numbers(0, 1),
         ),
         "cavity": ms.Cavity(balloon, given(np.arange(balloon.mesh.n_faces), np.int64), pressure=10.0),
-        "cells": ms.Cells(solid, [given.numbers(0, 1), given.numbers(2, 3)], stiffness=given([1e3, 1e3])),
+        "cells": ms.PneumaticCells(
+            solid, [given.numbers(0, 1), given.numbers(2, 3)], stiffness=given([1e3, 1e3])
+        ),
         "tendon": ms.Tendon(given([[0.0, 0.0, 0.0], [0.04, 0.0, 0.0]]), solid, tension=0.1),
         "contact": ms.Contact([plane], vertices=given.numbers(0, 1)),
         "body contact": ms.Contact(shell, other),
@@ -211,9 +213,12 @@ def _options(given: Arrays) -> dict[str, object]:
     """What is handed to functions beside a scene."""
     ball = ms.shapes.ball(0.1, given([0.0, 0, 0]))
     found = {
-        **{cls.__name__: cls() for cls in (ms.Newton, ms.MixedNewton, ms.ProjectiveDynamics, ms.Keep)},
+        **{
+            cls.__name__: cls()
+            for cls in (ms.Newton, ms.MixedNewton, ms.ProjectiveDynamics, ms.AdjointStorage)
+        },
         **{cls.__name__: cls() for cls in (ms.ImplicitEuler, ms.TRBDF2, ms.SDIRK2, ms.SDIRK3)},
-        "ink": ms.Ink(
+        "ink": ms.PrintableSet(
             5e4, given([[1.0, 0, 0], [0, 1.0, 0]]), levels=given([0.0, 1.0]), frames=given([np.eye(3)] * 4)
         ),
         "view": ms.View(30, -60, frame=given([[0.0, 0, 0], [0.1, 0.02, 0.01]])),
@@ -251,10 +256,10 @@ def made_objects(given: Arrays) -> dict[str, object]:
         contacts=[found["contact"]],
         water=found["water"],
     )
-    found["env actuator"] = ms.envs.Actuator(
+    found["env actuator"] = ms.envs.Action(
         scene, "applied_flux_density", lower=given([-1.0, -1, -1]), upper=given([1.0, 1, 1])
     )
-    found["steered"] = ms.envs.Steered(found["hinge"], "torque", 1, _steered)
+    found["steered"] = ms.envs.ParametricAction(found["hinge"], "torque", 1, _steered)
     return found
 
 
@@ -285,7 +290,7 @@ def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
     move = ms.simulate(
         scene, steps=2, time_step=1e-3, velocities=given(np.zeros((6, 3))), values=values, **asked
     )
-    path = ms.follow(scene, **asked)
+    path = ms.follow_path(scene, **asked)
     solid, muscle = made["solid"], made["muscle"]
     actuated = ms.Scene(
         solid,
@@ -299,10 +304,10 @@ def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
     swing = ms.simulate(ms.Scene(made["skeleton"], gravity=(0, 0, -9.81)), steps=1, time_step=1e-3)
     welded = ms.weld(mesh, mesh.transformed(translation=(0.04, 0, 0)))
     joined = ms.weld(made["tets"], made["tets"].transformed(translation=(0.04, 0, 0)))
-    record = ms.Minimum([np.zeros(3)], 1.0, 0.0)
+    record = ms.MinimizeResult([np.zeros(3)], 1.0, 0.0)
     found = {
         "equilibrium": rest,
-        "equilibria": ms.Equilibria([rest, rest]),
+        "equilibria": ms.EquilibriumSet([rest, rest]),
         "trajectory": move,
         "state of motion": move.end,
         "path": path,
@@ -318,13 +323,13 @@ def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
         "stresses": rest[sheet].stresses(),
         "states of a solid": of_solid[solid].stresses(),
         "states of fibres": of_solid[muscle].states(),
-        "touching": rest.touching(floor),
+        "touching": rest.contact_state(floor),
         "reaction": rest.reaction(clamp),
         "response": ms.linear_response(scene, **asked),
         "modes": ms.vibration_modes(scene, rest, count=1),
         "weld": welded,
         "weld of solids": joined,
-        "mended": ms.TetMesh.mended(made["tets"].rest_positions, made["tets"].tetrahedra),
+        "mended": ms.TetMesh.repaired(made["tets"].rest_positions, made["tets"].tetrahedra),
         "warm start": ms.WarmStart(scene),
         "picture": ms.plot(rest, width=400, style=ms.Style(backend="matplotlib")),
         "snapshot": ms.envs.Snapshot(move, 0, given(np.zeros(3))),
@@ -337,11 +342,13 @@ def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
         ms.Buckling,
         ms.CriticalPoint,
         ms.Extrapolation,
-        ms.Multistart,
+        ms.MultistartResult,
         ms.PrintableMinimum,
         ms.PrintableStage,
     )
-    return found | {cls.__name__: _from_fields(cls) for cls in (*rare, ms.control.Receding, ms.envs.Episode)}
+    return found | {
+        cls.__name__: _from_fields(cls) for cls in (*rare, ms.control.RecedingHorizonResult, ms.envs.Episode)
+    }
 
 
 def public_classes() -> dict[str, type]:

@@ -8,7 +8,7 @@ namespace magshell {
 DofMap::DofMap(const SystemMatrix& matrix, std::vector<PrescribedNode> held, const Nodes& nodes, Index moves,
                Registry& registry, ReducedCoordinatesList reduced)
     : held_(std::move(held)), nodes_(nodes), moves_(moves), full_size_(matrix.size()) {
-    support_factor_ = registry.controls.add("scene", "motion_factor", "1", 1, 1);
+    support_factor_ = registry.controls.add("scene", "support_factor", "1", 1, 1);
     for (Index k = 0; k < moves; ++k) {
         const std::string owner = "move " + std::to_string(k);
         slots_.push_back({registry.values.add(owner, "center", "m", 1, 3),

@@ -29,7 +29,7 @@ inline VolumeNames names_of(VolumeLaw law) {
         case VolumeLaw::pressure:
             return {{"pressure", nullptr}, {"Pa", nullptr}};
         case VolumeLaw::gas:
-            return {{"filling_pressure", "outside_pressure"}, {"Pa", "Pa"}};
+            return {{"gas_pressure", "outside_pressure"}, {"Pa", "Pa"}};
         case VolumeLaw::liquid:
             return {{"volume", "bulk_modulus"}, {"m3", "Pa"}};
         case VolumeLaw::cell:

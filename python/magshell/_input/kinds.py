@@ -12,9 +12,9 @@ if TYPE_CHECKING:
     import torch
     from numpy.typing import ArrayLike
 
-    from ..envs.actuator import Actuator
+    from ..envs.actuator import Action
     from ..mesh.tetrahedra.tet_mesh import TetMesh
-    from ..mesh.triangles.six_node_mesh import SixNodeMesh
+    from ..mesh.triangles.six_node_mesh import QuadraticTriangleMesh
     from ..mesh.triangles.triangle_mesh import TriangleMesh
     from ..model.fields.field import AppliedField
     from ..model.loads.face_energies import FaceEnergy
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from ..model.shells.shell import Shell
     from ..model.solids.solid import Solid
     from ..solve.dynamics.trajectory import Trajectory
-    from ..solve.statics.equilibria import Equilibria
+    from ..solve.statics.equilibria import EquilibriumSet
     from ..solve.statics.equilibrium import Equilibrium
-    from ..solve.statics.path import Path
+    from ..solve.statics.path import EquilibriumPath
 
     # A number, an array, a tensor, or sequences of those.
     Numbers: TypeAlias = ArrayLike | torch.Tensor | Sequence["Numbers"]
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     # A matrix (3, 3), or a Rotation of scipy's.
     Rotates: TypeAlias = Numbers | HasMatrix
 
-    SolveResult: TypeAlias = Equilibrium | Equilibria | Path | Trajectory
+    SolveResult: TypeAlias = Equilibrium | EquilibriumSet | EquilibriumPath | Trajectory
 
     # Where a search for an equilibrium begins.
     Starting: TypeAlias = Equilibrium | Numbers
@@ -63,7 +63,14 @@ if TYPE_CHECKING:
 
     # What there are pictures of.
     Shown: TypeAlias = (
-        TriangleMesh | SixNodeMesh | TetMesh | Shell | Solid | Scene | HasPositions | Iterable["Shown"]
+        TriangleMesh
+        | QuadraticTriangleMesh
+        | TetMesh
+        | Shell
+        | Solid
+        | Scene
+        | HasPositions
+        | Iterable["Shown"]
     )
 
     # A plane through what is shown: an axis, an axis and where, a point and a normal.
@@ -71,7 +78,7 @@ if TYPE_CHECKING:
 
     Fielded: TypeAlias = AppliedField | Iterable[AppliedField]
     Load: TypeAlias = DeadLoad | EdgeCouple | FaceEnergy | Pressure
-    EnvActuator: TypeAlias = Actuator
+    EnvActuator: TypeAlias = Action
 
     # A method of optimization, or what makes one for the parameters.
     Optimizing: TypeAlias = torch.optim.Optimizer | Callable[[list[Any]], Any]

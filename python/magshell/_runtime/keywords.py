@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 FLUX_DENSITY = "applied_flux_density"
-FACTORS = ("load_factor", "gravity_factor", "field_factor", "motion_factor")
+FACTORS = ("load_factor", "gravity_factor", "field_factor", "support_factor")
 CONTROLS = (FLUX_DENSITY, *FACTORS)
 OF_MOTION = (
     "damping",

@@ -1,4 +1,4 @@
-"""What a printer or a magnetizer can make: ms.Ink."""
+"""What a printer or a magnetizer can make: ms.PrintableSet."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _UNIT = 1e-6  # how far frames may be from orthonormal
 
 
-class Ink(Frozen):
+class PrintableSet(Frozen):
     """The magnetizations that can be printed: a few directions, one strength, and any share of it or a few.
 
     strength: A/m, of a face that is magnetized fully.
@@ -32,7 +32,7 @@ class Ink(Frozen):
     Raises ValueError on bad input.
 
     >>> import magshell as ms
-    >>> ink = ms.Ink(5e4, [(1, 0, 0), (-1, 0, 0)], levels=(0, 1))
+    >>> ink = ms.PrintableSet(5e4, [(1, 0, 0), (-1, 0, 0)], levels=(0, 1))
     >>> ink.nearest([(4e4, 1e4, 0), (2e4, 1e4, 0)]).tolist()
     [[50000.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
     """

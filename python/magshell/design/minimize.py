@@ -15,7 +15,7 @@ from .._runtime.log import log
 from .._runtime.progress import progress_bar
 from ..errors import DesignRejected, EquilibriumJumped, Interrupted, ObjectiveFailed
 from .configuration import load, save
-from .minimum import Minimum, Record
+from .minimum import MinimizeResult, Record
 from .run import PARTS, Run
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def minimize(
     checkpoint: str | Path | None = None,
     checkpoint_every: int = 1,
     resume: bool = False,
-) -> Minimum:
+) -> MinimizeResult:
     """Minimizes objective(*parameters) and leaves the parameters at the best design.
 
     objective: returns a scalar tensor, or a dict of named terms whose sum it is, or a tuple of one of these with a
@@ -64,7 +64,7 @@ def minimize(
     or no such object, ends the minimization there.
 
     Ctrl-C raises `ms.Interrupted`, an error in the objective or the callback `ms.ObjectiveFailed`, once a design is
-    known; both hold the best one, a Minimum, in `last_good`. Before that the error itself comes through.
+    known; both hold the best one, a MinimizeResult, in `last_good`. Before that the error itself comes through.
 
     >>> import torch, magshell as ms
     >>> x = torch.zeros(3, dtype=torch.float64, requires_grad=True)

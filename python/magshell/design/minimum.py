@@ -98,7 +98,7 @@ class Record:
 
 @immutable
 @dataclass(frozen=True)
-class Minimum:
+class MinimizeResult:
     """What `minimize` found. parameters: the best design, as tensors in the order given; history: a Record an
     iteration, from the start; reason: why it ended. rejections: why trial designs could not be evaluated, {reason: how
     many}, in all. conflict: what seems to keep the objective from falling, where it is one and the same jump of the
@@ -126,7 +126,7 @@ class Minimum:
         return "\n  ".join(filter(None, (first, rejected, self.conflict)))
 
 
-def effort(minima: Iterable[Minimum]) -> str:
+def effort(minima: Iterable[MinimizeResult]) -> str:
     """What several searches took together; empty where there was none."""
     found = list(minima)
     if not found:

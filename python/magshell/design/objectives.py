@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from .._input.quantity import quantity
 from .._input.tensors import detached, positive_number, real_tensor, require_torch, tensor_of
-from .ink import Ink
+from .ink import PrintableSet
 
 if TYPE_CHECKING:
     import torch
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 __all__ = [
     "bilinear",
-    "cap",
     "extension",
     "height_map",
+    "limit",
     "magnitude",
     "printable",
     "shape_matching",
@@ -179,7 +179,7 @@ def total_variation(
     return (_like(edge_lengths, rounded, "edge_lengths", interior.shape, axes=1)[interior] * rounded).sum()
 
 
-def cap(remanent_magnetization: Numbers, limit: Numbers, sharpness: float | None = None) -> torch.Tensor:
+def limit(remanent_magnetization: Numbers, limit: Numbers, sharpness: float | None = None) -> torch.Tensor:
     """Constraints g <= 0 that keep |M_r| at or below a limit: (|M_r| / limit)^2 - 1.
 
     remanent_magnetization: (n_f, 3) A/m. limit: A/m. One constraint a face, (n_f,); with a sharpness p > 1, a single
@@ -187,7 +187,7 @@ def cap(remanent_magnetization: Numbers, limit: Numbers, sharpness: float | None
     looser than the limit.
 
     >>> import magshell as ms
-    >>> ms.objectives.cap([(3e4, 0, 0), (0, 6e4, 0)], 6e4)
+    >>> ms.objectives.limit([(3e4, 0, 0), (0, 6e4, 0)], 6e4)
     tensor([-0.7500,  0.0000], dtype=torch.float64)
     """
     remanent_magnetization = real_tensor("remanent_magnetization", remanent_magnetization, ("n_f", "k"))
@@ -206,24 +206,28 @@ def cap(remanent_magnetization: Numbers, limit: Numbers, sharpness: float | None
 
 
 def printable(
-    remanent_magnetization: Numbers, ink: Ink, areas: Numbers | None = None, sharpness: float | None = None
+    remanent_magnetization: Numbers,
+    ink: PrintableSet,
+    areas: Numbers | None = None,
+    sharpness: float | None = None,
 ) -> torch.Tensor:
     """Mean squared distance of magnetizations from what an ink can print, over the square of its strength: 0 where all
     can be printed, 1 where none is magnetized and all must be fully.
 
     Without a unit, and the same for any mesh and any strength: multiply it by what the objective may lose.
-    remanent_magnetization: (n_f, 3) A/m. ink: an `ms.Ink`. areas: (n_f,) m2, of which the mean takes account; by default
+    remanent_magnetization: (n_f, 3) A/m. ink: an `ms.PrintableSet`. areas: (n_f,) m2, of which the mean takes
+        account; by default
     all faces count alike.
     sharpness: replaces the minimum over what can be printed by a smooth one, which is lower; 100 is close to it.
 
     >>> import magshell as ms
-    >>> ink = ms.Ink(5.0, directions=[(1, 0, 0), (-1, 0, 0)])
+    >>> ink = ms.PrintableSet(5.0, directions=[(1, 0, 0), (-1, 0, 0)])
     >>> round(float(ms.objectives.printable([(3.0, 4.0, 0)], ink)), 9)
     0.64
     """
     torch = require_torch("objectives.printable")
-    if not isinstance(ink, Ink):
-        raise ValueError(f"ink must be an ms.Ink, got {type(ink).__name__}")
+    if not isinstance(ink, PrintableSet):
+        raise ValueError(f"ink must be an ms.PrintableSet, got {type(ink).__name__}")
     squares = ink.squares(remanent_magnetization)
     if sharpness is None:
         squares = squares.min(dim=1).values

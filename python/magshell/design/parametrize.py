@@ -15,19 +15,19 @@ if TYPE_CHECKING:
     import torch
 
     from .._input.kinds import Numbers
-    from ..mesh.triangles.six_node_mesh import SixNodeMesh
+    from ..mesh.triangles.six_node_mesh import QuadraticTriangleMesh
     from ..mesh.triangles.triangle_mesh import TriangleMesh
 
 
 __all__ = [
     "along",
-    "capped",
+    "clip_to_limit",
     "frames_along",
     "from_regions",
     "log_scaled",
     "log_shares",
-    "project_to_cap",
     "radial_frames",
+    "softly_limited",
 ]
 
 
@@ -113,13 +113,13 @@ def log_shares(values: Numbers, lower: Numbers, upper: Numbers) -> torch.Tensor:
     return (real_tensor("values", values, ("...",)) / lower).log() / math.log(ratio)
 
 
-def capped(vectors: Numbers, limit: Numbers) -> torch.Tensor:
+def softly_limited(vectors: Numbers, limit: Numbers) -> torch.Tensor:
     """Magnetizations (n_f, 3) below a limit [A/m], smoothly from any (n_f, 3): v / sqrt(1 + |v|^2 / limit^2).
 
     vectors: (n_f, 3), A/m. limit: A/m.
 
     >>> import magshell as ms
-    >>> round(float(ms.parametrize.capped([(1e9, 0, 0)], 6e4)[0, 0]))
+    >>> round(float(ms.parametrize.softly_limited([(1e9, 0, 0)], 6e4)[0, 0]))
     60000
     """
     vectors = real_tensor("vectors", vectors, ("...", 3))
@@ -127,17 +127,17 @@ def capped(vectors: Numbers, limit: Numbers) -> torch.Tensor:
     return vectors / (1 + ((vectors / limit) ** 2).sum(-1, keepdim=True)) ** 0.5
 
 
-def project_to_cap(vectors: Numbers, limit: Numbers) -> torch.Tensor:
+def clip_to_limit(vectors: Numbers, limit: Numbers) -> torch.Tensor:
     """The nearest magnetizations (n_f, 3) that do not exceed a limit [A/m]: longer ones are cut to it.
 
     vectors: (n_f, 3), A/m. limit: A/m.
 
     >>> import magshell as ms
-    >>> ms.parametrize.project_to_cap([(3e4, 0, 0), (8e4, 0, 0)], 6e4)
+    >>> ms.parametrize.clip_to_limit([(3e4, 0, 0), (8e4, 0, 0)], 6e4)
     tensor([[30000.,     0.,     0.],
             [60000.,     0.,     0.]], dtype=torch.float64)
     """
-    torch = require_torch("parametrize.project_to_cap")
+    torch = require_torch("parametrize.clip_to_limit")
     vectors = real_tensor("vectors", vectors, ("...", 3))
     limit = positive_number("limit", "A/m", limit)
     squares = (vectors**2).sum(-1, keepdim=True)
@@ -148,8 +148,9 @@ def project_to_cap(vectors: Numbers, limit: Numbers) -> torch.Tensor:
     )
 
 
-def frames_along(mesh: TriangleMesh | SixNodeMesh, direction: Numbers) -> np.ndarray:
-    """Axes of each face for directions that follow it, (n_f, 3, 3) as the `frames` of `ms.Ink`: rows are the direction as
+def frames_along(mesh: TriangleMesh | QuadraticTriangleMesh, direction: Numbers) -> np.ndarray:
+    """Axes of each face for directions that follow it, (n_f, 3, 3) as the `frames` of `ms.PrintableSet`: rows
+    are the direction as
     far as it lies in the face, the one across within the face, and the face's normal.
 
     mesh: a TriangleMesh. direction: (3,), or one a face, (n_f, 3); of any length.
@@ -175,9 +176,10 @@ def frames_along(mesh: TriangleMesh | SixNodeMesh, direction: Numbers) -> np.nda
 
 
 def radial_frames(
-    mesh: TriangleMesh | SixNodeMesh, center: Numbers | None = None, axis: Numbers | None = None
+    mesh: TriangleMesh | QuadraticTriangleMesh, center: Numbers | None = None, axis: Numbers | None = None
 ) -> np.ndarray:
-    """Axes of each face for "radially in or out", (n_f, 3, 3) as the `frames` of `ms.Ink`: rows are outwards within the
+    """Axes of each face for "radially in or out", (n_f, 3, 3) as the `frames` of `ms.PrintableSet`: rows are
+    outwards within the
     face, around, and the face's normal.
 
     mesh: a TriangleMesh. center: (3,) m, by default the mean of the faces' barycenters. axis: (3,), where outwards is

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from .configuration import changes, decoded, encoded, kept, load, save
-from .ink import Ink
+from .ink import PrintableSet
 
 _PARTS = ("configuration", "faces", "stateful", "history", "search", "exchanges")
 
@@ -15,7 +15,7 @@ _PARTS = ("configuration", "faces", "stateful", "history", "search", "exchanges"
 class PrintableCheckpoint:
     """Where it is, if anywhere, and for what: the ink, the number of faces and the options that must be the same."""
 
-    def __init__(self, path: str | Path | None, ink: Ink, n_faces: int, options: dict[str, Any]):
+    def __init__(self, path: str | Path | None, ink: PrintableSet, n_faces: int, options: dict[str, Any]):
         self.path: Path | None = None if path is None else Path(path)
         ink_has = {name: getattr(ink, name) for name in ("strength", "directions", "levels", "frames")}
         self._configuration: dict[str, Any] = kept({"n_faces": n_faces, **ink_has, **options})

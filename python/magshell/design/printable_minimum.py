@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .._runtime.frozen import immutable
-from .ink import Ink
+from .ink import PrintableSet
 
 
 @immutable
@@ -43,7 +43,7 @@ class PrintableMinimum:
     history: a PrintableStage each. reason: why it ended.
     """
 
-    ink: Ink
+    ink: PrintableSet
     remanent_magnetization: Any
     objective: float
     free_objective: float

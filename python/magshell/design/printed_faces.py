@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .ink import Ink
+from .ink import PrintableSet
 
 if TYPE_CHECKING:
     import torch
@@ -25,7 +25,7 @@ class PrintedFaces:
     shares: np.ndarray
     upper: np.ndarray
 
-    def __init__(self, ink: Ink, remanent_magnetization: np.ndarray):
+    def __init__(self, ink: PrintableSet, remanent_magnetization: np.ndarray):
         count = len(remanent_magnetization)
         self.ink = ink
         self.axes = np.tile(np.eye(3), (count, 1, 1)) if ink.frames is None else ink.frames.copy()

@@ -12,7 +12,7 @@ from .._input.scalars import not_negative
 from .._input.tensors import detached, require_torch
 from .._runtime.progress import progress_bar
 from ..errors import Interrupted, ObjectiveFailed
-from .ink import Ink
+from .ink import PrintableSet
 from .jump_policies import checked_stateful
 from .printable_checkpoint import PrintableCheckpoint
 from .printable_minimum import PrintableMinimum, PrintableStage
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def minimize_printable(
     objective: Callable[..., Any],
     remanent_magnetization: Numbers,
-    ink: Ink,
+    ink: PrintableSet,
     *,
     max_iterations: int = 40,
     weights: Sequence[float] = (0.001, 0.003, 0.01),
@@ -52,7 +52,7 @@ def minimize_printable(
     objective: of a tensor (n_f, 3) A/m; returns a scalar tensor, or a dict of named terms whose sum it is. As in
         `ms.minimize` it may raise `ms.DesignRejected`; constraints are refused.
     remanent_magnetization: (n_f, 3) A/m, where to begin; brought into the box around what can be printed.
-    ink: an `ms.Ink`.
+    ink: an `ms.PrintableSet`.
     weights: of the pull, without a unit and rising: 1 adds, at the free design, what it costs to round that at once.
         That is much; small ones leave the objective its say. () leaves the pull out.
     blocks: how many; 1 rounds all at once. stage_iterations: of the optimizer after each block and each weight.
@@ -71,7 +71,7 @@ def minimize_printable(
     is known: both hold a PrintableMinimum in `last_good`, not all of which can be printed.
 
     >>> import magshell as ms
-    >>> ink = ms.Ink(1.0, [(1, 0, 0), (-1, 0, 0)], levels=(1,))
+    >>> ink = ms.PrintableSet(1.0, [(1, 0, 0), (-1, 0, 0)], levels=(1,))
     >>> start = [(0.0, 0, 0)] * 3
     >>> found = ms.minimize_printable(lambda m: (m.sum() - 0.9) ** 2, start, ink, progress=False)
     >>> round(found.objective, 3), found.not_printable, sorted(found.directions.tolist())
@@ -80,8 +80,8 @@ def minimize_printable(
     require_torch("minimize_printable")
     if not callable(objective):
         raise ValueError(f"objective must be a function of remanent_magnetization, got {objective!r:.60}")
-    if not isinstance(ink, Ink):
-        raise ValueError(f"ink must be an ms.Ink, got {type(ink).__name__}")
+    if not isinstance(ink, PrintableSet):
+        raise ValueError(f"ink must be an ms.PrintableSet, got {type(ink).__name__}")
     start = quantity("remanent_magnetization", "A/m", detached(remanent_magnetization), ("n_f", 3))
     if len(start) == 0:
         raise ValueError("remanent_magnetization has no faces")

@@ -16,7 +16,7 @@ from .._runtime.log import log
 from ..errors import DesignRejected, EquilibriumJumped
 from .configuration import decoded, encoded, kept
 from .jump_policies import checked_stateful, jumps_accepted, offering
-from .minimum import Minimum, Record, conflict, effort_in_words, reason_of, total
+from .minimum import MinimizeResult, Record, conflict, effort_in_words, reason_of, total
 from .objective_value import Answer
 from .optim.stagnation import STANDSTILL
 from .resume import check_objective, check_same
@@ -148,14 +148,16 @@ class Run:
         """What it means that a step moved nothing."""
         return getattr(self.optimizer, "standstill", STANDSTILL)
 
-    def minimum(self, reason: str) -> Minimum | None:
+    def minimum(self, reason: str) -> MinimizeResult | None:
         """The best design, which the parameters are set to. None before there is any."""
         if self.best is None:
             return None
         self.set(self.best["parameters"])
         best = [value.clone() for value in self.best["parameters"]]
         told = self._all_rejections, conflict(self.history, self._lost, self._stuck)
-        return Minimum(best, self.best["objective"], self.best["violation"], self.history, reason, *told)
+        return MinimizeResult(
+            best, self.best["objective"], self.best["violation"], self.history, reason, *told
+        )
 
     def snapshot(self) -> dict[Any, Any]:
         return {

@@ -3,7 +3,7 @@
     hinge = ms.Revolute(arm, origin=(0, 0, 0), axis=(0, 1, 0), torque=0.0)
     environment = ms.envs.Environment(
         scene,
-        actuators=[ms.envs.Actuator(hinge, "torque", lower=-1.0, upper=1.0)],
+        actuators=[ms.envs.Action(hinge, "torque", lower=-1.0, upper=1.0)],
         observation=lambda now: [now[hinge].angle, now[hinge].rate],
         reward=lambda now: -abs(now[hinge].angle - 0.5),
         time_step=1e-2,
@@ -12,7 +12,7 @@
     )
 
 Where an action is not the value itself but sets it through a function (the speed of what moves, a wave along a muscle),
-`Steered` takes that function.
+`ParametricAction` takes that function.
 
 Robots that come along are registered once their module is loaded, which gymnasium does for names before a colon:
 `gymnasium.make("magshell.envs.robots:magshell/MagneticStrip-v0")`, and `gymnasium.make_vec` for many in processes; whole
@@ -26,12 +26,12 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from .actuator import Actuator
+from .actuator import Action
 from .rollouts import Episode, episodes
 from .snapshot import Snapshot
-from .steered import Steered
+from .steered import ParametricAction
 
-__all__ = ["Actuator", "Environment", "Episode", "Snapshot", "Steered", "episodes", "robots"]
+__all__ = ["Action", "Environment", "Episode", "ParametricAction", "Snapshot", "episodes", "robots"]
 
 
 def __getattr__(name: str) -> Any:

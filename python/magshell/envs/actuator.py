@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ..model.scene.scene import Scene
 
 
-class Actuator(Frozen):
+class Action(Frozen):
     """A value that actions set. All its numbers are entries of the action, which run from -1 at `lower` to 1 at `upper`.
 
     owner: the scene, for applied_flux_density [T] and the factors of ms.simulate; or one of its objects, for what may
@@ -31,8 +31,8 @@ class Actuator(Frozen):
     >>> import magshell as ms
     >>> bob = ms.Link(mass=1.0, center=(0, 0, -1.0), inertia=0.1)
     >>> hinge = ms.Revolute(bob, origin=(0, 0, 0), axis=(0, 1, 0), torque=0.0)
-    >>> ms.envs.Actuator(hinge, "torque", lower=-2.0, upper=2.0)
-    Actuator(torque of Revolute, 1 number from -2 to 2)
+    >>> ms.envs.Action(hinge, "torque", lower=-2.0, upper=2.0)
+    Action(torque of Revolute, 1 number from -2 to 2)
     """
 
     name: str
@@ -63,7 +63,7 @@ class Actuator(Frozen):
         if not self._of_scene and self._of_owner is None:
             raise ValueError(f"the {type(owner).__name__} was made without {name}: give it one, zero will do")
         if not (self.lower < self.upper).all():
-            raise ValueError(f"lower of an Actuator must be below upper, got {lower} and {upper}")
+            raise ValueError(f"lower of an Action must be below upper, got {lower} and {upper}")
 
     def _refuse(self, which: str, value):
         raise ValueError(
@@ -118,6 +118,6 @@ class Actuator(Frozen):
     def __repr__(self) -> str:
         numbers = "1 number" if self.size == 1 else f"{self.size} numbers"
         return (
-            f"Actuator({self.name} of {type(self.owner).__name__}, {numbers} "
+            f"Action({self.name} of {type(self.owner).__name__}, {numbers} "
             f"from {self.lower.min():g} to {self.upper.max():g})"
         )

@@ -21,7 +21,7 @@ from ..output.plot.style import Style, style_of
 from ..output.plot.view import View, view_of
 from ..output.results.state import states_of
 from ..solve.dynamics.simulate import simulate as simulate_motion
-from .actuator import Actuator
+from .actuator import Action
 from .frames import Camera
 from .library import require_gymnasium
 from .snapshot import Snapshot
@@ -41,7 +41,8 @@ _ROUNDING = 1e-6  # beyond the bounds, of actions that were single precision on 
 class Environment(gymnasium.Env):
     """A scene that actions drive, step by step, as gymnasium has it.
 
-    actuators: what an action sets, Actuator or Steered objects. The action holds their numbers one after another, each from
+    actuators: what an action sets, Action or ParametricAction objects. The action holds their numbers one
+        after another, each from
         -1 to 1.
     observation: function of a Snapshot, the state after an action: finite numbers, always as many, in any one shape.
     reward: function of a Snapshot: a number. `snapshot.before` is the state that the action began in.
@@ -67,7 +68,7 @@ class Environment(gymnasium.Env):
     >>> hinge = ms.Revolute(bob, origin=(0, 0, 0), axis=(0, 1, 0), torque=0.0)
     >>> pendulum = ms.envs.Environment(
     ...     ms.Scene(ms.Skeleton([bob], [hinge]), gravity=(0, 0, -9.81)),
-    ...     actuators=[ms.envs.Actuator(hinge, "torque", lower=-2.0, upper=2.0)],
+    ...     actuators=[ms.envs.Action(hinge, "torque", lower=-2.0, upper=2.0)],
     ...     observation=lambda now: [now[hinge].angle, now[hinge].rate],
     ...     reward=lambda now: -abs(float(now[hinge].angle) - 0.2),
     ...     time_step=1e-2,
@@ -105,9 +106,9 @@ class Environment(gymnasium.Env):
     ):
         if not isinstance(scene, Scene):
             raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
-        self.scene, self.actuators = scene, checked_list("actuators", actuators, (Actuator,))
+        self.scene, self.actuators = scene, checked_list("actuators", actuators, (Action,))
         if not self.actuators:
-            raise ValueError("actuators must hold at least one ms.envs.Actuator")
+            raise ValueError("actuators must hold at least one ms.envs.Action")
         for k, each in enumerate(self.actuators):
             each._check_in(scene)
             others = [one for other in self.actuators[:k] if other.name == each.name for one in other.owners]

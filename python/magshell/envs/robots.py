@@ -15,7 +15,7 @@ from ..model.solids.materials import NeoHookean
 from ..model.solids.solid import Solid
 from ..model.supports.supports import Clamp, Pin
 from ..solve.options import ImplicitEuler
-from .actuator import Actuator
+from .actuator import Action
 from .environment import Environment
 from .library import require_gymnasium
 
@@ -53,7 +53,7 @@ def magnetic_strip(
     return Environment(
         scene,
         actuators=[
-            Actuator(scene, "applied_flux_density", lower=(-1e-3, -1e-3, -4e-3), upper=(1e-3, 1e-3, 4e-3))
+            Action(scene, "applied_flux_density", lower=(-1e-3, -1e-3, -4e-3), upper=(1e-3, 1e-3, 4e-3))
         ],
         observation=seen,
         reward=lambda now: -abs(now.positions[tip, 2].mean() - target) / STRIP_LENGTH,
@@ -89,7 +89,7 @@ def soft_arm(target: float = 0.6, render_mode: str | None = None) -> Environment
     scene = Scene([flesh, Skeleton([upper, lower], [hinge])], supports=[held], gravity=(0, 0, -9.81))
     return Environment(
         scene,
-        actuators=[Actuator(hinge, "torque", lower=-10.0, upper=10.0)],
+        actuators=[Action(hinge, "torque", lower=-10.0, upper=10.0)],
         observation=lambda now: [float(now[hinge].angle), float(now[hinge].rate)],
         reward=lambda now: -abs(float(now[hinge].angle) - target),
         start=lambda generator: {"velocities": generator.normal(scale=0.01, size=3)},

@@ -9,17 +9,17 @@ import numpy as np
 
 from .._input.arrays import count
 from .._input.quantity import quantity
-from .actuator import Actuator
+from .actuator import Action
 
 if TYPE_CHECKING:
     from ..model.scene.scene import Scene
 
 
-class Steered(Actuator):
+class ParametricAction(Action):
     """An Actuator whose numbers in the action are not the value's own, but what a function makes it of: waves along a
     muscle, the speed of a support instead of its place.
 
-    owner, name: as of Actuator; or a list of several owners whose values have one shape, set at once: their value is then
+    owner, name: as of Action; or a list of several owners whose values have one shape, set at once: their value is then
         (owners, ...), one after another. numbers: how many entries of the action, each from -1 to 1.
     value: function of these (numbers,), of the time [s] that the action begins, and of the value before it, that returns
         the value, of its own shape.
@@ -27,27 +27,27 @@ class Steered(Actuator):
     >>> import magshell as ms
     >>> bob = ms.Link(mass=1.0, center=(0, 0, -1.0), inertia=0.1)
     >>> hinge = ms.Revolute(bob, origin=(0, 0, 0), axis=(0, 1, 0), torque=0.0)
-    >>> ms.envs.Steered(hinge, "torque", 1, lambda share, time, before: before + 0.1 * share[0])
-    Steered(torque of Revolute, by 1 number)
+    >>> ms.envs.ParametricAction(hinge, "torque", 1, lambda share, time, before: before + 0.1 * share[0])
+    ParametricAction(torque of Revolute, by 1 number)
     """
 
     def __init__(self, owner: Any, name: str, numbers: int, value: Callable[..., Any]):
         self._several = isinstance(owner, list | tuple)
         if self._several and not owner:
-            raise ValueError("owner of a Steered must be one object or a list of at least one")
+            raise ValueError("owner of a ParametricAction must be one object or a list of at least one")
         super().__init__(owner[0] if self._several else owner, name, lower=-1.0, upper=1.0)
         self._further = (
-            [Actuator(each, name, lower=-1.0, upper=1.0) for each in owner[1:]] if self._several else []
+            [Action(each, name, lower=-1.0, upper=1.0) for each in owner[1:]] if self._several else []
         )
         for each in self._further:
             if each.shape != self.shape:
                 raise ValueError(
-                    f"{name} of all owners of a Steered must have one shape, got {self.shape} and {each.shape}"
+                    f"{name} of all owners of a ParametricAction must have one shape, got {self.shape} and {each.shape}"
                 )
         self._numbers = count("numbers", numbers)
         if not callable(value):
             raise ValueError(
-                f"value of a Steered must be a function of numbers, time and value before, got {value!r:.60}"
+                f"value of a ParametricAction must be a function of numbers, time and value before, got {value!r:.60}"
             )
         self._function = value
 
@@ -84,6 +84,4 @@ class Steered(Actuator):
     def __repr__(self) -> str:
         numbers = "1 number" if self.size == 1 else f"{self.size} numbers"
         kind = type(self.owner).__name__
-        return (
-            f"Steered({self.name} of {f'{len(self.owners)} {kind}' if self._several else kind}, by {numbers})"
-        )
+        return f"ParametricAction({self.name} of {f'{len(self.owners)} {kind}' if self._several else kind}, by {numbers})"

@@ -13,16 +13,16 @@ import numpy as np
 from .tetrahedra.tet_mesh import TetMesh
 from .topology import FLAT
 from .triangles.six_node_checks import edge_integrals, shape_integrals
-from .triangles.six_node_mesh import SixNodeMesh
+from .triangles.six_node_mesh import QuadraticTriangleMesh
 
 if TYPE_CHECKING:
     from .triangles.triangle_mesh import TriangleMesh
 
 
-def sides(mesh: TriangleMesh | SixNodeMesh | TetMesh) -> tuple[np.ndarray, int]:
+def sides(mesh: TriangleMesh | QuadraticTriangleMesh | TetMesh) -> tuple[np.ndarray, int]:
     """The nodes of each side, (n, 3) or (n, 6), and how many of the mesh's faces it is: face f is part f % parts of side
     f // parts."""
-    if isinstance(mesh, SixNodeMesh):
+    if isinstance(mesh, QuadraticTriangleMesh):
         return mesh.elements, len(FLAT)
     if isinstance(mesh, TetMesh) and mesh.order == 2:
         return mesh.nodes_of_sides, len(FLAT)
@@ -38,7 +38,9 @@ def corner_axes(corners: np.ndarray) -> np.ndarray:
     return np.stack([first, np.cross(normal, first)], axis=1)
 
 
-def shares(mesh: TriangleMesh | SixNodeMesh | TetMesh, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def shares(
+    mesh: TriangleMesh | QuadraticTriangleMesh | TetMesh, faces: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Whose nodes feel what acts on the area at rest of some faces (k,), and how much of it: (k, 3) or (k, 6) vertices,
     and the integrals of their shape functions over the face, m2, likewise."""
     nodes, parts = sides(mesh)
@@ -53,10 +55,10 @@ def shares(mesh: TriangleMesh | SixNodeMesh | TetMesh, faces: np.ndarray) -> tup
 
 
 def edge_shares(
-    mesh: TriangleMesh | SixNodeMesh | TetMesh, edges: np.ndarray
+    mesh: TriangleMesh | QuadraticTriangleMesh | TetMesh, edges: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Likewise along some edges (k,): (k, 2) or (k, 3) vertices, and m."""
-    if not isinstance(mesh, SixNodeMesh):
+    if not isinstance(mesh, QuadraticTriangleMesh):
         return mesh.edges[edges], np.repeat(mesh.edge_lengths[edges, None] / 2.0, 2, axis=1)
     nodes = mesh.nodes_of_edges[edges]
     return nodes, edge_integrals(mesh.rest_positions[nodes])

@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from .tetrahedra.tet_mesh import TetMesh
-from .triangles.six_node_mesh import SixNodeMesh
+from .triangles.six_node_mesh import QuadraticTriangleMesh
 
 if TYPE_CHECKING:
     from .triangles.triangle_mesh import TriangleMesh
@@ -29,14 +29,14 @@ class Nesting(NamedTuple):
 
 
 def nesting(
-    coarse: TriangleMesh | SixNodeMesh | TetMesh,
-    fine: TriangleMesh | SixNodeMesh | TetMesh,
+    coarse: TriangleMesh | QuadraticTriangleMesh | TetMesh,
+    fine: TriangleMesh | QuadraticTriangleMesh | TetMesh,
     names: tuple[str, str],
 ) -> Nesting:
     """Raises ValueError, which names the meshes, unless each cell of the coarse one is a union of fine ones, each edge
     divided alike. Vertices on a curved surface may lie beside the coarse one's edges. Of six-node elements the corners are
     compared alone, and other vertices are at -1."""
-    if isinstance(coarse, SixNodeMesh) and isinstance(fine, SixNodeMesh):
+    if isinstance(coarse, QuadraticTriangleMesh) and isinstance(fine, QuadraticTriangleMesh):
         corners = nesting(coarse.corners, fine.corners, names)
         vertices = np.full(coarse.n_vertices, -1)
         vertices[coarse.corner_vertices] = fine.corner_vertices[corners.vertices]

@@ -70,7 +70,7 @@ class Newton:
         10 m are known to 1e-13), that is more than the tolerance, and results have fewer digits.
     max_iterations: a load step that needs more is halved.
     first_load_step: of the way from the old controls to the new ones, in (0, 1].
-    smallest_load_step: below it, the solve relaxes down the energy instead (implicit Euler steps of a gradient flow). Up
+    min_load_step: below it, the solve relaxes down the energy instead (implicit Euler steps of a gradient flow). Up
         to 1/64 it is that of ways of usual length: where the whole way leads many extents far, shorter ones are tried.
     max_relaxation_steps: how many of those before it gives up.
     max_factorizations: how many of them before an equilibrium is given up, wherever it is then; 20 iterations without one
@@ -87,7 +87,7 @@ class Newton:
     tolerance: float = 1e-10
     max_iterations: int = 20
     first_load_step: float = 1.0
-    smallest_load_step: float = 1.0 / 64.0
+    min_load_step: float = 1.0 / 64.0
     max_relaxation_steps: int = 500
     max_factorizations: int = 5000
 
@@ -96,7 +96,7 @@ class Newton:
     def __post_init__(self) -> None:
         if not 0.0 < quantity("tolerance", "1", self.tolerance, ()) < 1.0:
             raise ValueError(f"tolerance must be in (0, 1), got {self.tolerance}")
-        for name in ("first_load_step", "smallest_load_step"):
+        for name in ("first_load_step", "min_load_step"):
             if not 0.0 < quantity(name, "1", getattr(self, name), ()) <= 1.0:
                 raise ValueError(f"{name} must be in (0, 1], got {getattr(self, name)}")
         for name in ("max_iterations", "max_relaxation_steps", "max_factorizations"):
@@ -111,7 +111,7 @@ class Newton:
         options = _core.StaticsOptions()
         options.newton = self._newton_options()
         options.first_step = self.first_load_step
-        options.smallest_step = self.smallest_load_step
+        options.smallest_step = self.min_load_step
         options.max_relaxation_steps = self.max_relaxation_steps
         options.max_factorizations = self.max_factorizations
         return options
@@ -125,7 +125,7 @@ class MixedNewton(Newton):
     Takes a thin shell to a large deflection in a handful of iterations where `Newton` takes dozens; same solution.
     Options as for Newton.
 
-    tolerance, max_iterations, first_load_step, smallest_load_step, max_relaxation_steps, max_factorizations: as in `Newton`.
+    tolerance, max_iterations, first_load_step, min_load_step, max_relaxation_steps, max_factorizations: as in `Newton`.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -143,7 +143,8 @@ class MixedNewton(Newton):
 class ProjectiveDynamics:
     """Implicit Euler in local and global steps, with a matrix that stays factorized ([Qiao21] 3, Algorithm 1).
 
-    The matrix is M/dt^2 + L, L a constant in the place of the stiffness, the same along x, y, z: of `ms.Projective` solids
+    The matrix is M/dt^2 + L, L a constant in the place of the stiffness, the same along x, y, z: of
+    `ms.ProjectiveMaterial` solids
     that of Bouaziz et al. 2014, of other solids with their modulus of waves at rest, 2 mu + lam (Liu, Bouaziz, Kavan 2017),
     which is slower where they get much stiffer; of shells that of waves in their plane, and their bending as it is at rest,
     edge rotations with it, along normals that turn with the sheet. It takes more rounds the thinner they are, and with
@@ -169,7 +170,7 @@ class ProjectiveDynamics:
 
     >>> import magshell as ms
     >>> bar = ms.meshes.box((0.1, 0.02, 0.02), cells=(10, 2, 2))
-    >>> soft = ms.Projective(young_modulus=1e5, poisson_ratio=0.4)
+    >>> soft = ms.ProjectiveMaterial(young_modulus=1e5, poisson_ratio=0.4)
     >>> solid = ms.Solid(bar, material=soft, mass_density=1e3, element="linear")
     >>> scene = ms.Scene(solid, supports=[ms.Pin(bar.vertices_at(x=0.0))], gravity=(0, 0, -9.81))
     >>> move = ms.simulate(scene, steps=5, time_step=5e-3, integrator=ms.ProjectiveDynamics())
@@ -300,19 +301,21 @@ KINDS = ("stages", "checkpoints", "factors")
 
 @immutable
 @dataclass(frozen=True)
-class Keep:
-    """What a motion keeps for its gradients, and how much of it: `keep` of ms.simulate.
+class AdjointStorage:
+    """What a motion keeps for its gradients, and how much of it: `adjoint_storage` of ms.simulate.
 
     what: "stages", all states; "checkpoints", between which the steps are taken again on the way back, some of them several
         times; "factors": all states with their factorizations, which pays where several gradients are taken of one motion.
-        None: all states if they fit into the budget, else checkpoints. `keep="factors"` is short for ms.Keep("factors").
+        None: all states if they fit into the budget, else checkpoints. `adjoint_storage="factors"` is short
+            for ms.AdjointStorage("factors").
     memory_budget: bytes.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.05, 0.01, cells=(4, 1))
     >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
     >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
-    >>> ms.simulate(scene, steps=2, time_step=5e-3, keep=ms.Keep("checkpoints", memory_budget=1e6)).keep
+    >>> storage = ms.AdjointStorage("checkpoints", memory_budget=1e6)
+    >>> ms.simulate(scene, steps=2, time_step=5e-3, adjoint_storage=storage).adjoint_storage
     'nothing'
     """
 
@@ -322,11 +325,11 @@ class Keep:
     def __post_init__(self) -> None:
         if self.what not in (None, *KINDS):
             raise ValueError(
-                f'keep must be "stages", "checkpoints", "factors" or None, got {self.what!r:.60}'
+                f'adjoint_storage must be "stages", "checkpoints", "factors" or None, got {self.what!r:.60}'
             )
         object.__setattr__(self, "memory_budget", not_negative("memory_budget", "bytes", self.memory_budget))
 
 
-def kept(keep: str | Keep | None) -> Keep:
+def kept(keep: str | AdjointStorage | None) -> AdjointStorage:
     """What a caller hands in, as a Keep. Raises ValueError."""
-    return keep if isinstance(keep, Keep) else Keep(keep)
+    return keep if isinstance(keep, AdjointStorage) else AdjointStorage(keep)

@@ -40,40 +40,40 @@ MISTAKES = {
         r"pressure \[Pa\] must be a number, got shape \(2,\)",
     ),
     "negative amount": (
-        lambda: ms.Cavity(BLOCK, filling_pressure=-1.0),
-        r"filling_pressure \[Pa\] must be at least 0",
+        lambda: ms.Cavity(BLOCK, gas_pressure=-1.0),
+        r"gas_pressure \[Pa\] must be at least 0",
     ),
     "no volume": (lambda: ms.Cavity(BLOCK, volume=0.0), r"volume \[m3\] must be above 0, got 0"),
     "bulk modulus of a gas": (
-        lambda: ms.Cavity(BLOCK, filling_pressure=1e5, bulk_modulus=1e9),
+        lambda: ms.Cavity(BLOCK, gas_pressure=1e5, bulk_modulus=1e9),
         "bulk_modulus is that of a liquid",
     ),
     "no body": (lambda: ms.Cavity("ball", pressure=1.0), "takes a Shell or a Solid, or several as"),
     "a body twice": (lambda: ms.Cavity([BLOCK, BLOCK], pressure=1.0), "names each body once"),
     "faces of several": (lambda: ms.Cavity([BLOCK, SHEET], [0], pressure=1.0), "faces are those of one body"),
-    "lids": (lambda: ms.Cavity(BLOCK, pressure=1.0, cap_rims="yes"), "cap_rims must be True or False"),
-    "cells of a shell": (lambda: ms.Cells(SHEET, stiffness=1.0), "Cells are of a Solid, got Shell"),
+    "lids": (lambda: ms.Cavity(BLOCK, pressure=1.0, close_rims="yes"), "close_rims must be True or False"),
+    "cells of a shell": (lambda: ms.PneumaticCells(SHEET, stiffness=1.0), "Cells are of a Solid, got Shell"),
     "cells overlap": (
-        lambda: ms.Cells(BLOCK, [[0, 1, 2], [5, 2]], stiffness=1.0),
+        lambda: ms.PneumaticCells(BLOCK, [[0, 1, 2], [5, 2]], stiffness=1.0),
         r"must not overlap, but tetrahedron 2 is in cells \[0, 1\]",
     ),
     "an empty cell": (
-        lambda: ms.Cells(BLOCK, np.where(np.arange(N_T) < 9, 0, 2), stiffness=1.0),
+        lambda: ms.PneumaticCells(BLOCK, np.where(np.arange(N_T) < 9, 0, 2), stiffness=1.0),
         "cell 1 has no tetrahedron",
     ),
-    "no cell": (lambda: ms.Cells(BLOCK, np.full(N_T, -1), stiffness=1.0), "groups holds no cell"),
+    "no cell": (lambda: ms.PneumaticCells(BLOCK, np.full(N_T, -1), stiffness=1.0), "groups holds no cell"),
     "groups of another mesh": (
-        lambda: ms.Cells(BLOCK, np.zeros(3, int), stiffness=1.0),
+        lambda: ms.PneumaticCells(BLOCK, np.zeros(3, int), stiffness=1.0),
         f"must be {N_T} integers",
     ),
-    "a tetrahedron that is none": (lambda: ms.Cells(BLOCK, [[N_T]], stiffness=1.0), "Cells groups"),
+    "a tetrahedron that is none": (lambda: ms.PneumaticCells(BLOCK, [[N_T]], stiffness=1.0), "Cells groups"),
     "stiffness of other cells": (
-        lambda: ms.Cells(BLOCK, [[0], [1]], stiffness=[1.0, 2.0, 3.0]),
+        lambda: ms.PneumaticCells(BLOCK, [[0], [1]], stiffness=[1.0, 2.0, 3.0]),
         r"stiffness \[Pa\] must be a number or one a cell, \(2,\), got \(3,\)",
     ),
-    "soft cells": (lambda: ms.Cells(BLOCK, stiffness=0.0), r"stiffness \[Pa\] must be above 0"),
+    "soft cells": (lambda: ms.PneumaticCells(BLOCK, stiffness=0.0), r"stiffness \[Pa\] must be above 0"),
     "cells of no volume": (
-        lambda: ms.Cells(BLOCK, stiffness=1.0, volume_ratio=-0.5),
+        lambda: ms.PneumaticCells(BLOCK, stiffness=1.0, volume_ratio=-0.5),
         r"volume_ratio \[1\] must be above 0, got -0.5",
     ),
     "a tendon of one point": (lambda: ms.Tendon(ENDS[:1], BLOCK), "needs two points or more, got 1"),
@@ -118,7 +118,11 @@ IN_SCENES = {
         r"inside out, its volume -2.7e-05 m3",
     ),
     "turned": (TURNED, lambda: ms.Cavity(TURNED, pressure=1.0), r"inside out, its volume -0.001 m3"),
-    "flat": (OPEN, lambda: ms.Cavity(OPEN, pressure=1.0, cap_rims=True), "the cavity has no volume at rest"),
+    "flat": (
+        OPEN,
+        lambda: ms.Cavity(OPEN, pressure=1.0, close_rims=True),
+        "the cavity has no volume at rest",
+    ),
     "a part of a side": (
         TEN,
         lambda: ms.Cavity(TEN, inner_faces(TEN)[1:], pressure=1.0),
@@ -201,18 +205,18 @@ def test_a_cavity_is_closed_by_a_body_that_is_tied_to_another():
 
 
 def test_values_that_a_solve_cannot_have():
-    gas = ms.Cavity(BLOCK, filling_pressure=1e5)
+    gas = ms.Cavity(BLOCK, gas_pressure=1e5)
     scene = held(BLOCK, actuators=[gas])
-    with pytest.raises(ValueError, match=r"Cavity has no value 'pressure'.*filling_pressure"):
+    with pytest.raises(ValueError, match=r"Cavity has no value 'pressure'.*gas_pressure"):
         ms.equilibrium(scene, values={gas: {"pressure": 1.0}})
-    with pytest.raises(ValueError, match=r"filling_pressure \[Pa\] must be at least 0, got -1"):
-        ms.equilibrium(scene, values={gas: {"filling_pressure": -1.0}})
-    with pytest.raises(ValueError, match=r"filling_pressure \[Pa\] must be at least 0, got -5"):
+    with pytest.raises(ValueError, match=r"gas_pressure \[Pa\] must be at least 0, got -1"):
+        ms.equilibrium(scene, values={gas: {"gas_pressure": -1.0}})
+    with pytest.raises(ValueError, match=r"gas_pressure \[Pa\] must be at least 0, got -5"):
         ms.simulate(
             scene,
             steps=2,
             time_step=1e-3,
-            values={gas: {"filling_pressure": [1.0, -5.0, 2.0]}},
+            values={gas: {"gas_pressure": [1.0, -5.0, 2.0]}},
             progress=False,
         )
     found = ms.equilibrium(scene)

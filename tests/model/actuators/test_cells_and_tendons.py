@@ -31,8 +31,11 @@ def test_bordered_groups_are_what_coupled_ones_are():
         np.flatnonzero(np.abs(body.mesh.tetrahedron_barycenters[:, 0] - c) < 0.025) for c in (0.025, 0.075)
     ]
     targets = [1.2, 0.9]
-    whole = ms.Cells(body, groups, stiffness=1e6, volume_ratio=targets)
-    apart = [ms.Cells(body, [g], stiffness=1e6, volume_ratio=t) for g, t in zip(groups, targets, strict=True)]
+    whole = ms.PneumaticCells(body, groups, stiffness=1e6, volume_ratio=targets)
+    apart = [
+        ms.PneumaticCells(body, [g], stiffness=1e6, volume_ratio=t)
+        for g, t in zip(groups, targets, strict=True)
+    ]
     found = [ms.equilibrium(fixed(body, actuators=each)) for each in ([whole], apart)]
     assert np.abs(found[0].positions - found[1].positions).max() < 1e-10
     ratios = found[0][whole].volume_ratios
@@ -45,10 +48,10 @@ def test_groups_as_numbers_and_as_lists_are_the_same():
     number = np.where(body.mesh.tetrahedron_barycenters[:, 0] < 0.03, 0, -1)
     number[body.mesh.tetrahedron_barycenters[:, 0] > 0.08] = 1
     as_list = [np.flatnonzero(number == k) for k in (0, 1)]
-    cells = [ms.Cells(body, groups, stiffness=1e5, volume_ratio=1.1) for groups in (number, as_list)]
+    cells = [ms.PneumaticCells(body, groups, stiffness=1e5, volume_ratio=1.1) for groups in (number, as_list)]
     for each in cells:
         assert all(np.array_equal(a, b) for a, b in zip(each.groups, as_list, strict=True))
-    assert cells[0].count == 2 and ms.Cells(body, stiffness=1.0).count == body.mesh.n_tetrahedra
+    assert cells[0].count == 2 and ms.PneumaticCells(body, stiffness=1.0).count == body.mesh.n_tetrahedra
 
 
 def test_cells_of_a_gripper_in_motion():
@@ -56,7 +59,7 @@ def test_cells_of_a_gripper_in_motion():
     body = bar(cells=(14, 2, 2))
     at = body.mesh.tetrahedron_barycenters
     number = (at[:, 0] * 140).astype(int) * 4 + (at[:, 1] > 0.005) * 2 + (at[:, 2] > 0.005)
-    cells = ms.Cells(body, number, stiffness=2e5)
+    cells = ms.PneumaticCells(body, number, stiffness=2e5)
     assert cells.count == 56
     course = np.ones((11, 56))
     course[:, 1::2] += 0.3 * np.linspace(0, 1, 11)[:, None]
@@ -154,7 +157,7 @@ def test_pictures_and_files(tmp_path):
 
 def test_linear_theory_refuses_springs():
     body = bar()
-    scene = fixed(body, actuators=[ms.Cells(body, stiffness=1e5)])
+    scene = fixed(body, actuators=[ms.PneumaticCells(body, stiffness=1e5)])
     with pytest.raises(ValueError, match=r"Cells\(192.*is a spring"):
         ms.linear_response(scene)
     with pytest.raises(ValueError, match="is a spring"):
@@ -166,7 +169,7 @@ def test_scenes_copy_and_print_their_actuators():
     import pickle
 
     body = hollow_block()
-    scene = held(body, actuators=[ms.Cavity(body, pressure=1e3), ms.Cells(body, stiffness=1e3)])
+    scene = held(body, actuators=[ms.Cavity(body, pressure=1e3), ms.PneumaticCells(body, stiffness=1e3)])
     for other in (copy.deepcopy(scene), pickle.loads(pickle.dumps(scene))):
         assert len(other.actuators) == 2 and other.actuators[0].body is other.bodies[0]
         assert np.array_equal(ms.equilibrium(other).positions, ms.equilibrium(scene).positions)
@@ -221,10 +224,10 @@ def test_a_path_by_the_rest_length_of_a_tendon_passes_limit_points():
         actuators=[tendon],
     )
     shorter = {tendon: {"rest_length": float(tendon.rest_length) - 0.5}}
-    path = ms.follow(scene, start=ms.equilibrium(scene), values=shorter, progress=False)
+    path = ms.follow_path(scene, start=ms.equilibrium(scene), values=shorter, progress=False)
     limits = [each.parameter for each in path.critical if each.kind == "limit"]
     assert len(limits) == 2 and limits[0] > limits[1] > 0.0
-    assert path.parameters[-1] == 1.0 and path.unstable_directions[-1] == 0
+    assert path.parameters[-1] == 1.0 and path.n_negative_eigenvalues[-1] == 0
     end = ms.equilibrium(scene, values=shorter, start=path.positions[-1])
     assert np.abs(end.positions - path.positions[-1]).max() < 1e-9
     assert end.displacements[middle, 2].max() < -0.06

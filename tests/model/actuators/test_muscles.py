@@ -208,7 +208,7 @@ def test_a_path_by_activation_ends_where_equilibria_are():
     scene, muscle, _ = loaded_arch(6e-4)
     lengthened = {muscle: {"activation": -0.002}}
     start = ms.equilibrium(scene, values=lengthened)
-    path = ms.follow(scene, start=start, values={muscle: {"activation": 0.02}}, progress=False)
+    path = ms.follow_path(scene, start=start, values={muscle: {"activation": 0.02}}, progress=False)
     end = ms.equilibrium(scene, values={muscle: {"activation": 0.02}}, start=path.positions[-1])
     assert path.parameters[-1] >= 1.0 - 1e-9 and not path.critical
     assert path.equilibrium(len(path) - 1)[muscle].activation() == pytest.approx(
@@ -226,11 +226,13 @@ def test_a_path_by_activation_turns_round_where_the_arch_snaps():
         return {muscle: {"activation": -0.002 + 0.022 * parameter}}
 
     start = ms.equilibrium(scene, values=activated(0.0))
-    path = ms.follow(scene, start=start, values=activated(1.0), progress=False, until=lambda at, _: at < 0.0)
+    path = ms.follow_path(
+        scene, start=start, values=activated(1.0), progress=False, until=lambda at, _: at < 0.0
+    )
     assert [each.kind for each in path.critical] == ["limit"]
     limit, turned = path.critical[0].parameter, int(np.argmax(path.parameters))
     assert 0.0 < limit < 1.0 and limit >= path.parameters.max() and path.parameters[-1] < 0.0
-    before, after = path.unstable_directions[: turned + 1], path.unstable_directions[turned + 1 :]
+    before, after = path.n_negative_eigenvalues[: turned + 1], path.n_negative_eigenvalues[turned + 1 :]
     assert before[0] == 0 and (after == 1).all() and len(after) > 0
     at_limit = path.critical[0].positions[middle, 2] - scene.mesh.rest_positions[middle, 2]
     held, snapped = (

@@ -14,13 +14,13 @@ def test_a_path_says_what_each_body_goes_through():
         ms.meshes.box((0.1, 0.02, 0.02), cells=(2, 1, 1)).transformed(translation=(0, 0.1, 0)),
         material=ms.StVenantKirchhoff(young_modulus=1e6, poisson_ratio=0.3),
     )
-    ball = ms.Rigid(
+    ball = ms.RigidBody(
         mass=0.01, inertia=1e-6, vertices=np.flatnonzero(mesh.rest_positions[:, 0] > 0.08), body=strip
     )
     held = [ms.Clamp(mesh.edges_at(x=0.0), body=strip), ms.Pin(solid.mesh.vertices_at(x=0.0), body=solid)]
     pull = ms.PointLoad(solid.mesh.vertices_at(x=0.1)[:1], (0.1, 0, 0), body=solid)
     push = ms.AreaLoad((0, 0, 0.05), body=strip)
-    path = ms.follow(ms.Scene([solid, strip, ball], supports=held, loads=[pull, push]), first_step=0.5)
+    path = ms.follow_path(ms.Scene([solid, strip, ball], supports=held, loads=[pull, push]), first_step=0.5)
     last = path.equilibrium(-1)
     for body in (solid, strip):
         assert path[body].positions.shape == (len(path), body.mesh.n_vertices, 3)
@@ -44,6 +44,6 @@ def test_arc_length_where_nothing_moves_is_that_of_the_parameter(held):
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, remanent_magnetization=1e5 * turn[:, 2])
     support = ms.Clamp(flat.edges_at(x=0.0)) if held == "clamped" else ms.Pin(np.arange(mesh.n_vertices))
     scene = ms.Scene(sheet, supports=[support], field=ms.UniformField())
-    path = ms.follow(scene, applied_flux_density=0.01 * turn[:, 2])
+    path = ms.follow_path(scene, applied_flux_density=0.01 * turn[:, 2])
     assert path.parameters[1] == pytest.approx(0.05, rel=1e-6) and path.parameters[-1] == 1.0
     assert len(path) < 10 and np.abs(path.displacements).max() < 1e-12

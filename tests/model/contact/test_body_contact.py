@@ -45,7 +45,7 @@ def test_reduced_hessian_is_that_of_the_free_unknowns():
     turn = np.array([[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1.0]])
     mesh = PLATE.transformed(rotation=turn)
     lower, upper = ms.Shell(mesh, **SOFT), above(1.15e-3, mesh)
-    stiff = ms.Rigid(PLATE.vertices_where(lambda x: x[:, 0] > 0.014), mass=1e-3, inertia=1e-8, body=upper)
+    stiff = ms.RigidBody(PLATE.vertices_where(lambda x: x[:, 0] > 0.014), mass=1e-3, inertia=1e-8, body=upper)
     mirror = ms.SymmetryPlane(turn[:, 0], body=lower)
     held = ms.Pin(PLATE.vertices_at(x=0.0), body=upper)
     scene = ms.Scene(
@@ -74,7 +74,7 @@ def test_sheets_at_rest_on_each_other():
     scene = two_sheets()
     (touch,) = scene.contacts
     rest = ms.equilibrium(scene)
-    touching = rest.touching(touch)
+    touching = rest.contact_state(touch)
     assert rest.stable and 1e-3 < touching.smallest_distance < 1.1e-3
     forces = touching.forces
     lower = slice(0, PLATE.n_vertices)
@@ -97,7 +97,7 @@ def test_upper_sheet_lies_on_the_lower_with_its_whole_weight():
     )
     rest = ms.equilibrium(scene)
     weight = 9.81 * 1e3 * 1e-3 * 0.02**2
-    assert rest.touching(touch).forces[PLATE.n_vertices :].sum(0)[2] == pytest.approx(weight, rel=1e-8)
+    assert rest.contact_state(touch).forces[PLATE.n_vertices :].sum(0)[2] == pytest.approx(weight, rel=1e-8)
 
 
 @pytest.mark.parametrize("integrator", [ms.ImplicitEuler(), ms.TRBDF2()])
@@ -123,7 +123,7 @@ def test_ball_falls_onto_a_sheet_and_never_through(integrator):
     move = ms.simulate(
         scene, steps=12, time_step=2e-3, velocities=velocities, integrator=integrator, progress=False
     )
-    distances = [move.touching(touch, k).smallest_distance for k in range(len(move))]
+    distances = [move.contact_state(touch, k).smallest_distance for k in range(len(move))]
     assert 0.5e-3 < min(distances) < 0.6e-3
     assert move[sheet].positions[..., 2].min() < -2e-3  # it gave way
     middles = move[ball].positions.mean(1)[:, 2]
@@ -168,10 +168,10 @@ def test_strip_folds_onto_itself():
     over = ms.Clamp(mesh.edges_at(x=0.06), rotation=(0, -np.pi, 0), center=(0.03, 0.005, 2e-3))
     scene = ms.Scene(strip, supports=[ms.Clamp(mesh.edges_at(x=0.0)), over], contacts=[touch])
     move = ms.simulate(
-        scene, steps=40, time_step=1e-2, motion_factor=np.linspace(0, 1, 41), damping=1e-4, progress=False
+        scene, steps=40, time_step=1e-2, support_factor=np.linspace(0, 1, 41), damping=1e-4, progress=False
     )
     assert len(move.self_intersections()) == 0
-    assert move.touching(touch).smallest_distance > 0.9 * touch.minimal_distance
+    assert move.contact_state(touch).smallest_distance > 0.9 * touch.min_distance
 
 
 def test_a_path_goes_through_the_closing_of_a_contact():
@@ -188,9 +188,9 @@ def test_a_path_goes_through_the_closing_of_a_contact():
         contacts=[touch],
         loads=[ms.EdgeLoad(mesh.edges_at(x=0.1), (0, 0, -0.06), body=upper)],
     )
-    path = ms.follow(scene, start=ms.equilibrium(scene, load_factor=0.0), progress=False)
+    path = ms.follow_path(scene, start=ms.equilibrium(scene, load_factor=0.0), progress=False)
     rest = ms.equilibrium(scene)
-    assert path.parameters[-1] == 1.0 and rest.touching(touch).normal_force > 1e-4
+    assert path.parameters[-1] == 1.0 and rest.contact_state(touch).normal_force > 1e-4
     np.testing.assert_allclose(path.positions[-1], rest.positions, atol=1e-9)
 
 
@@ -206,12 +206,12 @@ REFUSED = [
         lambda s, o: ms.Contact(s, o, friction_coefficient=0.3, static_friction_coefficient=0.2),
         "must not be smaller",
     ),
-    (lambda s, o: ms.Contact(s, o, reach=0.0), r"reach \[m\] must be positive"),
-    (lambda s, o: ms.Contact(s, o, minimal_distance=-1e-3), r"minimal_distance \[m\] must not be negative"),
+    (lambda s, o: ms.Contact(s, o, activation_distance=0.0), r"activation_distance \[m\] must be positive"),
+    (lambda s, o: ms.Contact(s, o, min_distance=-1e-3), r"min_distance \[m\] must not be negative"),
     (lambda s, o: ms.Contact(s, 3.0), "b must be a Shell, a Solid or a Rigid"),
-    (lambda s, o: ms.SelfContact(ms.Rigid(mass=1.0, inertia=1.0)), "a must be a Shell or Solid"),
-    (lambda s, o: ms.Contact(s, ms.Rigid(mass=1.0, inertia=1.0)), "free Rigid"),
-    (lambda s, o: ms.Contact(s, ms.Rigid([0, 1, 5])), "of which body"),
+    (lambda s, o: ms.SelfContact(ms.RigidBody(mass=1.0, inertia=1.0)), "a must be a Shell or Solid"),
+    (lambda s, o: ms.Contact(s, ms.RigidBody(mass=1.0, inertia=1.0)), "free Rigid"),
+    (lambda s, o: ms.Contact(s, ms.RigidBody([0, 1, 5])), "of which body"),
 ]
 
 
@@ -268,9 +268,9 @@ def test_a_relaxation_that_ends_early_tells_what_touches():
 
 def test_equilibrium_at_rest_is_that_of_the_scene_without_friction():
     rubbing, smooth = two_sheets(rubbing=0.5), two_sheets()
-    with pytest.raises(ValueError, match="at_rest=True"):
+    with pytest.raises(ValueError, match="ignore_velocity_forces=True"):
         ms.equilibrium(rubbing)
-    found, wanted = ms.equilibrium(rubbing, at_rest=True), ms.equilibrium(smooth)
+    found, wanted = ms.equilibrium(rubbing, ignore_velocity_forces=True), ms.equilibrium(smooth)
     np.testing.assert_array_equal(found.positions, wanted.positions)
 
 
@@ -303,7 +303,7 @@ def test_steps_taken_again_for_gradients_are_those_taken(lagged):
         move.positions[-1].square().sum().backward()
         return move.positions.detach().numpy(), velocities.grad.numpy()
 
-    kept, by_kept = by_velocities(keep="stages")
-    again, by_again = by_velocities(keep=ms.Keep("checkpoints", memory_budget=2e4))
+    kept, by_kept = by_velocities(adjoint_storage="stages")
+    again, by_again = by_velocities(adjoint_storage=ms.AdjointStorage("checkpoints", memory_budget=2e4))
     np.testing.assert_array_equal(kept, again)
     assert np.abs(by_kept - by_again).max() < 1e-6 * np.abs(by_kept).max()

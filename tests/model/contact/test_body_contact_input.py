@@ -54,7 +54,7 @@ def test_a_minimal_distance_larger_than_that_of_two_faces():
     touch = ms.Contact(lower, upper)
     scene = scene_of(lower, upper, contacts=[touch])
     with pytest.raises(ValueError, match=r"are 0.002 m apart, but must be farther than 0.003 m"):
-        simulated(scene, values={touch: {"minimal_distance": 3e-3}})
+        simulated(scene, values={touch: {"min_distance": 3e-3}})
 
 
 def fine(thickness=1e-3) -> ms.Shell:
@@ -65,23 +65,23 @@ def fine(thickness=1e-3) -> ms.Shell:
 
 def test_a_minimal_distance_larger_than_that_of_neighbours_at_rest():
     sheet = fine(thickness=1e-4)
-    too_far = ms.SelfContact(sheet, minimal_distance=1e-3)
+    too_far = ms.SelfContact(sheet, min_distance=1e-3)
     told = r"0.001 m, is larger .* face \d+ of body 0 and face \d+ of body 0 are (0.000\d+) m apart. Give it at most \1 m"
     with pytest.raises(ValueError, match=told) as raised:
         scene_of(sheet, contacts=[too_far])
     largest = float(str(raised.value).split("at most ")[1].split(" m")[0])
     assert largest == pytest.approx(5e-4 / 2**0.5, rel=1e-5)  # from a vertex to the diagonal beside its faces
-    touch = ms.SelfContact(sheet, minimal_distance=0.99 * largest)
+    touch = ms.SelfContact(sheet, min_distance=0.99 * largest)
     scene = scene_of(sheet, contacts=[touch])
     simulated(scene)
     with pytest.raises(ValueError, match=told):
-        simulated(scene, values={touch: {"minimal_distance": 1e-3}})
+        simulated(scene, values={touch: {"min_distance": 1e-3}})
     tied = [fine(1e-4), ms.Shell(fine().mesh.transformed(translation=(4e-3, 0.0, 0.0)), **SHEET)]
     with pytest.raises(ValueError, match=r"of a Contact, .* face \d+ of body 1 and face \d+ of body 0 are"):
         ms.Scene(
             tied,
             ties=[ms.Tie(*tied)],
-            contacts=[ms.Contact(*tied, minimal_distance=1e-3)],
+            contacts=[ms.Contact(*tied, min_distance=1e-3)],
             allow_rigid_motions=True,
         )
 
@@ -114,9 +114,9 @@ def test_what_touches_twice():
 @pytest.mark.parametrize(
     "name, value, message",
     [
-        ("minimal_distance", -1.0, r"minimal_distance \[m\] must not be negative"),
+        ("min_distance", -1.0, r"min_distance \[m\] must not be negative"),
         ("contact_stiffness", -1.0, r"contact_stiffness \[Pa\] must be positive"),
-        ("reach", np.nan, r"reach \[m\] must be finite"),
+        ("activation_distance", np.nan, r"activation_distance \[m\] must be finite"),
         ("friction_coefficient", 0.3, "without friction_coefficient cannot get one in a solve"),
         ("stiffness", 1.0, "no value 'stiffness'"),
     ],
@@ -130,10 +130,10 @@ def test_values_of_a_solve(name, value, message):
 
 def test_rigid_parts_that_cannot_touch():
     lower, upper = pair()
-    outside = ms.Rigid(np.arange(PLATE.n_vertices), body=upper)
+    outside = ms.RigidBody(np.arange(PLATE.n_vertices), body=upper)
     with pytest.raises(ValueError, match="about a body that is not in the scene"):
         scene_of(lower, upper, contacts=[ms.Contact(lower, outside)])
-    line = ms.Rigid([0, 1, 5], body=upper)
+    line = ms.RigidBody([0, 1, 5], body=upper)
     with pytest.raises(ValueError, match="rigid part 0 touches nothing"):
         scene_of(lower, upper, line, contacts=[ms.Contact(lower, line)])
 
@@ -144,7 +144,7 @@ def test_starts_that_lie_in_each_other():
     with pytest.raises(ValueError, match=r"face \d+ of body 0 and face \d+ of body 1 pass through"):
         simulated(scene, start=np.concatenate([PLATE.rest_positions] * 2))
     with pytest.raises(ValueError, match=r"must be one of scene\.contacts"):
-        simulated(scene).touching(ms.Contact(lower, upper))
+        simulated(scene).contact_state(ms.Contact(lower, upper))
 
 
 @pytest.mark.parametrize("rotation", [(0, 0, np.pi / 4), (0.3, -0.7, 0.2)])

@@ -43,7 +43,7 @@ def test_a_pressure_integrates_to_the_normal_forces(fallen):
     scene, motion = fallen
     touch, floor = scene.contacts
     state = states_of(motion)[-1]
-    on_ball, on_floor = (motion.touching(each) for each in (touch, floor))
+    on_ball, on_floor = (motion.contact_state(each) for each in (touch, floor))
     assert on_ball.normal_force > 0 and on_floor.normal_force > 0
     of_bodies = []
     for body, span in zip(scene.bodies, scene._bodies.spans, strict=True):
@@ -103,7 +103,7 @@ def test_the_arrows_forces_balance(fallen):
     """Normal forces and friction of two bodies come to nothing; those of the floor are what it bears."""
     scene, motion = fallen
     state = states_of(motion)[-1]
-    on_floor = motion.touching(scene.contacts[1])
+    on_floor = motion.contact_state(scene.contacts[1])
     sums = state.loads().forces.sum(axis=0)
     np.testing.assert_allclose(sums, (on_floor.forces + on_floor.friction).sum(axis=0), atol=1e-12)
 

@@ -43,7 +43,7 @@ def test_what_lands_does_not_pass_through_what_lies_on_it():
     motion = thrown_down(ms.Scene(bodies, contacts=contacts, allow_rigid_motions=True), speed=2.0, steps=6)
     gaps = motion[bodies[1]].positions[:, :, 2].min(axis=1) - motion[bodies[0]].positions[:, :, 2].max(axis=1)
     assert np.all(gaps > 0.0)
-    least = [motion.touching(contacts[1], k).distances.min(initial=1.0) for k in range(7)]
+    least = [motion.contact_state(contacts[1], k).distances.min(initial=1.0) for k in range(7)]
     assert min(least) > 1e-3  # the sheets' thickness
 
 

@@ -68,7 +68,7 @@ def test_supports_that_move_pull_what_they_speed_up(damping):
         allow_rigid_motions=True,
     )
     motion = ms.simulate(
-        scene, steps=6, time_step=1e-3, motion_factor=lambda t: (t / 6e-3) ** 2, record_every=1, **damping
+        scene, steps=6, time_step=1e-3, support_factor=lambda t: (t / 6e-3) ** 2, record_every=1, **damping
     )
     for k in (1, 6):
         reactions = [motion.reaction(support, k) for support in scene.supports]
@@ -94,8 +94,8 @@ def test_friction_of_what_slides_is_the_coefficient_times_the_normal_force():
     velocities = np.zeros((scene.mesh.n_vertices, 3))
     velocities[PLATE.n_vertices :, 0] = 0.05
     motion = ms.simulate(scene, steps=10, time_step=1e-3, velocities=velocities)
-    found = motion.touching(touch)
-    assert found.normal_force > 0 and found.slips.all()
+    found = motion.contact_state(touch)
+    assert found.normal_force > 0 and found.is_sliding.all()
     np.testing.assert_allclose(found.friction_ratios, 1.0, rtol=1e-9)
     assert found.friction_force[0] == pytest.approx(-0.3 * found.normal_force, rel=1e-2)
     np.testing.assert_allclose(found.friction[PLATE.n_vertices :].sum(axis=0), found.friction_force)
@@ -103,7 +103,7 @@ def test_friction_of_what_slides_is_the_coefficient_times_the_normal_force():
     own = inertia(scene, motion, 10)[PLATE.n_vertices :].sum(axis=0)
     borne = found.forces[PLATE.n_vertices :].sum(axis=0) + found.friction_force
     np.testing.assert_allclose(borne, own - weight(scene)[PLATE.n_vertices :].sum(axis=0), atol=1e-11)
-    assert motion.touching(touch, 0).friction_ratios.max(initial=0.0) <= 1.0 + 1e-12
+    assert motion.contact_state(touch, 0).friction_ratios.max(initial=0.0) <= 1.0 + 1e-12
     np.testing.assert_allclose(motion.reaction(held).force + weight(scene).sum(axis=0), own, atol=1e-12)
 
 
@@ -114,8 +114,8 @@ def test_friction_of_what_sticks_stays_below_it():
     scene = ms.Scene(
         [lower, upper], supports=[held], contacts=[touch], gravity=(1.0, 0, -9.81), allow_rigid_motions=True
     )
-    found = ms.simulate(scene, steps=200, time_step=2e-3).touching(touch)
-    assert not found.slips.any() and found.coefficient == 0.8
+    found = ms.simulate(scene, steps=200, time_step=2e-3).contact_state(touch)
+    assert not found.is_sliding.any() and found.coefficient == 0.8
     assert 0.0 < found.friction_ratios.max() < 0.5
     mass = upper.vertex_masses.sum()
     assert found.friction_force[0] == pytest.approx(mass * 1.0, rel=0.05)  # on the lower one
@@ -127,8 +127,8 @@ def test_obstacles_push_and_rub_likewise():
     scene = block_on(plane, friction_coefficient=0.4, sticking_speed=1e-4)
     contact, sheet = scene.contacts[0], scene.bodies[0]
     motion = simulated(scene, 20, 1e-3, velocities=(0.1, 0.02, 0))
-    found = motion.touching(contact)
-    assert found.slips.all() and found.normal_force > 0
+    found = motion.contact_state(contact)
+    assert found.is_sliding.all() and found.normal_force > 0
     mass = sheet.vertex_masses[:, None]
     own = (mass * (motion.velocities[-1] - motion.velocities[-2])).sum(axis=0) / 1e-3
     np.testing.assert_allclose(
@@ -145,7 +145,7 @@ def test_obstacles_push_and_rub_likewise():
             allow_rigid_motions=True,
         )
     )
-    touched = rest.touching(rest.scene.contacts[0])
+    touched = rest.contact_state(rest.scene.contacts[0])
     assert touched.normal_force == pytest.approx(9.81 * mass.sum(), rel=1e-8)
     assert not touched.friction_force.any() and not touched.friction_ratios.any()
 
@@ -155,7 +155,7 @@ def test_obstacles_are_asked_with_points_on_faces():
     motion = simulated(scene, 10, 1e-3)
     contact = scene.contacts[0]
     for k in (4, 10):
-        found = motion.touching(contact, k)
+        found = motion.contact_state(contact, k)
         own = (
             scene.bodies[0].vertex_masses[:, None] * (motion.velocities[k] - motion.velocities[k - 1]) / 1e-3
         )
@@ -197,14 +197,14 @@ def test_a_fold_of_the_other_surface_is_a_kink(turn, aside, sharp):
     )
     slope = np.array([[1.0, 0, 0], [0, 0.8, -0.6], [0, 0.6, 0.8]])
     upper = ms.Shell(ms.TriangleMesh(upright @ slope.T + start, tile.faces), **SOFT)
-    touch = ms.Contact(upper, lower, minimal_distance=1e-3)
+    touch = ms.Contact(upper, lower, min_distance=1e-3)
     held = ms.Pin(np.arange(lower.mesh.n_vertices), body=lower)
     scene = ms.Scene([lower, upper], supports=[held], contacts=[touch], allow_rigid_motions=True)
     motion = ms.simulate(scene, steps=1, time_step=1e-9)
-    assert len(motion.touching(touch, 0).pairs)
-    assert bool(motion.kinks) == sharp
+    assert len(motion.contact_state(touch, 0).pairs)
+    assert bool(motion.nonsmooth_vertices) == sharp
     if sharp:
-        np.testing.assert_array_equal(motion.kinks[0], [lower.mesh.n_vertices])
+        np.testing.assert_array_equal(motion.nonsmooth_vertices[0], [lower.mesh.n_vertices])
 
 
 def test_what_opens_and_closes_is_no_kink():
@@ -217,9 +217,9 @@ def test_what_opens_and_closes_is_no_kink():
     motion = ms.simulate(
         scene, steps=20, time_step=2e-4, velocities=np.repeat([[0, 0, 0], [0, 0, -0.05]], [16, 25], axis=0)
     )
-    touched = np.array([len(motion.touching(touch, k).pairs) > 0 for k in range(21)])
+    touched = np.array([len(motion.contact_state(touch, k).pairs) > 0 for k in range(21)])
     assert touched.any() and not touched[0] and not touched[-1]
-    assert motion.kinks == {}
+    assert motion.nonsmooth_vertices == {}
 
 
 def test_results_refuse_what_is_not_of_the_scene():
@@ -228,6 +228,6 @@ def test_results_refuse_what_is_not_of_the_scene():
     with pytest.raises(ValueError, match=r"one of scene\.supports"):
         rest.reaction(ms.Pin([0], body=scene.bodies[0]))
     with pytest.raises(ValueError, match=r"one of scene\.contacts"):
-        rest.touching(ms.Contact(ms.obstacles.Plane()))
+        rest.contact_state(ms.Contact(ms.obstacles.Plane()))
     with pytest.raises(ValueError, match=r"point \[m\]"):
         rest.reaction(scene.supports[0]).torque((1, 2))

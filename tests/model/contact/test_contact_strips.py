@@ -51,7 +51,7 @@ def tension_ratio(friction, angle, nodes, lagged) -> float:
         scene,
         steps=20,
         time_step=2e-3,
-        motion_factor=lambda t: 0.02 * t,
+        support_factor=lambda t: 0.02 * t,
         damping=1e-6,
         integrator=ms.ImplicitEuler(),
         progress=False,
@@ -99,7 +99,7 @@ def plate_above() -> ms.Shell:
 def between_plates(reach):
     mesh, start = half_fold(reach)
     sheet, plate = ms.Shell(mesh, **STRIP), plate_above()
-    touch = ms.Contact(sheet, plate, minimal_distance=0.0, reach=reach)
+    touch = ms.Contact(sheet, plate, min_distance=0.0, activation_distance=reach)
     scene = ms.Scene(
         [sheet, plate],
         supports=[ms.Clamp(mesh.edges_at(z=0.0), body=sheet), ms.Pin(np.arange(4), body=plate)],
@@ -116,7 +116,7 @@ def against_its_mirror(reach):
     points = np.concatenate([mesh.rest_positions for mesh, _ in halves])
     mesh = ms.TriangleMesh(points, np.concatenate([halves[0][0].faces, halves[1][0].faces + count]))
     sheet = ms.Shell(mesh, **STRIP)
-    touch = ms.SelfContact(sheet, minimal_distance=0.0, reach=reach)
+    touch = ms.SelfContact(sheet, min_distance=0.0, activation_distance=reach)
     clamps = [
         ms.Clamp(mesh.edges_at(x=0.0, z=0.0)),
         ms.Clamp(mesh.edges_at(x=aside, z=DISTANCE), displacement=(-aside, 0, 0)),
@@ -130,7 +130,7 @@ def test_fold(setting):
     reach = 2e-4
     scene, touch, start, count = setting(reach)
     found = ms.equilibrium(scene, start=start)
-    near = found.touching(touch)
+    near = found.contact_state(touch)
     gap = np.average(near.distances, weights=np.abs(near.normal_forces))
     distance = DISTANCE - (2 if setting is between_plates else 1) * gap
     force = -near.forces[:count, 2].sum() / WIDTH

@@ -23,8 +23,11 @@ def pressed_on(obstacle, steps=3, **options):
 
 def test_a_sharp_edge_is_one():
     motion = pressed_on(ridge())
-    assert list(motion.kinks) == [1, 2]  # at the start it does not touch, and at last not any more
-    for vertices in motion.kinks.values():
+    assert list(motion.nonsmooth_vertices) == [
+        1,
+        2,
+    ]  # at the start it does not touch, and at last not any more
+    for vertices in motion.nonsmooth_vertices.values():
         np.testing.assert_array_equal(vertices, MIDDLE)
 
 
@@ -42,7 +45,7 @@ def test_a_sharp_edge_is_one():
 def test_smooth_bodies_and_the_sides_of_sharp_ones_have_none(obstacle):
     motion = pressed_on(obstacle, steps=10)
     assert motion.energies["contact"].max() > 0
-    assert motion.kinks == {}
+    assert motion.nonsmooth_vertices == {}
 
 
 def test_points_on_faces_count_by_their_vertices():
@@ -52,7 +55,7 @@ def test_points_on_faces_count_by_their_vertices():
         (0.1, 0.1, 0.1), center=under - [0, 0, HALF_DIAGONAL], rotation=(0, np.pi / 4, 0)
     )
     motion = pressed_on(sharp, face_samples=1)
-    assert set(SHEET.mesh.faces[face]) <= set(motion.kinks[1])
+    assert set(SHEET.mesh.faces[face]) <= set(motion.nonsmooth_vertices[1])
 
 
 def test_it_looks_where_the_obstacle_was():
@@ -61,12 +64,12 @@ def test_it_looks_where_the_obstacle_was():
     scene = block_on(box, sheet=SHEET)
     moved = {box: {"center": box.center + np.array([-5e-3, 0, 0])}}
     motion = simulated(scene, 4, 1e-3, velocities=(0, 0, -1e-3), values=moved)
-    assert list(motion.kinks) == [2]
+    assert list(motion.nonsmooth_vertices) == [2]
 
 
 def test_there_is_none_without_contact():
     scene = ms.Scene(SHEET, water=ms.Water(), allow_rigid_motions=True)
-    assert simulated(scene, 2, 1e-3).kinks == {}
+    assert simulated(scene, 2, 1e-3).nonsmooth_vertices == {}
 
 
 def test_a_gradient_at_an_edge_is_that_of_a_side():
@@ -82,7 +85,7 @@ def test_a_gradient_at_an_edge_is_that_of_a_side():
         )
         options = {"values": {box: {"center": center}}, "solver": ms.Newton(tolerance=1e-13)}
         motion = simulated(scene, 3, 1e-3, velocities=(0, 0, -1e-3), **options)
-        assert motion.kinks
+        assert motion.nonsmooth_vertices
         return (1e3 * torch.as_tensor(motion.positions[-1]) * weights).sum()
 
     values, step = [], 5e-10

@@ -113,8 +113,8 @@ def test_a_path_with_an_obstacle_that_moves_far_keeps_the_sheet_on_its_side():
     scene = over_a_sheet(ball, contact_stiffness=100.0, smoothing=2e-3)
     start = ms.equilibrium(scene, values=moved(ball, 5e-3), start=ms.equilibrium(scene))
     try:
-        path = ms.follow(
-            scene, values=moved(ball, 0.05), start=start, first_step=0.5, largest_step=1.0, max_points=6
+        path = ms.follow_path(
+            scene, values=moved(ball, 0.05), start=start, first_step=0.5, max_step=1.0, max_points=6
         )
     except ms.NotConverged as error:
         path = error.last_good
@@ -170,7 +170,7 @@ def test_a_sheet_pressed_through_an_obstacle_that_is_too_soft_is_an_error():
     scene = over_a_sheet(ball, contact_stiffness=1e-2)
     with pytest.raises(ms.NotConverged, match=r"through an obstacle.*contact_stiffness \[N/m\]") as caught:
         ms.equilibrium(scene, values=moved(ball, 0.05), start=ms.equilibrium(scene))
-    assert 0.0 < caught.value.last_good.progress < 1.0
+    assert 0.0 < caught.value.last_good.load_fraction < 1.0
 
 
 def test_gradients_by_the_place_of_an_obstacle_that_moved_far_are_those_of_the_final_state():

@@ -258,7 +258,7 @@ def test_a_support_by_an_array_is_its_displacement_times_the_motion_factor():
     scene = ms.Scene(SHEET, supports=[clamp], gravity=(0, 0, -9.81))
     factor = np.linspace(0, 1, steps + 1) ** 2
     given = {"steps": steps, "time_step": 2e-3, **EXACT}
-    short = ms.simulate(scene, **given, motion_factor=factor)
+    short = ms.simulate(scene, **given, support_factor=factor)
     rows = {"displacement": factor[:, None] * far, "rotation": factor[:, None] * (0.0, 0.2, 0.0)}
     by_values = ms.simulate(scene, **given, values={clamp: rows})
     np.testing.assert_allclose(by_values.positions, short.positions, rtol=0, atol=1e-13)
@@ -287,7 +287,7 @@ def test_gradient_by_the_path_of_a_support(integrator):
         lift = {"displacement": lifted}
         motion = {"steps": steps, "time_step": 2e-3, "integrator": integrator, **EXACT}
         move = ms.simulate(scene, **motion, values={clamp: given, pin: lift})
-        assert not move.halved
+        assert not move.substeps
         return (weights * torch.as_tensor(move.displacements)).sum()
 
     check_gradients(loss, given, {"displacement": 1e-6, "rotation": 1e-4, "center": 1e-5})
@@ -309,9 +309,9 @@ def test_all_that_moves_at_once_from_checkpoints():
     alone = ms.Scene(SHEET, supports=[clamp], field=[CUBE, PAIR])
     found = []
     for kept in (
-        {"keep": "stages"},
-        {"keep": "factors"},
-        {"keep": ms.Keep("checkpoints", memory_budget=3e4)},
+        {"adjoint_storage": "stages"},
+        {"adjoint_storage": "factors"},
+        {"adjoint_storage": ms.AdjointStorage("checkpoints", memory_budget=3e4)},
     ):
         magnet = torch.tensor(ends(approach, steps, 2e-3), requires_grad=True)
         lift = torch.tensor(1e-4 * np.arange(steps + 1)[:, None] * np.ones(3), requires_grad=True)
@@ -347,7 +347,7 @@ def test_gradients_through_a_step_that_was_taken_in_parts():
             CUBE: {"center": approach},
         }
         move = ms.simulate(scene, steps=steps, time_step=time_step, values=values, **MAGNETIZED, **EXACT)
-        assert move.halved
+        assert move.substeps
         return (weights * torch.as_tensor(move.displacements)[-1]).sum()
 
     check_gradients(loss, given, {"ball": 1e-8, "lift": 1e-8})

@@ -125,8 +125,8 @@ def test_a_free_border_has_none_and_a_held_one_has():
         with pytest.raises(ValueError, match="pressure has no potential here"):
             ms.linear_buckling(scene)
         with pytest.raises(ValueError, match="pressure has no potential here"):
-            ms.follow(scene)
-    assert ms.follow(held).parameters[-1] == pytest.approx(1.0)
+            ms.follow_path(scene)
+    assert ms.follow_path(held).parameters[-1] == pytest.approx(1.0)
 
 
 def test_oblique_symmetry_planes_close_a_surface():
@@ -219,7 +219,7 @@ def test_in_time_as_numbers_as_a_function_and_by_the_factor():
     course = 20.0 * np.linspace(0.0, 1.0, n + 1)
     options = {"steps": n, "time_step": 2e-3, "progress": False}
     given = torch.tensor(course, requires_grad=True)
-    moved = ms.simulate(scene, values={load: {"pressure": given}}, keep="stages", **options)
+    moved = ms.simulate(scene, values={load: {"pressure": given}}, adjoint_storage="stages", **options)
     by_function = ms.simulate(scene, values={load: {"pressure": lambda t: 20.0 * t / 0.01}}, **options)
     by_factor = ms.simulate(scene, load_factor=course / 20.0, **options)
     end = moved.positions[-1].detach().numpy()

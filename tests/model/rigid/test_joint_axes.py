@@ -161,7 +161,7 @@ def test_gradient_by_the_place_of_a_closure():
     """A beam on two springs of which one is a Closure: the further out it is, the less it is pulled."""
     beam = ms.Link(mass=2.0, inertia=0.1, center=(0.5, 0, 0))
     hinge = ms.Revolute(beam, origin=(0, 0, 0), axis=(0, 1, 0))
-    loop = ms.Closure(beam, origin=(0.8, 0, 0), stiffness=200.0)
+    loop = ms.LoopClosure(beam, origin=(0.8, 0, 0), stiffness=200.0)
     scene = ms.Scene(ms.Skeleton([beam], [hinge, loop]), gravity=(0, 0, -G))
 
     def angle(place):
@@ -189,7 +189,7 @@ def test_gradient_by_places_of_a_thrown_chain(integrator):
         ms.Revolute(links[0], origin=(0, 0, 0), axis=(0, 1, 0.2), rate=3.0, spring_stiffness=1.0),
         ms.Prismatic(links[1], links[0], origin=(1, 0, 0), axis=(0.2, 0, 1), rate=0.5, spring_stiffness=60.0),
         ms.Revolute(links[2], links[1], origin=(1, 0.1, 0), axis=(1, 0.2, 0), motor_angle=0.0),
-        ms.Closure(links[0], origin=(0.7, 0, 0), stiffness=30.0),
+        ms.LoopClosure(links[0], origin=(0.7, 0, 0), stiffness=30.0),
     ]
     scene = ms.Scene(ms.Skeleton(links, joints), gravity=(0, 0, -G))
     weights = np.random.default_rng(2).standard_normal((3, 3))

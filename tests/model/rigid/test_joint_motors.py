@@ -78,7 +78,7 @@ def slider_crank():
         drive,
         ms.Revolute(rod, crank, origin=(r, 0, 0), axis=(0, 0, 1), rate=-10.0 - 10.0 * r / length),
         ms.Prismatic(slider, origin=(r + length, 0, 0), axis=(1, 0, 0)),
-        ms.Closure(rod, slider, origin=(r + length, 0, 0), stiffness=1e11),
+        ms.LoopClosure(rod, slider, origin=(r + length, 0, 0), stiffness=1e11),
     ]
     return ms.Scene(ms.Skeleton([crank, rod, slider], joints)), joints
 

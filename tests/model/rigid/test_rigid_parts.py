@@ -28,7 +28,7 @@ G = 9.81
 
 
 def top(**changed):
-    return ms.Rigid(**{"mass": 1.0, "inertia": INERTIA, "angular_velocity": SPIN, **changed})
+    return ms.RigidBody(**{"mass": 1.0, "inertia": INERTIA, "angular_velocity": SPIN, **changed})
 
 
 def spinning(steps_a_second, seconds=10, integrator=None, part=None):
@@ -123,7 +123,7 @@ def test_a_free_body_falls():
 
 def test_a_needle_swings_in_a_field():
     moment, inertia, flux_density, swing = 2.0, 0.5, 0.3, 1e-3
-    needle = ms.Rigid(
+    needle = ms.RigidBody(
         mass=1.0, inertia=inertia, magnetic_moment=moment * np.array([np.cos(swing), np.sin(swing), 0.0])
     )
     scene = ms.Scene(needle, field=ms.UniformField(), allow_rigid_motions=True)
@@ -136,7 +136,7 @@ def test_a_needle_swings_in_a_field():
 def test_a_magnet_is_pulled_along_the_gradient_of_its_field():
     source = ms.Dipoles([[0.0, 0.0, 0.3]], [[0.5, 0.0, 2.0]])
     moment, mass = np.array([0.1, 0.2, 0.4]), 2.0
-    magnet = ms.Rigid(mass=mass, inertia=1.0, magnetic_moment=moment)
+    magnet = ms.RigidBody(mass=mass, inertia=1.0, magnetic_moment=moment)
     scene = ms.Scene(magnet, field=source, allow_rigid_motions=True)
     motion = ms.simulate(scene, steps=10, time_step=0.05)
     step = 1e-5 * np.eye(3)
@@ -164,7 +164,7 @@ def carrying(part, sheet=None, **scene):
 def test_a_payload_bends_a_strip_as_in_beam_theory():
     """The part begins at 0.09: a force and a moment there, from its own weight at a center beyond the end."""
     mass, weight = 1e-6, 1e-2
-    part = ms.Rigid(END, mass=mass, inertia=1e-12, center=(0.12, 0.005, 0.0))
+    part = ms.RigidBody(END, mass=mass, inertia=1e-12, center=(0.12, 0.005, 0.0))
     light = strip(mass_density=1e-6)
     rest = ms.equilibrium(carrying(part, light, gravity=(0, 0, -weight / mass)), gravity_factor=1e-3)
     force, length, arm = 1e-3 * weight, 0.09, 0.03
@@ -177,7 +177,7 @@ def test_a_payload_bends_a_strip_as_in_beam_theory():
 
 def test_a_magnet_glued_on_turns_the_end():
     moment, flux_density = 1e-4, 1e-4
-    part = ms.Rigid(END, magnetic_moment=(moment, 0, 0))
+    part = ms.RigidBody(END, magnetic_moment=(moment, 0, 0))
     scene = carrying(part, field=ms.UniformField())
     rest = ms.equilibrium(scene, remanent_magnetization=(0, 0, 0), applied_flux_density=(0, 0, flux_density))
     turned = Rotation.from_matrix(rest[part].rotation).as_rotvec()
@@ -189,7 +189,7 @@ def test_a_magnet_glued_on_turns_the_end():
 
 @pytest.mark.parametrize("solve", ["at rest", "in motion"])
 def test_a_frame_keeps_its_distances(solve):
-    part = ms.Rigid(END)
+    part = ms.RigidBody(END)
     scene = carrying(part, gravity=(0.3, 0.5, -G))
     if solve == "at rest":
         found = ms.equilibrium(scene)
@@ -206,7 +206,7 @@ def test_it_is_the_limit_of_a_stiff_region():
     within = np.isin(MESH.faces, END).all(axis=1)
     stiff = strip(young_modulus=np.where(within, 1e11, 1e6))
     supports = {"supports": [ms.Clamp(MESH.edges_at(x=0.0))], "gravity": (0, 0.2, -1.0)}
-    alone, part = ms.Scene(stiff, **supports), ms.Rigid(END)
+    alone, part = ms.Scene(stiff, **supports), ms.RigidBody(END)
     both = ms.Scene([stiff, part], **supports)
     assert ms.equilibrium(both).positions == pytest.approx(ms.equilibrium(alone).positions, abs=1e-7)
     modes = [ms.vibration_modes(scene, ms.equilibrium(scene), count=3).frequencies for scene in (alone, both)]
@@ -219,7 +219,7 @@ def test_it_is_the_limit_of_a_stiff_region():
 
 def test_a_payload_lowers_the_frequency_as_rayleigh_says():
     """A point mass far heavier than the strip: 3 E I / (m L^3)."""
-    part = ms.Rigid(END, mass=0.1, inertia=1e-9, center=(0.09, 0.005, 0.0))
+    part = ms.RigidBody(END, mass=0.1, inertia=1e-9, center=(0.09, 0.005, 0.0))
     square = ms.vibration_modes(carrying(part), count=1).squares[0]
     assert square == pytest.approx(3.0 * STIFFNESS / (0.1 * 0.09**3), rel=3e-2)
 
@@ -228,16 +228,16 @@ def test_a_magnet_against_the_field_buckles_the_strip():
     """It turns the end by m B theta, the strip back by E I theta / L: only the curvature of turning knows of the former."""
     moment = 1e-3
     critical = STIFFNESS / (0.09 * moment)  # T
-    part = ms.Rigid(END, magnetic_moment=(-moment, 0, 0))
+    part = ms.RigidBody(END, magnetic_moment=(-moment, 0, 0))
     scene = carrying(part, field=ms.UniformField(), gravity=(1e-3, 0, 0))  # which moves it, and hardly pulls
     no = {"remanent_magnetization": (0, 0, 0)}
-    path = ms.follow(scene, **no, applied_flux_density=(1.5 * critical, 0, 0))
+    path = ms.follow_path(scene, **no, applied_flux_density=(1.5 * critical, 0, 0))
     assert [each.kind for each in path.critical] == ["bifurcation"]
     assert 1.5 * path.critical[0].parameter == pytest.approx(1.0, rel=2e-2)
-    assert path.unstable_directions[0] == 0 and path.unstable_directions[-1] == 1
+    assert path.n_negative_eigenvalues[0] == 0 and path.n_negative_eigenvalues[-1] == 1
     beyond = {**no, "applied_flux_density": (1.5 * critical, 0, 0)}
     straight = ms.equilibrium(scene, **beyond, require_stable=False)
-    assert not straight.stable and straight.unstable_directions == 1
+    assert not straight.stable and straight.n_negative_eigenvalues == 1
     bent = ms.equilibrium(scene, **beyond)
     assert bent.stable and np.abs(bent.displacements).max() > 0.02
     turned = np.linalg.norm(Rotation.from_matrix(bent[part].rotation).as_rotvec())
@@ -249,7 +249,7 @@ def test_a_magnet_against_the_field_buckles_the_strip():
 
 
 def test_going_on_has_the_same_bits():
-    part, free = ms.Rigid(END, mass=1e-3, inertia=1e-8), top(center=(0, 0, 1.0))
+    part, free = ms.RigidBody(END, mass=1e-3, inertia=1e-8), top(center=(0, 0, 1.0))
     scene = ms.Scene([strip(), part, free], gravity=(0, 0, -1.0), allow_rigid_motions=True)
     whole = ms.simulate(scene, steps=8, time_step=1e-3)
     first = ms.simulate(scene, steps=5, time_step=1e-3)
@@ -262,7 +262,7 @@ def test_going_on_has_the_same_bits():
 
 def test_a_frame_can_be_thrown():
     """Momenta of a free sheet with a payload stay what they were; velocities of vertices say how the part starts."""
-    part = ms.Rigid(END, mass=2e-3, inertia=(1e-8, 2e-8, 2.5e-8))
+    part = ms.RigidBody(END, mass=2e-3, inertia=(1e-8, 2e-8, 2.5e-8))
     scene = ms.Scene([strip(), part], allow_rigid_motions=True)
     turning = np.array([0.0, 3.0, 1.0])
     start = np.array([0.1, 0, 0]) + np.cross(turning, MESH.rest_positions)
@@ -285,7 +285,7 @@ def test_two_parts_with_common_faces_and_an_oblique_support():
     ids = [
         np.flatnonzero((np.abs(x - middle) < 0.0051) & (y > 0.0)) for middle in (0.05, 0.0625)
     ]  # columns 18 to 22, 23 to 27
-    parts = [ms.Rigid(each, mass=1e-4) for each in ids]
+    parts = [ms.RigidBody(each, mass=1e-4) for each in ids]
     held = [ms.Clamp(mesh.edges_where(lambda p: (p @ turn)[:, 0] < 1e-9)), ms.SymmetryPlane(turn[:, 1])]
     scene = ms.Scene([sheet, *parts], supports=held, gravity=turn @ [0.1, 0, -1.0])
     assert np.isin(mesh.faces, ids[0]).any(axis=1)[np.isin(mesh.faces, ids[1]).any(axis=1)].any()
@@ -313,7 +313,7 @@ def test_a_part_of_a_solid():
     mesh = ms.meshes.box((0.1, 0.01, 0.01), cells=(10, 2, 2))
     bar = ms.Solid(mesh, material=ms.NeoHookean(young_modulus=1e6, poisson_ratio=0.3), mass_density=1.0)
     end = bar.mesh.vertices_where(lambda x: x[:, 0] > 0.0799)
-    weight = ms.Rigid(end, mass=1e-3, center=(0.09, 0.005, 0.005), body=bar)
+    weight = ms.RigidBody(end, mass=1e-3, center=(0.09, 0.005, 0.005), body=bar)
     held = ms.Pin(bar.mesh.vertices_at(x=0.0))
     rest = ms.equilibrium(ms.Scene([bar, weight], supports=[held], gravity=(0, 0, -1.0)))
     before, after = bar.mesh.rest_positions[end], rest[bar].positions[end]

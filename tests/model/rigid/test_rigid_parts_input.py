@@ -31,7 +31,7 @@ def scene_with(*parts, sheet=None, **more):
 
 def payload(**changed):
     given = {"mass": 2e-4, "inertia": (1e-8, 1.2e-8, 2e-8), "magnetic_moment": (3e-4, 0, 1e-4)}
-    return ms.Rigid(END, **{**given, **changed})
+    return ms.RigidBody(END, **{**given, **changed})
 
 
 @pytest.mark.parametrize(
@@ -55,18 +55,18 @@ def payload(**changed):
 )
 def test_parts_that_cannot_be(given, message):
     with pytest.raises(ValueError, match=message):
-        ms.Rigid(**given)
+        ms.RigidBody(**given)
 
 
 def test_parts_that_do_not_fit_their_scene():
     with pytest.raises(ValueError, match="3 vertices at least"):
-        scene_with(ms.Rigid(END[:2]))
+        scene_with(ms.RigidBody(END[:2]))
     with pytest.raises(ValueError, match="lie on a line"):
-        scene_with(ms.Rigid(MESH.vertices_at(x=0.1)))
+        scene_with(ms.RigidBody(MESH.vertices_at(x=0.1)))
     with pytest.raises(ValueError, match=r"Rigid vertices must be in \[0, 33\), got 99"):
-        scene_with(ms.Rigid([30, 31, 99]))
+        scene_with(ms.RigidBody([30, 31, 99]))
     with pytest.raises(ValueError, match="rigid parts 0 and 1 share vertex 24"):
-        scene_with(payload(), ms.Rigid(END[:4]))
+        scene_with(payload(), ms.RigidBody(END[:4]))
     part = payload()
     with pytest.raises(ValueError, match="rigid parts 0 and 1 are one Rigid"):
         scene_with(part, part)
@@ -75,7 +75,7 @@ def test_parts_that_do_not_fit_their_scene():
     ):
         scene_with(part, supports=[ms.Pin(END[:1])], allow_rigid_motions=True)
     with pytest.raises(ValueError, match="rigid part 0, which is free"):
-        ms.Scene(ms.Rigid(mass=1.0, inertia=1.0))
+        ms.Scene(ms.RigidBody(mass=1.0, inertia=1.0))
     with pytest.raises(ValueError, match="has a magnetic_moment, but the scene has no field"):
         scene_with(part, field=())
     with pytest.raises(ValueError, match="needs the Shell"):
@@ -102,12 +102,12 @@ def test_starts_that_would_bend_a_part():
 
 def test_a_free_body_at_rest_is_neutral():
     with pytest.raises(ms.NotConverged, match=r"free bodies .rigid part 0."):
-        ms.equilibrium(ms.Scene(ms.Rigid(mass=1.0, inertia=1.0), allow_rigid_motions=True))
+        ms.equilibrium(ms.Scene(ms.RigidBody(mass=1.0, inertia=1.0), allow_rigid_motions=True))
 
 
 def test_several_sheets_say_which():
     low, high = strip(), strip(0.1)
-    part = ms.Rigid(END, mass=1e-3, body=high)
+    part = ms.RigidBody(END, mass=1e-3, body=high)
     held = [ms.Clamp(body.mesh.edges_at(x=0.0), body=body) for body in (low, high)]
     rest = ms.equilibrium(ms.Scene([low, part, high], supports=held, gravity=(0, 0, -0.5)))
     assert np.array_equal(rest[part].positions, rest[high].positions[END])
@@ -129,7 +129,7 @@ def test_same_bits_on_any_number_of_threads():
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
     ids = np.flatnonzero(mesh.rest_positions[:, 0] > 0.0599)
     scene = ms.Scene(
-        [sheet, ms.Rigid(ids, mass=1e-3)], supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -0.2)
+        [sheet, ms.RigidBody(ids, mass=1e-3)], supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -0.2)
     )
     try:
         for threads in (1, 2, 3):
@@ -145,7 +145,7 @@ def test_same_bits_on_any_number_of_threads():
 
 
 def test_pictures_and_printing(tmp_path):
-    part, free = payload(), ms.Rigid(mass=1e-3, inertia=1e-8, angular_velocity=(1.0, 0, 0))
+    part, free = payload(), ms.RigidBody(mass=1e-3, inertia=1e-8, angular_velocity=(1.0, 0, 0))
     scene = scene_with(part, free, allow_rigid_motions=True)
     move = ms.simulate(scene, **NO, steps=2, time_step=1e-3)
     assert len(states_of(move)) == 3
@@ -157,7 +157,7 @@ def test_pictures_and_printing(tmp_path):
 
 def test_an_end_state_is_kept_in_a_file(tmp_path):
     scene = scene_with(
-        payload(), ms.Rigid(mass=1e-3, inertia=1e-8, velocity=(1.0, 0, 0)), allow_rigid_motions=True
+        payload(), ms.RigidBody(mass=1e-3, inertia=1e-8, velocity=(1.0, 0, 0)), allow_rigid_motions=True
     )
     first = ms.simulate(scene, **NO, steps=3, time_step=1e-3)
     first.end.save(tmp_path / "end.npz")
@@ -172,7 +172,7 @@ def test_an_end_state_is_kept_in_a_file(tmp_path):
 @pytest.mark.parametrize("kind", ["contact", "water", "nothing"])
 def test_it_goes_with_what_else_acts(kind):
     """A thrown sheet with a frame: nothing bends it, and a gradient is that of differences."""
-    part, sheet = ms.Rigid(END, mass=1e-3, inertia=(2e-8, 3e-8, 4e-8)), strip()
+    part, sheet = ms.RigidBody(END, mass=1e-3, inertia=(2e-8, 3e-8, 4e-8)), strip()
     floor = ms.Contact(
         ms.obstacles.Plane((0.1, 0, 1.0), center=(0, 0, -2e-3)),
         contact_stiffness=20.0,
@@ -214,7 +214,7 @@ def test_a_warm_start_follows_a_payload():
 
 
 def test_a_start_that_says_twice_how_a_free_body_moves():
-    free = ms.Rigid(mass=1.0, inertia=1.0, velocity=(0, 0, 1.0))
+    free = ms.RigidBody(mass=1.0, inertia=1.0, velocity=(0, 0, 1.0))
     scene = ms.Scene(free, allow_rigid_motions=True)
     first = ms.simulate(scene, steps=1, time_step=0.1)
     with pytest.raises(ValueError, match="starts at rest positions; this one goes on from Trajectory"):
@@ -222,7 +222,7 @@ def test_a_start_that_says_twice_how_a_free_body_moves():
 
 
 def test_free_bodies_go_on_whatever_the_vertices_are_told():
-    free, part = ms.Rigid(mass=1.0, inertia=1.0, velocity=(0, 0, 1.0)), ms.Rigid(END)
+    free, part = ms.RigidBody(mass=1.0, inertia=1.0, velocity=(0, 0, 1.0)), ms.RigidBody(END)
     scene = ms.Scene([strip(), free, part], allow_rigid_motions=True)
     first = ms.simulate(scene, steps=2, time_step=1e-3)
     on = ms.simulate(scene, steps=2, time_step=1e-3, start=first, velocities=(0.1, 0, 0))
@@ -242,7 +242,7 @@ def differences(function, at, along, step):
 def test_gradients_of_a_top_to_1e_6(integrator, name):
     """The inertia as a tensor, along symmetric changes."""
     tensor = np.array([[1.0, 0.1, -0.2], [0.1, 2.0, 0.3], [-0.2, 0.3, 2.5]])
-    top = ms.Rigid(
+    top = ms.RigidBody(
         mass=1.5, inertia=tensor, center=(0.1, 0.2, 0.3), angular_velocity=(0.1, 2.0, 0.2), velocity=(1, 0, 0)
     )
     scene = ms.Scene(top, gravity=(0, 0, -1.0), allow_rigid_motions=True)
@@ -294,7 +294,7 @@ def test_gradients_at_rest_to_1e_6():
 
 def test_a_contact_with_obstacles_that_the_shape_of_a_free_part_would_pass_through():
     surface = ms.meshes.box((0.02, 0.02, 0.02), cells=(1, 1, 1)).surface
-    block = ms.Rigid.of(surface, 1e3)
+    block = ms.RigidBody.of(surface, 1e3)
     mesh = ms.meshes.rectangle(0.02, 0.02, cells=(2, 2))
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
     floor = ms.obstacles.Plane(center=(0, 0, -1e-3))
@@ -309,7 +309,7 @@ def test_a_contact_with_obstacles_that_the_shape_of_a_free_part_would_pass_throu
         ):
             scene(*bodies)
     scene(sheet, block, body=sheet)
-    riding = ms.Rigid([0, 1, 3], shape=surface)
+    riding = ms.RigidBody([0, 1, 3], shape=surface)
     scene(sheet, riding)  # its vertices touch
     with pytest.raises(ValueError, match="is about nothing"):
-        scene(ms.Rigid(mass=1.0, inertia=1.0))
+        scene(ms.RigidBody(mass=1.0, inertia=1.0))

@@ -22,10 +22,10 @@ def cube(height=6e-4, **moved):
 
 
 def test_a_cube_rests_on_a_plate():
-    part = ms.Rigid.of(cube(), 2e3)
+    part = ms.RigidBody.of(cube(), 2e3)
     scene = on_plate(part)
     rest = ms.equilibrium(scene)
-    found = rest.touching(scene.contacts[0])
+    found = rest.contact_state(scene.contacts[0])
     weight = 9.81 * 2e3 * 64e-9
     assert part.mass == pytest.approx(2e3 * 64e-9)
     assert found.normal_force == pytest.approx(weight, rel=1e-6)
@@ -39,7 +39,7 @@ def test_a_cube_rests_on_a_plate():
 @pytest.mark.parametrize("integrator", [ms.ImplicitEuler(), ms.TRBDF2()])
 def test_a_cube_falls_slides_and_stops(integrator):
     """From a speed that friction brakes within the time, v/(mu g)."""
-    part = ms.Rigid.of(cube(), 2e3, velocity=(0.02, 0, 0))
+    part = ms.RigidBody.of(cube(), 2e3, velocity=(0.02, 0, 0))
     scene = on_plate(part, friction_coefficient=0.5, sticking_speed=1e-4)
     motion = ms.simulate(scene, steps=40, time_step=2.5e-4, integrator=integrator)
     touch = scene.contacts[0]
@@ -47,40 +47,46 @@ def test_a_cube_falls_slides_and_stops(integrator):
     assert motion[part].velocity[0][0] == pytest.approx(0.02, rel=1e-12)
     assert abs(motion[part].velocity[-1][0]) < 2e-4
     assert way[-1] - way[0] == pytest.approx(0.02**2 / (2 * 0.5 * 9.81), rel=0.2)
-    found = motion.touching(touch)
-    assert len(found.pairs) and not found.slips.any()
-    assert min(motion.touching(touch, k).smallest_distance for k in range(41)) > 5e-4
+    found = motion.contact_state(touch)
+    assert len(found.pairs) and not found.is_sliding.any()
+    assert min(motion.contact_state(touch, k).smallest_distance for k in range(41)) > 5e-4
 
 
 def test_two_shapes_hit_each_other():
     """Two cubes in free flight: momentum stays, and they part again."""
-    a = ms.Rigid.of(cube(0.0), 1e3, velocity=(0.1, 0, 0))
-    b = ms.Rigid.of(cube(0.4e-3).transformed(translation=(4.3e-3, 0.5e-3, 0)), 2e3)
-    touch = ms.Contact(a, b, contact_stiffness=1e5, reach=2e-4)
+    a = ms.RigidBody.of(cube(0.0), 1e3, velocity=(0.1, 0, 0))
+    b = ms.RigidBody.of(cube(0.4e-3).transformed(translation=(4.3e-3, 0.5e-3, 0)), 2e3)
+    touch = ms.Contact(a, b, contact_stiffness=1e5, activation_distance=2e-4)
     scene = ms.Scene([a, b], contacts=[touch], allow_rigid_motions=True)
     motion = ms.simulate(scene, steps=60, time_step=2e-4)
     momentum = a.mass * motion[a].velocity + b.mass * motion[b].velocity
     assert np.abs(momentum - momentum[0]).max() < 1e-9 * momentum[0][0]
     assert motion[b].velocity[-1][0] > 0.01
-    touched = [len(motion.touching(touch, k).pairs) > 0 for k in range(61)]
+    touched = [len(motion.contact_state(touch, k).pairs) > 0 for k in range(61)]
     assert any(touched) and not touched[0] and not touched[-1]
 
 
 def test_it_is_as_a_rigid_part_of_a_solid():
     """The same cube as a Solid whose vertices are all one Rigid moves alike."""
-    free = ms.Rigid.of(cube(), 2e3, velocity=(0.02, 0.01, 0))
+    free = ms.RigidBody.of(cube(), 2e3, velocity=(0.02, 0.01, 0))
     scenes = [
-        on_plate(free, friction_coefficient=0.3, contact_stiffness=1e5, reach=1e-4, sticking_speed=1e-3)
+        on_plate(
+            free,
+            friction_coefficient=0.3,
+            contact_stiffness=1e5,
+            activation_distance=1e-4,
+            sticking_speed=1e-3,
+        )
     ]
     mesh = ms.meshes.box((4e-3, 4e-3, 4e-3), cells=(1, 1, 1)).transformed(translation=(7.3e-3, 8.1e-3, 6e-4))
     rubber = ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.3)
     solid = ms.Solid(mesh, material=rubber, element="linear", mass_density=1e-3)
-    part = ms.Rigid(
+    part = ms.RigidBody(
         np.arange(solid.mesh.n_vertices), body=solid, mass=free.mass, inertia=free.inertia, center=free.center
     )
     plate = ms.Shell(PLATE, **SOFT)
     same = dict(friction_coefficient=0.3, contact_stiffness=1e5, reach=1e-4, sticking_speed=1e-3)
-    touch = ms.Contact(part, plate, minimal_distance=5e-4, **same)
+    touch = ms.Contact(part, plate, min_distance=5e-4, **same)
     held = ms.Pin(np.arange(PLATE.n_vertices), body=plate)
     scenes.append(
         ms.Scene(
@@ -101,8 +107,10 @@ def test_it_is_as_a_rigid_part_of_a_solid():
 
 def test_gradients_go_through():
     torch = pytest.importorskip("torch")
-    part = ms.Rigid.of(cube(), 2e3, velocity=(0.02, 0, -0.01), angular_velocity=(1.0, 2.0, 0.5))
-    scene = on_plate(part, friction_coefficient=0.3, contact_stiffness=1e5, reach=1e-4, sticking_speed=1e-2)
+    part = ms.RigidBody.of(cube(), 2e3, velocity=(0.02, 0, -0.01), angular_velocity=(1.0, 2.0, 0.5))
+    scene = on_plate(
+        part, friction_coefficient=0.3, contact_stiffness=1e5, activation_distance=1e-4, sticking_speed=1e-2
+    )
     touch = scene.contacts[0]
 
     def end(**given):
@@ -147,13 +155,13 @@ def test_a_link_touches_with_its_shape():
         [plate, skeleton], supports=[held], contacts=[touch], gravity=DOWN, allow_rigid_motions=True
     )
     motion = ms.simulate(scene, steps=30, time_step=1e-3, integrator=ms.ImplicitEuler())
-    distances = [motion.touching(touch, k).smallest_distance for k in range(31)]
+    distances = [motion.contact_state(touch, k).smallest_distance for k in range(31)]
     assert 5e-4 < min(distances) < 6e-4
     assert motion[arm].center[-1][2] < arm.center[2] - 3e-4
 
 
 def test_pictures_show_it(tmp_path):
-    part = ms.Rigid.of(cube(), 2e3)
+    part = ms.RigidBody.of(cube(), 2e3)
     scene = on_plate(part)
     motion = ms.simulate(scene, steps=2, time_step=1e-3)
     small = {"width": 400, "style": ms.Style(backend="matplotlib")}
@@ -168,24 +176,24 @@ def test_pictures_show_it(tmp_path):
 
 
 def test_shapes_of_distances_and_bad_ones():
-    ball = ms.Rigid.of(ms.shapes.ball(0.01), 1e3)
+    ball = ms.RigidBody.of(ms.shapes.ball(0.01), 1e3)
     assert ball.mass == pytest.approx(1e3 * 4 / 3 * np.pi * 1e-6, rel=0.03)
     assert np.trace(ball.inertia_tensor) / 3 == pytest.approx(0.4 * ball.mass * 1e-4, rel=0.05)
     with pytest.raises(ValueError, match="shape must be a TriangleMesh or one of"):
-        ms.Rigid(mass=1.0, inertia=1.0, shape="ball")
+        ms.RigidBody(mass=1.0, inertia=1.0, shape="ball")
     with pytest.raises(ValueError, match="must be closed"):
-        ms.Rigid.of(PLATE, 1e3)
-    two = [ms.Rigid.of(cube(z), 1e3) for z in (0.0, 0.1)]
+        ms.RigidBody.of(PLATE, 1e3)
+    two = [ms.RigidBody.of(cube(z), 1e3) for z in (0.0, 0.1)]
     with pytest.raises(ValueError, match=r"contact_stiffness \[Pa\] is needed"):
         ms.Contact(*two)
     with pytest.raises(ValueError, match="give it a shape"):
-        ms.Contact(ms.Rigid(mass=1.0, inertia=1.0), ms.Shell(PLATE, **SOFT))
+        ms.Contact(ms.RigidBody(mass=1.0, inertia=1.0), ms.Shell(PLATE, **SOFT))
     with pytest.raises(ValueError, match="not in the scene"):
         ms.Scene(
             two[0], contacts=[ms.Contact(two[0], two[1], contact_stiffness=1e5)], allow_rigid_motions=True
         )
     plate = ms.Shell(PLATE, **SOFT)
-    low = ms.Rigid.of(cube(4e-4), 1e3)
+    low = ms.RigidBody.of(cube(4e-4), 1e3)
     scene = on_plate(low)
     with pytest.raises(ValueError, match="rigid part 0"):
         ms.equilibrium(scene)

@@ -47,7 +47,7 @@ def test_standing_rods_on_springs_buckle_under_their_weight():
 
 def test_a_path_follows_a_torque_and_a_motor():
     scene, joints = double_pendulum(spring_stiffness=30.0, torque=0.0, second={"motor_angle": 0.0})
-    path = ms.follow(scene, values={joints[0]: {"torque": 4.0}, joints[1]: {"motor_angle": 0.8}})
+    path = ms.follow_path(scene, values={joints[0]: {"torque": 4.0}, joints[1]: {"motor_angle": 0.8}})
     rest = ms.equilibrium(scene, values={joints[0]: {"torque": 4.0}, joints[1]: {"motor_angle": 0.8}})
     for joint in joints:
         assert float(path[joint].angle[-1]) == pytest.approx(float(rest[joint].angle), abs=1e-8)
@@ -60,7 +60,7 @@ def test_a_moment_in_a_ball_joint_is_refused_where_it_must():
     with pytest.raises(ValueError, match="torque of a Ball has no potential"):
         ms.vibration_modes(scene, ms.equilibrium(scene), count=1)
     with pytest.raises(ValueError, match="torque of a Ball has no potential"):
-        ms.follow(scene, gravity_factor=1.0)
+        ms.follow_path(scene, gravity_factor=1.0)
 
 
 def test_a_skeleton_that_motors_hold_altogether_has_nothing_to_vibrate():

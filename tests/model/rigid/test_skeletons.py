@@ -136,7 +136,7 @@ def test_slider_crank_closes_its_loop():
         drive,
         ms.Revolute(rod, crank, origin=(r, 0, 0), axis=(0, 0, 1)),
         ms.Prismatic(slider, origin=(r + length, 0, 0), axis=(1, 0, 0)),
-        ms.Closure(rod, slider, origin=(r + length, 0, 0), stiffness=1e6),
+        ms.LoopClosure(rod, slider, origin=(r + length, 0, 0), stiffness=1e6),
     ]
     scene, rest = ms.Scene(ms.Skeleton([crank, rod, slider], joints)), None
     for angle in np.linspace(0, theta, 6)[1:]:

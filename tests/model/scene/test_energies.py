@@ -111,6 +111,6 @@ def test_a_clamp_that_turns_has_its_direction_there(order):
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.3, mass_density=1e3)
     turned = ms.Clamp(mesh.edges_at(x=0.0), rotation=(0.0, -0.5, 0.0))
     scene = ms.Scene(sheet, supports=[turned], gravity=(0, 0, -9.81))
-    rest = ms.equilibrium(scene, motion_factor=0.7)
-    found = ms.energies(scene, rest.positions, edge_rotations=rest.edge_rotations, motion_factor=0.7)
+    rest = ms.equilibrium(scene, support_factor=0.7)
+    found = ms.energies(scene, rest.positions, edge_rotations=rest.edge_rotations, support_factor=0.7)
     assert found["bending"] == pytest.approx(rest.energies["bending"], rel=1e-9)

@@ -183,7 +183,7 @@ def test_growth_along_a_path_buckles_where_the_theory_says():
     ends = [ms.Clamp(mesh.edges_at(x=place)) for place in (0.0, LENGTH)]
     scene = ms.Scene(sheet, supports=ends)
     along = np.diag([1.0, 0.0, 0.0])
-    path = ms.follow(
+    path = ms.follow_path(
         scene,
         start=ms.equilibrium(scene),
         values={sheet: {"growth": np.eye(3) + 1e-3 * along}},

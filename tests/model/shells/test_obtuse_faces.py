@@ -74,7 +74,7 @@ def test_a_motion_and_a_path_warn_too():
     with pytest.warns(ms.MeshQualityWarning, match=r"the motion, at 0\.\d+ s, cannot be trusted"):
         ms.simulate(scenes[0], steps=20, time_step=2e-2, **controls(1.0, UP), progress=False)
     with pytest.warns(ms.MeshQualityWarning, match=r"the path, at parameter .* cannot be trusted"):
-        ms.follow(scenes[1], **controls(1.0, UP), progress=False)
+        ms.follow_path(scenes[1], **controls(1.0, UP), progress=False)
 
 
 @pytest.mark.parametrize("bending", ["midedge", "hinge"])

@@ -19,17 +19,17 @@ def folded(x: np.ndarray) -> np.ndarray:
     return np.column_stack([x[:, :2], np.abs(x[:, 0] - 0.5) + 0.3 * x[:, 0] * x[:, 1]])
 
 
-def sheet(place=lambda x: x, **values) -> tuple[ms.SixNodeMesh, ms.Shell]:
-    mesh = ms.SixNodeMesh.of(ms.TriangleMesh(place(FLAT.rest_positions), FLAT.faces))
+def sheet(place=lambda x: x, **values) -> tuple[ms.QuadraticTriangleMesh, ms.Shell]:
+    mesh = ms.QuadraticTriangleMesh.of(ms.TriangleMesh(place(FLAT.rest_positions), FLAT.faces))
     values = {"thickness": 0.02, "young_modulus": 1e6, "poisson_ratio": 0.3, **values}
     return mesh, ms.Shell(mesh, bending="midedge2", **values)
 
 
-def left_edges(mesh: ms.SixNodeMesh) -> np.ndarray:
+def left_edges(mesh: ms.QuadraticTriangleMesh) -> np.ndarray:
     return mesh.edges_where(lambda middles: middles[:, 0] < 1e-9)
 
 
-def right_edges(mesh: ms.SixNodeMesh) -> np.ndarray:
+def right_edges(mesh: ms.QuadraticTriangleMesh) -> np.ndarray:
     return mesh.edges_where(lambda middles: middles[:, 0] > 1.0 - 1e-9)
 
 
@@ -65,7 +65,7 @@ def varied() -> ms.Scene:
 
 def with_a_rigid_part() -> ms.Scene:
     mesh, shell = sheet(arched)
-    part = ms.Rigid(np.flatnonzero(mesh.rest_positions[:, 0] > 0.7))
+    part = ms.RigidBody(np.flatnonzero(mesh.rest_positions[:, 0] > 0.7))
     return ms.Scene(
         [shell, part], supports=[ms.Clamp(left_edges(mesh))], loads=[ms.AreaLoad((0.1, 0.2, 1.0))]
     )
@@ -93,7 +93,7 @@ SCENES = {
 def test_the_same_as_from_the_whole_hessian(name) -> None:
     scene = SCENES[name]()
     found = ms.linear_response(scene)
-    inputs = plain_inputs(scene, None, None, None, load_factor=1.0, motion_factor=1.0)
+    inputs = plain_inputs(scene, None, None, None, load_factor=1.0, support_factor=1.0)
     with inputs.in_core():
         stiffness = RestStiffness(inputs)
         stiffness.factorize()

@@ -196,7 +196,7 @@ def test_everything_else_takes_several_sheets(pair, tmp_path):
     np.testing.assert_allclose(modes.frequencies, np.sort(single)[:6], rtol=1e-8)
     linear = ms.linear_response(scene, applied_flux_density=1e-3 * STRONG)
     assert linear.displacements.shape == (n_v, 3)
-    path = ms.follow(scene, applied_flux_density=STRONG, largest_step=0.1, progress=False)
+    path = ms.follow_path(scene, applied_flux_density=STRONG, max_step=0.1, progress=False)
     assert path.positions.shape == (len(path), n_v, 3) and path.parameters[-1] >= 1.0
     assert ms.linear_buckling(pushed(), modes=2).factors == pytest.approx(
         sorted([*(ms.linear_buckling(pushed(k)).factors[0] for k in (0, 1))]), rel=1e-6

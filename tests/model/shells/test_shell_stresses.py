@@ -181,7 +181,7 @@ def test_every_kind_of_result_has_them_with_the_values_it_was_found_with():
     assert np.allclose(stresses.membrane_forces, force, atol=2e-3)
     assert np.allclose(2 * stresses.von_mises_stresses, rest[shell].stresses().von_mises_stresses, rtol=1e-2)
     assert np.array_equal(rest[shell].stresses().membrane_forces, force)
-    path = ms.follow(scene)
+    path = ms.follow_path(scene)
     assert np.allclose(path[shell].stresses().membrane_forces, force, atol=1e-5)
     assert np.abs(path[shell].stresses(0).membrane_forces).max() < 1e-12
     cases = ms.equilibrium(scene, load_factor=[0.0, 1.0])

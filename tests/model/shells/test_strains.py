@@ -182,7 +182,7 @@ def test_load_cases_have_the_largest_of_all():
 
 def test_a_path_has_them_at_each_point():
     scene = strip(field=ms.UniformField())
-    path = ms.follow(scene, remanent_magnetization=MAGNETIZATION, applied_flux_density=(0, 0, 2e-3))
+    path = ms.follow_path(scene, remanent_magnetization=MAGNETIZATION, applied_flux_density=(0, 0, 2e-3))
     assert len(path.largest_bending_strain) == len(path)
     for k in (0, len(path) - 1):
         assert np.abs(path.strains(k).bending).max() == path.largest_bending_strain[k]
@@ -204,7 +204,7 @@ def test_a_motion_has_them_in_each_state(dtype):
         ms.Scene(shell, supports=[clamp], loads=[ms.PointLoad([5], (0, 0, 0))]),
         steps=6,
         time_step=1e-3,
-        motion_factor=lambda t: t / 6e-3,
+        support_factor=lambda t: t / 6e-3,
         vertex_loads=load,
         record_every=2,
     )
@@ -263,6 +263,6 @@ def test_a_motion_and_a_path_name_the_state():
         ms.Pin(mesh.vertices_at(x=0.1), displacement=(0.06, 0, 0)),
     ]
     with pytest.warns(ms.LargeStrainWarning, match=r"recorded state 4, at 0\.4 s: .* 8 of 8 faces"):
-        ms.simulate(ms.Scene(shell, supports=ends), steps=4, time_step=0.1, motion_factor=lambda t: t / 0.4)
+        ms.simulate(ms.Scene(shell, supports=ends), steps=4, time_step=0.1, support_factor=lambda t: t / 0.4)
     with pytest.warns(ms.LargeStrainWarning, match=r"the path, at point \d+, parameter 1"):
-        ms.follow(ms.Scene(shell, supports=ends))
+        ms.follow_path(ms.Scene(shell, supports=ends))

@@ -155,7 +155,7 @@ def test_follow_warm_start_and_multistart_come_to_the_equilibrium():
     solid = bar(0.3, cells=(6, 1, 1))
     scene = bent(solid)
     rest = ms.equilibrium(scene)
-    path = ms.follow(scene)
+    path = ms.follow_path(scene)
     assert path.stable.all() and np.allclose(path.positions[-1], rest.positions, atol=1e-6)
     warm = ms.WarmStart(scene)
     warm()

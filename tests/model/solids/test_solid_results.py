@@ -76,14 +76,14 @@ def test_every_kind_of_result_says_what_its_solid_goes_through():
     ratio = rest[solid].strains().volume_ratios.max()
     assert f"J {rest[solid].strains().volume_ratios.min():.4g} to {ratio:.4g}" in repr(rest)
     assert "membrane" not in repr(rest)
-    path = ms.follow(scene)
+    path = ms.follow_path(scene)
     assert "von Mises" in repr(path) and "in the last state" in repr(path)
     assert np.allclose(path.equilibrium(-1)[solid].strains().volume_ratios, ratio, rtol=1e-4)
     motion = ms.simulate(scene, steps=3, time_step=1e-4)
     assert "von Mises" in repr(motion)
     assert np.allclose(motion[solid].strains(0).volume_ratios, 1.0)
     assert motion[solid].strains().volume_ratios.max() > 1.0
-    cases = ms.equilibrium(scene, motion_factor=[0.5, 1.0])
+    cases = ms.equilibrium(scene, support_factor=[0.5, 1.0])
     assert np.allclose(cases[solid].strains(1).volume_ratios, ratio, rtol=1e-6)
     assert cases[solid].strains(0).volume_ratios.max() < ratio
 
@@ -108,7 +108,7 @@ def test_shells_beside_solids_have_their_own_rows(order):
     assert "of the membrane" in repr(rest) and f"body {scene.bodies.index(solid)}: J " in repr(rest)
     motion = ms.simulate(scene, steps=2, time_step=1e-3)
     assert motion[sheet].strains(1).membrane.shape == (sheet.mesh.n_faces, 2)
-    assert len(ms.follow(scene)) > 1
+    assert len(ms.follow_path(scene)) > 1
 
 
 def test_strains_of_sheets_are_refused_where_there_are_none():
@@ -164,7 +164,7 @@ def test_a_couple_on_an_edge_of_a_solid_is_refused():
 def test_a_rigid_part_on_a_solid_leaves_its_strains_to_be_asked_for():
     solid = bar(mass_density=1e3)
     end = solid.mesh.vertices_at(x=0.1)
-    part = ms.Rigid(end, mass=0.01, inertia=1e-6 * np.eye(3), center=(0.1, 0.01, 0.01))
+    part = ms.RigidBody(end, mass=0.01, inertia=1e-6 * np.eye(3), center=(0.1, 0.01, 0.01))
     held = ms.Pin(solid.mesh.vertices_at(x=0.0))
     scene = ms.Scene([solid, part], supports=[held], gravity=(0, 0, -9.81))
     rest = ms.equilibrium(scene)

@@ -158,9 +158,12 @@ def test_copies_solve_alike():
         (lambda m: ms.StableNeoHookean(log_barrier=1, **MODULI), "log_barrier"),
         (lambda m: ms.Guccione(**{**GUCCIONE, "fibres": (0.0, 0.0, 0.0)}), "fibres.*no zero vectors"),
         (lambda m: ms.Guccione(**{**GUCCIONE, "fibres": 1.0}), r"fibres.*shape \(3,\).*got \(\)"),
-        (lambda m: ms.Projective(young_modulus=1e5, poisson_ratio=-0.1), r"poisson_ratio.*\[0, 1/2\)"),
         (
-            lambda m: ms.Solid(m, material=ms.Projective(**MODULI), mean_volume=True),
+            lambda m: ms.ProjectiveMaterial(young_modulus=1e5, poisson_ratio=-0.1),
+            r"poisson_ratio.*\[0, 1/2\)",
+        ),
+        (
+            lambda m: ms.Solid(m, material=ms.ProjectiveMaterial(**MODULI), mean_volume=True),
             "mean_volume is not for Projective",
         ),
         (lambda m: ms.Solid(m, material="rubber"), "material must be one of a solid"),

@@ -92,7 +92,7 @@ def test_far_floors_do_not_make_the_sheet_a_speck(tmp_path) -> None:
 def test_free_rigid_parts_are_drawn(tmp_path) -> None:
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, mass_density=2e3)
     shape = ms.meshes.ball(0.005, cells=2).surface.transformed(translation=(0.02, 0.005, 0.02))
-    ball = ms.Rigid(mass=1e-3, inertia=1e-8, center=(0.02, 0.005, 0.02), shape=shape)
+    ball = ms.RigidBody(mass=1e-3, inertia=1e-8, center=(0.02, 0.005, 0.02), shape=shape)
     scene = ms.Scene(
         [sheet, ball],
         supports=[ms.Clamp(MESH.edges_at(x=0.0))],

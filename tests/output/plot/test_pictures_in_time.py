@@ -103,7 +103,7 @@ def test_a_movie_moves_it(motion, tmp_path):
 def test_along_a_path_magnets_and_obstacles_are_where_they_are_there():
     start = ms.equilibrium(SCENE, remanent_magnetization=UP)
     values = {MAGNET: {"center": (0.01, 0.005, -0.02)}, FLOOR: {"center": (0, 0, -0.1)}}
-    path = ms.follow(SCENE, start=start, remanent_magnetization=UP, values=values, progress=False)
+    path = ms.follow_path(SCENE, start=start, remanent_magnetization=UP, values=values, progress=False)
     states = states_of(path)
     assert len(states) == len(path) > 2
     for state, parameter in zip(states, path.parameters, strict=True):

@@ -294,7 +294,7 @@ def test_a_path_knows_its_fields(mesh) -> None:
     source = ms.Dipoles([[0.05, 0.01, -0.2]], [[0.0, 0.0, 1.0]])
     clamp = ms.Clamp(mesh.edges_at(x=0.0))
     scene = ms.Scene(sheet, supports=[clamp], field=[ms.UniformField(), source])
-    path = ms.follow(
+    path = ms.follow_path(
         scene,
         remanent_magnetization=MAGNETIZATION,
         applied_flux_density=(0, 0, 1e-3),

@@ -134,7 +134,7 @@ def test_controls_may_be_given_in_four_ways(strip):
 def test_a_clamp_that_shakes():
     clamp = ms.Clamp(MESH.edges_at(x=0.0), displacement=(0, 0, 1e-3))
     scene = ms.Scene(shell(), supports=[clamp])
-    move = simulate(scene, steps=100, time_step=5e-3, motion_factor=lambda t: np.sin(20 * t))
+    move = simulate(scene, steps=100, time_step=5e-3, support_factor=lambda t: np.sin(20 * t))
     held = MESH.vertices_at(x=0.0)
     expected = 1e-3 * np.sin(20 * move.times)
     np.testing.assert_allclose(
@@ -171,7 +171,7 @@ def test_a_step_that_fails_is_taken_in_parts(strip):
     jump[2:, 2] = 0.08
     options = {"steps": 4, "time_step": 5e-3, "applied_flux_density": jump, "damping": 1e-5}
     move = simulate(strip, **options, solver=ms.Newton(max_iterations=4))
-    assert set(move.halved) <= {2, 3} and move.halved[2] >= 2
+    assert set(move.substeps) <= {2, 3} and move.substeps[2] >= 2
     assert "in parts" in repr(move)
     assert move.steps_done == 4 and len(move) == 5
 
@@ -249,7 +249,7 @@ BAD = [
         {"steps": 10, "record_every": 11},
         "record_every must be at most steps = 10, got 11: only the start would be recorded",
     ),
-    ({"keep": "all"}, "keep must be"),
+    ({"adjoint_storage": "all"}, "adjoint_storage must be"),
     ({"remanent_magnetization": None}, "remanent_magnetization"),
 ]
 

@@ -42,7 +42,7 @@ def simulate(scene, steps=STEPS, **options):
         "time_step": TIME_STEP,
         "remanent_magnetization": (3e4, 0, 0),
         "applied_flux_density": field,
-        "motion_factor": lambda time: np.sin(50 * time),
+        "support_factor": lambda time: np.sin(50 * time),
         "gravity_factor": lambda time: 1 + 10 * time,
         "field_factor": lambda time: np.cos(200 * time),
         "progress": False,
@@ -90,7 +90,7 @@ def test_functions_of_the_time_go_on(kind, integrator):
     first = simulate(scene, FIRST, **options)
     second = simulate(scene, 4, start=first, **options)
     third = simulate(scene, STEPS - FIRST - 4, start=second.end, **options)
-    assert (kind == "halved") == bool(third.halved)
+    assert (kind == "halved") == bool(third.substeps)
     same_bits(whole, first, second, third)
 
 
@@ -103,7 +103,7 @@ def test_arrays_begin_with_the_first_step_of_the_part(rows, integrator):
 
     def part(begin, end, **options):
         rows = slice(begin, end + more)
-        given = {"applied_flux_density": values[rows], "motion_factor": factors[rows], **options}
+        given = {"applied_flux_density": values[rows], "support_factor": factors[rows], **options}
         return simulate(scene, end - begin, integrator=integrator, **given)
 
     first = part(0, FIRST)
@@ -111,7 +111,7 @@ def test_arrays_begin_with_the_first_step_of_the_part(rows, integrator):
 
 
 def test_constants_and_a_file_between(tmp_path):
-    options = {"applied_flux_density": (0, 0, 1e-2), "motion_factor": 1.0, **MAXWELL}
+    options = {"applied_flux_density": (0, 0, 1e-2), "support_factor": 1.0, **MAXWELL}
     scene = strip(contacts=floor(heaving))
     whole, first = simulate(scene, **options), simulate(scene, FIRST, **options)
     first.end.save(tmp_path / "state.npz")
@@ -189,7 +189,7 @@ def test_gradients_of_a_part(name):
             return 1e-2 * wave * torch.tensor((0.0, 0.1, 1.0), dtype=torch.float64)
 
         options = {"start": first, "time_step": inputs["time_step"], "applied_flux_density": swinging}
-        options |= {"motion_factor": lambda time: (50 * time) ** 2, "field_factor": 1.0}
+        options |= {"support_factor": lambda time: (50 * time) ** 2, "field_factor": 1.0}
         move = simulate(scene, 5, **options, solver=ms.MixedNewton(tolerance=1e-13))
         return 1e3 * torch.as_tensor(move.positions)[1:, -1].pow(2).sum()
 

@@ -47,7 +47,7 @@ def swing(scene, law, integrator, steps):
         "viscous": {"damping": 0.03 * scene.shell.vertex_masses.mean() * 2 * np.pi / period},
         "maxwell": {"maxwell_modulus": 0.5, "maxwell_time": 0.3 * period},
         "stiffness": {"stiffness_damping": 0.02 * period},
-        "clamp": {"motion_factor": swell},
+        "clamp": {"support_factor": swell},
     }[law]
     strength = 0.0 if law == "clamp" else 2e-3 * (thickness / 1e-3) ** 2
     move = ms.simulate(
@@ -168,7 +168,7 @@ def test_a_long_run_neither_grows_nor_loses_a_step(name):
     first = ms.simulate(scene, **options)
     before = resident_memory()
     second = ms.simulate(scene, **options, start=first)
-    assert second.steps_done == steps and not first.halved and not second.halved
+    assert second.steps_done == steps and not first.substeps and not second.substeps
     assert second.times[-1] == pytest.approx(2 * steps * time_step)
     if before is not None:  # the system tells how large a process is
         assert resident_memory() - before < 4e6

@@ -36,7 +36,7 @@ def celled(grouped, order=1):
     )
     middle = solid.mesh.tetrahedron_barycenters[:, 0] > 0.5 * SIZE[0]
     groups = [np.flatnonzero(middle), np.flatnonzero(~middle)] if grouped else None
-    cells = ms.Cells(solid, groups, stiffness=2e5, volume_ratio=1.0)
+    cells = ms.PneumaticCells(solid, groups, stiffness=2e5, volume_ratio=1.0)
     count = cells.count
     return held(solid, cells), {
         cells: {"volume_ratio": np.tile(np.linspace(1.0, 1.2, 5)[:, None], (1, count))}
@@ -48,7 +48,7 @@ def hollow(**inside):
     solid = ms.Solid(mesh, material=MATERIALS["Projective"], mass_density=1e3, element="linear")
     rest = mesh.rest_positions
     inner = np.flatnonzero((np.hypot(*rest[:, :2].T) < 0.0041)[mesh.faces].all(axis=1))
-    cavity = ms.Cavity(solid, inner, cap_rims=True, **inside)
+    cavity = ms.Cavity(solid, inner, close_rims=True, **inside)
     pin = ms.Pin(np.flatnonzero(rest[:, 2] < 1e-9))
     scene = ms.Scene(solid, supports=[pin], actuators=[cavity], gravity=(0, 2.0, -9.81))
     return scene, cavity
@@ -58,7 +58,7 @@ def blown(law):
     volume = np.pi * 0.004**2 * 0.02
     inside = {
         "pressure": {"pressure": 2e3},
-        "gas": {"filling_pressure": 1.04e5},
+        "gas": {"gas_pressure": 1.04e5},
         "liquid": {"volume": 1.1 * volume, "bulk_modulus": 1e6},
     }[law]
     return hollow(**inside)[0], {}

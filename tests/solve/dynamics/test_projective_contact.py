@@ -14,7 +14,7 @@ REACH = 3e-4
 def block(poisson_ratio=0.3, young_modulus=5e4, cells=(3, 3, 2)):
     return ms.Solid(
         ms.meshes.box((SIZE, SIZE, 0.5 * SIZE), cells=cells),
-        material=ms.Projective(young_modulus=young_modulus, poisson_ratio=poisson_ratio),
+        material=ms.ProjectiveMaterial(young_modulus=young_modulus, poisson_ratio=poisson_ratio),
         mass_density=1e3,
         element="linear",
     )
@@ -34,7 +34,7 @@ def slope(angle, friction, body=None, obstacle=None):
 def moved(scene, steps, time_step, **options):
     method = ms.ProjectiveDynamics(contact="coulomb", **options)
     move = ms.simulate(scene, steps=steps, time_step=time_step, integrator=method, progress=False)
-    assert not move.halved
+    assert not move.substeps
     return move
 
 
@@ -176,7 +176,7 @@ def pushed_together(friction, velocity=(0.0, 0.0, -0.5), **contact):
     upper = ms.Solid(
         ms.TetMesh(x, lower.mesh.tetrahedra), material=lower.material, mass_density=1e3, element="linear"
     )
-    touching = ms.Contact(lower, upper, reach=REACH, friction_coefficient=friction, **contact)
+    touching = ms.Contact(lower, upper, activation_distance=REACH, friction_coefficient=friction, **contact)
     scene = ms.Scene([lower, upper], contacts=[touching], allow_rigid_motions=True)
     start = np.zeros((scene.mesh.n_vertices, 3))
     start[lower.mesh.n_vertices :] = velocity
@@ -223,7 +223,7 @@ def test_a_block_sticks_or_slides_on_another(sticks):
     scene = ms.Scene(
         [lower, upper],
         supports=[ms.Pin(lower.mesh.vertices_at(z=lower.mesh.rest_positions[:, 2].min()), body=lower)],
-        contacts=[ms.Contact(lower, upper, reach=REACH, friction_coefficient=friction)],
+        contacts=[ms.Contact(lower, upper, activation_distance=REACH, friction_coefficient=friction)],
         gravity=GRAVITY * np.array([np.sin(angle), 0.0, -np.cos(angle)]),
         allow_rigid_motions=True,
     )

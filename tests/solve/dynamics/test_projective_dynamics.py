@@ -64,7 +64,7 @@ SCENES = {
 def test_supports(name):
     solid = bar(MATERIALS["Corotated"])
     scene = ms.Scene(solid, supports=SCENES[name](solid), gravity=(0, 2.0, -9.81))
-    options = {"motion_factor": lambda t: t / 0.02} if name == "moving" else {}
+    options = {"support_factor": lambda t: t / 0.02} if name == "moving" else {}
     assert_same(*both(scene, **options))
 
 
@@ -92,7 +92,9 @@ def test_skeletons_turn_while_the_soft_part_stays_factorized(free):
 def test_rigid_parts():
     solid = bar(MATERIALS["Corotated"])
     x = solid.mesh.rest_positions[:, 0]
-    weight = ms.Rigid(np.flatnonzero(x > 0.9 * SIZE[0]), mass=2e-3, inertia=(1e-8, 2e-8, 3e-8), body=solid)
+    weight = ms.RigidBody(
+        np.flatnonzero(x > 0.9 * SIZE[0]), mass=2e-3, inertia=(1e-8, 2e-8, 3e-8), body=solid
+    )
     scene = ms.Scene([solid, weight], supports=[clamped(solid)], gravity=(0, 2.0, -9.81))
     assert_same(*both(scene))
 
@@ -146,8 +148,10 @@ def test_gradients_are_those_of_implicit_euler():
         return [leaf.grad.numpy() for leaf in leaves.values()]
 
     for keep in ("stages", "checkpoints"):
-        mine = gradient(TIGHT, keep=ms.Keep(keep, memory_budget=2e9 if keep == "stages" else 5e4))
-        newton = gradient(ms.ImplicitEuler(), solver=NEWTON, keep=keep)
+        mine = gradient(
+            TIGHT, adjoint_storage=ms.AdjointStorage(keep, memory_budget=2e9 if keep == "stages" else 5e4)
+        )
+        newton = gradient(ms.ImplicitEuler(), solver=NEWTON, adjoint_storage=keep)
         for found, expected in zip(mine, newton, strict=True):
             assert np.abs(found - expected).max() < 1e-8 * np.abs(expected).max()
 

@@ -37,7 +37,7 @@ def test_response_is_the_limit_of_small_equilibria(bending: str) -> None:
     small = 1e-3
 
     def state(t: float) -> ms.Equilibrium:
-        factors = dict.fromkeys(("load_factor", "gravity_factor", "motion_factor"), t)
+        factors = dict.fromkeys(("load_factor", "gravity_factor", "support_factor"), t)
         return ms.equilibrium(
             scene, **{**field, "applied_flux_density": t * field["applied_flux_density"]}, **factors
         )
@@ -85,7 +85,7 @@ def test_buckling_load_and_mode() -> None:
 
 def test_buckling_is_where_the_path_branches() -> None:
     scene = pushed(2 * EULER)
-    branch = ms.follow(scene, progress=False).critical[0]
+    branch = ms.follow_path(scene, progress=False).critical[0]
     assert branch.kind == "bifurcation"
     assert ms.linear_buckling(scene).factors[0] == pytest.approx(branch.parameter, rel=1e-3)
 
@@ -96,7 +96,7 @@ def test_buckling_by_motion() -> None:
     far = ms.Clamp(mesh.edges_at(x=LENGTH), displacement=(-shortening, 0, 0))
     scene = ms.Scene(shell, supports=[ms.Clamp(mesh.edges_at(x=0.0)), far])
     assert ms.linear_buckling(scene).factors[0] == pytest.approx(1.0, rel=0.03)
-    assert ms.linear_buckling(scene, motion_factor=0.5).factors[0] == pytest.approx(2.0, rel=0.03)
+    assert ms.linear_buckling(scene, support_factor=0.5).factors[0] == pytest.approx(2.0, rel=0.03)
 
 
 @pytest.mark.parametrize("direction", [(-1, 0, 0), (0, 0, -1)])
@@ -132,8 +132,8 @@ def test_modes_must_be_a_positive_integer(modes) -> None:
 
 def test_not_more_modes_than_unknowns() -> None:
     scene = pushed(EULER)
-    with pytest.raises(ValueError, match=f"below the {scene.n_unknowns} unknowns"):
-        ms.linear_buckling(scene, modes=scene.n_unknowns)
+    with pytest.raises(ValueError, match=f"below the {scene.n_dofs} unknowns"):
+        ms.linear_buckling(scene, modes=scene.n_dofs)
 
 
 @pytest.mark.parametrize("function", [ms.linear_response, ms.linear_buckling])

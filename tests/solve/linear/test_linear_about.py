@@ -37,7 +37,7 @@ def turned_at_its_end() -> tuple[ms.Scene, dict]:
         ms.Clamp(MESH.edges_at(x=0.0)),
         ms.Clamp(END, displacement=(-0.02, 0, 0.01), rotation=(0, 1.0, 0)),
     ]
-    return ms.Scene(shell(rest_curvature=5.0), supports=ends), {"motion_factor": 0.5}
+    return ms.Scene(shell(rest_curvature=5.0), supports=ends), {"support_factor": 0.5}
 
 
 def breathing() -> tuple[ms.Scene, dict]:
@@ -50,7 +50,7 @@ def breathing() -> tuple[ms.Scene, dict]:
         body,
         supports=[ms.Pin(mesh.vertices_at(x=0.0))],
         loads=[load],
-        actuators=[ms.Cells(body, stiffness=1e5)],
+        actuators=[ms.PneumaticCells(body, stiffness=1e5)],
     )
     return scene, {"load_factor": 1.0}
 
@@ -60,7 +60,7 @@ def test_a_response_is_the_slope_of_equilibria(case) -> None:
     scene, at = case()
     about = ms.equilibrium(scene, progress=False, **at)
     fixed = {name: value for name, value in at.items() if name != "remanent_magnetization"}
-    towards = {"load_factor": 2.0} if "motion_factor" not in at else {"motion_factor": 1.0}
+    towards = {"load_factor": 2.0} if "support_factor" not in at else {"support_factor": 1.0}
     if "applied_flux_density" in at:
         towards["applied_flux_density"] = np.array([1e-4, 0, 5e-3])
     found = ms.linear_response(scene, about, **{**fixed, **towards})
@@ -116,7 +116,7 @@ def test_buckling_is_where_the_path_branches(case) -> None:
     scene, at, towards = case()
     about = ms.equilibrium(scene, **at)
     magnetization = {name: at[name] for name in at if name == "remanent_magnetization"}
-    branch = ms.follow(scene, start=about, progress=False, **magnetization, **towards).critical[0]
+    branch = ms.follow_path(scene, start=about, progress=False, **magnetization, **towards).critical[0]
     assert branch.kind == "bifurcation"
     found = ms.linear_buckling(scene, about, **towards)
     assert found.factors[0] == pytest.approx(branch.parameter, rel=2e-3)

@@ -143,7 +143,7 @@ def test_an_unstable_equilibrium_says_so(magnetic):
     """Straight beyond the critical field, the square as far below zero as it is above as far before, to first order."""
     straight = ms.equilibrium(magnetic, **along_the_axis(-3.0), require_stable=False)
     found = ms.vibration_modes(magnetic, straight, count=2)
-    assert found.unstable == straight.unstable_directions == 1
+    assert found.unstable == straight.n_negative_eigenvalues == 1
     assert found.squares[0] < 0 and np.isnan(found.frequencies[0]) and found.frequencies[1] > 0
     near = ms.equilibrium(magnetic, **along_the_axis(2 * -(np.pi**2) / 4 + 3.0))
     mirrored = ms.vibration_modes(magnetic, near, count=1).squares[0]
@@ -172,7 +172,7 @@ def test_the_growth_rate_is_that_of_the_motion(magnetic):
 def test_more_unstable_directions_than_modes_asked_for(magnetic):
     straight = ms.equilibrium(magnetic, **along_the_axis(-30.0), require_stable=False)
     found = ms.vibration_modes(magnetic, straight, count=1)
-    assert found.unstable == straight.unstable_directions == 2 and len(found.squares) == 1
+    assert found.unstable == straight.n_negative_eigenvalues == 2 and len(found.squares) == 1
 
 
 def test_values_of_the_equilibrium_are_used():

@@ -95,13 +95,13 @@ def test_cases_start_from_cases(scene):
 
 def test_a_failing_case_is_named_and_the_others_kept(scene):
     fields = [(0, 0, 1e-3), (0, 0, 50.0)]
-    solver = ms.MixedNewton(max_iterations=2, smallest_load_step=1.0, max_relaxation_steps=1)
+    solver = ms.MixedNewton(max_iterations=2, min_load_step=1.0, max_relaxation_steps=1)
     first = ms.equilibrium(scene, remanent_magnetization=(4e4, 0, 0), applied_flux_density=fields[0])
     with pytest.raises(ms.NotConverged, match="load case 1 of 2") as caught:
         ms.equilibrium(
             scene, remanent_magnetization=(4e4, 0, 0), applied_flux_density=fields, solver=solver, start=first
         )
-    assert len(caught.value.last_good) == 2 and caught.value.last_good[0].progress == 1.0
+    assert len(caught.value.last_good) == 2 and caught.value.last_good[0].load_fraction == 1.0
 
 
 @pytest.mark.parametrize(

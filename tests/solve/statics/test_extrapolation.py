@@ -1,4 +1,4 @@
-"""ms.extrapolated: what nested meshes say of the exact solution, and how far they are from it."""
+"""ms.richardson_extrapolation: what nested meshes say of the exact solution, and how far they are from it."""
 
 import numpy as np
 import pytest
@@ -43,7 +43,7 @@ def strip_end(mesh) -> np.ndarray:
 
 
 def test_a_roof_gains_a_digit():
-    found = ms.extrapolated(roof, [roof_mesh(16), roof_mesh(32)])
+    found = ms.richardson_extrapolation(roof, [roof_mesh(16), roof_mesh(32)])
     plain, gained = (abs(value / ROOF_EXACT - 1.0) for value in (found.values[-1], found.value))
     assert 8e-3 < plain < 1e-2
     assert gained < 1.5e-3
@@ -52,7 +52,7 @@ def test_a_roof_gains_a_digit():
 
 
 def test_a_magnetic_strip_gains_a_digit():
-    found = ms.extrapolated(strip_end, [strip_mesh(20), strip_mesh(40)])
+    found = ms.richardson_extrapolation(strip_end, [strip_mesh(20), strip_mesh(40)])
     exact = np.array(magnetic_strip.ACROSS[5.0])
     plain, gained = (np.abs(value - exact).max() for value in (found.values[-1], found.value))
     assert 2e-4 < plain < 6e-4
@@ -60,7 +60,7 @@ def test_a_magnetic_strip_gains_a_digit():
     np.testing.assert_allclose(found.error, np.abs(found.values[-1] - exact), rtol=0.2)
 
 
-def second_order_roof(n: int) -> ms.SixNodeMesh:
+def second_order_roof(n: int) -> ms.QuadraticTriangleMesh:
     span = (0.0, linear_cylinders.ROOF_HALF_ANGLE)
     size = linear_cylinders.ROOF_RADIUS, linear_cylinders.ROOF_LENGTH / 2
     return ms.meshes.cylinder(*size, span, cells=(n, n), order=2)
@@ -69,8 +69,8 @@ def second_order_roof(n: int) -> ms.SixNodeMesh:
 def test_six_node_elements_gain_a_digit():
     """Two meshes assume the order 4 that three find."""
     meshes = [second_order_roof(n) for n in (3, 6, 12)]
-    by_two = ms.extrapolated(lambda mesh: roof(mesh, "midedge2"), meshes[1:])
-    by_three = ms.extrapolated(lambda mesh: roof(mesh, "midedge2"), meshes)
+    by_two = ms.richardson_extrapolation(lambda mesh: roof(mesh, "midedge2"), meshes[1:])
+    by_three = ms.richardson_extrapolation(lambda mesh: roof(mesh, "midedge2"), meshes)
     limit = 0.3006 * (1 - 2.5e-5)  # of finer meshes, NGSolve's of order 4 too
     assert by_two.order == 4.0 and 3.5 < by_three.order < 4.3
     for found in (by_two, by_three):
@@ -81,7 +81,9 @@ def test_six_node_elements_gain_a_digit():
 def test_under_a_point_force_the_order_is_lower():
     """B5, clamped, a force in the middle."""
     meshes = [ms.meshes.rectangle(0.5, 0.5, (n, n), diagonals="crossed", order=2) for n in (2, 4, 8)]
-    found = ms.extrapolated(lambda mesh: plates.middle_deflection(mesh, "clamped", "force"), meshes)
+    found = ms.richardson_extrapolation(
+        lambda mesh: plates.middle_deflection(mesh, "clamped", "force"), meshes
+    )
     assert 1.5 < found.order < 3.0
     assert abs(found.value - plates.SQUARE["clamped", "force"]) < 0.5 * found.error
 
@@ -90,17 +92,21 @@ def test_rows_by_vertex_are_those_of_corners():
     """Also of a cap, whose middle nodes are no corners of the generator's finer mesh."""
     coarse = ms.meshes.spherical_cap(1.0, 0.3, np.pi / 2, cells=(8, 4), order=2)
     for fine in (coarse.refined(), ms.meshes.spherical_cap(1.0, 0.3, np.pi / 2, cells=(16, 8), order=2)):
-        found = ms.extrapolated(lambda mesh: mesh.rest_positions, [coarse, fine])
+        found = ms.richardson_extrapolation(lambda mesh: mesh.rest_positions, [coarse, fine])
         assert found.value == pytest.approx(coarse.rest_positions[coarse.corner_vertices], abs=1e-14)
-    with pytest.raises(ValueError, match=r"of one kind, got .* a SixNodeMesh and .* a TriangleMesh"):
-        ms.extrapolated(lambda mesh: 1.0, [coarse, coarse.surface])
+    with pytest.raises(
+        ValueError, match=r"of one kind, got .* a QuadraticTriangleMesh and .* a TriangleMesh"
+    ):
+        ms.richardson_extrapolation(lambda mesh: 1.0, [coarse, coarse.surface])
 
 
 def test_three_meshes_tell_the_order():
-    found = ms.extrapolated(roof, [roof_mesh(8), roof_mesh(16), roof_mesh(32)])
+    found = ms.richardson_extrapolation(roof, [roof_mesh(8), roof_mesh(16), roof_mesh(32)])
     assert 1.5 < found.order < 2.1
     assert abs(found.value / ROOF_EXACT - 1.0) < 2e-3
-    assert ms.extrapolated(roof, [roof_mesh(8), roof_mesh(16), roof_mesh(32)], order=2).order == 2.0
+    assert (
+        ms.richardson_extrapolation(roof, [roof_mesh(8), roof_mesh(16), roof_mesh(32)], order=2).order == 2.0
+    )
 
 
 def model(power: float, exact: float = 3.0):
@@ -117,8 +123,8 @@ def square(n: int) -> ms.TriangleMesh:
 def test_errors_that_are_powers_are_gone(power, ratio):
     meshes = [square(n) for n in (2, 2 * ratio, 2 * ratio**2)]
     for found in (
-        ms.extrapolated(model(power), meshes),
-        ms.extrapolated(model(power), meshes[:2], order=power),
+        ms.richardson_extrapolation(model(power), meshes),
+        ms.richardson_extrapolation(model(power), meshes[:2], order=power),
     ):
         assert found.value == pytest.approx(3.0, abs=1e-12)
         assert found.order == pytest.approx(power, abs=1e-9)
@@ -130,7 +136,7 @@ def test_dicts_and_rows_by_vertex():
         x = mesh.rest_positions[:, 0]
         return {"sum": model(2.0)(mesh), "rows": np.stack([x, x + model(1.0)(mesh)], axis=1)}
 
-    found = ms.extrapolated(solve, [square(n) for n in (2, 4, 8)])
+    found = ms.richardson_extrapolation(solve, [square(n) for n in (2, 4, 8)])
     assert found.value["sum"] == pytest.approx(3.0, abs=1e-12)
     assert found.value["rows"].shape == (9, 2)
     np.testing.assert_allclose(found.value["rows"][:, 0], square(2).rest_positions[:, 0], atol=1e-15)
@@ -142,7 +148,7 @@ def test_dicts_and_rows_by_vertex():
 def test_solids_and_their_refinements():
     mesh = ms.meshes.box((1, 1, 1), cells=(1, 1, 1))
     meshes = [mesh, mesh.refined(), mesh.refined().refined()]
-    found = ms.extrapolated(lambda each: 1.0 + 1.0 / each.n_tetrahedra, meshes)
+    found = ms.richardson_extrapolation(lambda each: 1.0 + 1.0 / each.n_tetrahedra, meshes)
     assert found.value == pytest.approx(1.0, abs=1e-12)
     assert found.order == pytest.approx(3.0)
 
@@ -160,13 +166,13 @@ def test_gradients_go_through():
 
     coarse = ms.meshes.rectangle(0.1, 0.02, cells=(5, 1))
     meshes = [coarse, coarse.refined()]
-    found = ms.extrapolated(tip, meshes)
+    found = ms.richardson_extrapolation(tip, meshes)
     (slope,) = torch.autograd.grad(found.value, strength)
     with torch.no_grad():
         strength += 10.0
-        above = float(ms.extrapolated(tip, meshes).value)
+        above = float(ms.richardson_extrapolation(tip, meshes).value)
         strength -= 20.0
-        below = float(ms.extrapolated(tip, meshes).value)
+        below = float(ms.richardson_extrapolation(tip, meshes).value)
     assert float(slope) == pytest.approx((above - below) / 20.0, rel=1e-5)
 
 
@@ -190,7 +196,7 @@ def test_both_sides_of_a_slit_are_told_apart():
         return np.where(right, np.sign(mean - np.pi), 0.0)
 
     coarse, fine = slit(2), slit(4)
-    found = ms.extrapolated(rows, [coarse, fine])
+    found = ms.richardson_extrapolation(rows, [coarse, fine])
     assert np.count_nonzero(found.value) == 6
     np.testing.assert_array_equal(found.value, rows(coarse))
 
@@ -200,16 +206,16 @@ def test_what_does_not_converge_is_said():
     with pytest.raises(
         ms.NotConverged, match=r"changes by 1 and then by 0\.9, which tells no limit"
     ) as caught:
-        ms.extrapolated(lambda mesh: next(values), [square(n) for n in (2, 4, 8)])
+        ms.richardson_extrapolation(lambda mesh: next(values), [square(n) for n in (2, 4, 8)])
     assert caught.value.last_good.value == 2.9
     assert caught.value.last_good.error == 1.0
     values = iter([1.0, 2.0, 1.9])
     with pytest.raises(ms.NotConverged, match="turns back"):
-        ms.extrapolated(lambda mesh: next(values), [square(n) for n in (2, 4, 8)])
+        ms.richardson_extrapolation(lambda mesh: next(values), [square(n) for n in (2, 4, 8)])
 
 
 def test_what_does_not_change_is_converged():
-    found = ms.extrapolated(lambda mesh: 2.0, [square(n) for n in (2, 4, 8)])
+    found = ms.richardson_extrapolation(lambda mesh: 2.0, [square(n) for n in (2, 4, 8)])
     assert found.value == 2.0 and found.error == 0.0 and np.isnan(found.order)
 
 
@@ -226,7 +232,10 @@ def irregular(n: int) -> ms.TriangleMesh:
     [
         ([square(2)], "two or three, the coarsest first, got 1"),
         (square(2), "two or three"),
-        ([square(2), 3.0], r"meshes\[1\] must be a TriangleMesh, a SixNodeMesh or a TetMesh, got float"),
+        (
+            [square(2), 3.0],
+            r"meshes\[1\] must be a TriangleMesh, a QuadraticTriangleMesh or a TetMesh, got float",
+        ),
         ([square(4), square(2)], "32 and 8 faces"),
         ([square(2), square(3)], "8 and 18 faces, where the finer one must have 4, 9"),
         ([square(2), square(4), square(12)], "refined alike, got edges divided by 2, then by 3"),
@@ -237,28 +246,28 @@ def irregular(n: int) -> ms.TriangleMesh:
 )
 def test_meshes_that_are_not_nested_are_refused_before_any_solve(meshes, message):
     with pytest.raises(ValueError, match=message):
-        ms.extrapolated(lambda mesh: pytest.fail("solved"), meshes)
+        ms.richardson_extrapolation(lambda mesh: pytest.fail("solved"), meshes)
 
 
 def test_values_that_do_not_compare_are_refused():
     meshes = [square(2), square(4)]
     with pytest.raises(ValueError, match=r"or a row for each vertex, got \(8,\), \(32,\)"):
-        ms.extrapolated(lambda mesh: mesh.face_areas, meshes)
+        ms.richardson_extrapolation(lambda mesh: mesh.face_areas, meshes)
     with pytest.raises(ValueError, match="not finite"):
-        ms.extrapolated(lambda mesh: np.nan, meshes)
+        ms.richardson_extrapolation(lambda mesh: np.nan, meshes)
     with pytest.raises(ValueError, match="real numbers"):
-        ms.extrapolated(lambda mesh: "x", meshes)
+        ms.richardson_extrapolation(lambda mesh: "x", meshes)
     with pytest.raises(ValueError, match=r"\['b'\] for meshes\[1\], but \['a'\]"):
-        ms.extrapolated(lambda mesh: {"a" if mesh is meshes[0] else "b": 1.0}, meshes)
+        ms.richardson_extrapolation(lambda mesh: {"a" if mesh is meshes[0] else "b": 1.0}, meshes)
     with pytest.raises(ValueError, match="function of a mesh"):
-        ms.extrapolated(3.0, meshes)
+        ms.richardson_extrapolation(3.0, meshes)
     with pytest.raises(ValueError, match="order must be positive"):
-        ms.extrapolated(lambda mesh: 1.0, meshes, order=-1)
+        ms.richardson_extrapolation(lambda mesh: 1.0, meshes, order=-1)
 
 
 def test_an_irregular_mesh_refined_is_nested():
     mesh = irregular(3)
-    found = ms.extrapolated(model(2.0), [mesh, mesh.refined()])
+    found = ms.richardson_extrapolation(model(2.0), [mesh, mesh.refined()])
     assert found.value == pytest.approx(3.0)
 
 
@@ -276,8 +285,8 @@ def test_refined_onto_a_surface():
     tube = ms.meshes.cylinder(1.0, 1.0, cells=(12, 3))
     fine = tube.refined(surface=lambda x: np.hypot(x[:, 0], x[:, 2]) - 1.0)
     np.testing.assert_allclose(np.hypot(fine.rest_positions[:, 0], fine.rest_positions[:, 2]), 1.0, atol=1e-6)
-    assert ms.extrapolated(lambda mesh: mesh.face_areas.sum(), [tube, fine]).value == pytest.approx(
-        2.0 * np.pi, rel=1e-3
-    )
+    assert ms.richardson_extrapolation(
+        lambda mesh: mesh.face_areas.sum(), [tube, fine]
+    ).value == pytest.approx(2.0 * np.pi, rel=1e-3)
     with pytest.raises(ValueError, match="surface must be a signed distance"):
         tube.refined(surface=1.0)

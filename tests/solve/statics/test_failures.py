@@ -13,7 +13,7 @@ from crossed_cells import crossed
 import magshell as ms
 
 LENGTH, WIDTH, THICKNESS, YOUNG = 0.1, 0.01, 1e-3, 1e6  # m, Pa
-HASTY = ms.MixedNewton(max_iterations=3, smallest_load_step=0.5, max_relaxation_steps=1)
+HASTY = ms.MixedNewton(max_iterations=3, min_load_step=0.5, max_relaxation_steps=1)
 
 
 def cantilever(field, cells=(20, 2)):
@@ -42,10 +42,10 @@ def test_too_few_iterations():
         )
     good = caught.value.last_good
     assert isinstance(good, ms.Equilibrium) and good.scene is scene
-    assert 0.0 <= good.progress < 1.0 and not good.stable
+    assert 0.0 <= good.load_fraction < 1.0 and not good.stable
     assert np.isfinite(good.positions).all() and "of the way" in repr(good)
     # What it hands back holds at its own controls, and is a start.
-    assert good.applied_flux_density[2] == pytest.approx(20e-3 * good.progress)
+    assert good.applied_flux_density[2] == pytest.approx(20e-3 * good.load_fraction)
     found = ms.equilibrium(
         scene, remanent_magnetization=(4e4, 0, 0), applied_flux_density=(0, 0, 20e-3), start=good
     )
@@ -57,7 +57,7 @@ def test_a_sheet_that_leaves_a_sampled_field():
     with pytest.raises(ms.NotConverged) as caught:
         ms.equilibrium(cantilever(short_grid(2e-3)), remanent_magnetization=(4e4, 0, 0))
     good = caught.value.last_good
-    assert good.progress < 1.0 and np.isfinite(good.positions).all() and np.isfinite(good.energy)
+    assert good.load_fraction < 1.0 and np.isfinite(good.positions).all() and np.isfinite(good.energy)
 
 
 def test_a_sheet_that_starts_outside_a_sampled_field():
@@ -117,7 +117,7 @@ def test_a_nearly_degenerate_face_is_named():
 
 
 def test_a_failure_says_where_and_what_was_tried():
-    solver = ms.MixedNewton(max_iterations=3, smallest_load_step=0.2, max_relaxation_steps=1)
+    solver = ms.MixedNewton(max_iterations=3, min_load_step=0.2, max_relaxation_steps=1)
     with pytest.raises(ms.NotConverged) as caught:
         ms.equilibrium(
             cantilever(ms.UniformField()),
@@ -184,7 +184,7 @@ def long_solve(progress):
         scene,
         remanent_magnetization=(4e4, 0, 0),
         applied_flux_density=(1e-3, 0, 0.5),
-        solver=ms.Newton(max_iterations=500, smallest_load_step=1e-6, max_relaxation_steps=10**6),
+        solver=ms.Newton(max_iterations=500, min_load_step=1e-6, max_relaxation_steps=10**6),
         progress=progress,
     )
 
@@ -230,7 +230,7 @@ def test_ctrl_c_hands_back_the_last_good_state(solve):
     assert isinstance(caught.value, KeyboardInterrupt)
     good = caught.value.last_good
     assert isinstance(good, ms.Equilibrium) and np.isfinite(good.positions).all()
-    assert 0.0 <= good.progress < 1.0
+    assert 0.0 <= good.load_fraction < 1.0
 
 
 def slides_into_the_floor() -> ms.Scene:

@@ -23,7 +23,7 @@ def test_a_path_of_equilibria_along_which_things_move():
         clamp: {"displacement": (0, 0, 1e-3), "rotation": (0, -0.1, 0)},
         floor: {"center": (0, 0, -0.004)},
     }
-    path = ms.follow(scene, start=far, values=values, progress=False)
+    path = ms.follow_path(scene, start=far, values=values, progress=False)
     assert (
         path.parameters[0] == 0
         and path.parameters[-1] == 1
@@ -53,4 +53,4 @@ def test_a_path_of_equilibria_along_which_things_move():
     with pytest.raises(
         ValueError, match="start has another thickness than the path, which cannot change on its way"
     ):
-        ms.follow(scene, start=far, values={sheet: {"thickness": 1.1e-3}}, progress=False)
+        ms.follow_path(scene, start=far, values={sheet: {"thickness": 1.1e-3}}, progress=False)

@@ -1,4 +1,4 @@
-"""ms.equilibria: the equilibria of one scene at the same controls."""
+"""ms.find_equilibria: the equilibria of one scene at the same controls."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def field(scene, strength=0.0) -> dict:
 
 def test_both_wells_of_a_bistable_beam():
     scene = beam()
-    found = ms.equilibria(scene, **field(scene), attempts=6)
+    found = ms.find_equilibria(scene, **field(scene), attempts=6)
     assert len(found) == 2 and found.stable
     up, down = sorted((height(each) for each in found), reverse=True)
     assert up == pytest.approx(-down, rel=1e-6) and up > 3e-3
@@ -48,24 +48,24 @@ def test_both_wells_of_a_bistable_beam():
 def test_its_saddles_if_asked_for():
     """Straight, and in two waves, each with the unstable directions that theory says."""
     scene = beam()
-    found = ms.equilibria(scene, **field(scene), unstable=True)
+    found = ms.find_equilibria(scene, **field(scene), include_unstable=True)
     assert (np.diff(found.energy) >= 0).all()
-    assert [each.unstable_directions for each in found] == [0, 0, 1, 1, 2]
+    assert [each.n_negative_eigenvalues for each in found] == [0, 0, 1, 1, 2]
     waves, straight = found[2], found[4]
     assert max(abs(height(waves)), abs(height(straight))) < 1e-9
     assert np.abs(waves.positions[:, 2]).max() > 1e-3
     assert np.abs(straight.positions[:, 2]).max() < 1e-12
     for each in found:
-        assert each.residual < 1e-9 and each.progress == 1.0
+        assert each.residual < 1e-9 and each.load_fraction == 1.0
 
 
 def test_a_field_takes_one_well_away():
     """Above the field that makes it snap there is one."""
     scene = beam()
-    weak = ms.equilibria(scene, **field(scene, 2e-3), attempts=6)
+    weak = ms.find_equilibria(scene, **field(scene, 2e-3), attempts=6)
     assert len(weak) == 2
     assert weak.energy[0] < weak.energy[1]
-    strong = ms.equilibria(scene, **field(scene, 2e-2), attempts=6)
+    strong = ms.find_equilibria(scene, **field(scene, 2e-2), attempts=6)
     assert len(strong) == 1
 
 
@@ -76,12 +76,12 @@ def test_gradients_through_each():
 
     def heights(value) -> list:
         flux_density = value * torch.tensor((0.0, 0.0, 1.0), dtype=torch.float64)
-        found = ms.equilibria(
+        found = ms.find_equilibria(
             scene,
             remanent_magnetization=outwards(scene.mesh),
             applied_flux_density=flux_density,
             attempts=12,
-            unstable=True,
+            include_unstable=True,
         )
         middle = scene.mesh.nearest_vertex((LENGTH / 2, WIDTH / 2, 0))
         return [(each, each.positions[middle, 2]) for each in found]
@@ -105,7 +105,7 @@ def test_where_there_is_one_there_is_one():
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
     scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
     controls = {"remanent_magnetization": (4e4, 0, 0), "applied_flux_density": (0, 0, 2e-3)}
-    found = ms.equilibria(scene, **controls, attempts=8)
+    found = ms.find_equilibria(scene, **controls, attempts=8)
     assert len(found) == 1
     np.testing.assert_allclose(found[0].positions, ms.equilibrium(scene, **controls).positions, atol=1e-9)
 
@@ -114,16 +114,16 @@ def test_starts_of_ones_own():
     scene = beam()
     up = ms.equilibrium(scene, **field(scene))
     mirrored = up.positions * (1, 1, -1)
-    found = ms.equilibria(scene, **field(scene), start=[up, mirrored], attempts=1)
+    found = ms.find_equilibria(scene, **field(scene), start=[up, mirrored], attempts=1)
     assert len(found) == 2
-    again = ms.equilibria(scene, **field(scene), start=found, attempts=1)
+    again = ms.find_equilibria(scene, **field(scene), start=found, attempts=1)
     assert len(again) == 2
-    assert len(ms.equilibria(scene, **field(scene), start=mirrored.tolist(), attempts=1)) == 1
+    assert len(ms.find_equilibria(scene, **field(scene), start=mirrored.tolist(), attempts=1)) == 1
 
 
 def test_what_counts_as_one():
     scene = beam()
-    assert len(ms.equilibria(scene, **field(scene), attempts=6, same_within=0.1)) == 1
+    assert len(ms.find_equilibria(scene, **field(scene), attempts=6, distinct_tolerance=0.1)) == 1
 
 
 def test_far_beyond_its_first_instability_a_sheet_has_many():
@@ -135,7 +135,7 @@ def test_far_beyond_its_first_instability_a_sheet_has_many():
     sheet = ms.Shell(mesh, thickness=0.03, young_modulus=21e6, poisson_ratio=0.0)
     held, lifted = (np.flatnonzero(np.abs(strip.edge_midpoints[:, 0] - x) < 1e-9) for x in (0.0, 1.0))
     scene = ms.Scene(sheet, supports=[ms.Clamp(held)], loads=[ms.EdgeLoad(lifted, (0, 0, 8.0))])
-    found = ms.equilibria(scene, attempts=8)
+    found = ms.find_equilibria(scene, attempts=8)
     assert len(found) >= 2 and found.stable
     assert (np.diff(found.energy) >= 0).all() and np.ptp(found.energy) > 1e-3 * abs(found.energy[0])
 
@@ -150,7 +150,7 @@ def test_interrupted_it_hands_back_what_it_has():
             raise KeyboardInterrupt
 
     with pytest.raises(ms.Interrupted, match="after 3 equilibria were found, saddles counted") as caught:
-        ms.equilibria(scene, **field(scene), attempts=10, progress=watch)
+        ms.find_equilibria(scene, **field(scene), attempts=10, progress=watch)
     assert len(caught.value.last_good) == 2
     assert min(calls) == 0.0
 
@@ -159,8 +159,8 @@ def test_interrupted_it_hands_back_what_it_has():
     ("options", "message"),
     [
         ({"attempts": 0}, "attempts must be an integer of at least 1"),
-        ({"unstable": 1}, "unstable must be True or False"),
-        ({"same_within": -1.0}, r"same_within \[m\] must be positive"),
+        ({"include_unstable": 1}, "include_unstable must be True or False"),
+        ({"distinct_tolerance": -1.0}, r"distinct_tolerance \[m\] must be positive"),
         ({"seed": -1}, "seed must be an integer"),
         ({"start": "x"}, "start"),
         ({"start": [np.zeros((3, 3))]}, r"start \[m\] must have shape"),
@@ -170,7 +170,7 @@ def test_interrupted_it_hands_back_what_it_has():
 def test_bad_input(options, message):
     scene = beam((4, 1))
     with pytest.raises(ValueError, match=message):
-        ms.equilibria(scene, **{**field(scene), **options})
+        ms.find_equilibria(scene, **{**field(scene), **options})
 
 
 def test_a_start_that_looks_like_a_saddle_finds_it():
@@ -184,14 +184,14 @@ def test_a_start_that_looks_like_a_saddle_finds_it():
     u = mesh.rest_positions[:, 0] / 0.04
     guess = mesh.rest_positions - np.outer(u, (1.5e-3, 0, 0))
     guess[:, 2] = 3e-3 * np.sin(2 * np.pi * u) * np.sin(np.pi * u)
-    found = ms.equilibria(
-        ms.Scene(sheet, supports=ends), start=guess, unstable=True, attempts=16, progress=False
+    found = ms.find_equilibria(
+        ms.Scene(sheet, supports=ends), start=guess, include_unstable=True, attempts=16, progress=False
     )
-    kinds = [each.unstable_directions for each in found]
+    kinds = [each.n_negative_eigenvalues for each in found]
     assert kinds[:2] == [0, 0] and 1 in kinds  # down both sides of it are the wells
     saddle = found[kinds.index(1)]
     assert saddle.energy > 1.5 * found[0].energy
     middle = mesh.vertices_at(x=0.02)
     assert abs(saddle.positions[middle, 2]).max() < 1e-5 < abs(found[0].positions[middle, 2]).min()
-    alone = ms.equilibria(ms.Scene(sheet, supports=ends), start=guess, attempts=4, progress=False)
+    alone = ms.find_equilibria(ms.Scene(sheet, supports=ends), start=guess, attempts=4, progress=False)
     assert all(each.stable for each in alone)

@@ -39,7 +39,7 @@ def critical_field(buckled):
     """Where path following says that the strip snaps."""
     scene, start = buckled
     push = 0.02 if height(snap(buckled, 0.02)) < 0 else -0.02
-    path = ms.follow(
+    path = ms.follow_path(
         scene,
         **design(push),
         start=start,
@@ -195,7 +195,7 @@ def test_a_design_crosses_a_snap_and_resumes_with_the_same_bits(buckled, critica
             )
             return 1e6 * (rest.positions[middle, 2].mean() - wanted) ** 2
 
-        optimizer = ms.optim.MMA([share], lower=0.1, upper=1.5, max_shortenings=3)
+        optimizer = ms.optim.MMA([share], lower=0.1, upper=1.5, max_backtracks=3)
         return ms.minimize(
             objective,
             [share],

@@ -12,6 +12,7 @@
 
 #include "magshell/assembly/element_loop.h"
 #include "magshell/body/fibres.h"
+#include "magshell/core/parameters.h"
 #include "magshell/energy/fibre.h"
 #include "magshell/strain/tetrahedron.h"
 

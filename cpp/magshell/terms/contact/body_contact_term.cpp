@@ -31,8 +31,8 @@ BodyContactTerm::BodyContactTerm(const Nodes& nodes, const std::vector<ContactSu
         const auto number = [&](const char* name, const char* unit) {
             return registry.values.add(owner, name, unit, 1, 1);
         };
-        slots_.push_back({number("contact_stiffness", "Pa"), number("reach", "m"),
-                          number("minimal_distance", "m"), number("smoothing", "m"),
+        slots_.push_back({number("contact_stiffness", "Pa"), number("activation_distance", "m"),
+                          number("min_distance", "m"), number("smoothing", "m"),
                           number("friction_coefficient", "1"), number("static_friction_coefficient", "1"),
                           number("sticking_speed", "m/s")});
         laws_[c].penalty = contacts[c].penalty;

@@ -10,12 +10,12 @@
 [Chen22] bounds every component of the field by 0.05 T: the box of `ms.optim.MMA` or `LBFGS` on per-step values, or on
 the control points of a spline, holds it exactly.
 
-Where contact makes gradients of long motions useless, `ms.control.in_windows` searches the first steps first. Where noise
-grows with time, `ms.control.receding` goes on from where what it found has led.
+Where contact makes gradients of long motions useless, `ms.control.time_windows` searches the first steps first. Where noise
+grows with time, `ms.control.receding_horizon` goes on from where what it found has led.
 """
 
 from .curves import Arc, Chain, Curve, Polyline
-from .horizons import Horizon, Receding, receding
+from .horizons import Horizon, RecedingHorizonResult, receding_horizon
 from .motions import (
     curve_distance,
     frames_at,
@@ -25,11 +25,11 @@ from .motions import (
     track,
     track_fitting,
 )
-from .penalties import dmp, field_cap, field_excess, field_rate, field_strength
-from .signals import fit_fourier, fourier, harmonics, held, rotating, step_times
+from .penalties import field_excess, field_limit, field_rate, field_strength, low_frequency_penalty
+from .signals import fit_fourier, fourier, harmonics, rotating, step_times, zero_order_hold
 from .splines import fit_spline, spline
 from .waves import pulse, wave
-from .windows import Window, Windows, in_windows
+from .windows import Window, Windows, time_windows
 
 __all__ = [
     "Arc",
@@ -37,13 +37,12 @@ __all__ = [
     "Curve",
     "Horizon",
     "Polyline",
-    "Receding",
+    "RecedingHorizonResult",
     "Window",
     "Windows",
     "curve_distance",
-    "dmp",
-    "field_cap",
     "field_excess",
+    "field_limit",
     "field_rate",
     "field_strength",
     "fit_fourier",
@@ -51,19 +50,20 @@ __all__ = [
     "fourier",
     "frames_at",
     "harmonics",
-    "held",
-    "in_windows",
     "key_frames",
+    "low_frequency_penalty",
     "path_following",
     "pulse",
-    "receding",
+    "receding_horizon",
     "rotating",
     "spline",
     "step_times",
     "successive_targets",
+    "time_windows",
     "track",
     "track_fitting",
     "wave",
+    "zero_order_hold",
 ]
 
 

@@ -13,7 +13,7 @@ from ..._input.quantity import real_numbers
 from ..._input.tensors import real_tensor, require_torch
 from ...errors import DesignRejected, ObjectiveFailed
 from ..minimize import minimize
-from ..minimum import Minimum
+from ..minimum import MinimizeResult
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
@@ -51,7 +51,7 @@ def search_rows(
     upper: Numbers,
     make: Callable[..., Any] | None,
     **options: Any,
-) -> tuple[Minimum | None, DesignRejected | None]:
+) -> tuple[MinimizeResult | None, DesignRejected | None]:
     """The best rows, or None; and why a search ended early that met a design that cannot be evaluated.
 
     make: function (parameters, lower, upper) -> optimizer; None: ms.optim.LBFGS. options: of ms.minimize.

@@ -16,7 +16,7 @@ from ..._runtime.frozen import immutable
 from ..._runtime.log import log
 from ..._runtime.progress import progress_bar
 from ...errors import DesignRejected, Interrupted, ObjectiveFailed
-from ..minimum import Minimum, effort
+from ..minimum import MinimizeResult, effort
 from ..objective_value import Answer
 from ._search import Trials, check_functions, given_controls, row_bound, search_rows
 
@@ -36,7 +36,7 @@ class Horizon:
 
 @immutable
 @dataclass(frozen=True)
-class Receding:
+class RecedingHorizonResult:
     """What `receding` found.
 
     controls: (steps, ...), a tensor. reached: how many rows are settled; those behind are as planned last, or as given.
@@ -49,7 +49,7 @@ class Receding:
     controls: Any
     reached: int
     state: Any = field(repr=False)
-    searches: Sequence[tuple[Horizon, Minimum]] = field(repr=False)
+    searches: Sequence[tuple[Horizon, MinimizeResult]] = field(repr=False)
     failures: Sequence[tuple[Horizon, str]] = ()
     trials: int = 0
 
@@ -59,13 +59,13 @@ class Receding:
         return sum(found.history[-1].evaluations for _, found in self.searches)
 
 
-def receding(
+def receding_horizon(
     objective: Callable[..., Any],
     advance: Callable[..., Any],
     controls: Numbers,
     *,
-    horizon: int,
-    stride: int,
+    prediction_horizon: int,
+    control_horizon: int,
     start: Any = None,
     lower: Numbers = -np.inf,
     upper: Numbers = np.inf,
@@ -78,8 +78,9 @@ def receding(
     tolerance: float = 1e-3,
     until: Callable[..., Any] | None = None,
     progress: bool = True,
-) -> Receding:
-    """Minimizes over a control in time, `horizon` rows at once, of which the first `stride` are then done for good.
+) -> RecedingHorizonResult:
+    """Minimizes over a control in time, `prediction_horizon` rows at once, of which the first
+    `control_horizon` are then done for good.
 
     For motions that are unstable: what a little noise in the start becomes grows with time, until gradients of the whole
     motion say nothing that a search can use, and the motion found depends on rounding. Over a horizon in which noise grows
@@ -93,7 +94,7 @@ def receding(
     advance: function of the rows (settled - first, ...), a tensor; of the Horizon; and of that state. It returns the state
         in which row `settled` begins, Trajectory.end say.
     controls: (steps, ...), where every row starts until it is planned.
-    horizon, stride: rows. The last horizons end with the control, and are shorter.
+    prediction_horizon, control_horizon: rows. The last horizons end with the control, and are shorter.
     start: the state in which row 0 begins, handed to the first calls as it is.
     lower, upper: bounds, numbers or of the shape of a row.
     trials: before every search, so many other plans are tried, by the objective without its gradient, and the search
@@ -125,17 +126,24 @@ def receding(
     >>> def fall(push, horizon, state):
     ...     return list(fallen(push, state))[-1]
     >>> begin = torch.tensor([0.1, 0.0], dtype=torch.float64)
-    >>> found = ms.control.receding(lean, fall, torch.zeros(60).double(), horizon=20, stride=10, start=begin, progress=False)
+    >>> found = ms.control.receding_horizon(
+    ...     lean, fall, torch.zeros(60).double(), prediction_horizon=20, control_horizon=10, start=begin, progress=False
+    ... )
     >>> bool(abs(found.state[0]) < 0.01)
     True
     """
-    torch, given = require_torch("control.receding"), given_controls(controls)
+    torch, given = require_torch("control.receding_horizon"), given_controls(controls)
     low, high = row_bound("lower", lower, given), row_bound("upper", upper, given)
     named = {"optimizer": optimizer, "until": until}
     check_functions(objective=objective, advance=advance, **{k: v for k, v in named.items() if v is not None})
-    horizon, stride = count("horizon", horizon), count("stride", stride)
+    horizon, stride = (
+        count("prediction_horizon", prediction_horizon),
+        count("control_horizon", control_horizon),
+    )
     if stride > horizon:
-        raise ValueError(f"stride must be no more than the horizon, got {stride} of {horizon} rows")
+        raise ValueError(
+            f"control_horizon must be no more than the prediction_horizon, got {stride} of {horizon} rows"
+        )
     to_try = Trials.of(count("trials", trials, least=0), spread, periods, given)
     options = {
         "max_iterations": count("max_iterations", max_iterations, least=0),
@@ -146,12 +154,12 @@ def receding(
         raise ValueError("max_iterations and trials are both 0: there is nothing to search with")
     rng = np.random.default_rng(count("seed", seed, least=0))
     steps, planned, state = len(given), given.clamp(low, high), start
-    searches: Sequence[tuple[Horizon, Minimum]] = []
+    searches: Sequence[tuple[Horizon, MinimizeResult]] = []
     failures: list[tuple[Horizon, str]] = []
     reached = known = tried = 0
 
-    def until_now() -> Receding:
-        return Receding(planned, reached, state, searches, failures, tried)
+    def until_now() -> RecedingHorizonResult:
+        return RecedingHorizonResult(planned, reached, state, searches, failures, tried)
 
     def value(rows, part: Horizon, state) -> float:
         with torch.no_grad():

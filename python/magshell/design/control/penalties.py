@@ -6,7 +6,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..._input.tensors import positive_number
-from ..objectives import cap
 from ._arguments import tensor
 from .signals import oscillation
 
@@ -58,24 +57,24 @@ def field_excess(flux_density: Numbers, limit: float) -> torch.Tensor:
     return ((flux_density.abs() - positive_number("limit", "T", limit)).clamp(min=0) ** 2).sum(-1).mean()
 
 
-def field_cap(flux_density: Numbers, limit: float, sharpness: float | None = None) -> torch.Tensor:
+def field_limit(flux_density: Numbers, limit: float, sharpness: float | None = None) -> torch.Tensor:
     """Constraints g <= 0 that keep all components within a limit: (B_i / limit)^2 - 1.
 
     For MMA and GCMMA, with fields that are not bounded by their parameters: Fourier series. flux_density: (n, 3) T.
-    limit: T. One constraint a component, (3 n,); with a sharpness, a single one, as in `ms.objectives.cap`, which itself
+    limit: T. One constraint a component, (3 n,); with a sharpness, a single one, as in `ms.objectives.limit`, which itself
     caps |B|.
 
     >>> import magshell as ms
     >>> import numpy as np
     >>> field = np.array([(3e-3, 0, 0), (0, 4e-3, 0)])  # T
-    >>> ms.control.field_cap(field, 5e-3).max().item() <= 0
+    >>> ms.control.field_limit(field, 5e-3).max().item() <= 0
     True
     """
     flux_density = tensor("flux_density", "T", flux_density, ("n", 3))
-    return cap(flux_density.reshape(-1, 1), positive_number("limit", "T", limit), sharpness)
+    return limit(flux_density.reshape(-1, 1), positive_number("limit", "T", limit), sharpness)
 
 
-def dmp(
+def low_frequency_penalty(
     flux_density: Numbers,
     times: Numbers,
     angular_frequencies: Numbers,
@@ -98,7 +97,7 @@ def dmp(
     >>> times = np.linspace(0, 1, 5)
     >>> turning = np.stack([np.cos(7 * times), np.sin(7 * times), 0 * times], axis=1)
     >>> one, other = np.array([[1.0, 0, 0]]), np.array([[0, 1.0, 0]])
-    >>> float(ms.control.dmp(turning, times, [7.0], one, other))
+    >>> float(ms.control.low_frequency_penalty(turning, times, [7.0], one, other))
     0.0
     """
     flux_density = tensor("flux_density", "T", flux_density, ("n", 3))

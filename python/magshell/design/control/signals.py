@@ -44,13 +44,13 @@ def step_times(steps: int, time_step: Numbers, start: Trajectory | MotionState |
     return clock.moment(torch.arange(steps + 1, dtype=torch.float64), 0.0, time_step)
 
 
-def held(values: Any, steps: int) -> torch.Tensor:
+def zero_order_hold(values: Any, steps: int) -> torch.Tensor:
     """A value a step, (steps, 3) T, from fewer: each is held equally long, to within one step.
 
     values: (k, 3) T, k <= steps. Bounds of the values are bounds of the field.
 
     >>> import magshell as ms
-    >>> ms.control.held([(1e-3, 0, 0), (2e-3, 0, 0)], steps=4)[:, 0]
+    >>> ms.control.zero_order_hold([(1e-3, 0, 0), (2e-3, 0, 0)], steps=4)[:, 0]
     tensor([0.0010, 0.0010, 0.0020, 0.0020], dtype=torch.float64)
     """
     values = tensor("values", "T", values, ("k", 3))
@@ -96,7 +96,7 @@ def fourier(
 
     times: (n,) or one, s. angular_frequencies w: (J,) rad/s. cosine_amplitudes alpha, sine_amplitudes beta: (J, 3) T.
     mean: (3,) T. Frequencies are numbers far larger than fields: tell the optimizer the scale of each. Bounds of the
-    parameters do not bound the field tightly; `field_cap` does.
+    parameters do not bound the field tightly; `field_limit` does.
 
     >>> import magshell as ms
     >>> import numpy as np

@@ -15,7 +15,7 @@ from ..._input.scalars import flag, not_negative
 from ..._input.tensors import require_torch
 from ..._runtime.frozen import immutable
 from ...errors import Interrupted
-from ..minimum import Minimum
+from ..minimum import MinimizeResult
 from ._search import check_functions, given_controls, row_bound, search_rows
 
 if TYPE_CHECKING:
@@ -36,11 +36,11 @@ class Window:
 @immutable
 @dataclass(frozen=True)
 class Windows:
-    """What `in_windows` found. controls: (steps, ...), a tensor. searches: [(Window, Minimum)], in their order; failures:
+    """What `time_windows` found. controls: (steps, ...), a tensor. searches: [(Window, Minimum)], in their order; failures:
     [(Window, why)], of those whose search ended early, which left what was best until then."""
 
     controls: object
-    searches: Sequence[tuple[Window, Minimum]] = field(repr=False)
+    searches: Sequence[tuple[Window, MinimizeResult]] = field(repr=False)
     failures: Sequence[tuple[Window, str]] = ()
 
     @property
@@ -49,7 +49,7 @@ class Windows:
         return sum(found.history[-1].evaluations for _, found in self.searches)
 
 
-def in_windows(
+def time_windows(
     objective: Callable[..., Any],
     controls: Numbers,
     *,
@@ -90,17 +90,17 @@ def in_windows(
     >>> import torch, magshell as ms
     >>> def miss(push, window):  # a mass on ice is to be a meter away at the end of every window
     ...     return (push.cumsum(0).sum() / window.steps - 1) ** 2
-    >>> found = ms.control.in_windows(miss, torch.zeros(8, dtype=torch.float64), lengths=(2, 4, 8), progress=False)
+    >>> found = ms.control.time_windows(miss, torch.zeros(8, dtype=torch.float64), lengths=(2, 4, 8), progress=False)
     >>> len(found.searches), bool(found.searches[-1][1].objective < 1e-6)
     (3, True)
     """
-    torch, now = require_torch("control.in_windows"), given_controls(controls)
+    torch, now = require_torch("control.time_windows"), given_controls(controls)
     windows = _windows(len(now), lengths, smoothings, depth)
     low, high = row_bound("lower", lower, now), row_bound("upper", upper, now)
     check_functions(objective=objective, **({} if optimizer is None else {"optimizer": optimizer}))
     count("max_iterations", max_iterations)
     tolerance, hold = not_negative("tolerance", "", tolerance), flag("hold", hold)
-    searches: Sequence[tuple[Window, Minimum]] = []
+    searches: Sequence[tuple[Window, MinimizeResult]] = []
     failures: list[tuple[Window, str]] = []
     reached = windows[0].steps
     for window in windows:

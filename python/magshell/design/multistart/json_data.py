@@ -14,10 +14,12 @@ from ..._runtime.frozen import FixedDict
 from ...solve.dynamics.obstacle_paths import ReadPath
 from ...solve.dynamics.trajectory import MotionState
 from ...solve.options import SDIRK2, SDIRK3, TRBDF2, Clock, ImplicitEuler, ProjectiveDynamics
-from ..minimum import Minimum, Record
+from ..minimum import MinimizeResult, Record
 
 _INTEGRATORS = (ImplicitEuler, TRBDF2, SDIRK2, SDIRK3, ProjectiveDynamics)
-_RECORDS = {each.__name__: each for each in (Minimum, Record, MotionState, Clock, ReadPath, *_INTEGRATORS)}
+_RECORDS = {
+    each.__name__: each for each in (MinimizeResult, Record, MotionState, Clock, ReadPath, *_INTEGRATORS)
+}
 _ADVICE = "return numbers, arrays and tensors, such as (minimum, equilibrium.positions)"
 
 

@@ -18,11 +18,11 @@ from ..._input.tensors import is_tensor
 from ..._runtime.log import log
 from ..._runtime.progress import progress_bar
 from ...errors import Interrupted, MultistartFailed
-from ..minimum import Minimum, effort
+from ..minimum import MinimizeResult, effort
 from .run_start import CallOff, Outcome, attempt_packed, attempt_sent, failure, this_process
 from .serialization import packed, refuse_while_importing
 from .start_files import StartFiles
-from .starts import FailedStart, FinishedStart, Multistart
+from .starts import FailedStart, FinishedStart, MultistartResult
 from .worker_processes import WorkerDied, WorkerProcesses
 
 
@@ -37,10 +37,10 @@ def multistart(
     checkpoint: str | Path | None = None,
     resume: bool = False,
     progress: bool = True,
-) -> Multistart:
+) -> MultistartResult:
     """Calls run(start) for every start, several at a time, and orders what they return: the best one first.
 
-    run: returns an ms.Minimum (or anything with an `objective`), a number, or a tuple that begins with one of these
+    run: returns an ms.MinimizeResult (or anything with an `objective`), a number, or a tuple that begins with one of these
         and holds whatever else is to be kept, such as (minimum, equilibrium.positions). It gets a copy of its start.
         Make the scene inside, or hand it in with functools.partial: meshes, shells, fields and scenes pickle.
     starts: arrays, tensors or anything else that pickles; `ms.random_starts` makes some. A run that draws random
@@ -49,9 +49,9 @@ def multistart(
         default processes are made here, and ended: `workers` of them, one for each processor.
     attempts: how often a start is begun whose process, made here, dies; then it counts as failed. Other executors
         have rules of their own.
-    feasibility: how far a Minimum may break its constraints and still come before all that break theirs by more.
+    feasibility: how far a MinimizeResult may break its constraints and still come before all that break theirs by more.
     checkpoint: a folder that gets a file for every start that has finished. The files hold data only: run must return
-        numbers, arrays, tensors, ms.Minimum, or containers of these, and reading them runs nothing.
+        numbers, arrays, tensors, ms.MinimizeResult, or containers of these, and reading them runs nothing.
     resume: take from it what is there, and run the rest and what failed. What is taken is told by the bar, by the result
         and by its `resumed`. Another start under the same number is refused, and so is a run that is another one: by its
         name, its code, the arguments bound to it, what it holds, and what it looks up in its module and in others that
@@ -61,7 +61,7 @@ def multistart(
     Every start has one thread, magshell's, torch's and in processes made here the BLAS's too, so that results are the
     same bits on any executor and any number of workers. An error in one start is kept in `failed`, and the others go
     on. Ctrl-C raises `ms.Interrupted`, and an executor that breaks, or no start that finishes, `ms.MultistartFailed`:
-    both hold what has finished, a Multistart, in `last_good`.
+    both hold what has finished, a MultistartResult, in `last_good`.
 
     A script calls this under `if __name__ == "__main__":`, as its processes import the script. In a notebook
     cloudpickle must be installed, or `run` come from a module.
@@ -160,7 +160,7 @@ class _State:
         if self._files and not outcome.failed:
             self._files.write(number, outcome)
 
-    def result(self) -> Multistart:
+    def result(self) -> MultistartResult:
         finished, failed = [], []
         for number, outcome in sorted(self.outcomes.items()):
             start, seconds = self.starts[number], outcome.seconds
@@ -172,7 +172,7 @@ class _State:
                 finished.append(FinishedStart(number, start, *values, seconds))
         finished.sort(key=self._rank)
         seconds = time.perf_counter() - self._began
-        return Multistart(tuple(finished), tuple(failed), tuple(self.unfinished), seconds, self.resumed)
+        return MultistartResult(tuple(finished), tuple(failed), tuple(self.unfinished), seconds, self.resumed)
 
     def _rank(self, found: FinishedStart) -> tuple[float, float]:
         """Feasible designs by their objective, before all others by how far they are from it."""
@@ -186,7 +186,7 @@ class _State:
     def summary(self) -> str:
         found = self.result()
         best = f"best {found.best.objective:.6g}" if found else ""
-        done = effort(each.result for each in found if isinstance(each.result, Minimum))
+        done = effort(each.result for each in found if isinstance(each.result, MinimizeResult))
         failed = f"{len(found.failed)} failed" if found.failed else ""
         resumed = f"{len(self.resumed)} from {self._files.folder}" if self.resumed else ""
         return ", ".join(filter(None, (best, done, failed, resumed)))
@@ -221,7 +221,7 @@ def _in_words(error: Exception) -> str:
     return f"{type(error).__name__}: {error}"
 
 
-def _unless_all_failed(found: Multistart) -> Multistart:
+def _unless_all_failed(found: MultistartResult) -> MultistartResult:
     if found.finished:
         return found
     first = found.failed[0]

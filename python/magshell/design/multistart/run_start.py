@@ -106,7 +106,7 @@ def _dumps(value) -> bytes:
 
 def _cannot_be_sent(outcome: Outcome, error: Exception) -> Outcome:
     return Outcome(
-        error=f"what run returned cannot be pickled ({error}): return an ms.Minimum, or numbers and arrays, such as "
+        error=f"what run returned cannot be pickled ({error}): return an ms.MinimizeResult, or numbers and arrays, such as "
         "(objective, equilibrium.positions)",
         seconds=outcome.seconds,
     )
@@ -129,7 +129,7 @@ def _objective(result) -> tuple[float, float]:
         objective = float(real_numbers("the objective", detached(value)))
     except (TypeError, ValueError):
         raise TypeError(
-            "run must return something with an `objective` (an ms.Minimum), a number, or a tuple that begins "
+            "run must return something with an `objective` (an ms.MinimizeResult), a number, or a tuple that begins "
             f"with one of these; it returned {result!r:.80}"
         ) from None
     if math.isnan(objective):

@@ -47,7 +47,7 @@ class FailedStart:
 
 @immutable
 @dataclass(frozen=True, eq=False, repr=False)
-class Multistart(Sequence[Any]):
+class MultistartResult(Sequence[Any]):
     """The finished starts as a sequence, best first. failed: FailedStarts, by number. unfinished: numbers of the starts
     that an interruption left. seconds: in all. resumed: numbers of the starts whose results came from the checkpoint."""
 

@@ -25,7 +25,7 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
     not call backward. What it says of the design that a step ends at is kept for the next step; another closure
     object, or parameters that were changed in between, make the next step ask again.
 
-    A closure may raise `ms.DesignRejected`: the step then goes less far, up to `max_shortenings` times, before the
+    A closure may raise `ms.DesignRejected`: the step then goes less far, up to `max_backtracks` times, before the
     last rejection comes through. A step that raises leaves parameters and state as they were.
     """
 
@@ -33,15 +33,15 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
         "_run",
         "_sample",
         "_sample_x",
-        "max_shortenings",
+        "max_backtracks",
     )  # what a copy takes along, beyond torch's own
 
     standstill = STANDSTILL  # what it means when a step moves nothing
 
-    def __init__(self, params: Iterable[Any], defaults: dict[Any, Any], max_shortenings: int):
-        if not (isinstance(max_shortenings, int) and max_shortenings >= 0):
-            raise ValueError(f"max_shortenings must be an integer, 0 or more, got {max_shortenings!r}")
-        self.max_shortenings = max_shortenings
+    def __init__(self, params: Iterable[Any], defaults: dict[Any, Any], max_backtracks: int):
+        if not (isinstance(max_backtracks, int) and max_backtracks >= 0):
+            raise ValueError(f"max_backtracks must be an integer, 0 or more, got {max_backtracks!r}")
+        self.max_backtracks = max_backtracks
         self._run: dict[Any, Any] = {}
         Iterate.__init__(self)
         torch.optim.Optimizer.__init__(self, listed("params", params, is_tensor), defaults)

@@ -25,7 +25,7 @@ class GCMMA(MMA):
 
     K. Svanberg, A class of globally convergent optimization methods ..., SIAM J. Optim. 12 (2002).
 
-    params, lower, upper, scale, move, asymptote_initial, penalty, max_shortenings and the rest: as in `optim.MMA`.
+    params, lower, upper, scale, move, asymptote_initial, penalty, max_backtracks and the rest: as in `optim.MMA`.
 
     >>> import torch, magshell as ms
     >>> x = torch.zeros(3, dtype=torch.float64, requires_grad=True)
@@ -42,12 +42,12 @@ class GCMMA(MMA):
         steepest = np.abs(around.slopes).max(axis=1, initial=0.0)
         approximation, t = around.step(convexity, self.penalty)
         rejected = 0
-        for _ in range(_INNER_LIMIT + self.max_shortenings):
+        for _ in range(_INNER_LIMIT + self.max_backtracks):
             try:
                 reached, trial = self._trial(box.moved(x, t * around.scale))
             except DesignRejected:
                 rejected += 1
-                if rejected > self.max_shortenings:
+                if rejected > self.max_backtracks:
                     raise
                 longest = 0.5 * np.abs(t).max()
                 while np.abs(t).max() > longest:

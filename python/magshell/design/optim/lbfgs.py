@@ -37,7 +37,7 @@ class LBFGS(BoxOptimizer):
     where an objective is dear and known only nearby, 0.1 is safer.
     max_evaluations: of the closure in one line search; the lowest design of a search cut short is taken. Where each is dear
     and the objective kinked, as of a sheet near a snap, 5 will do.
-    max_shortenings: how often a line search may meet a design that the closure rejects; it counts as higher than any.
+    max_backtracks: how often a line search may meet a design that the closure rejects; it counts as higher than any.
 
     R. H. Byrd, P. Lu, J. Nocedal, C. Zhu, A limited memory algorithm for bound constrained optimization,
     SIAM J. Sci. Comput. 16 (1995).
@@ -67,7 +67,7 @@ class LBFGS(BoxOptimizer):
         memory: int = 10,
         first_step: float = 1.0,
         max_evaluations: int = 20,
-        max_shortenings: int = 6,
+        max_backtracks: int = 6,
     ):
         for name, count in (("memory", memory), ("max_evaluations", max_evaluations)):
             if isinstance(count, bool) or not (isinstance(count, int) and count > 0):
@@ -75,7 +75,7 @@ class LBFGS(BoxOptimizer):
         if not (isinstance(first_step, int | float) and 0 < first_step < math.inf):
             raise ValueError(f"first_step must be a positive number, got {first_step!r}")
         self.memory, self.first_step, self.max_evaluations = memory, float(first_step), max_evaluations
-        super().__init__(params, {"lower": lower, "upper": upper, "scale": scale}, max_shortenings)
+        super().__init__(params, {"lower": lower, "upper": upper, "scale": scale}, max_backtracks)
 
     def _check_sample(self, sample: Sample) -> None:
         if len(sample.constraints):
@@ -143,11 +143,11 @@ class LBFGS(BoxOptimizer):
             return Probe(length, sample.objective, slope, (moved, sample))
 
         start = Probe(0.0, objective, line.slope)
-        limits = {"limit": self.max_evaluations - 1, "max_rejected": self.max_shortenings}  # beside the first
+        limits = {"limit": self.max_evaluations - 1, "max_rejected": self.max_backtracks}  # beside the first
         best = strong_wolfe(probe, start, 1.0, line.longest, **limits)
         if best is not None:
             return best.found
-        if len(rejections) > self.max_shortenings:
+        if len(rejections) > self.max_backtracks:
             raise rejections[-1]
         if probes == self.max_evaluations:
             self.standstill: str = (

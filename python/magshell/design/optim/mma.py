@@ -33,7 +33,7 @@ class MMA(BoxOptimizer):
     asymptote_shrink, asymptote_grow: its factors after an oscillation and after progress.
     penalty: the price of breaking a constraint by as much as its slope would change it over a size, in units of the
     same change of the objective; only a design that cannot keep its constraints pays it.
-    max_shortenings: how often a step to a design that the closure rejects is halved.
+    max_backtracks: how often a step to a design that the closure rejects is halved.
 
     Every option but the last two can differ between parameter groups. K. Svanberg, The method of moving asymptotes,
     Int. J. Numer. Meth. Eng. 24 (1987), with the asymptotes and the subproblem as in his notes of 2007.
@@ -64,7 +64,7 @@ class MMA(BoxOptimizer):
         asymptote_shrink: float = 0.7,
         asymptote_grow: float = 1.2,
         penalty: float = 1000.0,
-        max_shortenings: int = 6,
+        max_backtracks: int = 6,
     ):
         self.penalty: float = positive("penalty", "", penalty)
         super().__init__(
@@ -78,18 +78,18 @@ class MMA(BoxOptimizer):
                 "asymptote_shrink": asymptote_shrink,
                 "asymptote_grow": asymptote_grow,
             },
-            max_shortenings,
+            max_backtracks,
         )
 
     def _advance(self, sample: Sample, box: Box, x: np.ndarray) -> None:
         around, distance = self._surroundings(sample, box, x)
         _, t = around.step(self._first_convexity(around), self.penalty)
-        for shortening in range(self.max_shortenings + 1):
+        for shortening in range(self.max_backtracks + 1):
             share = 0.5**shortening
             try:
                 reached, trial = self._trial(box.moved(x, share * t * around.scale))
             except DesignRejected:
-                if shortening == self.max_shortenings:
+                if shortening == self.max_backtracks:
                     raise
             else:
                 self._commit(x, reached, trial.differentiate(), distance, around.size)

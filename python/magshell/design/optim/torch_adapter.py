@@ -20,17 +20,17 @@ class AnyTorch(Iterate):
 
     Each step gets a closure, which answers from the kept sample where the design is known; an optimizer whose step
     takes none finds the parameters' gradients. No constraints, no bounds. A step that leads to a rejected design, or
-    meets one on its way, is taken back and again with half the learning rate, up to `max_shortenings` times; a line
+    meets one on its way, is taken back and again with half the learning rate, up to `max_backtracks` times; a line
     search of torch's own, which extends steps, may meet it again each time. A step that raises leaves parameters and
     the optimizer's state as they were.
     """
 
-    max_shortenings: int
+    max_backtracks: int
     optimizer: Any
 
-    def __init__(self, optimizer: torch.optim.Optimizer, max_shortenings: int = 6):
+    def __init__(self, optimizer: torch.optim.Optimizer, max_backtracks: int = 6):
         super().__init__()
-        self.optimizer, self.max_shortenings = optimizer, max_shortenings
+        self.optimizer, self.max_backtracks = optimizer, max_backtracks
         self._takes_closure = bool(inspect.signature(optimizer.step).parameters)
         for parameter in self.parameters:
             check_parameter(parameter)
@@ -41,11 +41,11 @@ class AnyTorch(Iterate):
 
     def step(self, closure: Callable[..., Any]) -> float:
         """Moves the parameters and returns the objective there."""
-        for shortening in range(self.max_shortenings + 1):
+        for shortening in range(self.max_backtracks + 1):
             try:
                 return self._step(closure, share=0.5**shortening)
             except DesignRejected:
-                if shortening == self.max_shortenings:
+                if shortening == self.max_backtracks:
                     raise
 
     def leap(self, closure: Callable[..., Any]) -> float:
@@ -61,7 +61,7 @@ class AnyTorch(Iterate):
 
     def configuration(self) -> dict[Any, Any]:
         """{name: value} of the groups' options."""
-        return {"max_shortenings": self.max_shortenings, **group_options(self.param_groups, set())}
+        return {"max_backtracks": self.max_backtracks, **group_options(self.param_groups, set())}
 
     def _step(self, closure: Callable[..., Any], share: float) -> float:
         begin = self.evaluate(closure)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..triangles.six_node_mesh import SixNodeMesh
+from ..triangles.six_node_mesh import QuadraticTriangleMesh
 from ..triangles.triangle_mesh import TriangleMesh
 
 
@@ -22,7 +22,7 @@ def sheet_of_order(
 ) -> TriangleMesh | Any:
     """The mesh with elements of this order. place: (n, 3) m -> (n, 3) m, from middles of edges onto the surface."""
     check_order(order)
-    return mesh if order == 1 else SixNodeMesh.of(mesh, place)
+    return mesh if order == 1 else QuadraticTriangleMesh.of(mesh, place)
 
 
 def round_sheet(mesh: TriangleMesh, order: int, axes: tuple[int, ...]) -> TriangleMesh | Any:

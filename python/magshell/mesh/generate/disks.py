@@ -17,7 +17,7 @@ from ._six_nodes import round_sheet
 def disk(radius: float, cells: int, *, order: int = 1) -> TriangleMesh | Any:
     """The disk of the given radius [m] around the origin in the plane z = 0, its normal along +z.
 
-    order: 1 for three nodes a face; 2 for a SixNodeMesh, whose edges on its rims are arcs.
+    order: 1 for three nodes a face; 2 for a QuadraticTriangleMesh, whose edges on its rims are arcs.
 
     Ring k of `cells` rings holds 6 k vertices, so all faces are nearly equilateral: 6 cells^2 of them.
 

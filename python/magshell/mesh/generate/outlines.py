@@ -46,7 +46,7 @@ def outline(
         slits: polylines (n, 2), m, cut through the sheet: both sides get vertices of their own. Slits may
             cross and may end on the boundary; an end inside the sheet stays joined. One, or a list.
         size: the longest edge to aim for, m. Short sides of the polygons make the mesh finer around them.
-        order: 1 for three nodes a face; 2 for a SixNodeMesh, whose `elements` the same triangles are.
+        order: 1 for three nodes a face; 2 for a QuadraticTriangleMesh, whose `elements` the same triangles are.
 
     Raises:
         ValueError: for polygons that intersect themselves or each other, holes or slits outside of the sheet,

@@ -32,7 +32,7 @@ def rectangle(
         diagonals: "alternating", "aligned" (all from the origin outwards) or "crossed" (four faces a cell).
         irregular: moves interior vertices at random by up to this fraction of their spacing, at most 0.25.
         seed: of these moves; the same seed gives the same mesh.
-        order: 1 for three nodes a face; 2 for a SixNodeMesh, whose `elements` the same triangles are.
+        order: 1 for three nodes a face; 2 for a QuadraticTriangleMesh, whose `elements` the same triangles are.
 
     >>> rectangle(0.12, 0.02, cells=(60, 10)).n_faces
     1200

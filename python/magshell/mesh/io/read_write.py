@@ -17,7 +17,7 @@ from ..._runtime.files import replacing
 from ..._runtime.solver_entry_point import grouped
 from ..selection import RELATIVE_TOLERANCE
 from ..tetrahedra.tet_mesh import TetMesh
-from ..triangles.six_node_mesh import SixNodeMesh
+from ..triangles.six_node_mesh import QuadraticTriangleMesh
 from ..triangles.triangle_mesh import TriangleMesh, checked_mesh
 from .file_counts import check_counts
 from .obj import read_obj
@@ -45,7 +45,7 @@ class Fields(NamedTuple):
 @grouped()
 def read_mesh(path: FilePath, drop_unused: bool = False, unit: str = "m") -> TriangleMesh | Any:
     """The mesh in an OBJ, PLY, STL, VTU or gmsh MSH file (the last three need the extra `io`): a TetMesh where a VTU or
-    MSH file holds tetrahedra, a SixNodeMesh where it holds triangles of six points (gmsh's second order), else a
+    MSH file holds tetrahedra, a QuadraticTriangleMesh where it holds triangles of six points (gmsh's second order), else a
     TriangleMesh.
 
     No format has a word for the unit, and CAD programs write mm: say so by `unit`. Points in the plane get z = 0. An
@@ -95,7 +95,7 @@ def read_fields(path: FilePath, drop_unused: bool = False) -> Fields | TetFields
 
 def write_mesh(
     path: FilePath,
-    mesh: TriangleMesh | SixNodeMesh | TetMesh,
+    mesh: TriangleMesh | QuadraticTriangleMesh | TetMesh,
     positions: Numbers | None = None,
     vertex_fields: Mapping[str, Numbers] | None = None,
     face_fields: Mapping[str, Numbers] | None = None,
@@ -106,7 +106,7 @@ def write_mesh(
     Args:
         path: ends in .vtu or .ply.
         mesh: gives the faces, or the tetrahedra: their parts are written as the field `part`, without names. Fields on a
-            solid's faces go to a file of its `surface`. Of a SixNodeMesh the curved elements are written, and what
+            solid's faces go to a file of its `surface`. Of a QuadraticTriangleMesh the curved elements are written, and what
             `face_fields` says of them; fields on its flat faces go to a file of its `surface` too.
         positions: (n_v, 3), m, instead of the rest positions.
         vertex_fields: name -> (n_v,) or (n_v, k).
@@ -129,7 +129,7 @@ def write_mesh(
     if ending not in _WRITERS:
         other = "; write_surface writes .stl and .obj" if ending in (".stl", ".obj") else ""
         raise ValueError(f"cannot write {path.name!r}: the ending must be {' or '.join(_WRITERS)}{other}")
-    solid, six = isinstance(mesh, TetMesh), isinstance(mesh, SixNodeMesh)
+    solid, six = isinstance(mesh, TetMesh), isinstance(mesh, QuadraticTriangleMesh)
     if not (solid or six or isinstance(mesh, TriangleMesh)) and hasattr(mesh, "surface"):
         raise ValueError(
             "mesh is that of several bodies, some of tetrahedra: write_series writes a result of all of them, and of one "
@@ -180,7 +180,9 @@ def _refuse_misplaced(solid: bool, ending: str, face_fields, tetrahedron_fields)
         raise ValueError("tetrahedron_fields: a TriangleMesh has no tetrahedra")
 
 
-def _read(path, drop_unused: bool) -> tuple[TriangleMesh | SixNodeMesh, Fields] | tuple[TetMesh, TetFields]:
+def _read(
+    path, drop_unused: bool
+) -> tuple[TriangleMesh | QuadraticTriangleMesh, Fields] | tuple[TetMesh, TetFields]:
     path = Path(path)
     ending = path.suffix.lower()
     if ending not in _READABLE:
@@ -207,7 +209,7 @@ def _read(path, drop_unused: bool) -> tuple[TriangleMesh | SixNodeMesh, Fields] 
 
     points, faces, vertex_fields = _used(path, "triangle", points, faces, vertex_fields, drop_unused)
     try:
-        mesh = (TriangleMesh if faces.shape[1] == 3 else SixNodeMesh)(points, faces)
+        mesh = (TriangleMesh if faces.shape[1] == 3 else QuadraticTriangleMesh)(points, faces)
     except ValueError as error:
         raise ValueError(f"{str(path)!r}: {error}") from error
     return mesh, Fields(vertex_fields, face_fields)

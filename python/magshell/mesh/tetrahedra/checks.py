@@ -12,7 +12,7 @@ from .jacobian import bent, jacobians, not_positive, straight_volumes
 
 # Six volumes over the longest edge cubed is 0.71 for a regular tetrahedron. Below this, round-off decides the sign.
 DEGENERATE = 1e-10
-_MEND = "TetMesh.mended(...) mends this, and says what it did"
+_MEND = "TetMesh.repaired(...) mends this, and says what it did"
 _GMSH_ORDER = [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]
 
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @immutable
 @dataclass(frozen=True)
-class MendReport:
+class RepairReport:
     """How many of each: merged, turned and dropped."""
 
     vertices_merged: int
@@ -50,7 +50,7 @@ class Mended(NamedTuple):
     mesh: Any
     vertex_map: np.ndarray
     tetrahedron_map: np.ndarray
-    report: MendReport
+    report: RepairReport
 
 
 def mended(
@@ -91,7 +91,7 @@ def mended(
     mesh = kind(positions[used], number[nodes], parts[kept], part_names)
     unused = len(np.unique(target)) - len(used)
     return Mended(
-        mesh, number[target], tetrahedron_map, MendReport(merged, collapsed, turned, len(repeats), unused)
+        mesh, number[target], tetrahedron_map, RepairReport(merged, collapsed, turned, len(repeats), unused)
     )
 
 

@@ -58,7 +58,7 @@ class TetMesh(TetSelection):
     Raises:
         ValueError: naming the first offenders: coordinates that are not finite, indices out of range, degenerate,
             inverted or doubled tetrahedra, faces of more than two, vertices that belong to none, a surface that touches
-            itself in an edge or a vertex, ten nodes between which the Jacobian is not positive. `TetMesh.mended` mends
+            itself in an edge or a vertex, ten nodes between which the Jacobian is not positive. `TetMesh.repaired` mends
             what can be, and says what it did.
 
     `faces` are the triangles of the surface, outwards, in the numbers of this mesh's vertices: one for each face of four-
@@ -117,7 +117,7 @@ class TetMesh(TetSelection):
         )
 
     @classmethod
-    def mended(
+    def repaired(
         cls,
         rest_positions: Numbers,
         tetrahedra: Numbers,
@@ -136,7 +136,7 @@ class TetMesh(TetSelection):
 
         >>> import magshell as ms
         >>> cube = ms.meshes.box((1, 1, 1), cells=(1, 1, 1))
-        >>> mended = TetMesh.mended(cube.rest_positions, cube.tetrahedra[:, [1, 0, 2, 3]])
+        >>> mended = TetMesh.repaired(cube.rest_positions, cube.tetrahedra[:, [1, 0, 2, 3]])
         >>> print(mended.report)
         6 tetrahedra turned
         """

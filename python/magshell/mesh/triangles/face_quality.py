@@ -11,7 +11,7 @@ from ..._runtime.frozen import Frozen
 from ..mesh_base import frozen
 
 if TYPE_CHECKING:
-    from .six_node_mesh import SixNodeMesh
+    from .six_node_mesh import QuadraticTriangleMesh
     from .triangle_mesh import TriangleMesh
 
 
@@ -29,7 +29,7 @@ class MeshQuality(Frozen):
       largest angles: 90.0 deg (face 0), 90.0 deg (face 1), 90.0 deg (face 2)
     """
 
-    def __init__(self, mesh: TriangleMesh | SixNodeMesh, thickness: np.ndarray | None = None):
+    def __init__(self, mesh: TriangleMesh | QuadraticTriangleMesh, thickness: np.ndarray | None = None):
         self._mesh = mesh
         self.thickness = thickness
 

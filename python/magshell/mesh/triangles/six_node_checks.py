@@ -9,7 +9,7 @@ import numpy as np
 from ..topology import FLAT
 
 if TYPE_CHECKING:
-    from .six_node_mesh import SixNodeMesh
+    from .six_node_mesh import QuadraticTriangleMesh
 
 
 _NODES = np.array(
@@ -152,7 +152,7 @@ _INNER = [(3, 4), (4, 5), (5, 3)]  # nodes of an element between which edges ins
 _PARAMETERS = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5)])
 
 
-def divided(mesh: SixNodeMesh) -> tuple[np.ndarray, np.ndarray]:
+def divided(mesh: QuadraticTriangleMesh) -> tuple[np.ndarray, np.ndarray]:
     """Positions of the new nodes (2 n_e + 3 n, 3), and the elements (4 n, 6): of element k those at its corners, then the
     one between its middle nodes. Edge k gets two nodes, the first nearer to its first end; then each element gets three."""
     n_v, n_e, elements = mesh.n_vertices, mesh.n_edges, mesh.elements

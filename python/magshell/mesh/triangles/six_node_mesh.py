@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 _MIRRORED = [0, 2, 1, 5, 4, 3]
 
 
-class SixNodeMesh(MeshBase):
+class QuadraticTriangleMesh(MeshBase):
     """An oriented manifold mesh of triangles of six nodes, which may be curved, with or without boundary. Immutable.
 
     Args:
@@ -76,7 +76,9 @@ class SixNodeMesh(MeshBase):
         self._elements = frozen(nodes.astype(np.int32))
 
     @classmethod
-    def of(cls, mesh: TriangleMesh, place: Callable[[np.ndarray], np.ndarray] | None = None) -> SixNodeMesh:
+    def of(
+        cls, mesh: TriangleMesh, place: Callable[[np.ndarray], np.ndarray] | None = None
+    ) -> QuadraticTriangleMesh:
         """The mesh with six nodes of one with three: vertices keep their numbers, edge k gets node n_v + k.
 
         place: where the surface is: it takes the middles of all edges, (n_e, 3) m, to the points of the surface that are
@@ -87,7 +89,7 @@ class SixNodeMesh(MeshBase):
         >>> coarse = ms.meshes.cylinder(1.0, 1.0, angle=1.0, cells=(4, 4))
         >>> def outwards(x):
         ...     return x * [1, 0, 1] / np.linalg.norm(x[:, [0, 2]], axis=1, keepdims=True) + x * [0, 1, 0]
-        >>> curved = ms.SixNodeMesh.of(coarse, place=outwards)
+        >>> curved = ms.QuadraticTriangleMesh.of(coarse, place=outwards)
         >>> bool(abs(curved.element_areas.sum() - 1.0) < 1e-4)
         True
         """
@@ -101,7 +103,7 @@ class SixNodeMesh(MeshBase):
         )
 
     @classmethod
-    def fitted(cls, mesh: TriangleMesh, to: TriangleMesh | None = None) -> SixNodeMesh:
+    def fitted(cls, mesh: TriangleMesh, to: TriangleMesh | None = None) -> QuadraticTriangleMesh:
         """The mesh with six nodes of one with three, its new nodes on a smooth surface through the vertices of a finer one.
 
         For surfaces of which there is a mesh only, from a scan or a program. Around each edge's middle a polynomial of
@@ -116,7 +118,7 @@ class SixNodeMesh(MeshBase):
         >>> import magshell as ms
         >>> fine = ms.meshes.cylinder(1.0, 1.0, angle=1.0, cells=(16, 16))
         >>> coarse = ms.meshes.cylinder(1.0, 1.0, angle=1.0, cells=(4, 4))
-        >>> radii = np.linalg.norm(ms.SixNodeMesh.fitted(coarse, to=fine).rest_positions[:, [0, 2]], axis=1)
+        >>> radii = np.linalg.norm(ms.QuadraticTriangleMesh.fitted(coarse, to=fine).rest_positions[:, [0, 2]], axis=1)
         >>> bool(abs(radii - 1.0).max() < 1e-6)
         True
         """
@@ -128,13 +130,14 @@ class SixNodeMesh(MeshBase):
     def __reduce__(
         self,
     ) -> tuple[Any, ...]:  # copies and worker processes rebuild the connectivity, which is cheap
-        return SixNodeMesh, (self.rest_positions, self.elements)
+        return QuadraticTriangleMesh, (self.rest_positions, self.elements)
 
     def __repr__(self) -> str:
         extent = " x ".join(f"{length:.4g}" for length in np.ptp(self.rest_positions, axis=0))
         parts = "1 part" if self.n_components == 1 else f"{self.n_components} parts"
         return (
-            f"SixNodeMesh: {self.n_vertices} vertices, {self.n_elements} elements of six nodes, {self.n_edges} edges\n"
+            f"QuadraticTriangleMesh: {self.n_vertices} vertices, {self.n_elements} elements of six nodes, "
+            f"{self.n_edges} edges\n"
             f"  size: {extent} m, area {self.element_areas.sum():.4g} m2\n"
             f"  shape: {parts}, {len(self.boundary_edges)} edges on the boundary\n"
             f"  elements: edges {self.edge_lengths.min():.3g} to {self.edge_lengths.max():.3g} m"
@@ -302,7 +305,7 @@ class SixNodeMesh(MeshBase):
         """The flat mesh of the corners alone, numbered as they come: `corners`."""
         return self._corners
 
-    def refined(self, place: Callable[[np.ndarray], np.ndarray] | None = None) -> SixNodeMesh:
+    def refined(self, place: Callable[[np.ndarray], np.ndarray] | None = None) -> QuadraticTriangleMesh:
         """Each element divided into four, 4 k to 4 k + 3, in the order of `faces`: on the same curved surface.
 
         Vertices keep their numbers, those on edges become corners, and new ones come after. place: where the surface is, if
@@ -311,19 +314,21 @@ class SixNodeMesh(MeshBase):
         new, elements = divided(self)
         if place is not None:
             new = _placed("place(nodes)", "m", place, new)
-        return SixNodeMesh(np.concatenate([self.rest_positions, new]), elements)
+        return QuadraticTriangleMesh(np.concatenate([self.rest_positions, new]), elements)
 
-    def flipped(self) -> SixNodeMesh:
+    def flipped(self) -> QuadraticTriangleMesh:
         """The same surface with its normals on the other side; elements and vertices keep their numbers."""
-        return SixNodeMesh(self.rest_positions, self.elements[:, _MIRRORED])
+        return QuadraticTriangleMesh(self.rest_positions, self.elements[:, _MIRRORED])
 
-    def transformed(self, rotation: Rotates | None = None, translation: Numbers | None = None) -> SixNodeMesh:
+    def transformed(
+        self, rotation: Rotates | None = None, translation: Numbers | None = None
+    ) -> QuadraticTriangleMesh:
         """The mesh moved by x -> rotation x + translation, as a TriangleMesh is."""
-        return SixNodeMesh(moved(self.rest_positions, rotation, translation), self.elements)
+        return QuadraticTriangleMesh(moved(self.rest_positions, rotation, translation), self.elements)
 
-    def scaled(self, factor: float) -> SixNodeMesh:
+    def scaled(self, factor: float) -> QuadraticTriangleMesh:
         """The mesh with all coordinates multiplied by a positive factor."""
-        return SixNodeMesh(self.rest_positions * positive("factor", "", factor), self.elements)
+        return QuadraticTriangleMesh(self.rest_positions * positive("factor", "", factor), self.elements)
 
 
 def _placed(

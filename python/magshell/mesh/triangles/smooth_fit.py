@@ -44,7 +44,8 @@ class SmoothSurface:
             raise ValueError(
                 f"{self._name} folds by {fold:.0f} degrees at its edge {edge}, from vertex {fine.edges[edge][0]} to "
                 f"{fine.edges[edge][1]}: a smooth surface is fitted where faces turn by at most "
-                f"{np.degrees(_SMOOTH):.0f} from one to the next. Take a finer mesh, or SixNodeMesh.of(mesh, place=...)"
+                f"{np.degrees(_SMOOTH):.0f} from one to the next. Take a finer mesh, or "
+                f"QuadraticTriangleMesh.of(mesh, place=...)"
             )
 
     def inside(self, point: np.ndarray, normal: np.ndarray, length: float) -> np.ndarray:

@@ -70,7 +70,7 @@ class TriangleMesh(MeshBase):
 
     @property
     def elements(self) -> np.ndarray:
-        """What has a thickness and a magnetization of its own: here the faces, of a SixNodeMesh its elements."""
+        """What has a thickness and a magnetization of its own: here the faces, of a QuadraticTriangleMesh its elements."""
         return self.faces
 
     @property

@@ -24,7 +24,7 @@ ATMOSPHERE = 101325.0  # Pa
 WATER = 2.2e9  # Pa, its bulk modulus
 _LAWS = {
     "pressure": ("pressure",),
-    "gas": ("filling_pressure", "outside_pressure"),
+    "gas": ("gas_pressure", "outside_pressure"),
     "liquid": ("volume", "bulk_modulus"),
 }
 
@@ -38,14 +38,15 @@ class Cavity(Actuator):
     And what is inside, one of
 
     pressure: Pa, over that outside, whatever the volume is. Negative: suction.
-    filling_pressure: Pa, of a gas at constant temperature, absolute and at the volume at rest: it is the amount of gas,
+    gas_pressure: Pa, of a gas at constant temperature, absolute and at the volume at rest: it is the amount of gas,
         n R T over that volume. 0 is a vacuum.
         outside_pressure: Pa, that of the surroundings, by default one atmosphere.
     volume: m3, of a liquid. Its pressure is what that takes: that of a bulk modulus (Pa, by default water's) and no
         multiplier, so it takes bulk_modulus / pressure digits of what a double has; solves treat it as a constraint.
         A load factor says how much of what is missing at rest is filled in: load steps fill a volume far from that.
 
-    cap_rims: close what is open by lids without stiffness, fans of triangles from one vertex of each rim, flat where the rim
+    close_rims: close what is open by lids without stiffness, fans of triangles from one vertex of each rim,
+        flat where the rim
         is. The pressure on them pulls at the rim.
 
     All of its numbers may change in time, and have gradients. What a result says: `result[cavity].volume` (m3) and
@@ -71,7 +72,7 @@ class Cavity(Actuator):
 
     _units: ClassVar[dict[str, str]] = {
         "pressure": "Pa",
-        "filling_pressure": "Pa",
+        "gas_pressure": "Pa",
         "outside_pressure": "Pa",
         "volume": "m3",
         "bulk_modulus": "Pa",
@@ -83,25 +84,25 @@ class Cavity(Actuator):
         faces: Numbers | None = None,
         *,
         pressure: Numbers | None = None,
-        filling_pressure: Numbers | None = None,
+        gas_pressure: Numbers | None = None,
         outside_pressure: Numbers | None = None,
         volume: Numbers | None = None,
         bulk_modulus: Numbers | None = None,
-        cap_rims: bool = False,
+        close_rims: bool = False,
     ):
         self._parts = _parts(body, faces)
         self.bodies: tuple[Any, ...] = tuple(each for each, _ in self._parts)
-        if not isinstance(cap_rims, bool):
-            raise ValueError(f"cap_rims must be True or False, got {cap_rims!r:.60}")
-        self.cap_rims = cap_rims
-        given = {"pressure": pressure, "filling_pressure": filling_pressure, "volume": volume}
+        if not isinstance(close_rims, bool):
+            raise ValueError(f"close_rims must be True or False, got {close_rims!r:.60}")
+        self.close_rims = close_rims
+        given = {"pressure": pressure, "gas_pressure": gas_pressure, "volume": volume}
         chosen = [name for name, value in given.items() if value is not None]
         if len(chosen) != 1:
             raise ValueError(
-                "a Cavity takes one of pressure [Pa], filling_pressure [Pa] (a gas) and volume [m3] (a liquid), got "
+                "a Cavity takes one of pressure [Pa], gas_pressure [Pa] (a gas) and volume [m3] (a liquid), got "
                 + (" and ".join(chosen) or "none")
             )
-        self.law: str = {"pressure": "pressure", "filling_pressure": "gas", "volume": "liquid"}[chosen[0]]
+        self.law: str = {"pressure": "pressure", "gas_pressure": "gas", "volume": "liquid"}[chosen[0]]
         for name, value, law in (
             ("outside_pressure", outside_pressure, "gas"),
             ("bulk_modulus", bulk_modulus, "liquid"),
@@ -115,7 +116,7 @@ class Cavity(Actuator):
             self.pressure: np.ndarray = number("pressure", "Pa", pressure)
             self._is_spring = False
         elif self.law == "gas":
-            self.filling_pressure: np.ndarray = number("filling_pressure", "Pa", filling_pressure, 0.0)
+            self.gas_pressure: np.ndarray = number("gas_pressure", "Pa", gas_pressure, 0.0)
             outside = ATMOSPHERE if outside_pressure is None else outside_pressure
             self.outside_pressure: np.ndarray = number("outside_pressure", "Pa", outside, 0.0)
         else:
@@ -129,11 +130,13 @@ class Cavity(Actuator):
     def replaced(self, **values: Any) -> Cavity:
         """Returns the same cavity with other numbers of what is inside."""
         now = {name: getattr(self, name) for name in self._replaceable} | values
-        return self._keep_shapes(Cavity(self._parts, cap_rims=self.cap_rims, **now))
+        return self._keep_shapes(Cavity(self._parts, close_rims=self.close_rims, **now))
 
     def surface(self, bodies: Bodies) -> ClosedSurface:
         """In a scene's bodies. Raises ValueError where it is not closed."""
-        return of_faces(bodies, [(body, _chosen(body, faces)) for body, faces in self._parts], self.cap_rims)
+        return of_faces(
+            bodies, [(body, _chosen(body, faces)) for body, faces in self._parts], self.close_rims
+        )
 
     def rest_volume(self, scene: Scene) -> float:
         """m3, in a scene that has it."""
@@ -149,7 +152,7 @@ class Cavity(Actuator):
         if self.law == "pressure":
             return load_factor * self.pressure + 0.0 * volume
         if self.law == "gas":
-            return load_factor * (self.filling_pressure * rest_volume / volume - self.outside_pressure)
+            return load_factor * (self.gas_pressure * rest_volume / volume - self.outside_pressure)
         target = rest_volume + load_factor * (self.volume - rest_volume)
         return -self.bulk_modulus * (volume - target) / rest_volume
 

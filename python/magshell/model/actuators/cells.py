@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _FEW_NODES = 40
 
 
-class Cells(Actuator):
+class PneumaticCells(Actuator):
     """Pneumatic cells of a solid: V K/2 (J - a)^2 each, J the volume of a cell over that at rest, V, and a its target
     ([Qiao21]: "the pneumatic activation can control the volume of a tetrahedron"). It is beside the solid's own energy: a
     cell that wants to be larger is under pressure.
@@ -42,7 +42,7 @@ class Cells(Actuator):
     >>> mesh = ms.meshes.box((1, 1, 1), cells=(2, 2, 2))
     >>> cube = ms.Solid(mesh, material=ms.NeoHookean(young_modulus=1.0, poisson_ratio=0.0), element="linear")
     >>> planes = [ms.SymmetryPlane(normal) for normal in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
-    >>> blown = ms.Cells(cube, stiffness=1e6, volume_ratio=1.125)
+    >>> blown = ms.PneumaticCells(cube, stiffness=1e6, volume_ratio=1.125)
     >>> found = ms.equilibrium(ms.Scene(cube, supports=planes, actuators=[blown]))
     >>> round(float(found.positions[:, 0].max()), 3)  # 1.125^(1/3)
     1.04
@@ -75,10 +75,10 @@ class Cells(Actuator):
         """How many cells there are."""
         return len(self._groups)
 
-    def replaced(self, **values: Any) -> Cells:
+    def replaced(self, **values: Any) -> PneumaticCells:
         """Returns the same cells with other numbers."""
         now = {name: getattr(self, name) for name in self._replaceable} | values
-        return self._keep_shapes(Cells(self.body, self._groups, **now))
+        return self._keep_shapes(PneumaticCells(self.body, self._groups, **now))
 
     def _filling(self, scene: Scene) -> float:
         return float(np.abs(np.asarray(self.volume_ratio) - 1.0).max(initial=0.0))
@@ -107,7 +107,7 @@ class Cells(Actuator):
         return CellsResult(result, self)
 
     def __repr__(self) -> str:
-        return f"Cells({self.count}{on_body(self.body)})"
+        return f"PneumaticCells({self.count}{on_body(self.body)})"
 
 
 def _groups(groups, n_tetrahedra: int) -> list[np.ndarray]:

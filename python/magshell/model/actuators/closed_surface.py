@@ -63,7 +63,7 @@ class ClosedSurface:
 
 
 def of_faces(
-    bodies: Bodies, parts: Sequence[tuple[Shell | Solid, np.ndarray | None]], cap_rims: bool
+    bodies: Bodies, parts: Sequence[tuple[Shell | Solid, np.ndarray | None]], close_rims: bool
 ) -> ClosedSurface:
     """parts: [(body, faces or None)] of a scene's Bodies; the faces of a solid look into the cavity, those of a shell out of
     it.
@@ -81,12 +81,13 @@ def of_faces(
     curved_nodes, curved_weights = np.concatenate(curved), np.concatenate(signs[1])
     rim = _open_edges(triangles, weights, curved_nodes, curved_weights)
     if len(rim):
-        if not cap_rims:
+        if not close_rims:
             named = ", ".join(f"({a}, {b})" for a, b, _ in rim[:_NAMED].tolist())
             more = ", ..." if len(rim) > _NAMED else ""
             raise ValueError(
                 f"the surface of the cavity is not closed: {len(rim)} edges have a face on one side only: {named}{more} "
-                "(vertices of the scene). Choose the faces that are missing, tie the bodies, or say cap_rims=True for flat "
+                "(vertices of the scene). Choose the faces that are missing, tie the bodies, or say "
+                "close_rims=True for flat "
                 "lids over what is open"
             )
         caps, cap_weights = _caps(rim)

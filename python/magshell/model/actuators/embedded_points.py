@@ -8,9 +8,9 @@ import numpy as np
 
 from ...mesh.topology import EDGES, FLAT
 from ...mesh.triangles.six_node_checks import shapes
-from ...mesh.triangles.six_node_mesh import SixNodeMesh
+from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 from ..bodies.bodies import Bodies
-from ..rigid.rigid import Rigid
+from ..rigid.rigid import RigidBody
 from ..solids.solid import Solid
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def riding_points(
     each) and weights, which add up to 1. Raises ValueError where a point lies outside its body."""
     found = []
     for k, (body, point) in enumerate(points):
-        if isinstance(body, Rigid):
+        if isinstance(body, RigidBody):
             found.append(_on_rigid(body, point, bodies, places))
             continue
         vertices, weights, gap = _in_solid(body, point) if isinstance(body, Solid) else _on_shell(body, point)
@@ -55,7 +55,7 @@ def _once(vertices: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.nda
     return vertices[kept], weights[kept]
 
 
-def _on_rigid(part: Rigid, point: np.ndarray, bodies: Bodies, places) -> tuple[np.ndarray, np.ndarray]:
+def _on_rigid(part: RigidBody, point: np.ndarray, bodies: Bodies, places) -> tuple[np.ndarray, np.ndarray]:
     """Of the four corners of its own points, wherever it is."""
     k = bodies.rigid_number(part)
     corners = places[k].rest[:4]
@@ -114,7 +114,7 @@ def _ten_shapes(coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _on_shell(body, point: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """Nodes and weights of the nearest face or element, and how far from it the point lies (m)."""
     weights, gaps = _to_faces(body.mesh, point)
-    if not isinstance(body.mesh, SixNodeMesh):
+    if not isinstance(body.mesh, QuadraticTriangleMesh):
         nearest = int(np.argmin(gaps))
         return body.mesh.faces[nearest], weights[nearest], float(gaps[nearest])
     best = None

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..._input.quantity import quantity
 from ..bodies.bodies import BODIES, Bodies, on_body
-from ..rigid.rigid import Rigid
+from ..rigid.rigid import RigidBody
 from ..shells.shell import Shell
 from ..solids.solid import Solid
 from .actuator import Actuator, number
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 _SMOOTHING = 1e-3  # of the length at rest
-_KINDS = (*BODIES, Rigid)
+_KINDS = (*BODIES, RigidBody)
 
 
 class Tendon(Actuator):
@@ -62,8 +62,8 @@ class Tendon(Actuator):
 
     def __init__(
         self,
-        points: Numbers | Sequence[tuple[Shell | Solid | Rigid, Numbers]],
-        body: Shell | Solid | Rigid | None = None,
+        points: Numbers | Sequence[tuple[Shell | Solid | RigidBody, Numbers]],
+        body: Shell | Solid | RigidBody | None = None,
         *,
         tension: Numbers = 0.0,
         stiffness: Numbers = 0.0,
@@ -143,7 +143,7 @@ class Tendon(Actuator):
         return f"Tendon({len(self._points)} points, tension={float(self.tension):g}{on_body(self.body)})"
 
 
-def _points(points, body) -> list[tuple[Shell | Solid | Rigid, np.ndarray]]:
+def _points(points, body) -> list[tuple[Shell | Solid | RigidBody, np.ndarray]]:
     if isinstance(points, list | tuple) and points and all(_is_pair(each) for each in points):
         if body is not None:
             raise ValueError("points name their bodies, so body= must not")

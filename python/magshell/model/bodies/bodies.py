@@ -11,10 +11,10 @@ import numpy as np
 
 from ..._input.checked_list import checked_list
 from ...mesh.triangles.face_quality import MeshQuality
-from ...mesh.triangles.six_node_mesh import SixNodeMesh
+from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ..rigid.joints import Joint
-from ..rigid.rigid import Rigid
+from ..rigid.rigid import RigidBody
 from ..rigid.skeleton import Skeleton
 from ..shells.shell import Shell
 from ..solids.skin import Skin
@@ -30,7 +30,7 @@ BODIES = (Shell, Solid)
 
 
 class Bodies:
-    """Raises ValueError where one is no Shell, Solid, Rigid or Skeleton, or is there twice, or where a tie cannot be.
+    """Raises ValueError where one is no Shell, Solid, RigidBody or Skeleton, or is there twice, or where a tie cannot be.
 
     shells: all Shells and Solids. rigid: the Rigid parts, links among them, whose points come after all vertices.
     touching: those of the rigid parts whose shapes touch: vertices of theirs come after the points of all.
@@ -39,20 +39,20 @@ class Bodies:
 
     def __init__(
         self,
-        bodies: Shell | Solid | Rigid | Skeleton | Iterable[Shell | Solid | Rigid | Skeleton],
+        bodies: Shell | Solid | RigidBody | Skeleton | Iterable[Shell | Solid | RigidBody | Skeleton],
         ties: Iterable[Tie] = (),
-        touching: Iterable[Rigid] = (),
+        touching: Iterable[RigidBody] = (),
     ):
-        self.touching: tuple[Rigid, ...] = tuple(touching)
-        listed = checked_list("bodies", bodies, (*BODIES, Rigid, Skeleton), repeats=True)
+        self.touching: tuple[RigidBody, ...] = tuple(touching)
+        listed = checked_list("bodies", bodies, (*BODIES, RigidBody, Skeleton), repeats=True)
         self.skeletons: tuple[Skeleton, ...] = tuple(body for body in listed if isinstance(body, Skeleton))
         self.listed: tuple[Any, ...] = tuple(listed)
         self.shells: tuple[Shell | Solid, ...] = tuple(body for body in listed if isinstance(body, BODIES))
-        self.rigid: tuple[Rigid, ...] = tuple(
-            part for body in listed for part in _parts(body) if isinstance(part, Rigid)
+        self.rigid: tuple[RigidBody, ...] = tuple(
+            part for body in listed for part in _parts(body) if isinstance(part, RigidBody)
         )
         if not listed:
-            raise ValueError("bodies must hold at least one Shell, Solid, Rigid or Skeleton")
+            raise ValueError("bodies must hold at least one Shell, Solid, RigidBody or Skeleton")
         for k, part in enumerate(self.rigid):
             if self.rigid_number(part) < k:
                 raise ValueError(
@@ -151,7 +151,7 @@ class Bodies:
         """Of all skeletons."""
         return tuple(joint for skeleton in self.skeletons for joint in skeleton.joints)
 
-    def skeleton_of(self, part: Rigid) -> Skeleton | None:
+    def skeleton_of(self, part: RigidBody) -> Skeleton | None:
         """The one that it is a link of; None where it is alone."""
         for skeleton in self.skeletons:
             if any(part is link for link in skeleton.links):
@@ -163,18 +163,18 @@ class Bodies:
         (skeleton,) = (each for each in self.skeletons if any(joint is own for own in each.joints))
         return [self.rigid_number(each) for each in skeleton._moved_by(joint)]
 
-    def started_by(self, part: Rigid) -> list[int]:
+    def started_by(self, part: RigidBody) -> list[int]:
         """The numbers of the rigid parts that start with the velocity of a free one: of a skeleton, its tree."""
         skeleton = self.skeleton_of(part)
         moved = [part] if skeleton is None else skeleton._tree(part)
         return [self.rigid_number(each) for each in moved]
 
-    def drifts(self, part: Rigid) -> bool:
+    def drifts(self, part: RigidBody) -> bool:
         """Whether nothing but itself tells a rigid part where to be."""
         skeleton = self.skeleton_of(part)
         return part.vertices is None if skeleton is None else skeleton._drifts(part)
 
-    def held_by_joints(self, part: Rigid) -> bool:
+    def held_by_joints(self, part: RigidBody) -> bool:
         """Whether joints lead from it to the world."""
         skeleton = self.skeleton_of(part)
         return skeleton is not None and skeleton._held(part)
@@ -190,7 +190,7 @@ class Bodies:
 
     @property
     def six_node_sheets(self) -> tuple[Shell, ...]:
-        return tuple(body for body in self.shells if isinstance(body.mesh, SixNodeMesh))
+        return tuple(body for body in self.shells if isinstance(body.mesh, QuadraticTriangleMesh))
 
     @property
     def flat_sheets_alone(self) -> bool:
@@ -236,13 +236,13 @@ class Bodies:
         )
         raise ValueError(f"a body of the scene is one of scene.bodies, got {what}")
 
-    def rigid_number(self, part: Rigid) -> int:
+    def rigid_number(self, part: RigidBody) -> int:
         """Which of the rigid parts it is. Raises ValueError where it is none of them."""
         for k, each in enumerate(self.rigid):
             if each is part:
                 return k
         raise ValueError(
-            "a rigid part of the scene is one of scene.rigid_parts, got a Rigid that is not in it"
+            "a rigid part of the scene is one of scene.rigid_parts, got a RigidBody that is not in it"
         )
 
     @property
@@ -260,7 +260,7 @@ class Bodies:
         """Vertices of shapes that touch."""
         return sum(part.shape.n_vertices for part in self.touching)
 
-    def first_on_surface(self, part: Rigid) -> int:
+    def first_on_surface(self, part: RigidBody) -> int:
         """Where the vertices of its shape begin, among all points as a caller counts them."""
         before = 0
         for each in self.rigid:

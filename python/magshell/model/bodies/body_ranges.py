@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from ...mesh.triangles.six_node_mesh import SixNodeMesh
+from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class Span(NamedTuple):
 
 def turning_edges(mesh: MeshBase) -> int:
     """How many edges the core has for a mesh: of a solid, none."""
-    return mesh.n_edges if isinstance(mesh, TriangleMesh | SixNodeMesh) else 0
+    return mesh.n_edges if isinstance(mesh, TriangleMesh | QuadraticTriangleMesh) else 0
 
 
 def rotations_of(mesh: MeshBase) -> int:
@@ -60,4 +60,4 @@ def rotations_of(mesh: MeshBase) -> int:
 
 def magnetized_rows(mesh: MeshBase) -> int:
     """How many rows it has in a magnetization of all bodies: one an element of a sheet, of a solid one a face."""
-    return mesh.n_elements if isinstance(mesh, TriangleMesh | SixNodeMesh) else mesh.n_faces
+    return mesh.n_elements if isinstance(mesh, TriangleMesh | QuadraticTriangleMesh) else mesh.n_faces

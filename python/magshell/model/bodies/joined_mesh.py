@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...mesh.triangles.six_node_mesh import SixNodeMesh
+from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class JoinedMesh:
         sheets = [
             mesh.edges + first
             for mesh, first in zip(self.meshes, self._first, strict=False)
-            if isinstance(mesh, TriangleMesh | SixNodeMesh)
+            if isinstance(mesh, TriangleMesh | QuadraticTriangleMesh)
         ]
         return np.concatenate(sheets) if sheets else np.zeros((0, 2), dtype=np.int32)
 

@@ -14,7 +14,7 @@ def called(bodies: Iterable[Any]) -> str:
 
     >>> import magshell as ms
     >>> sheet = ms.Shell(ms.meshes.rectangle(0.1, 0.02, cells=(10, 2)), thickness=1e-3, young_modulus=1e5)
-    >>> called([sheet]), called([sheet, ms.Rigid(mass=1.0, inertia=1.0, center=(0, 0, 0))])
+    >>> called([sheet]), called([sheet, ms.RigidBody(mass=1.0, inertia=1.0, center=(0, 0, 0))])
     ('the sheet', 'the bodies')
     """
     every = list(bodies)

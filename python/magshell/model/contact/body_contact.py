@@ -10,7 +10,7 @@ from ..._input.owner import Owner
 from ..._input.scalars import flag, not_negative, positive
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ..bodies.bodies import BODIES
-from ..rigid.rigid import Rigid
+from ..rigid.rigid import RigidBody
 from ..shells.shell import Shell
 from ..solids.solid import Solid
 
@@ -31,25 +31,27 @@ def width_of(mesh: MeshBase) -> float:
 _REACH_OF_SHEETS = 0.1  # of the thickness
 _REACH_OF_SOLIDS = 0.05  # of the mean edge on the surface
 _STICKING = 1e-2  # of the larger body's extent, a second
-_SMOOTHING = 0.1  # of the reach
+_SMOOTHING = 0.1  # of the activation distance
 LAWS = ("barrier", "penalty")
 
 
 class BodyContact(Owner):
     """Two bodies that do not pass through each other: what ms.Contact(a, b, ...) makes.
 
-    a, b: a Shell, a Solid, or a Rigid: of one with a shape, that touches; of others with vertices and a body, the faces
+    a, b: a Shell, a Solid, or a RigidBody: of one with a shape, that touches; of others with vertices and a body, the faces
         between these.
-    minimal_distance: m, that is always left between them, as sheets are thick: by default half the largest thickness of
+    min_distance: m, that is always left between them, as sheets are thick: by default half the largest thickness of
         each. Solids have none.
-    reach: m, beyond the minimal distance, from which on they push each other apart; by default a tenth of the thickness, or
+    activation_distance: m, beyond the minimal distance, from which on they push each other apart; by default a
+        tenth of the thickness, or
         a twentieth of the mean edge on the surface of solids, the smaller of the two bodies'. What touches lightly rests at
         nearly all of it.
-    contact_stiffness: Pa, the pressure with which they push at about half the reach; by default Young's modulus, the smaller
+    contact_stiffness: Pa, the pressure with which they push at about half the activation distance; by default
+        Young's modulus, the smaller
         of the two bodies'. Forces do not depend on a time step.
     law: "barrier", which grows without bound: nothing ever passes, whatever presses; or "penalty", softer and cheaper,
         which `contact_stiffness` bounds: what presses more is let into the minimal distance, and steps still do not pass.
-    smoothing: m, of a penalty, as of contacts with obstacles; by default a tenth of the reach.
+    smoothing: m, of a penalty, as of contacts with obstacles; by default a tenth of the activation distance.
     friction_coefficient: Coulomb's, or None for contact without friction. It acts in ms.simulate only.
     static_friction_coefficient: of what sticks, where it is larger; by default there is but one.
     sticking_speed: m/s, below which friction holds, as of contacts with obstacles.
@@ -57,13 +59,15 @@ class BodyContact(Owner):
 
     Pairs are vertices and faces, and edges and edges, whatever side they come from. At a given gap what lies flat bears 1.0
     to 3.5 times that pressure, by how its edges cross those below: most where two meshes coincide; and where single edges
-    cross, the force goes with the area of their faces. So meshes change the gap at which a load rests, within the reach,
+    cross, the force goes with the area of their faces. So meshes change the gap at which a load rests, within
+    the activation distance,
     and not the load. Friction acts at the middle surfaces of sheets. No step of a solve passes a pair; a
     start in which faces intersect, or are nearer than the minimal distance, is refused with their numbers. Defaults are
     taken from the bodies as they are here: a solve with another thickness or modulus keeps them.
 
     Gradients go through impacts, exactly of the motion as its steps have it. The stiffer the contact and the longer the
-    step, the shorter is the way on which they hold: a barrier turns a body around within a fraction of the reach, and where
+    step, the shorter is the way on which they hold: a barrier turns a body around within a fraction of the
+    activation distance, and where
     a small change moves an impact by a whole step, a loss is rough. Take steps that resolve the impact, a longer reach, or
     the penalty, for a smooth loss.
 
@@ -86,16 +90,16 @@ class BodyContact(Owner):
     True
     """
 
-    a: Shell | Solid | Rigid
-    b: Shell | Solid | Rigid
+    a: Shell | Solid | RigidBody
+    b: Shell | Solid | RigidBody
     lagged_friction: bool
 
     body = None
     _for_all = True
     _replaceable = (
         "contact_stiffness",
-        "reach",
-        "minimal_distance",
+        "activation_distance",
+        "min_distance",
         "smoothing",
         "friction_coefficient",
         "static_friction_coefficient",
@@ -104,11 +108,11 @@ class BodyContact(Owner):
 
     def __init__(
         self,
-        a: Shell | Solid | Rigid,
-        b: Shell | Solid | Rigid,
+        a: Shell | Solid | RigidBody,
+        b: Shell | Solid | RigidBody,
         *,
-        minimal_distance: Numbers | None = None,
-        reach: Numbers | None = None,
+        min_distance: Numbers | None = None,
+        activation_distance: Numbers | None = None,
         contact_stiffness: Numbers | None = None,
         law: str = "barrier",
         smoothing: Numbers | None = None,
@@ -121,8 +125,8 @@ class BodyContact(Owner):
         if self.a is self.b:
             raise ValueError("a and b are one body: SelfContact(body) is contact of a body with itself")
         self._take(
-            minimal_distance=minimal_distance,
-            reach=reach,
+            min_distance=min_distance,
+            activation_distance=activation_distance,
             contact_stiffness=contact_stiffness,
             law=law,
             smoothing=smoothing,
@@ -141,14 +145,14 @@ class BodyContact(Owner):
         def number(name, unit, default, check=positive):
             return default if given[name] is None else check(name, unit, given[name])
 
-        self._distance_given: bool = given["minimal_distance"] is not None
-        self.minimal_distance: float = number("minimal_distance", "m", self._distance(bodies), not_negative)
-        self.reach: float = number("reach", "m", self._reach(bodies))
+        self._distance_given: bool = given["min_distance"] is not None
+        self.min_distance: float = number("min_distance", "m", self._distance(bodies), not_negative)
+        self.activation_distance: float = number("activation_distance", "m", self._reach(bodies))
         stiffness = min(map(_modulus, bodies))
         if stiffness == np.inf and given["contact_stiffness"] is None:
             raise ValueError("contact_stiffness [Pa] is needed between rigid shapes, which have no modulus")
         self.contact_stiffness: float = number("contact_stiffness", "Pa", stiffness)
-        self.smoothing: float = number("smoothing", "m", _SMOOTHING * self.reach)
+        self.smoothing: float = number("smoothing", "m", _SMOOTHING * self.activation_distance)
         self.friction_coefficient: float | None = number("friction_coefficient", "1", None, not_negative)
         self.static_friction_coefficient: float | None = number(
             "static_friction_coefficient", "1", None, not_negative
@@ -217,7 +221,7 @@ class BodyContact(Owner):
         friction = "" if self.friction_coefficient is None else f", friction {self.friction_coefficient:g}"
         return (
             f"{type(self).__name__}({' and '.join(type(side).__name__ for side in self._sides)}; {self.law}, "
-            f"{self.contact_stiffness:g} Pa within {self.reach:g} m beyond {self.minimal_distance:g} m{friction})"
+            f"{self.contact_stiffness:g} Pa within {self.activation_distance:g} m beyond {self.min_distance:g} m{friction})"
         )
 
 
@@ -226,7 +230,8 @@ class SelfContact(BodyContact):
 
     a: a Shell or a Solid. The others are as in BodyContact, which ms.Contact(a, b, ...) makes, but that by default a sheet
     keeps its whole thickness from itself. Neighbours along the surface that are nearer at rest than twice minimal distance
-    and reach keep half of what they have there, in the proportion of the two. Where that is less than the minimal distance
+    and activation distance keep half of what they have there, in the proportion of the two. Where that is less
+    than the minimal distance
     itself, a scene refuses one that was given, naming faces and the largest possible, and warns of a thickness
     (ms.MeshQualityWarning). A mesh that passes through itself at rest is refused.
 
@@ -241,10 +246,10 @@ class SelfContact(BodyContact):
 
     def __init__(
         self,
-        a: Shell | Solid | Rigid,
+        a: Shell | Solid | RigidBody,
         *,
-        minimal_distance: Numbers | None = None,
-        reach: Numbers | None = None,
+        min_distance: Numbers | None = None,
+        activation_distance: Numbers | None = None,
         contact_stiffness: Numbers | None = None,
         law: str = "barrier",
         smoothing: Numbers | None = None,
@@ -256,11 +261,11 @@ class SelfContact(BodyContact):
         if not isinstance(a, BODIES):
             raise ValueError(f"a must be a Shell or Solid of the scene, got {a!r:.60}")
         _check_does_not_cross(a)
-        self.a: Shell | Solid | Rigid = a
-        self.b: Shell | Solid | Rigid = a
+        self.a: Shell | Solid | RigidBody = a
+        self.b: Shell | Solid | RigidBody = a
         self._take(
-            minimal_distance=minimal_distance,
-            reach=reach,
+            min_distance=min_distance,
+            activation_distance=activation_distance,
             contact_stiffness=contact_stiffness,
             law=law,
             smoothing=smoothing,
@@ -283,27 +288,29 @@ class SelfContact(BodyContact):
 
 
 class RigidShape(NamedTuple):
-    """What a Rigid with a shape touches with."""
+    """What a RigidBody with a shape touches with."""
 
     mesh: TriangleMesh
 
 
-def touches_with_shape(side: Shell | Solid | Rigid) -> bool:
-    return isinstance(side, Rigid) and side.shape is not None
+def touches_with_shape(side: Shell | Solid | RigidBody) -> bool:
+    return isinstance(side, RigidBody) and side.shape is not None
 
 
-def checked_side(name: str, side: Shell | Solid | Rigid) -> Shell | Solid | Rigid:
+def checked_side(name: str, side: Shell | Solid | RigidBody) -> Shell | Solid | RigidBody:
     """A body in contact, as it was given."""
     if isinstance(side, BODIES) or touches_with_shape(side):
         return side
-    if not isinstance(side, Rigid):
-        raise ValueError(f"{name} must be a Shell, a Solid or a Rigid of the scene, got {side!r:.60}")
+    if not isinstance(side, RigidBody):
+        raise ValueError(f"{name} must be a Shell, a Solid or a RigidBody of the scene, got {side!r:.60}")
     if side.vertices is None:
         raise ValueError(
             f"{name} is a free Rigid without faces to touch with: give it a shape, or make it of the vertices of a body"
         )
     if side.body is None:
-        raise ValueError(f"{name} is a Rigid that does not say of which body it is: Rigid(..., body=...)")
+        raise ValueError(
+            f"{name} is a RigidBody that does not say of which body it is: RigidBody(..., body=...)"
+        )
     return side
 
 
@@ -316,11 +323,11 @@ def _check_does_not_cross(body) -> None:
         )
 
 
-def side_of(side: Shell | Solid | Rigid) -> Shell | Solid | RigidShape:
+def side_of(side: Shell | Solid | RigidBody) -> Shell | Solid | RigidShape:
     """What it touches with."""
     if touches_with_shape(side):
         return RigidShape(side.shape)
-    return side.body if isinstance(side, Rigid) else side
+    return side.body if isinstance(side, RigidBody) else side
 
 
 def _thickness(body) -> float:

@@ -14,7 +14,7 @@ from ..._input.selections import indices, selection
 from ..._runtime.solver_entry_point import grouped
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ..bodies.bodies import BODIES, checked_body, joined, on_body
-from ..rigid.rigid import Rigid
+from ..rigid.rigid import RigidBody
 from ..shells.shell import Shell
 from ..solids.solid import Solid
 from .body_contact import BodyContact, width_of
@@ -69,9 +69,11 @@ class Contact(Owner):
     @overload
     def __new__(cls, obstacles: Obstacle | Iterable[Obstacle], **options: Any) -> Contact: ...
     @overload
-    def __new__(cls, a: Shell | Solid | Rigid, b: Shell | Solid | Rigid, **options: Any) -> BodyContact: ...
+    def __new__(
+        cls, a: Shell | Solid | RigidBody, b: Shell | Solid | RigidBody, **options: Any
+    ) -> BodyContact: ...
     def __new__(cls, *given: Any, **options: Any) -> Contact | BodyContact:
-        if given and isinstance(given[0], (*BODIES, Rigid)):
+        if given and isinstance(given[0], (*BODIES, RigidBody)):
             return BodyContact(*given, **options)
         if {"a", "b"} & set(options):
             return BodyContact(*given, **options)

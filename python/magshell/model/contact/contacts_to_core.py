@@ -13,7 +13,7 @@ from ..._input.selections import indices
 from ..._runtime.warning_stacklevel import callers_level
 from ...errors import MeshQualityWarning
 from ..bodies.words import called
-from ..rigid.rigid import Rigid
+from ..rigid.rigid import RigidBody
 from ..solids.solid import Solid
 from .body_contact import BodyContact, side_of, touches_with_shape
 
@@ -66,7 +66,7 @@ def _check_each_pair_once(contacts) -> None:
             )
 
 
-def shapes_that_touch(contacts: Sequence[Contact | BodyContact]) -> tuple[Rigid, ...]:
+def shapes_that_touch(contacts: Sequence[Contact | BodyContact]) -> tuple[RigidBody, ...]:
     """Rigid parts that contacts are about with their shapes, each once."""
     sides = [side for contact in contacts for side in contact._sides if touches_with_shape(side)]
     return tuple({id(side): side for side in sides}.values())
@@ -76,7 +76,7 @@ def _surface(side, bodies) -> dict[Any, Any]:
     """The faces of a body, of a rigid part's shape, or those between its vertices: (k, 3), the scene's vertices."""
     body = side_of(side)
     try:
-        rigid = bodies.rigid_number(side) if isinstance(side, Rigid) else -1
+        rigid = bodies.rigid_number(side) if isinstance(side, RigidBody) else -1
         number = -1 if touches_with_shape(side) else bodies.number(body)
     except ValueError:
         raise ValueError(f"a Contact is about a body that is not in the scene: {side!r}") from None
@@ -103,22 +103,22 @@ def check_neighbours(scene: Scene, warns: bool = False) -> None:
     """Neighbours along a surface cannot keep more from each other than they have at rest: a minimal distance that was asked
     for is refused where they do not, and one that a thickness gave is told, if it warns."""
     for k, contact in enumerate(scene._body_contacts):
-        wanted = scene._in_core.current(contact).minimal_distance
+        wanted = scene._in_core.current(contact).min_distance
         nearest, faces = _core.nearest_neighbours(scene._model, k)
         if wanted <= nearest:
             continue
         kind = type(contact).__name__.removeprefix("Body")
         told = (
-            f"the minimal_distance of a {kind}, {wanted:g} m, is larger than what neighbours along a surface have at rest: "
+            f"the min_distance of a {kind}, {wanted:g} m, is larger than what neighbours along a surface have at rest: "
             f"{faces} are {nearest:g} m apart"
         )
-        if contact._distance_given or wanted != contact.minimal_distance:
+        if contact._distance_given or wanted != contact.min_distance:
             raise ValueError(f"{told}. Give it at most {nearest:g} m, or a mesh with longer edges")
         if warns:
-            kept = 0.5 * nearest * wanted / (wanted + contact.reach)
+            kept = 0.5 * nearest * wanted / (wanted + contact.activation_distance)
             warnings.warn(
                 f"{told}, and keep {kept:g} m of it. All that are not neighbours keep it. A mesh with edges longer than the "
-                "thickness needs no such exception, nor does a smaller minimal_distance=",
+                "thickness needs no such exception, nor does a smaller min_distance=",
                 MeshQualityWarning,
                 stacklevel=callers_level(),
             )
@@ -132,7 +132,7 @@ def check_apart(scene: Scene, state: np.ndarray) -> None:
 
 
 def check_shapes(
-    contacts: Sequence[Contact | BodyContact], parts: Sequence[Rigid], places: list[Place]
+    contacts: Sequence[Contact | BodyContact], parts: Sequence[RigidBody], places: list[Place]
 ) -> None:
     """Obstacles keep out vertices of sheets and solids: a contact that would seem to be about the shape of a rigid part
     that has none of these has to say what it is about."""

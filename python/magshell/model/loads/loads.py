@@ -10,7 +10,7 @@ from ..._input.owner import Owner
 from ..._input.quantity import quantity, real_numbers
 from ..._input.selections import indices, selection
 from ...mesh.face_shapes import edge_shares, shares
-from ...mesh.triangles.six_node_mesh import SixNodeMesh
+from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ..bodies.bodies import checked_body
 from ..shells.shell import Shell
@@ -178,7 +178,7 @@ class EdgeCouple(Owner):
 
     def _edge_couples(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
         """The edges (k,) and their couples (k,), N m. Raises ValueError for a solid, whose edges do not turn."""
-        if not isinstance(mesh, TriangleMesh | SixNodeMesh):
+        if not isinstance(mesh, TriangleMesh | QuadraticTriangleMesh):
             raise ValueError(
                 "an EdgeCouple turns edges of a shell: a couple on a solid is one of PointLoads on its face"
             )
@@ -219,7 +219,7 @@ class EdgeCouple(Owner):
         if self.couple_per_length.ndim == 0:
             return edges, lengths[:, None]
         ends = mesh.rest_positions[mesh.edges[edges]]
-        faces = mesh.corners.edge_faces if isinstance(mesh, SixNodeMesh) else mesh.edge_faces
+        faces = mesh.corners.edge_faces if isinstance(mesh, QuadraticTriangleMesh) else mesh.edge_faces
         along = (ends[:, 1] - ends[:, 0]) * np.where(faces[edges, 0] >= 0, 1.0, -1.0)[:, None]
         return edges, along
 

@@ -31,7 +31,7 @@ class Pressure(Owner):
     planes, and the pressure one for all of it, it has a potential: p times the volume that it displaces. Where it has
     none, equilibria, motions, linear response and gradients are exact all the same, with an unsymmetric stiffness;
     `stable` says then that the symmetric part of that is positive definite: nothing gives way slowly, but the energy is
-    only the work on the straight way from the rest shape, and flutter is not looked for. ms.follow, ms.linear_buckling
+    only the work on the straight way from the rest shape, and flutter is not looked for. ms.follow_path, ms.linear_buckling
     and ms.vibration_modes, which need more, refuse.
 
     A cube under a pressure all around, p = 0.03 of a modulus of 1 at a Poisson's ratio of 0.25, shrinks by p (1 - 2 nu) to

@@ -45,7 +45,8 @@ class BodyResult(Frozen):
 
     @property
     def edge_rotations(self) -> Computed:
-        """(..., n_e) rad, zero where an edge has none; of a SixNodeMesh (..., 2 n_e), two an edge, at its Gauss points from
+        """(..., n_e) rad, zero where an edge has none; of a QuadraticTriangleMesh (..., 2 n_e), two an edge,
+        at its Gauss points from
         the lower to the higher corner."""
         return self._result.edge_rotations[..., self._span.rotations]
 
@@ -55,14 +56,16 @@ class BodyResult(Frozen):
         return self._result.velocities[..., self._span.vertices, :]
 
     def strains(self, index: int = -1) -> Strains:
-        """The principal strains of its faces (of a SixNodeMesh at the middles of its flat faces, four an element), as
+        """The principal strains of its faces (of a QuadraticTriangleMesh at the middles of its flat faces,
+        four an element), as
         `strains` of the result has them for all sheets; of a motion or a path in a recorded state, by default the last."""
         arguments = () if np.ndim(self._result.positions) == 2 else (index,)
         rows = slice(self._first_row, self._first_row + self.mesh.n_faces)
         return Strains(*(each[rows] for each in self._result.strains(*arguments)))
 
     def stresses(self, index: int = -1) -> ShellStresses:
-        """Membrane force and bending moment of its faces (of a SixNodeMesh at the middles of its flat faces) with the strain
+        """Membrane force and bending moment of its faces (of a QuadraticTriangleMesh at the middles of its
+        flat faces) with the strain
         and curvature that make them, stress at the surfaces, von Mises stress, with the values that the result was found
         with; of a motion or a path in a recorded state, by default the last. Of a solid, `stresses` has the same names where
         they mean the same.
@@ -79,7 +82,7 @@ class BodyResult(Frozen):
 
     @property
     def remanent_magnetization(self) -> Computed:
-        """(n_f, 3), of a SixNodeMesh one an element, or (3,) A/m, or None."""
+        """(n_f, 3), of a QuadraticTriangleMesh one an element, or (3,) A/m, or None."""
         given = self._result.remanent_magnetization
         return given if np.ndim(given) < 2 else given[self._span.rows]
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..._runtime.frozen import Frozen
 from ..rigid.joints import Joint
-from ..rigid.rigid import RigidResult, _cross
+from ..rigid.rigid import RigidBodyResult, _cross
 from ..rigid.skeleton import motor_rows
 
 if TYPE_CHECKING:
@@ -24,8 +24,8 @@ class JointResult(Frozen):
         if not any(joint is each for each in result.scene.joints):
             raise ValueError(f"a joint of the scene is one of scene.joints, got {joint!r} that is not in it")
         self._result, self.joint = result, joint
-        self._child = RigidResult(result, joint.child)
-        self._parent = None if joint.parent is None else RigidResult(result, joint.parent)
+        self._child = RigidBodyResult(result, joint.child)
+        self._parent = None if joint.parent is None else RigidBodyResult(result, joint.parent)
 
     @property
     def angle(self) -> Computed:
@@ -121,12 +121,12 @@ class JointResult(Frozen):
         child = self._child.rotation
         return child if self._parent is None else self._parent.rotation.swapaxes(-1, -2) @ child
 
-    def _velocity_of(self, link: RigidResult | None):
+    def _velocity_of(self, link: RigidBodyResult | None):
         if link is None:
             return 0.0
         return link.velocity + _cross(link.angular_velocity, self._place_of(link) - link.center)
 
-    def _place_of(self, link: RigidResult | None):
+    def _place_of(self, link: RigidBodyResult | None):
         if link is None:
             return _like(self.joint.origin, self._child.center)
         middle = link._place.center

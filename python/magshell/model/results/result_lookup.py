@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..actuators.muscle import Muscle, MuscleResult
 from ..rigid.joints import Joint
-from ..rigid.rigid import Rigid, RigidResult
+from ..rigid.rigid import RigidBody, RigidBodyResult
 from ..shells.shell import Shell
 from ..solids.solid import Solid
 from .body_result import BodyResult
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 
 def result_of(
-    result: SolveResult, body: Shell | Solid | Rigid | Joint | Muscle
-) -> BodyResult | SolidResult | RigidResult | JointResult | MuscleResult:
+    result: SolveResult, body: Shell | Solid | RigidBody | Joint | Muscle
+) -> BodyResult | SolidResult | RigidBodyResult | JointResult | MuscleResult:
     """`result[body]`, `result[joint]` or `result[actuator]`. Raises ValueError where the scene has no such one."""
     if hasattr(body, "_result_in"):  # an actuator
         return body._result_in(result)
@@ -27,8 +27,8 @@ def result_of(
         return JointResult(result, body)
     if isinstance(body, Muscle):
         return MuscleResult(result, body)
-    if isinstance(body, Rigid):
-        return RigidResult(result, body)
+    if isinstance(body, RigidBody):
+        return RigidBodyResult(result, body)
     return SolidResult(result, body) if isinstance(body, Solid) else BodyResult(result, body)
 
 

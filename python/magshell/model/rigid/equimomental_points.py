@@ -8,7 +8,7 @@ import numpy as np
 
 from ..._input.selections import indices
 from ..._input.tensors import is_tensor
-from .rigid import Rigid, or_zero
+from .rigid import RigidBody, or_zero
 from .skeleton import Skeleton
 
 if TYPE_CHECKING:
@@ -42,29 +42,29 @@ class Place(NamedTuple):
     length: float
     surface: np.ndarray  # (m, 3) m at rest, of its shape where that touches; after the tens of all parts
 
-    def center_of(self, part: Rigid) -> np.ndarray:
+    def center_of(self, part: RigidBody) -> np.ndarray:
         """(3,) m, of its own mass, at rest."""
         return self.center if part.center is None else part.center
 
-    def masses(self, part: Rigid) -> np.ndarray:
+    def masses(self, part: RigidBody) -> np.ndarray:
         """(10,) kg: of its points. Some may be negative; they add up to the body."""
         if part.mass is None:
             return np.zeros(10)
         return np.linalg.solve(_MOMENTS, self._moments(part))
 
-    def _local(self, part: Rigid) -> tuple[np.ndarray, np.ndarray]:
+    def _local(self, part: RigidBody) -> tuple[np.ndarray, np.ndarray]:
         """The center and the second moments about it, in lengths along the axes."""
         inertia = part.inertia_tensor
         spread = 0.5 * np.trace(inertia) * np.eye(3) - inertia
         center = self.axes.T @ (self.center_of(part) - self.center) / self.length
         return center, self.axes.T @ spread @ self.axes / self.length**2
 
-    def _moments(self, part: Rigid) -> np.ndarray:
+    def _moments(self, part: RigidBody) -> np.ndarray:
         center, spread = self._local(part)
         second = spread + part.mass * np.outer(center, center)
         return np.concatenate([[part.mass], part.mass * center, [second[i, j] for i, j in _PAIRS]])
 
-    def masses_vjp(self, part: Rigid, by_masses: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def masses_vjp(self, part: RigidBody, by_masses: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """By mass (), by inertia as it was given, and by center (3,)."""
         by = np.linalg.solve(_MOMENTS.T, by_masses)
         center, _ = self._local(part)
@@ -80,7 +80,7 @@ class Place(NamedTuple):
         by_inertia = {2: by_tensor, 1: np.diag(by_tensor)}.get(len(shape), np.trace(by_tensor))
         return np.asarray(by_mass), np.asarray(by_inertia), by_center
 
-    def start_velocities(self, part: Rigid, points: np.ndarray) -> np.ndarray:
+    def start_velocities(self, part: RigidBody, points: np.ndarray) -> np.ndarray:
         """(n, 3) m/s of points (n, 3) m that start with a free body at rest positions."""
         turning = np.cross(or_zero(part.angular_velocity), points - self.center_of(part))
         return or_zero(part.velocity) + turning
@@ -112,29 +112,31 @@ def places(bodies: Bodies) -> list[Place]:
     return found
 
 
-def _vertices(part: Rigid, bodies) -> np.ndarray:
+def _vertices(part: RigidBody, bodies) -> np.ndarray:
     """The scene's."""
     if part.vertices is None:
         return np.zeros(0, dtype=np.int64)
     if not bodies.shells:
         raise ValueError(
-            "a Rigid with vertices needs the Shell or Solid whose vertices they are among the bodies"
+            "a RigidBody with vertices needs the Shell or Solid whose vertices they are among the bodies"
         )
     of = bodies.of(part)
     chosen = np.asarray(indices("Rigid vertices", part.vertices, of.mesh.n_vertices))
     if len(chosen) < 3:
-        raise ValueError(f"a Rigid needs 3 vertices at least, to tell how it is turned, got {len(chosen)}")
+        raise ValueError(
+            f"a RigidBody needs 3 vertices at least, to tell how it is turned, got {len(chosen)}"
+        )
     rest = of.mesh.rest_positions[chosen]
     spread = np.linalg.svd(rest - rest.mean(axis=0), compute_uv=False)
     if spread[1] <= 1e-6 * spread[0]:
         raise ValueError(
-            "the vertices of a Rigid lie on a line, about which it could turn: add one beside it"
+            "the vertices of a RigidBody lie on a line, about which it could turn: add one beside it"
         )
     return bodies.original[chosen + of.first_vertex]
 
 
 def _place(
-    part: Rigid, skeleton: Skeleton | None, rest: np.ndarray, vertices: np.ndarray, first: int
+    part: RigidBody, skeleton: Skeleton | None, rest: np.ndarray, vertices: np.ndarray, first: int
 ) -> Place:
     middle = rest.mean(axis=0) if len(rest) else np.zeros(3)
     center = middle if part.center is None else part.center

@@ -9,7 +9,7 @@ import numpy as np
 from ..._input.owner import Owner
 from ..._input.quantity import quantity
 from ..._input.scalars import not_negative, positive
-from .rigid import Rigid
+from .rigid import RigidBody
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
@@ -21,8 +21,8 @@ class Joint(Owner):
     child: the link (Rigid) that it carries. parent: the link that it is fixed to, or None for the world.
     """
 
-    child: Rigid
-    parent: Rigid | None
+    child: RigidBody
+    parent: RigidBody | None
 
     _kind: ClassVar[str] = ""
     _defaults: ClassVar[dict[str, Any]] = {}  # by name: where it does not act
@@ -30,16 +30,16 @@ class Joint(Owner):
 
     def __init__(
         self,
-        child: Rigid,
-        parent: Rigid | None,
+        child: RigidBody,
+        parent: RigidBody | None,
         origin: Numbers,
         axis: Numbers | None = None,
         rate: Numbers | None = None,
         **law: Any,
     ):
         for name, link in (("child", child), ("parent", parent)):
-            if not isinstance(link, Rigid) and (name == "child" or link is not None):
-                raise ValueError(f"{name} of a {type(self).__name__} must be a Rigid, got {link!r:.60}")
+            if not isinstance(link, RigidBody) and (name == "child" or link is not None):
+                raise ValueError(f"{name} of a {type(self).__name__} must be a RigidBody, got {link!r:.60}")
         if child is parent:
             raise ValueError(f"child and parent of a {type(self).__name__} must be two links")
         self.child, self.parent = child, parent
@@ -250,7 +250,7 @@ class Fixed(Joint):
     _kind = "fixed"
     _replaceable = ("origin",)
 
-    def __init__(self, child: Rigid, parent: Rigid | None = None, origin: Numbers = (0.0, 0.0, 0.0)):
+    def __init__(self, child: RigidBody, parent: RigidBody | None = None, origin: Numbers = (0.0, 0.0, 0.0)):
         super().__init__(child, parent, origin)
 
 
@@ -276,7 +276,7 @@ class Revolute(Joint):
 
     >>> import numpy as np
     >>> import magshell as ms
-    >>> rod = ms.Rigid(mass=1.0, inertia=1 / 12, center=(0.5, 0, 0))
+    >>> rod = ms.RigidBody(mass=1.0, inertia=1 / 12, center=(0.5, 0, 0))
     >>> hinge = ms.Revolute(rod, origin=(0, 0, 0), axis=(0, 1, 0))
     >>> scene = ms.Scene(ms.Skeleton([rod], [hinge]), gravity=(0, 0, -9.81))
     >>> move = ms.simulate(scene, steps=100, time_step=5e-3)
@@ -304,8 +304,8 @@ class Revolute(Joint):
 
     def __init__(
         self,
-        child: Rigid,
-        parent: Rigid | None = None,
+        child: RigidBody,
+        parent: RigidBody | None = None,
         *,
         origin: Numbers,
         axis: Numbers,
@@ -363,8 +363,8 @@ class Prismatic(Joint):
 
     def __init__(
         self,
-        child: Rigid,
-        parent: Rigid | None = None,
+        child: RigidBody,
+        parent: RigidBody | None = None,
         *,
         origin: Numbers,
         axis: Numbers,
@@ -431,8 +431,8 @@ class Ball(Joint):
 
     def __init__(
         self,
-        child: Rigid,
-        parent: Rigid | None = None,
+        child: RigidBody,
+        parent: RigidBody | None = None,
         *,
         origin: Numbers,
         axis: Numbers | None = None,
@@ -470,7 +470,7 @@ class Ball(Joint):
         return np.cross(points - self.origin, by_velocities).sum(axis=0)
 
 
-class Closure(Joint):
+class LoopClosure(Joint):
     """Closes a loop: pulls a point of one link, and the same place on another or in the world, together.
 
     origin: (3,) m, the place at rest, which solves may change. stiffness: N/m; the gap is the force over it, and
@@ -481,7 +481,7 @@ class Closure(Joint):
     >>> import magshell as ms
     >>> a, b = (ms.Link(mass=1.0, center=(x, 0, -1.0), inertia=0.1) for x in (0.0, 1.0))
     >>> hinges = [ms.Revolute(link, origin=(x, 0, 0), axis=(0, 1, 0)) for link, x in ((a, 0.0), (b, 1.0))]
-    >>> ms.Skeleton([a, b], [*hinges, ms.Closure(a, b, origin=(0.5, 0, -1.0), stiffness=1e4)])
+    >>> ms.Skeleton([a, b], [*hinges, ms.LoopClosure(a, b, origin=(0.5, 0, -1.0), stiffness=1e4)])
     Skeleton(2 links, 3 joints)
     """
 
@@ -489,5 +489,7 @@ class Closure(Joint):
     _defaults: ClassVar[dict[str, float]] = {"stiffness": 0.0}
     _replaceable = (*_defaults, "origin")
 
-    def __init__(self, child: Rigid, parent: Rigid | None = None, *, origin: Numbers, stiffness: Numbers):
+    def __init__(
+        self, child: RigidBody, parent: RigidBody | None = None, *, origin: Numbers, stiffness: Numbers
+    ):
         super().__init__(child, parent, origin, stiffness=positive("stiffness", "N/m", stiffness))

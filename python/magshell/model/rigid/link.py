@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ..shells.shell import Shell
 from ..solids.solid import Solid
-from .rigid import Rigid
+from .rigid import RigidBody
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
 
 
-class Link(Rigid):
-    """A Rigid of a skeleton. It may be a point mass, or without any mass, as its joints keep it from spinning.
+class Link(RigidBody):
+    """A RigidBody of a skeleton. It may be a point mass, or without any mass, as its joints keep it from spinning.
 
-    As Rigid; without vertices it needs its center. `shape`: as of a Rigid; by default pictures show
+    As Rigid; without vertices it needs its center. `shape`: as of a RigidBody; by default pictures show
     rods between joints. Link.of makes mass, inertia and center from one.
 
-    magnetic_moment, velocity, angular_velocity, body: as in `Rigid`.
+    magnetic_moment, velocity, angular_velocity, body: as in `RigidBody`.
 
     >>> import magshell as ms
     >>> bob = ms.Link(mass=1.0, center=(0, 0, -1.0))

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def filled(shape: TriangleMesh, mass_density: Numbers) -> dict[Any, Any]:
-    """mass [kg], inertia [kg m2] and center [m] of a Rigid that fills it. Raises ValueError where it is open, or turned
+    """mass [kg], inertia [kg m2] and center [m] of a RigidBody that fills it. Raises ValueError where it is open, or turned
     inside out."""
     density = positive("mass_density", "kg/m3", mass_density)
     volume, center, second = moments_of(shape)
@@ -56,7 +56,7 @@ def moments_of(shape: TriangleMesh) -> tuple[float, np.ndarray, np.ndarray]:
 _ROUNDING = 1e-9
 
 
-class Rigid(Owner):
+class RigidBody(Owner):
     """Vertices of a body that move as one rigid body: a payload, a stiff frame, a magnet glued on. Or a free body without
     a mesh. One of the bodies of a scene.
 
@@ -79,7 +79,7 @@ class Rigid(Owner):
 
     >>> import numpy as np
     >>> import magshell as ms
-    >>> top = ms.Rigid(mass=1.0, inertia=(1.0, 2.0, 3.0), angular_velocity=(0, 0, 2.0))
+    >>> top = ms.RigidBody(mass=1.0, inertia=(1.0, 2.0, 3.0), angular_velocity=(0, 0, 2.0))
     >>> scene = ms.Scene(top, allow_rigid_motions=True)
     >>> move = ms.simulate(scene, steps=50, time_step=np.pi / 100)
     >>> bool(np.abs(move[top].rotation[-1] - np.diag([-1.0, -1.0, 1.0])).max() < 1e-2)  # half a turn
@@ -106,7 +106,7 @@ class Rigid(Owner):
         if body is not None and not isinstance(body, Shell | Solid):
             raise ValueError(f"body must be a Shell or a Solid of the scene, got {body!r:.60}")
         if vertices is None and body is not None:
-            raise ValueError("a Rigid of a body needs its vertices: Rigid(vertices=..., body=...)")
+            raise ValueError("a RigidBody of a body needs its vertices: RigidBody(vertices=..., body=...)")
         self.shape: TriangleMesh | None = _checked_shape(shape)
         self.vertices: np.ndarray | None = None if vertices is None else selection("Rigid vertices", vertices)
         self.body = body
@@ -130,7 +130,7 @@ class Rigid(Owner):
     def _check_free(self) -> None:
         if self.mass is None:
             raise ValueError(
-                "a free Rigid needs a mass [kg], and an inertia [kg m2]: Rigid(mass=..., inertia=...)"
+                "a free Rigid needs a mass [kg], and an inertia [kg m2]: RigidBody(mass=..., inertia=...)"
             )
         least = 0.0 if self.inertia is None else np.linalg.eigvalsh(self.inertia_tensor)[0]
         if not least > 0:
@@ -145,7 +145,7 @@ class Rigid(Owner):
         given = np.zeros(()) if self.inertia is None else self.inertia
         return given if given.ndim == 2 else given * np.eye(3)
 
-    def replaced(self, **values: Any) -> Rigid:
+    def replaced(self, **values: Any) -> RigidBody:
         """The same part with other values."""
         own = {name: getattr(self, name) for name in self._replaceable}
         for name in values:
@@ -154,22 +154,22 @@ class Rigid(Owner):
         return self._again({**own, **values})
 
     @classmethod
-    def of(cls, shape: TriangleMesh | Shape, mass_density: float, **others: Any) -> Rigid:
+    def of(cls, shape: TriangleMesh | Shape, mass_density: float, **others: Any) -> RigidBody:
         """The one that fills a closed surface, faces outwards: mass [kg], inertia and center by its density [kg/m3].
         others: of its arguments.
 
         Raises ValueError where the surface is open, or turned inside out.
 
         >>> import magshell as ms
-        >>> ms.Rigid.of(ms.meshes.box((0.02, 0.02, 0.02), cells=(1, 1, 1)).surface, 1e3)
-        Rigid(free, mass 0.008 kg)
+        >>> ms.RigidBody.of(ms.meshes.box((0.02, 0.02, 0.02), cells=(1, 1, 1)).surface, 1e3)
+        RigidBody(free, mass 0.008 kg)
         """
         surface = _checked_shape(shape)
         if surface is None:
             raise ValueError("shape must be a TriangleMesh or one of ms.shapes, got None")
         return cls(shape=surface, **filled(surface, mass_density), **others)
 
-    def _again(self, values: dict[Any, Any]) -> Rigid:
+    def _again(self, values: dict[Any, Any]) -> RigidBody:
         return type(self)(self.vertices, body=self.body, shape=self.shape, **values)
 
     def _add_numbers(self, label: str, values: Values, numbers: dict[Any, Any]) -> None:
@@ -209,7 +209,7 @@ class Rigid(Owner):
             if self.magnetic_moment is None
             else f", magnetic_moment {tuple(self.magnetic_moment.tolist())} A m2"
         )
-        return f"Rigid({what}{mass}{magnet})"
+        return f"RigidBody({what}{mass}{magnet})"
 
 
 _SHAPE_TETRAHEDRA = 2000
@@ -251,16 +251,16 @@ def or_zero(vector: np.ndarray | None) -> np.ndarray:
     return np.zeros(3) if vector is None else vector
 
 
-class RigidResult(Frozen):
+class RigidBodyResult(Frozen):
     """A rigid part of a result. Of tensors in their graph, tensors.
 
     rotation: (..., 3, 3), from how it was turned at rest. center: (..., 3) m, of its own mass as the scene has it: a point
         that stays the same one where a solve has another center.
     """
 
-    body: Rigid
+    body: RigidBody
 
-    def __init__(self, result: SolveResult, part: Rigid):
+    def __init__(self, result: SolveResult, part: RigidBody):
         scene = result.scene
         k = scene._bodies.rigid_number(part)
         self._result, self.body = result, part

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..._input.checked_list import checked_list
 from ..._runtime.frozen import FixedDict, Frozen, remember, variant
-from .joints import Closure, Fixed, Joint, Prismatic
-from .rigid import Rigid
+from .joints import Fixed, Joint, LoopClosure, Prismatic
+from .rigid import RigidBody
 
 if TYPE_CHECKING:
     from ..._input.kinds import FilePath, Numbers
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 class Skeleton(Frozen):
     """Links and the joints between them: one tree, or several. One of the bodies of a scene, and so are its links.
 
-    links: Link (or Rigid) objects: vertices of a body that they carry, or numbers alone, or both.
+    links: Link (or RigidBody) objects: vertices of a body that they carry, or numbers alone, or both.
     joints: Fixed, Revolute, Prismatic and Ball objects, each leading to a link; a link to which none leads is free.
         Closure objects close loops.
 
@@ -42,11 +42,11 @@ class Skeleton(Frozen):
     """
 
     def __init__(self, links: Link | Iterable[Link], joints: Joint | Iterable[Joint] = ()):
-        self.links: tuple[Rigid, ...] = checked_list("links", links, (Rigid,))
+        self.links: tuple[RigidBody, ...] = checked_list("links", links, (RigidBody,))
         self.joints: tuple[Joint, ...] = checked_list("joints", joints, (Joint,))
         if not self.links:
             raise ValueError("links must hold at least one Link")
-        self.named: dict[str, Rigid | Joint] = FixedDict()  # of a file
+        self.named: dict[str, RigidBody | Joint] = FixedDict()  # of a file
         self._leading: dict[int, Joint] = {}
         for k, joint in enumerate(self.joints):
             self._check(k, joint)
@@ -100,11 +100,11 @@ class Skeleton(Frozen):
             link = getattr(joint, role)
             if link is not None and not any(link is each for each in self.links):
                 raise ValueError(f"the {role} of joint {k} is not among the links of the skeleton")
-        if isinstance(joint, Closure):
+        if isinstance(joint, LoopClosure):
             return
         if id(joint.child) in self._leading:
             raise ValueError(
-                f"two joints lead to one link (joint {k} is the second): in a tree one does; close a loop by a Closure"
+                f"two joints lead to one link (joint {k} is the second): in a tree one does; close a loop by a LoopClosure"
             )
         self._leading[id(joint.child)] = joint
 
@@ -133,23 +133,23 @@ class Skeleton(Frozen):
             now = [k for k in waiting if (p := self._parent_of(k)) is None or number[id(p)] in order]
             if not now:
                 raise ValueError(
-                    f"joints must make trees, but links {waiting} make a loop: close it by a Closure instead"
+                    f"joints must make trees, but links {waiting} make a loop: close it by a LoopClosure instead"
                 )
             order += now
             waiting = [k for k in waiting if k not in now]
         return order
 
-    def _parent_of(self, number: int) -> Rigid | None:
+    def _parent_of(self, number: int) -> RigidBody | None:
         """The link that a link, by its number, hangs on; None where that is the world."""
         joint = self._joint_to(self.links[number])
         return None if joint is None else joint.parent
 
-    def _reach(self, link: Rigid, center: np.ndarray) -> float:
+    def _reach(self, link: RigidBody, center: np.ndarray) -> float:
         """How far from a point of a link its joints are, m."""
         places = [joint.origin for joint in self.joints if link is joint.child or link is joint.parent]
         return max((float(np.linalg.norm(place - center)) for place in places), default=0.0)
 
-    def _turning_scale(self, link: Rigid) -> float:
+    def _turning_scale(self, link: RigidBody) -> float:
         """Return a length, m, for a link that does not turn by itself as one of its joints is a slide or fixed; else 0.
 
         It only sets how rotations of the link are scaled: that of the skeleton, 0.01 m where all of it is at one place.
@@ -161,41 +161,41 @@ class Skeleton(Frozen):
         places = np.array([*centers, *(joint.origin for joint in self.joints)])
         return float(np.linalg.norm(np.ptp(places, axis=0))) or 0.01
 
-    def _held(self, link: Rigid) -> bool:
+    def _held(self, link: RigidBody) -> bool:
         """Whether joints lead from a link to the world."""
         return id(self._root(link)) in self._leading
 
-    def _drifts(self, link: Rigid) -> bool:
+    def _drifts(self, link: RigidBody) -> bool:
         """Whether neither the world nor a vertex of a body is in the tree of a link."""
         return not self._held(link) and all(each.vertices is None for each in self._tree(link))
 
-    def _moved_by(self, joint: Joint) -> list[Rigid]:
+    def _moved_by(self, joint: Joint) -> list[RigidBody]:
         """All links that it carries."""
         return [link for link in self.links if self._on_the_way(joint, link)]
 
-    def _on_the_way(self, joint: Joint, link: Rigid) -> bool:
+    def _on_the_way(self, joint: Joint, link: RigidBody) -> bool:
         before = self._leading.get(id(link))
         while before is not None and before is not joint:
             before = None if before.parent is None else self._leading.get(id(before.parent))
         return before is joint
 
-    def _tree(self, link: Rigid) -> list[Rigid]:
+    def _tree(self, link: RigidBody) -> list[RigidBody]:
         """All links that joints lead to from the root of this one."""
         root = self._root(link)
         return [each for each in self.links if self._root(each) is root]
 
-    def _root(self, link: Rigid) -> Rigid:
+    def _root(self, link: RigidBody) -> RigidBody:
         joint = self._leading.get(id(link))
         while joint is not None and joint.parent is not None:
             link, joint = joint.parent, self._leading.get(id(joint.parent))
         return link
 
     @property
-    def _links_in_order(self) -> tuple[Rigid, ...]:
+    def _links_in_order(self) -> tuple[RigidBody, ...]:
         """The links, parents first."""
         return tuple(self.links[k] for k in self._order)
 
-    def _joint_to(self, link: Rigid) -> Joint | None:
+    def _joint_to(self, link: RigidBody) -> Joint | None:
         """The joint that leads to a link; None where it is free."""
         return self._leading.get(id(link))
 
@@ -210,7 +210,7 @@ def skeleton_inputs(bodies: Bodies, labels: list[tuple[object, str]]) -> dict[st
     """Of a scene's Bodies. labels: the core's name of every object."""
     part = {id(link): k for k, link in enumerate(bodies.rigid)}
     label = {id(item): name for item, name in labels if isinstance(item, Joint)}
-    closures = [joint for joint in bodies.joints if isinstance(joint, Closure)]
+    closures = [joint for joint in bodies.joints if isinstance(joint, LoopClosure)]
     return {
         "skeletons": [_skeleton(each, part, label) for each in bodies.skeletons],
         "closures": [

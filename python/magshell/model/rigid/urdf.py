@@ -80,7 +80,7 @@ def _placed(robot) -> dict[str, np.ndarray]:
                 )
         if joint.child in parent_of:
             raise ValueError(
-                f"two joints lead to link {joint.child!r}: a skeleton is a tree, ms.Closure closes loops"
+                f"two joints lead to link {joint.child!r}: a skeleton is a tree, ms.LoopClosure closes loops"
             )
         parent_of[joint.child] = joint
     roots = known - parent_of.keys()

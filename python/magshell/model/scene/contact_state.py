@@ -97,7 +97,7 @@ def _per_speed(sliding: np.ndarray, sticking_speed: float) -> np.ndarray:
 
 @immutable
 @dataclass(frozen=True)
-class Touching:
+class ContactState:
     """What of a contact touches in one state.
 
     pairs: (k, 4), the scene's vertices. Of bodies: of a vertex and a face, or of two edges; of three or two, with -1
@@ -111,7 +111,7 @@ class Touching:
     coefficient: the largest that friction may be, of the normal force; zero without friction. sticking_speed: m/s.
     forces: (n_v, 3) N, on every vertex of the scene, with which they push each other apart; and what turns edges that are
         nearly parallel, as their pairs fade there, which comes to nothing on each edge. friction: (n_v, 3) N, likewise
-        what rubs. pushed: (n_v,) N, what vertices have of the normal forces, without regard to direction.
+        what rubs. normal_force_magnitudes: (n_v,) N, what vertices have of the normal forces, without regard to direction.
     """
 
     pairs: np.ndarray
@@ -124,7 +124,7 @@ class Touching:
     sticking_speed: float
     forces: np.ndarray
     friction: np.ndarray
-    pushed: np.ndarray
+    normal_force_magnitudes: np.ndarray
     _pushes: np.ndarray  # (n_v, 3) N, of the normal forces alone, without what turns nearly parallel edges
     _direction: np.ndarray  # (k,), 1 where the first part is of the contact's first body or at an obstacle
 
@@ -158,7 +158,7 @@ class Touching:
         return np.divide(sizes, bound, out=np.zeros(len(sizes)), where=bound > 0.0)
 
     @property
-    def slips(self) -> np.ndarray:
+    def is_sliding(self) -> np.ndarray:
         """(k,), whether a pair with friction slides at its sticking speed or faster; without friction everything does."""
         return self.sliding_speeds >= (self.sticking_speed if self.coefficient > 0.0 else 0.0)
 
@@ -166,7 +166,7 @@ class Touching:
         near = f", {self.smallest_distance:.4g} m apart at least" if len(self.pairs) else ""
         rubs = ""
         if self.coefficient > 0.0 and len(self.pairs):
-            rubs = f", {np.count_nonzero(self.slips)} of them slip"
+            rubs = f", {np.count_nonzero(self.is_sliding)} of them slip"
         return f"Touching: {len(self.pairs)} pairs{near}, {self.normal_force:.4g} N{rubs}"
 
 
@@ -177,7 +177,7 @@ def touching_in(
     state: np.ndarray,
     velocities: np.ndarray | None = None,
     time: float | None = None,
-) -> Touching:
+) -> ContactState:
     """values: of the solve that found the state. velocities: (n_v, 3) m/s, or with those of the points of rigid parts, and
     time, s, of a motion. Raises ValueError where the contact is none of the scene's."""
     velocities = np.zeros((scene.mesh.n_vertices, 3)) if velocities is None else velocities
@@ -198,7 +198,7 @@ def touching_in(
     )
 
 
-def _gathered(scene, found: dict[Any, Any], coefficient: float, sticking_speed: float) -> Touching:
+def _gathered(scene, found: dict[Any, Any], coefficient: float, sticking_speed: float) -> ContactState:
     pairs, weights = found["pairs"], found["weights"]
     there = pairs >= 0
 
@@ -208,7 +208,7 @@ def _gathered(scene, found: dict[Any, Any], coefficient: float, sticking_speed: 
         np.add.at(sums, pairs[there], rows[there])
         return sums[: scene.mesh.n_vertices]
 
-    return Touching(
+    return ContactState(
         pairs,
         found["distances"],
         found["normals"],

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..contact.contacts_to_core import LARGEST_SMOOTH_TURN
-from .contact_state import Touching
+from .contact_state import ContactState
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 _NEXT = np.array([[1, 2], [2, 3], [3, 1]])  # of a point and a triangle, the sides of this
 
 
-def near_body_kinks(scene: Scene, touching: Touching, smoothing: float, positions: np.ndarray) -> np.ndarray:
+def near_body_kinks(
+    scene: Scene, touching: ContactState, smoothing: float, positions: np.ndarray
+) -> np.ndarray:
     """Vertices (k,) of the first parts of pairs whose closest points are nearer than the smoothing [m] to where they change
     over to a neighbour that turns away by more than LARGEST_SMOOTH_TURN, or to nothing. positions: of all points."""
     pairs = touching.pairs[touching.normal_forces > 0.0]

@@ -38,7 +38,7 @@ from ..loads.pressure import Pressure
 from ..loads.water import Water
 from ..rigid.equimomental_points import places
 from ..rigid.joints import Joint
-from ..rigid.rigid import Rigid
+from ..rigid.rigid import RigidBody
 from ..rigid.skeleton import Skeleton, skeleton_inputs
 from ..shells.obtuse_faces import Caps
 from ..shells.shell import Shell
@@ -86,7 +86,7 @@ class Scene(Drawn):
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
     >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e5)
-    >>> ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField()).n_unknowns
+    >>> ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField()).n_dofs
     160
 
     >>> other = ms.Shell(mesh.transformed(translation=(0, 0, 0.05)), thickness=5e-4, young_modulus=1e5, bending="hinge")
@@ -106,7 +106,7 @@ class Scene(Drawn):
     @grouped()
     def __init__(
         self,
-        bodies: Shell | Solid | Rigid | Skeleton | Iterable[Shell | Solid | Rigid | Skeleton],
+        bodies: Shell | Solid | RigidBody | Skeleton | Iterable[Shell | Solid | RigidBody | Skeleton],
         *,
         ties: Tie | Iterable[Tie] = (),
         supports: Support | Iterable[Support] = (),
@@ -292,7 +292,7 @@ class Scene(Drawn):
         return self._bodies.ties
 
     @property
-    def rigid_parts(self) -> tuple[Rigid, ...]:
+    def rigid_parts(self) -> tuple[RigidBody, ...]:
         """Rigid parts and links."""
         return self._bodies.rigid
 
@@ -343,7 +343,7 @@ class Scene(Drawn):
         return self.water is not None or rubs
 
     @property
-    def n_unknowns(self) -> int:
+    def n_dofs(self) -> int:
         """Free position components and edge rotations."""
         return self._model.free_size
 
@@ -366,7 +366,7 @@ class Scene(Drawn):
             lines.append(f"  in {self.water!r}")
         if self.gravity.any():
             lines.append(f"  under gravity {tuple(self.gravity.tolist())} m/s2")
-        lines.append(f"  {self.n_unknowns} unknowns")
+        lines.append(f"  {self.n_dofs} unknowns")
         return "\n".join(lines)
 
     def _whose(self, item) -> str:

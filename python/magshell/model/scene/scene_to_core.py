@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...mesh.triangles.six_node_mesh import SixNodeMesh
+from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ..actuators.cavity import Cavity
-from ..actuators.cells import Cells
+from ..actuators.cells import PneumaticCells
 from ..actuators.muscle import Muscle
 from ..actuators.tendon import Tendon
 from ..loads.face_energies import FaceEnergy
@@ -85,7 +85,9 @@ def actuator_inputs(scene: Scene) -> dict[str, list[dict[Any, Any]]]:
     """Volumes and tendons."""
     bodies = scene._bodies
     volumes = [
-        each._core_input(label, bodies) for each, label in scene._labels if isinstance(each, Cavity | Cells)
+        each._core_input(label, bodies)
+        for each, label in scene._labels
+        if isinstance(each, Cavity | PneumaticCells)
     ]
     tendons = [
         each._core_input(label, bodies, scene._rigid)
@@ -137,7 +139,7 @@ def _six_node_sheets(scene, directed_edges: np.ndarray) -> list[dict[Any, Any]]:
             "directed_edges": directed[k],
         }
         for k, (shell, span) in enumerate(zip(scene.bodies, scene._bodies.spans, strict=True))
-        if isinstance(shell.mesh, SixNodeMesh)
+        if isinstance(shell.mesh, QuadraticTriangleMesh)
     ]
 
 

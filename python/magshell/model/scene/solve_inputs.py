@@ -69,7 +69,7 @@ class Inputs:
         if scene.has_forces_of_motion and not (moving or without_forces_of_motion):
             raise ValueError(
                 "the scene has friction or water, which act on what moves: use ms.simulate, with some damping until it "
-                "rests, or ms.equilibrium(..., at_rest=True), which leaves them out"
+                "rests, or ms.equilibrium(..., ignore_velocity_forces=True), which leaves them out"
             )
         self.scene = scene
         self.given: list[Any] = []

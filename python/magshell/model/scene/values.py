@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..contact.contact import Contact
     from ..contact.obstacles.obstacle import Obstacle
     from ..rigid.joints import Joint
-    from ..rigid.rigid import Rigid
+    from ..rigid.rigid import RigidBody
     from ..solids.skin import Skin
     from ..solids.solid import Solid
     from .scene import Scene
@@ -172,11 +172,11 @@ class Values:
         masses = [place.masses(part) for place, part in zip(self.scene._rigid, self.rigid, strict=True)]
         return [*masses, np.zeros(self.scene._bodies.n_on_surfaces)]
 
-    def rigid_place(self, part: Rigid) -> Any:
+    def rigid_place(self, part: RigidBody) -> Any:
         """Where one of `rigid` is."""
         return next(place for place, each in zip(self.scene._rigid, self.rigid, strict=True) if each is part)
 
-    def started_by(self, part: Rigid) -> list[Any]:
+    def started_by(self, part: RigidBody) -> list[Any]:
         """The places of all that starts with one of `rigid`."""
         scene = self.scene
         own = next(each for each, now in zip(scene.rigid_parts, self.rigid, strict=True) if now is part)

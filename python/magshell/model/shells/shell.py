@@ -13,7 +13,7 @@ from ..._runtime.solver_entry_point import grouped
 from ...mesh.face_shapes import corner_axes, sides
 from ...mesh.triangles.face_quality import MeshQuality
 from ...mesh.triangles.six_node_checks import shape_integrals, shape_products
-from ...mesh.triangles.six_node_mesh import SixNodeMesh
+from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 
 if TYPE_CHECKING:
@@ -115,17 +115,19 @@ _LUMPED = {3: np.full(3, 1 / 3), 6: np.array([1 / 19] * 3 + [16 / 57] * 3)}
 class Shell(Owner):
     """A thin sheet of St. Venant-Kirchhoff material under the Kirchhoff-Love assumption.
 
-    Every property is a number, or an array with one entry a face (of a SixNodeMesh an element); `curvature_scale` one an
+    Every property is a number, or an array with one entry a face (of a QuadraticTriangleMesh an element);
+    `curvature_scale` one an
     edge.
 
-    mesh: TriangleMesh or SixNodeMesh, its positions are the rest shape.
+    mesh: TriangleMesh or QuadraticTriangleMesh, its positions are the rest shape.
     thickness: m, positive.
     young_modulus: Pa, positive.
     poisson_ratio: in (-1, 1/2].
     mass_density: kg/m3, positive; only gravity asks for it.
     curvature_scale: positive factor on every bending strain, [Chen22] k_cur; not for "midedge2".
     bending: "midedge", the default (second order on irregular meshes too, see `quality`; one rotation an edge: the
-        lowest-order Hellan-Herrmann-Johnson element); "midedge2", the default and the only one for a SixNodeMesh (fourth
+        lowest-order Hellan-Herrmann-Johnson element); "midedge2", the default and the only one for a
+        QuadraticTriangleMesh (fourth
         order in smooth problems; curved elements, two rotations an edge, linear moments, and membrane strains of Regge
         elements: Neunteufel and Schoeberl 2019, 2021); or "hinge" ([Chen22] (19): no rotations, cheaper, and off by several
         percent on irregular meshes).
@@ -142,12 +144,14 @@ class Shell(Owner):
     the angles of a curved rest shape as they are, so that it scales the shape (in general its second fundamental form is
     multiplied by the root of det G). Everything else stays: thickness is that of the grown sheet; mass, weight,
     magnetization and area loads are those of the mesh, and the magnetization stretches with the sheet, grown or not. Both
-    may change along ms.follow and in ms.simulate. With "hinge" both faces of an edge share one angle, their mean, and free
+    may change along ms.follow_path and in ms.simulate. With "hinge" both faces of an edge share one angle,
+    their mean, and free
     edges have none.
 
     Which one: an element of "midedge2" costs about eight times a face of "midedge", and needs far fewer of them. Where
     deflections and loads are wanted to a percent or better, and where sheets are curved at rest or twist, take "midedge2"
-    with a SixNodeMesh; the coarsest mesh that shows the shape will often do. Where the mesh has to be fine anyway, for
+    with a QuadraticTriangleMesh; the coarsest mesh that shows the shape will often do. Where the mesh has to
+    be fine anyway, for
     contacts, many small faces of their own magnetization, creases and folds, or where a few percent are enough, take
     "midedge". Smoothness is what order four lives on: at clamps' corners, point forces and jumps inside an element the two
     are alike.
@@ -175,7 +179,7 @@ class Shell(Owner):
     @grouped()
     def __init__(
         self,
-        mesh: TriangleMesh | SixNodeMesh,
+        mesh: TriangleMesh | QuadraticTriangleMesh,
         *,
         thickness: Numbers,
         young_modulus: Numbers,
@@ -187,8 +191,10 @@ class Shell(Owner):
         growth: Numbers | None = None,
         rest_curvature: Numbers | None = None,
     ):
-        if not isinstance(mesh, TriangleMesh | SixNodeMesh):
-            raise ValueError(f"mesh must be a TriangleMesh or a SixNodeMesh, got {type(mesh).__name__}")
+        if not isinstance(mesh, TriangleMesh | QuadraticTriangleMesh):
+            raise ValueError(
+                f"mesh must be a TriangleMesh or a QuadraticTriangleMesh, got {type(mesh).__name__}"
+            )
         self.mesh = mesh
         self.bending: str = _checked_bending(bending, mesh)
         faces = ("n_f" if mesh.order == 1 else "n", mesh.n_elements)
@@ -287,7 +293,7 @@ class Shell(Owner):
 
     @property
     def _grown_by(self) -> np.ndarray:
-        """(n_f, 2, 2) in `corner_axes` of the faces; of a SixNodeMesh, each flat face like its element."""
+        """(n_f, 2, 2) in `corner_axes` of the faces; of a QuadraticTriangleMesh, each flat face like its element."""
         n = len(self.mesh.faces)
         if self.growth is None:
             return np.broadcast_to(np.eye(2), (n, 2, 2))
@@ -309,12 +315,12 @@ class Shell(Owner):
 
     @property
     def _face_thickness(self) -> np.ndarray:
-        """(n_f,), m: of a SixNodeMesh, of its flat faces."""
+        """(n_f,), m: of a QuadraticTriangleMesh, of its flat faces."""
         return self._on_faces(self.thickness)
 
     @property
     def _face_magnetization(self) -> np.ndarray | None:
-        """(n_f, 3) A/m, of its own; of a SixNodeMesh, on its flat faces."""
+        """(n_f, 3) A/m, of its own; of a QuadraticTriangleMesh, on its flat faces."""
         own = self.remanent_magnetization
         return None if own is None else self._on_faces(own)
 
@@ -323,7 +329,7 @@ class Shell(Owner):
 
     @property
     def face_volumes(self) -> np.ndarray:
-        """Rest volumes, (n_f,), m3: of a SixNodeMesh, of its elements."""
+        """Rest volumes, (n_f,), m3: of a QuadraticTriangleMesh, of its elements."""
         return self.mesh.element_areas * self.thickness
 
     @property
@@ -391,7 +397,7 @@ def _checked_bending(bending, mesh) -> str:
     if bending == "midedge2" and mesh.order == 1:
         raise ValueError(
             'bending="midedge2" needs a mesh of six-node elements: ms.meshes.rectangle(..., order=2) and its like, '
-            "ms.SixNodeMesh.of(mesh, place=...) of a TriangleMesh, or a file of second order from gmsh"
+            "ms.QuadraticTriangleMesh.of(mesh, place=...) of a TriangleMesh, or a file of second order from gmsh"
         )
     if bending != "midedge2" and mesh.order == 2:
         raise ValueError(

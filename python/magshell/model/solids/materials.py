@@ -207,7 +207,7 @@ class Corotated(_Isotropic):
     """
 
 
-class Projective(_Isotropic):
+class ProjectiveMaterial(_Isotropic):
     """What Projective Dynamics is for: mu |F - R|^2 + lam/2 |F - P|^2, R the nearest rotation, P the nearest matrix with
     determinant 1 (Bouaziz et al. 2014; with the weights 2 mu and lam of [Qiao21]). Elements turned inside out come back.
     Volume counts at every point of an element, so that it has no mean_volume.
@@ -217,7 +217,7 @@ class Projective(_Isotropic):
 
     >>> import magshell as ms
     >>> bar = ms.meshes.box((0.1, 0.02, 0.02), cells=(4, 1, 1))
-    >>> ms.Solid(bar, material=ms.Projective(young_modulus=1e6, poisson_ratio=0.3)).material.young_modulus
+    >>> ms.Solid(bar, material=ms.ProjectiveMaterial(young_modulus=1e6, poisson_ratio=0.3)).material.young_modulus
     array(1000000.)
     """
 

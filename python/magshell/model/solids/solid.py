@@ -13,7 +13,7 @@ from ..._runtime.solver_entry_point import grouped
 from ...mesh.tetrahedra.jacobian import shape_integrals, shape_products
 from ...mesh.tetrahedra.tet_mesh import TetMesh
 from ..shells.shell import magnetization_of
-from .materials import Projective, SolidMaterial
+from .materials import ProjectiveMaterial, SolidMaterial
 from .mean_volume import warn_of_free_modes
 from .skin import Skin
 
@@ -78,7 +78,7 @@ class Solid(Owner):
             raise ValueError(f"mean_volume must be True, False or None, got {mean_volume!r}")
         if mean_volume and element == "linear":
             raise ValueError("mean_volume is for quadratic elements: linear ones have one point each")
-        if mean_volume and isinstance(material, Projective):
+        if mean_volume and isinstance(material, ProjectiveMaterial):
             raise ValueError(
                 "mean_volume is not for Projective: no part of its energy depends on the volume alone"
             )

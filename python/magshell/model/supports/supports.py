@@ -12,7 +12,7 @@ from ..._input.quantity import quantity
 from ..._input.scalars import not_negative
 from ..._input.selections import indices, selection
 from ...mesh.tetrahedra.tet_mesh import TetMesh
-from ...mesh.triangles.six_node_mesh import SixNodeMesh
+from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ..bodies.bodies import checked_body, on_body
 from ..shells.shell import Shell
@@ -123,7 +123,7 @@ class Pin(Support):
 
     def _held(self, mesh: TriangleMesh) -> list[Held]:
         vertices = indices("Pin vertices", self.vertices, mesh.n_vertices)
-        if isinstance(mesh, SixNodeMesh):
+        if isinstance(mesh, QuadraticTriangleMesh):
             _refuse_ends_alone(mesh, vertices)
         elif not isinstance(mesh, TriangleMesh):
             _refuse_corners_alone(mesh, vertices)
@@ -171,7 +171,7 @@ class Clamp(Support):
         self._move = _Move(displacement, rotation, center)
 
     def _held(self, mesh: TriangleMesh) -> list[Held]:
-        if not isinstance(mesh, TriangleMesh | SixNodeMesh):
+        if not isinstance(mesh, TriangleMesh | QuadraticTriangleMesh):
             raise ValueError("a Clamp holds edges of a shell: a Pin of the vertices of a face clamps a solid")
         vertices = np.unique(mesh.nodes_of_edges[self._checked(mesh)])
         return [Held(vertices, np.broadcast_to(np.eye(3), (len(vertices), 3, 3)), self._move_on(mesh))]
@@ -209,7 +209,7 @@ class SymmetryPlane(Support):
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
     >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
     >>> half = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0)), ms.SymmetryPlane((1, 0, 0), (0.1, 0, 0))])
-    >>> half.n_unknowns < ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))]).n_unknowns
+    >>> half.n_dofs < ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))]).n_dofs
     True
     """
 
@@ -253,7 +253,7 @@ class SymmetryPlane(Support):
         return [Held(vertices, np.broadcast_to(self.normal, (len(vertices), 1, 3)), None)]
 
     def _directed(self, mesh: TriangleMesh) -> list[DirectedEdges]:
-        if not isinstance(mesh, TriangleMesh | SixNodeMesh):
+        if not isinstance(mesh, TriangleMesh | QuadraticTriangleMesh):
             return []  # a solid has no angle across the plane
         on_plane = np.zeros(mesh.n_vertices, dtype=bool)
         on_plane[self._vertices(mesh)] = True
@@ -293,7 +293,7 @@ def _refuse_corners_alone(mesh, vertices: np.ndarray) -> None:
         )
 
 
-def _refuse_ends_alone(mesh: SixNodeMesh, vertices: np.ndarray) -> None:
+def _refuse_ends_alone(mesh: QuadraticTriangleMesh, vertices: np.ndarray) -> None:
     """What was selected on the mesh of three nodes would hold a row of edges by their ends, and let the nodes between go."""
     held = np.zeros(mesh.n_vertices, dtype=bool)
     held[vertices] = True
@@ -350,7 +350,7 @@ class _Move:
 
 def continuations(mesh: TriangleMesh, edges: np.ndarray) -> np.ndarray:
     """Unit vectors across edges, in the plane of their first face and away from it, (k, 3)."""
-    flat = mesh.corners if isinstance(mesh, SixNodeMesh) else mesh
+    flat = mesh.corners if isinstance(mesh, QuadraticTriangleMesh) else mesh
     faces = np.where(flat.edge_faces[edges, 0] >= 0, flat.edge_faces[edges, 0], flat.edge_faces[edges, 1])
     ends = mesh.rest_positions[mesh.edges[edges]]
     along = ends[:, 1] - ends[:, 0]
@@ -367,4 +367,4 @@ def _called(mesh: Any) -> str:
     """Say what a mesh is of."""
     if isinstance(mesh, TetMesh):
         return "the solid"
-    return "the sheet" if isinstance(mesh, TriangleMesh | SixNodeMesh) else "the scene"
+    return "the sheet" if isinstance(mesh, TriangleMesh | QuadraticTriangleMesh) else "the scene"

@@ -18,7 +18,7 @@ class ContactLoads(NamedTuple):
     have of the normal forces without regard to their direction."""
 
     forces: np.ndarray
-    pushed: np.ndarray
+    normal_force_magnitudes: np.ndarray
 
     def pressures(self, positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
         """(n_v,) Pa, of vertices that have a third of each of their faces as these are now. Over the surface of a body its
@@ -26,11 +26,11 @@ class ContactLoads(NamedTuple):
         x0, x1, x2 = np.moveaxis(positions[faces], 1, 0)
         thirds = np.linalg.norm(np.cross(x1 - x0, x2 - x0), axis=1) / 6.0
         areas = np.bincount(faces.ravel(), np.repeat(thirds, 3), minlength=len(positions))
-        return np.divide(self.pushed, areas, out=np.zeros(len(positions)), where=areas > 0.0)
+        return np.divide(self.normal_force_magnitudes, areas, out=np.zeros(len(positions)), where=areas > 0.0)
 
     def of(self, vertices: np.ndarray) -> ContactLoads:
         """Of some vertices alone."""
-        return ContactLoads(self.forces[vertices], self.pushed[vertices])
+        return ContactLoads(self.forces[vertices], self.normal_force_magnitudes[vertices])
 
 
 def contact_loads(result: SolveResult, index: int) -> ContactLoads:
@@ -38,11 +38,11 @@ def contact_loads(result: SolveResult, index: int) -> ContactLoads:
     scene, moving = result.scene, isinstance(result, Trajectory)
     values, state = result._values_at(index), result._state_at(index)
     found = [
-        result.touching(contact, index) if moving else touching_in(scene, values, contact, state)
+        result.contact_state(contact, index) if moving else touching_in(scene, values, contact, state)
         for contact in scene.contacts
     ]
     forces, pushed = np.zeros((scene.mesh.n_vertices, 3)), np.zeros(scene.mesh.n_vertices)
     for each in found:
         forces += each._pushes + each.friction
-        pushed += each.pushed
+        pushed += each.normal_force_magnitudes
     return ContactLoads(forces, pushed)

@@ -16,7 +16,7 @@ from ...model.rigid.skeleton import Skeleton
 
 if TYPE_CHECKING:
     from ..._input.kinds import SolveResult
-    from ...model.rigid.rigid import Rigid
+    from ...model.rigid.rigid import RigidBody
     from ...model.scene.scene import Scene
 
 
@@ -24,7 +24,7 @@ _THICK = 0.06  # the radius of a rod, in its length
 _KNOB = 1.4  # and of its ends, in that
 
 
-def surface_of(skeleton: Skeleton, link: Rigid, center: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def surface_of(skeleton: Skeleton, link: RigidBody, center: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """At rest: vertices (n, 3) m, faces (m, 3). center: (3,) m, of the link."""
     shape = getattr(link, "shape", None)
     if shape is not None:

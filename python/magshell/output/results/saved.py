@@ -18,7 +18,7 @@ from ...design.digest import digest
 from ...design.multistart.json_data import from_plain, to_plain
 from ...model.scene.scene import Scene
 from ...solve.dynamics.trajectory import MotionState, Trajectory
-from ...solve.statics.equilibria import Equilibria
+from ...solve.statics.equilibria import EquilibriumSet
 from ...solve.statics.equilibrium import Equilibrium
 
 
@@ -96,12 +96,12 @@ def _parts(scene: Scene) -> dict[str, object]:
 
 
 _FORMAT = 1
-_KINDS = {each.__name__: each for each in (Equilibrium, Equilibria, Trajectory)}
+_KINDS = {each.__name__: each for each in (Equilibrium, EquilibriumSet, Trajectory)}
 _CONTENTS = "contents"
 
 
 @offered
-def save(path: str | Path, result: Equilibrium | Equilibria | Trajectory) -> None:
+def save(path: str | Path, result: Equilibrium | EquilibriumSet | Trajectory) -> None:
     """Writes a result into one file, an .npz of arrays and of JSON text, from which `load` makes it again.
 
     result: an Equilibrium, Equilibria, or a Trajectory; of a Path its points, `path.equilibrium(k)`. Tensors become arrays,
@@ -125,9 +125,9 @@ def save(path: str | Path, result: Equilibrium | Equilibria | Trajectory) -> Non
     (True, True)
     """
     if type(result) not in _KINDS.values():
-        points = ": save its points, ms.Equilibria(path.equilibrium(k) for k in ...)"
+        points = ": save its points, ms.EquilibriumSet(path.equilibrium(k) for k in ...)"
         why = points if type(result).__name__ == "Path" else ""
-        why = ": several are ms.Equilibria([...])" if isinstance(result, list | tuple) else why
+        why = ": several are ms.EquilibriumSet([...])" if isinstance(result, list | tuple) else why
         raise ValueError(
             f"result must be an Equilibrium, Equilibria or a Trajectory, got {type(result).__name__}{why}"
         )
@@ -192,11 +192,11 @@ def load(path: str | Path, scene: Scene) -> Any:  # which of them, the file tell
             f"then.{versions}"
         )
     try:
-        cases = held["_cases"] if kind is Equilibria else [held]
-        made = [_made(Equilibrium if kind is Equilibria else kind, case, scene) for case in cases]
+        cases = held["_cases"] if kind is EquilibriumSet else [held]
+        made = [_made(Equilibrium if kind is EquilibriumSet else kind, case, scene) for case in cases]
     except Exception as error:
         raise ValueError(f"{path} is not a saved result: {error}") from error
-    return Equilibria(made) if kind is Equilibria else made[0]
+    return EquilibriumSet(made) if kind is EquilibriumSet else made[0]
 
 
 class _Later(Exception):
@@ -205,7 +205,7 @@ class _Later(Exception):
 
 def _fields(result, scene: Scene) -> dict[Any, Any]:
     """What makes it again, with numbers in the place of the scene's objects."""
-    if isinstance(result, Equilibria):
+    if isinstance(result, EquilibriumSet):
         return {"_cases": [_fields(case, scene) for case in result]}
     numbers = {id(each): k for k, each in enumerate((scene, *scene.objects))}
     held = {name: value for name, value in result.__getstate__().items() if name != "scene"}

@@ -19,7 +19,7 @@ from ..._runtime.progress import SolveBar
 from ...mesh.io.read_write import check_field_name, write_cells, write_mesh
 from ...mesh.io.tetrahedra import cells_and_data
 from ...mesh.tetrahedra.tet_mesh import TetMesh
-from ...mesh.triangles.six_node_mesh import SixNodeMesh
+from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ...model.shells.shell_stresses import ShellStresses
 from ...model.solids.solid_stresses import SolidStates
@@ -179,7 +179,7 @@ def write_series(
             on_faces, on_tetrahedra = (
                 {name: values[k] for name, values in more[kind].items()} for kind in ("face", "tetrahedron")
             )
-            if isinstance(state.mesh, TriangleMesh | SixNodeMesh):
+            if isinstance(state.mesh, TriangleMesh | QuadraticTriangleMesh):
                 on_faces = _of_sheets(state, magnetized) | on_faces
                 flat = state.mesh if isinstance(state.mesh, TriangleMesh) else state.mesh.surface
                 write_mesh(path.parent / names[k], flat, state.positions, on_vertices, on_faces)
@@ -192,7 +192,7 @@ def write_series(
 def _by_state(fields: dict[Any, Any] | None, kind: str, states: list[State]) -> dict[str, np.ndarray]:
     fields = named_values(f"{kind}_fields", fields)
     mesh = states[0].mesh
-    if kind == "tetrahedron" and fields and isinstance(mesh, TriangleMesh | SixNodeMesh):
+    if kind == "tetrahedron" and fields and isinstance(mesh, TriangleMesh | QuadraticTriangleMesh):
         raise ValueError("tetrahedron_fields: there are no tetrahedra")
     rows = _counts(mesh)[kind]
     for name, values in fields.items():

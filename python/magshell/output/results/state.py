@@ -12,7 +12,7 @@ from ..._input.quantity import quantity
 from ..._input.tensors import detached
 from ...mesh.face_shapes import sides
 from ...mesh.tetrahedra.tet_mesh import TetMesh
-from ...mesh.triangles.six_node_mesh import SixNodeMesh
+from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ...model.bodies.body_ranges import magnetized_rows
 from ...model.bodies.joined_mesh import JoinedMesh
@@ -25,8 +25,8 @@ from ...model.shells.shell_stresses import ShellStresses
 from ...model.solids.solid import Solid
 from ...model.solids.solid_stresses import SolidStates
 from ...solve.dynamics.trajectory import Trajectory
-from ...solve.statics.equilibria import Equilibria
-from ...solve.statics.path import Path
+from ...solve.statics.equilibria import EquilibriumSet
+from ...solve.statics.path import EquilibriumPath
 from .contact_loads import ContactLoads, contact_loads
 from .link_surfaces import (
     bones_at_rest,
@@ -60,7 +60,7 @@ class State:
     loads: () -> ContactLoads of a result of a scene with contacts, or None without any.
     """
 
-    mesh: TriangleMesh | SixNodeMesh | TetMesh | JoinedMesh
+    mesh: TriangleMesh | QuadraticTriangleMesh | TetMesh | JoinedMesh
     positions: np.ndarray
     remanent_magnetization: np.ndarray | None = None
     flux_density: np.ndarray | None = None
@@ -152,7 +152,7 @@ def states_of(
         "field": field,
         "obstacles": obstacles,
     }
-    if isinstance(what, TriangleMesh | SixNodeMesh | TetMesh):
+    if isinstance(what, TriangleMesh | QuadraticTriangleMesh | TetMesh):
         return _states(what, given)
     if isinstance(what, Shell | Solid):
         return _states(what.mesh, _magnetized(given, [what]))
@@ -164,7 +164,7 @@ def states_of(
         tendons = tuple(tendons_at_rest(what))
         return [replace(state, bones=tuple(bones), shapes=tuple(shapes), tendons=tendons) for state in states]
     is_result = isinstance(getattr(what, "scene", None), Scene) and hasattr(what, "positions")
-    if is_result and not isinstance(what, Equilibria):
+    if is_result and not isinstance(what, EquilibriumSet):
         own = _held_by(what)
         merged = {name: own.get(name) if value is None else value for name, value in given.items()}
         around = surroundings_of(what)
@@ -266,7 +266,7 @@ def with_times(states: list[State], times: Numbers) -> list[State]:
 def _held_by(result) -> dict[str, Any]:
     """What a result says of its states; `strengths` are the factors on the fields that vary in space."""
     held = {name: getattr(result, name, None) for name in ("positions", "remanent_magnetization", "field")}
-    if isinstance(result, Path):
+    if isinstance(result, EquilibriumPath):
         flux_densities = result.applied_flux_densities
         strengths = result._control("field_factor")[:, 0].tolist()
         titles = [f"parameter {parameter:.4g}" for parameter in result.parameters]
@@ -336,7 +336,7 @@ def _magnetization(mesh: TriangleMesh, values) -> np.ndarray | None:
         return None
     array = quantity("remanent_magnetization", "A/m", detached(values), ("...", 3))
     meshes = getattr(mesh, "meshes", [mesh])
-    parts = [sides(each)[1] if isinstance(each, SixNodeMesh) else 1 for each in meshes]
+    parts = [sides(each)[1] if isinstance(each, QuadraticTriangleMesh) else 1 for each in meshes]
     rows = [magnetized_rows(each) for each in meshes]
     if max(parts, default=1) > 1 and array.shape == (sum(rows), 3):
         return np.repeat(array, np.repeat(parts, rows), axis=0)

@@ -12,7 +12,7 @@ from ..._runtime.files import replace_file
 from ...mesh.io.obj import write_obj
 from ...mesh.io.stl import write_stl
 from ...mesh.tetrahedra.tet_mesh import TetMesh
-from ...mesh.triangles.six_node_mesh import SixNodeMesh
+from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 from ...mesh.triangles.thickened import thickened
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ...model.scene.scene import Scene
@@ -91,7 +91,7 @@ def _surface(state: State, thickness: np.ndarray | None) -> tuple[np.ndarray, np
         elif thickness is None:
             parts.append((there, mesh.faces))
         else:
-            sheet = mesh.surface if isinstance(mesh, SixNodeMesh) else mesh
+            sheet = mesh.surface if isinstance(mesh, QuadraticTriangleMesh) else mesh
             parts.append(thickened(sheet, there, thickness[own]))
     first = np.cumsum([0, *(len(points) for points, _ in parts)])
     numbered = [faces + before for (_, faces), before in zip(parts, first, strict=False)]
@@ -112,7 +112,7 @@ def _thickness(what, state: State, given, index: int) -> np.ndarray | None:
         return np.broadcast_to(values, (n_f,))
     if given != "own":
         raise ValueError(f'thickness must be None, "own", or m, got {given!r}')
-    if isinstance(what, TriangleMesh | SixNodeMesh | TetMesh):
+    if isinstance(what, TriangleMesh | QuadraticTriangleMesh | TetMesh):
         raise ValueError('thickness="own" is that of a Shell, and a mesh has none: give a number, m')
     if isinstance(what, Shell | Solid):
         bodies = [what]

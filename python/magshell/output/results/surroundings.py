@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from ...model.contact.obstacles import Obstacle
 from ...model.fields.field import AppliedField
 from ...solve.dynamics.trajectory import Trajectory
-from ...solve.statics.path import Path
+from ...solve.statics.path import EquilibriumPath
 
 if TYPE_CHECKING:
     from ..._input.kinds import SolveResult
@@ -28,7 +28,7 @@ def surroundings_of(result: SolveResult) -> Surroundings:
     scene = result.scene
     if not hasattr(result, "_values_at"):
         return Surroundings([scene.fields], [scene.obstacles])
-    count = len(result) if isinstance(result, Trajectory | Path) else 1
+    count = len(result) if isinstance(result, Trajectory | EquilibriumPath) else 1
     values = [result._values_at(k) for k in range(count)]
     fields, obstacles = (
         [tuple(map(each.current, objects)) for each in values] for objects in (scene.fields, scene.obstacles)

@@ -9,22 +9,23 @@ import numpy as np
 
 from ..._input.tensors import detached
 from ...solve.dynamics.trajectory import Trajectory
-from ...solve.statics.equilibria import Equilibria
+from ...solve.statics.equilibria import EquilibriumSet
 from ...solve.statics.equilibrium import Equilibrium
-from ...solve.statics.path import Path
+from ...solve.statics.path import EquilibriumPath
 
 if TYPE_CHECKING:
     import pandas
     import xarray
 
-_RESULTS = Equilibrium | Equilibria | Path | Trajectory
+_RESULTS = Equilibrium | EquilibriumSet | EquilibriumPath | Trajectory
 _PER = ("state", "vertex")
 
 
-def to_xarray(result: Equilibrium | Equilibria | Path | Trajectory) -> xarray.Dataset:
+def to_xarray(result: Equilibrium | EquilibriumSet | EquilibriumPath | Trajectory) -> xarray.Dataset:
     """A result as an xarray.Dataset (needs the package xarray).
 
-    Along `time` [s] of a Trajectory, `parameter` of a Path or `case` of Equilibria: `positions`, `displacements` and, of a
+    Along `time` [s] of a Trajectory, `parameter` of a EquilibriumPath or `case` of EquilibriumSet:
+    `positions`, `displacements` and, of a
     motion, `velocities`, (..., vertex, axis); energies, one variable a term, and `kinetic_energy`; the largest strains;
     `applied_flux_density` (..., axis). Beside them `rest_positions` (vertex, axis) and `faces` (face, corner). What has a
     unit has it in `attrs["units"]`. Tensors become arrays.
@@ -58,12 +59,14 @@ def to_xarray(result: Equilibrium | Equilibria | Path | Trajectory) -> xarray.Da
     return xarray.Dataset(variables, labels, {"kind": type(result).__name__})
 
 
-def to_pandas(result: Equilibrium | Equilibria | Path | Trajectory, per: str = "state") -> pandas.DataFrame:
+def to_pandas(
+    result: Equilibrium | EquilibriumSet | EquilibriumPath | Trajectory, per: str = "state"
+) -> pandas.DataFrame:
     """A result as a pandas.DataFrame (needs the package pandas), the units in the names of its columns.
 
     per: "state": a row for each state, of energies, strains and the uniform field; "vertex": a row for each vertex in each
         state, of where it is, and of a motion how fast it goes. The index is `time [s]` of a Trajectory, `parameter` of a
-        Path or `case` of Equilibria, and `vertex`.
+        Path or `case` of EquilibriumSet, and `vertex`.
 
     Raises ValueError on bad input, ImportError without pandas.
 
@@ -110,18 +113,22 @@ def _states(result) -> tuple[str | None, np.ndarray | None]:
     """The coordinate that its states lie along, and where they are."""
     if not isinstance(result, _RESULTS):
         raise ValueError(
-            f"result must be an Equilibrium, Equilibria, a Path or a Trajectory, got {type(result).__name__}"
+            f"result must be an Equilibrium, Equilibria, a EquilibriumPath or a Trajectory, got {type(result).__name__}"
         )
     if isinstance(result, Equilibrium):
         return None, None
     if isinstance(result, Trajectory):
         return "time", result.times
-    return ("parameter", result.parameters) if isinstance(result, Path) else ("case", np.arange(len(result)))
+    return (
+        ("parameter", result.parameters)
+        if isinstance(result, EquilibriumPath)
+        else ("case", np.arange(len(result)))
+    )
 
 
 def _columns(result) -> dict[str, tuple[str, np.ndarray]]:
     """{name: (unit, a number a state)}."""
-    if isinstance(result, Equilibria):
+    if isinstance(result, EquilibriumSet):
         cases = [_columns(case) for case in result]
         return {
             name: (unit, np.array([case[name][1] for case in cases]))
@@ -132,8 +139,8 @@ def _columns(result) -> dict[str, tuple[str, np.ndarray]]:
     }
     if isinstance(result, Trajectory):
         found["kinetic_energy"] = ("J", result.kinetic_energy)
-    if isinstance(result, Path):
-        found["unstable_directions"] = ("1", result.unstable_directions)
+    if isinstance(result, EquilibriumPath):
+        found["n_negative_eigenvalues"] = ("1", result.n_negative_eigenvalues)
     for name in ("largest_membrane_strain", "largest_bending_strain"):
         found[name] = ("1", np.asarray(getattr(result, name)))
     return found

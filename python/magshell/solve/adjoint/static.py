@@ -33,15 +33,15 @@ class Adjoint:
 
     def _refuse(self) -> None:
         found = self._found
-        if found.progress < 1.0 or found.outcome != _core.Outcome.converged:
+        if found.load_fraction < 1.0 or found.outcome != _core.Outcome.converged:
             raise NoGradient(
                 "no gradient here: the solve did not converge, "
-                f"it got {found.progress:.3g} of the way ({found.reason})"
+                f"it got {found.load_fraction:.3g} of the way ({found.reason})"
             )
         if not found.stable:
             raise NoGradient(
                 "no gradient here: the equilibrium is not stable "
-                f"({found.unstable_directions} directions lower its energy, or its Hessian is singular), "
+                f"({found.n_negative_eigenvalues} directions lower its energy, or its Hessian is singular), "
                 "and no body would stay in it. Solve with require_stable=True."
             )
 

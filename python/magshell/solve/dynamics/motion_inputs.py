@@ -27,7 +27,7 @@ from .trajectory import MotionState, Trajectory
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
     from ...model.scene.time_series import Course
-    from ..options import Keep
+    from ..options import AdjointStorage
 
 
 _CONTROLS = {  # (unit, of one time)
@@ -35,7 +35,7 @@ _CONTROLS = {  # (unit, of one time)
     "field_factor": ("1", ()),
     "load_factor": ("1", ()),
     "gravity_factor": ("1", ()),
-    "motion_factor": ("1", ()),
+    "support_factor": ("1", ()),
 }
 
 
@@ -57,7 +57,7 @@ class MotionInputs:
         steps: int,
         time_step: Numbers,
         record_every: int,
-        keep: Keep,
+        adjoint_storage: AdjointStorage,
         start: Any,
         velocities: Numbers,
         damping: Numbers,
@@ -77,7 +77,10 @@ class MotionInputs:
                 "only the start would be recorded"
             )
         check_memory(self.steps, self.record_every, len(integrator._times) + 1, inputs.scene._model.size)
-        self.keep, self.memory_budget = getattr(_core.Keep, keep.what or "nothing"), int(keep.memory_budget)
+        self.keep, self.memory_budget = (
+            getattr(_core.Keep, adjoint_storage.what or "nothing"),
+            int(adjoint_storage.memory_budget),
+        )
         self.given_time_step, self._outside = time_step, None
         self.time_step: float = positive("time_step", "s", inputs.take("time_step", time_step))
         self._mass = inputs.values.masses

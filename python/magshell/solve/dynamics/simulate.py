@@ -25,7 +25,17 @@ from ...model.shells.obtuse_faces import warn_of_caps
 from ...model.shells.shell import Shell
 from ...model.shells.strains import StrainHistory, warn_if_large
 from ..adjoint.dynamic import MotionAdjoint
-from ..options import SDIRK2, SDIRK3, TRBDF2, ImplicitEuler, Integrator, Keep, MixedNewton, Newton, kept
+from ..options import (
+    SDIRK2,
+    SDIRK3,
+    TRBDF2,
+    AdjointStorage,
+    ImplicitEuler,
+    Integrator,
+    MixedNewton,
+    Newton,
+    kept,
+)
 from .motion_inputs import MotionInputs
 from .trajectory import MotionState, Trajectory
 
@@ -34,7 +44,7 @@ if TYPE_CHECKING:
     from ..statics.equilibrium import Equilibrium
 
 
-@grouped(solver=MixedNewton, keep=Keep)
+@grouped(solver=MixedNewton, adjoint_storage=AdjointStorage)
 @solve_entry
 def simulate(
     scene: Scene,
@@ -46,7 +56,7 @@ def simulate(
     load_factor: Any = 1.0,
     gravity_factor: Any = 1.0,
     field_factor: Any = 1.0,
-    motion_factor: Any = 1.0,
+    support_factor: Any = 1.0,
     damping: Any = 0.0,
     stiffness_damping: Any = 0.0,
     maxwell_modulus: Any = 0.0,
@@ -62,7 +72,7 @@ def simulate(
     values: dict[Any, Any] | None = None,
     integrator: Integrator | None = None,
     record_every: int = 1,
-    keep: str | Keep | None = None,
+    adjoint_storage: str | AdjointStorage | None = None,
     solver: Newton | None = None,
     progress: bool = True,
 ) -> Trajectory:
@@ -72,7 +82,7 @@ def simulate(
     applied_flux_density: T: constant (3,), one a step (steps, 3), at the ends of all steps (steps + 1, 3) with straight
         lines between them, or a function of the time [s] that returns (3,). The time is the motion's own, as in `times`: 0
         at its beginning, and where `start` is a motion it goes on. Arrays begin with the first step taken here.
-    load_factor, gravity_factor, field_factor, motion_factor: as in ms.equilibrium; numbers, or in time as above.
+    load_factor, gravity_factor, field_factor, support_factor: as in ms.equilibrium; numbers, or in time as above.
     damping: N s/m, viscous, on every vertex or (n_v,).
     stiffness_damping: s. The rate of the strains adds as much stress as this time of it would: for small motions the
         damping matrix is this time the stiffness matrix.
@@ -93,7 +103,8 @@ def simulate(
         A method of higher order makes an impact bounce, and each of its steps there is much work, unless the steps resolve
         it.
     record_every: steps between the states that come back, the start first.
-    keep: for gradients; "stages" (all states), "checkpoints", "factors", or an ms.Keep, which says how many bytes it may
+    adjoint_storage: for gradients; "stages" (all states), "checkpoints", "factors", or an ms.AdjointStorage,
+        which says how many bytes it may
         take. By default all states if they fit into 2 GB, else checkpoints.
     solver: of a step; MixedNewton() by default, of which the load steps are not used. ProjectiveDynamics needs none.
     progress: show a bar once the motion has taken two seconds.
@@ -106,8 +117,9 @@ def simulate(
     second derivatives, as in ms.equilibrium.
 
     They are exact where the motion is differentiable: through impact, stick and slip on smooth obstacles too. It is not
-    where a point touches a kink of an obstacle (Trajectory.kinks says where), where a little more makes a step fail or
-    be taken in other parts (Trajectory.halved), and in water whose tables have kinks (Water.is_smooth); gradients there
+    where a point touches a kink of an obstacle (Trajectory.nonsmooth_vertices says where), where a little more
+    makes a step fail or
+    be taken in other parts (Trajectory.substeps), and in water whose tables have kinks (Water.is_smooth); gradients there
     are those of one side.
 
     >>> import magshell as ms
@@ -161,7 +173,7 @@ def simulate(
         steps=steps,
         time_step=time_step,
         record_every=record_every,
-        keep=kept(keep),
+        adjoint_storage=kept(adjoint_storage),
         start=start,
         velocities=velocities,
         damping=damping,
@@ -175,7 +187,7 @@ def simulate(
         load_factor=load_factor,
         gravity_factor=gravity_factor,
         field_factor=field_factor,
-        motion_factor=motion_factor,
+        support_factor=support_factor,
     )
     began = time.perf_counter()
     with inputs.in_core(), SolveBar("simulate", progress) as bar:
@@ -189,7 +201,7 @@ def simulate(
         found.outcome.name,
         found.steps_done,
         asked.steps,
-        len(result.halved),
+        len(result.substeps),
         found.iterations,
         found.factorizations,
         result.wall_time,
@@ -275,8 +287,10 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         largest_bending_strain=strain.bending,
         steps=asked.steps,
         steps_done=found.steps_done,
-        halved={step: len(parts) for step, parts in found.halved.items() if len(parts) > 1},
-        calmed=tuple(step for step, parts in found.halved.items() if any(calm for _, _, calm in parts)),
+        substeps={step: len(parts) for step, parts in found.substeps.items() if len(parts) > 1},
+        fallback_steps=tuple(
+            step for step, parts in found.substeps.items() if any(calm for _, _, calm in parts)
+        ),
         end=MotionState(
             ended.time,
             found.last_state,
@@ -291,7 +305,7 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         ),
         iterations=found.iterations,
         factorizations=found.factorizations,
-        keep=found.keep.name,
+        adjoint_storage=found.keep.name,
         bytes=found.bytes,
         wall_time=wall_time,
         linear_time=found.linear_time,

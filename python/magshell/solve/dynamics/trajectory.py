@@ -24,7 +24,7 @@ from ...model.contact.contacts_to_core import near_kinks
 from ...model.fields.field import AppliedField
 from ...model.results.result_lookup import OfOneBody, result_of
 from ...model.results.solid_result import told_strains
-from ...model.scene.contact_state import Touching, touching_in
+from ...model.scene.contact_state import ContactState, touching_in
 from ...model.scene.nonsmooth_contacts import near_body_kinks
 from ...model.scene.reactions import Reaction, reaction_in
 from ...model.scene.scene import Scene
@@ -123,8 +123,9 @@ class Trajectory(Filmed, OfOneBody):
     remanent_magnetization: as given, A/m, or None; applied_flux_density: (n, 3) T, the uniform part at those times.
     largest_membrane_strain, largest_bending_strain: (n,), magnitudes, 1, of what `strains` has. Beyond 0.2 the sheet
         leaves the model, of which ms.LargeStrainWarning warns.
-    steps_done: all of those asked for, unless the simulation stopped early. halved: {step: in how many parts it was
-    taken}. calmed: the steps, or steps with parts, that implicit Euler took instead of the integrator, because bodies
+    steps_done: all of those asked for, unless the simulation stopped early. substeps: {step: in how many parts it was
+    taken}. fallback_steps: the steps, or steps with parts, that implicit Euler took instead of the integrator,
+    because bodies
     touched and the step would have gained energy that nothing put in. end: the last state, from which another simulation
     goes on. bytes: kept for gradients.
     """
@@ -143,12 +144,12 @@ class Trajectory(Filmed, OfOneBody):
     largest_bending_strain: np.ndarray
     steps: int
     steps_done: int
-    halved: dict[int, int]
-    calmed: tuple[int, ...]
+    substeps: dict[int, int]
+    fallback_steps: tuple[int, ...]
     end: MotionState
     iterations: int
     factorizations: int
-    keep: str
+    adjoint_storage: str
     bytes: int
     wall_time: float
     linear_time: float
@@ -216,7 +217,7 @@ class Trajectory(Filmed, OfOneBody):
         return self.kinetic_energy + sum(self.energies.values())
 
     @property
-    def kinks(self) -> dict[int, np.ndarray]:
+    def nonsmooth_vertices(self) -> dict[int, np.ndarray]:
         """{recorded state: vertices} that touch where the motion is not differentiable, or within the smoothing of there: an
         obstacle by the sharp edge of a box or a mesh, or in the middle of a body; of bodies in contact, the point or edge
         whose closest point goes over a fold of the other surface by more than 0.3 rad, or over its border.
@@ -230,7 +231,7 @@ class Trajectory(Filmed, OfOneBody):
         >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
         >>> ridge = ms.obstacles.Box((0.1, 0.1, 0.1), rotation=(0, np.pi / 4, 0), center=(0.01, 0.01, -0.0707105))
         >>> scene = ms.Scene(sheet, contacts=[ms.Contact(ridge)], allow_rigid_motions=True)
-        >>> ms.simulate(scene, steps=1, time_step=1e-3, velocities=(0, 0, -1e-4)).kinks
+        >>> ms.simulate(scene, steps=1, time_step=1e-3, velocities=(0, 0, -1e-4)).nonsmooth_vertices
         {0: array([3, 4, 5], dtype=int32), 1: array([3, 4, 5], dtype=int32)}
         """
         positions, now, bodies = detached(self.positions), self._values.current, self.scene._bodies
@@ -249,7 +250,7 @@ class Trajectory(Filmed, OfOneBody):
     def _near_body_kinks(self, contact: BodyContact, index: int) -> np.ndarray:
         smoothing = self._values.current(contact).smoothing
         positions = self.scene._model.points(self._state_at(index))
-        return near_body_kinks(self.scene, self.touching(contact, index), smoothing, positions)
+        return near_body_kinks(self.scene, self.contact_state(contact, index), smoothing, positions)
 
     def strains(self, index: int = -1) -> Any:
         """The principal strains of every face of the sheets, Strains, in a recorded state, by default the last; where a
@@ -275,7 +276,7 @@ class Trajectory(Filmed, OfOneBody):
         state[before : before + self._directions.shape[1]] = self._directions[index]
         return state
 
-    def touching(self, contact: BodyContact | Contact, index: int = -1) -> Touching:
+    def contact_state(self, contact: BodyContact | Contact, index: int = -1) -> ContactState:
         """The pairs of a contact that touch in a recorded state, by default the last, and their forces."""
         own = () if self._own_velocities is None else (self._own_velocities,)
         velocities = np.concatenate(
@@ -298,8 +299,8 @@ class Trajectory(Filmed, OfOneBody):
 
     def __repr__(self) -> str:
         stopped = "" if self.steps_done == self.steps else f" of {self.steps}"
-        halved = f", {len(self.halved)} of them in parts" if self.halved else ""
-        halved += f", {len(self.calmed)} by implicit Euler" if self.calmed else ""
+        halved = f", {len(self.substeps)} of them in parts" if self.substeps else ""
+        halved += f", {len(self.fallback_steps)} by implicit Euler" if self.fallback_steps else ""
         strain = StrainHistory(self.largest_membrane_strain, self.largest_bending_strain)
         crossings = told(self.scene.mesh, detached(self.positions))
         a_step = 1e3 * self.wall_time / max(self.steps_done, 1)
@@ -309,5 +310,6 @@ class Trajectory(Filmed, OfOneBody):
             f"  {told_strains(self, strain)}\n"
             f"  {crossings}\n"
             f"  {self.iterations} iterations, {self.factorizations} factorizations\n"
-            f"  {self.wall_time:.3g} s, {a_step:.3g} ms a step; for gradients: {self.keep}, {self.bytes / 1e6:.3g} MB"
+            f"  {self.wall_time:.3g} s, {a_step:.3g} ms a step; for gradients: {self.adjoint_storage}, "
+            f"{self.bytes / 1e6:.3g} MB"
         )

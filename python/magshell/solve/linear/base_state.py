@@ -98,7 +98,7 @@ class StiffnessAbout(Stiffness):
         """du of all unknowns, held ones included, as the controls go to those of the inputs: K du = g(c) - g(c1) - K dm."""
         model, layout = self._model, inputs.scene._control_layout
         further = inputs.controls - self.controls
-        moved = model.prescribed_rate(self.controls) * layout.of(further, "scene", "motion_factor")
+        moved = model.prescribed_rate(self.controls) * layout.of(further, "scene", "support_factor")
         forces = self.gradient - model.gradient(self.state, inputs.controls)
         return self.answer(forces, moved)
 
@@ -118,5 +118,5 @@ def refuse_what_cannot_be(function: str, equilibrium: Equilibrium, inputs: Input
     if np.array_equal(inputs.controls, equilibrium._controls):
         raise ValueError(
             "the controls are those of the equilibrium, so that nothing changes: give the load_factor, "
-            "applied_flux_density, ... towards which they go, as to ms.follow"
+            "applied_flux_density, ... towards which they go, as to ms.follow_path"
         )

@@ -66,7 +66,7 @@ def linear_buckling(
     load_factor: float = 1.0,
     gravity_factor: float = 1.0,
     field_factor: float = 1.0,
-    motion_factor: float = 1.0,
+    support_factor: float = 1.0,
     values: dict[Any, Any] | None = None,
     modes: int = 1,
 ) -> Buckling:
@@ -78,19 +78,19 @@ def linear_buckling(
 
     so the state before buckling is assumed proportional to lambda, and K to change linearly along it. Exact
     in the limit of small displacements before buckling: columns, plates loaded in their plane, closed shells.
-    A shallow arch that softens on its way needs ms.follow. Controls and values as in ms.equilibrium; a field's own
+    A shallow arch that softens on its way needs ms.follow_path. Controls and values as in ms.equilibrium; a field's own
     stiffness counts.
 
     equilibrium: of this scene, a stable one: a grown or loaded sheet, one in a field. K is then that of the equilibrium, u
         the response to controls that go from its own to those given here (`ms.linear_response`), and the factors are
-        shares of that way: the parameter of ms.follow(..., start=). Magnetization and values are its own.
+        shares of that way: the parameter of ms.follow_path(..., start=). Magnetization and values are its own.
 
     modes: how many to find. Fewer come back where the others lie beyond what linear theory can tell: where
         the sheet has moved by a tenth of its size, or at a thousand times the first factor of either sign.
 
     Joints that pull at rest, or have motors, are refused, as they are no controls. Bodies in contact are refused: a contact
     bears in one direction only, so that a mode and its opposite have different factors, and none of them is linear;
-    ms.follow passes where contacts open and close. So are actuators that are springs of their own.
+    ms.follow_path passes where contacts open and close. So are actuators that are springs of their own.
 
     Raises ValueError on bad input, about an equilibrium that is not stable, with its own controls, or one that requires a
     gradient, as there is none here; in a scene with contact of bodies, where the supports leave the sheet a motion without
@@ -116,18 +116,19 @@ def linear_buckling(
         load_factor=load_factor,
         gravity_factor=gravity_factor,
         field_factor=field_factor,
-        motion_factor=motion_factor,
+        support_factor=support_factor,
     )
     refuse_springs(inputs)
     if scene._body_contacts:
         raise ValueError(
-            "the scene has contact of bodies, which holds in one direction only, so that no linear mode buckles: ms.follow "
+            "the scene has contact of bodies, which holds in one direction only, so that no linear mode "
+            "buckles: ms.follow_path "
             "follows it as it opens and closes, or leave it out"
         )
     driven = [joint for joint in map(inputs.values.current, scene.joints) if joint._driven]
     if equilibrium is None and (acting := [*pulling_joints(inputs), *driven]):
         raise ValueError(
-            f"linear buckling multiplies the controls, and {acting[0]!r:.80} acts whatever they are: ms.follow has it"
+            f"linear buckling multiplies the controls, and {acting[0]!r:.80} acts whatever they are: ms.follow_path has it"
         )
     began = time.perf_counter()
     model = scene._model

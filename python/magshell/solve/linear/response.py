@@ -61,7 +61,7 @@ def linear_response(
     load_factor: float = 1.0,
     gravity_factor: float = 1.0,
     field_factor: float = 1.0,
-    motion_factor: float = 1.0,
+    support_factor: float = 1.0,
     values: dict[Any, Any] | None = None,
 ) -> LinearResponse:
     """The deflection to first order in the loads, by one factorization of the stiffness at the rest shape.
@@ -71,7 +71,8 @@ def linear_response(
     pull in joints at rest are loads too, and motors move. Controls and values as in ms.equilibrium.
 
     equilibrium: of this scene, a stable one: a grown or loaded sheet, one in a field. The deflection is then that from there
-        as the controls go from its own to those given here, to first order: the tangent of ms.follow(..., start=) at its
+        as the controls go from its own to those given here, to first order: the tangent of ms.follow_path(...,
+        start=) at its
         start. The stiffness is that of the equilibrium, with what loads, fields and actuators add to it; magnetization and
         values are its own. Contacts stay as they are.
 
@@ -82,7 +83,7 @@ def linear_response(
     a potential, or one that requires a gradient, as there is none here; and where the supports leave a motion without
     stiffness to what is loaded; Interrupted.
 
-    remanent_magnetization, applied_flux_density, load_factor, gravity_factor, field_factor, motion_factor: as in
+    remanent_magnetization, applied_flux_density, load_factor, gravity_factor, field_factor, support_factor: as in
     `equilibrium`.
 
     >>> import magshell as ms
@@ -105,7 +106,7 @@ def linear_response(
         load_factor=load_factor,
         gravity_factor=gravity_factor,
         field_factor=field_factor,
-        motion_factor=motion_factor,
+        support_factor=support_factor,
     )
     given = inputs.given if equilibrium is None else [*inputs.given, equilibrium.positions]
     at_rest = forces_at_rest(inputs) if equilibrium is None else None

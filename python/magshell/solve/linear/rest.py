@@ -39,7 +39,7 @@ class RestStiffness(Stiffness):
             if not len(motion := found.motion):
                 refuse_indefinite(found.report, found.unknowns, self._where)
             return motion
-        moved = model.prescribed_rate(self.controls) * layout.of(inputs.controls, "scene", "motion_factor")
+        moved = model.prescribed_rate(self.controls) * layout.of(inputs.controls, "scene", "support_factor")
         moved = moved + model.driven_increment(self.state, self.controls)
         forces = (self.gradient if at_rest is None else at_rest) - model.gradient(self.state, inputs.controls)
         return self.answer(forces, moved)
@@ -50,7 +50,7 @@ def refuse_springs(inputs: Inputs) -> None:
     if springs := [each for each in map(inputs.values.current, inputs.scene.actuators) if each._is_spring]:
         raise ValueError(
             f"linear theory takes the stiffness at rest without what acts there, and {springs[0]!r} is a spring that "
-            "acts: ms.equilibrium, ms.follow, ms.vibration_modes and ms.linear_response about an equilibrium have it"
+            "acts: ms.equilibrium, ms.follow_path, ms.vibration_modes and ms.linear_response about an equilibrium have it"
         )
 
 

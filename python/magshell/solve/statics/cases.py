@@ -11,7 +11,7 @@ from ..._input.quantity import shape_of
 from ..._runtime.keywords import FACTORS, FLUX_DENSITY
 from ...errors import DesignRejected, Interrupted, NotConverged
 from ...model.scene.scene import Scene
-from .equilibria import Equilibria
+from .equilibria import EquilibriumSet
 from .equilibrium import Equilibrium
 from .single_solve import Search, find
 
@@ -48,14 +48,14 @@ def split(arguments: dict[Any, Any]) -> list[dict[Any, Any]] | None:
     return [{**arguments, **{name: value[k] for name, value in of_cases.items()}} for k in range(count)]
 
 
-def join(found: Sequence[Equilibrium], of_cases: bool) -> Equilibrium | Equilibria:
+def join(found: Sequence[Equilibrium], of_cases: bool) -> Equilibrium | EquilibriumSet:
     """As the split arguments had it."""
-    return Equilibria(found) if of_cases else found[0]
+    return EquilibriumSet(found) if of_cases else found[0]
 
 
 def starts_of(start: Any, count: int) -> Sequence[Any]:
     """Where each case starts."""
-    if not isinstance(start, Equilibria):
+    if not isinstance(start, EquilibriumSet):
         return [start] * count
     if len(start) != count:
         raise ValueError(f"start holds {len(start)} equilibria, for {count} load cases")
@@ -70,7 +70,9 @@ def of_case(error: BaseException, number: int, count: int, last_good: Any) -> Ba
     return type(error)(told, last_good)
 
 
-def find_all(scene: Scene, cases: list[dict[Any, Any]], starts: Sequence[Any], search: Search) -> Equilibria:
+def find_all(
+    scene: Scene, cases: list[dict[Any, Any]], starts: Sequence[Any], search: Search
+) -> EquilibriumSet:
     """The equilibrium of each case. An error tells which one failed, and holds those before it and its last state."""
     found: list[Equilibrium] = []
     for k, (arguments, start) in enumerate(zip(cases, starts, strict=True)):
@@ -78,10 +80,10 @@ def find_all(scene: Scene, cases: list[dict[Any, Any]], starts: Sequence[Any], s
         try:
             found.append(find(scene, arguments, start, _part_of(search, k, len(cases))).equilibrium)
         except (NotConverged, Interrupted) as error:
-            raise of_case(error, k, len(cases), Equilibria([*found, error.last_good])) from error
+            raise of_case(error, k, len(cases), EquilibriumSet([*found, error.last_good])) from error
         except ValueError as error:
             raise ValueError(f"load case {k} of {len(cases)}: {error}") from error
-    return Equilibria(found)
+    return EquilibriumSet(found)
 
 
 def _part_of(search: Search, k: int, count: int) -> Search:

@@ -27,11 +27,11 @@ _SMALLEST_MOVE = 1e-6  # of the sheet's size, in one step of relaxation
 def why_not(inputs: Inputs, found: _core.StaticsResult, at_rest: bool) -> str:
     """The text of a NotConverged. found: what the core handed back; at_rest: whether it started from an equilibrium."""
     scene, failed = inputs.scene, found.failed
-    whole = found.progress >= 1.0
+    whole = found.load_fraction >= 1.0
     head = (
         f"no stable equilibrium was found at the new controls, in {found.iterations} iterations"
         if whole
-        else f"the solve stopped at {found.progress:.3g} of the way to the new controls, after {found.iterations} "
+        else f"the solve stopped at {found.load_fraction:.3g} of the way to the new controls, after {found.iterations} "
         "iterations"
     )
     kept = (
@@ -180,9 +180,7 @@ def _advice_of_any(inputs, found, at_rest: bool) -> str:
         return "Allow it more steps (max_relaxation_steps of the solver), or start from a nearby equilibrium."
     if not at_rest:
         return "Start from positions closer to an equilibrium."
-    return (
-        "Start from a nearby equilibrium, or let load steps get shorter (smallest_load_step of the solver)."
-    )
+    return "Start from a nearby equilibrium, or let load steps get shorter (min_load_step of the solver)."
 
 
 def _listed(numbers: np.ndarray) -> str:

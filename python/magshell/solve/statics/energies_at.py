@@ -35,7 +35,7 @@ def energies(
     load_factor: Any = 1.0,
     gravity_factor: Any = 1.0,
     field_factor: Any = 1.0,
-    motion_factor: Any = 1.0,
+    support_factor: Any = 1.0,
     thickness: Numbers | None = None,
     young_modulus: Numbers | None = None,
     poisson_ratio: Numbers | None = None,
@@ -73,7 +73,7 @@ def energies(
             "load_factor": load_factor,
             "gravity_factor": gravity_factor,
             "field_factor": field_factor,
-            "motion_factor": motion_factor,
+            "support_factor": support_factor,
             "thickness": thickness,
             "young_modulus": young_modulus,
             "poisson_ratio": poisson_ratio,
@@ -82,7 +82,7 @@ def energies(
             "vertex_loads": vertex_loads,
             "values": values,
         },
-        at_rest=True,
+        ignore_velocity_forces=True,
     )
     if inputs.leaves or any(map(wants_gradient, given.values())):
         raise ValueError("energies have no gradients: give tensors detached")

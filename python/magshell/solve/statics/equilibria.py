@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ...model.scene.scene import Scene
 
 
-class Equilibria(Kept, OfOneBody, Sequence[Equilibrium]):
+class EquilibriumSet(Kept, OfOneBody, Sequence[Equilibrium]):
     """A scene at rest in each of k load cases, or in k ways in one; a sequence of Equilibrium.
 
     positions, displacements: (k, n_v, 3) m; edge_rotations: (k, n_e) rad. Tensors where those of the cases are.
@@ -28,7 +28,7 @@ class Equilibria(Kept, OfOneBody, Sequence[Equilibrium]):
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
     >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
     >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
-    >>> ms.Equilibria([ms.equilibrium(scene), ms.equilibrium(scene, gravity_factor=0.5)]).positions.shape
+    >>> ms.EquilibriumSet([ms.equilibrium(scene), ms.equilibrium(scene, gravity_factor=0.5)]).positions.shape
     (2, 33, 3)
     """
 
@@ -108,7 +108,7 @@ class Equilibria(Kept, OfOneBody, Sequence[Equilibrium]):
         if isinstance(index, BODIES) or hasattr(index, "_result_in"):
             return result_of(self, index)
         chosen = self._cases[index]
-        return Equilibria(chosen) if isinstance(index, slice) else chosen
+        return EquilibriumSet(chosen) if isinstance(index, slice) else chosen
 
     def __repr__(self) -> str:
         return "\n".join([f"Equilibria: {len(self)}", *(repr(case) for case in self._cases)])

@@ -15,7 +15,7 @@ from ...model.contact.body_contact import BodyContact
 from ...model.contact.contact import Contact
 from ...model.results.result_lookup import OfOneBody, result_of
 from ...model.results.solid_result import told_strains
-from ...model.scene.contact_state import Touching, touching_in
+from ...model.scene.contact_state import ContactState, touching_in
 from ...model.scene.reactions import Reaction, reaction_in
 from ...model.scene.scene import Scene
 from ...model.scene.values import Values
@@ -33,7 +33,7 @@ class Equilibrium(Kept, OfOneBody):
 
     positions: (n_v, 3) m; edge_rotations: (n_e,) rad, zero where an edge has none.
     remanent_magnetization: (n_f, 3) A/m, or None; applied_flux_density: (3,) T, the uniform part.
-    energies: J, by term. stable: no direction lowers the energy; unstable_directions: how many do.
+    energies: J, by term. stable: no direction lowers the energy; n_negative_eigenvalues: how many do.
     residual: relative to the forces that cancel in it, and to their round-off. at_roundoff: whether round-off ended the
         solve, above the solver's tolerance, as of very thin sheets and long chains.
     progress: how far the controls got, 1 unless a solve failed.
@@ -49,16 +49,16 @@ class Equilibrium(Kept, OfOneBody):
     applied_flux_density: Any
     energies: dict[str, float]
     stable: bool
-    unstable_directions: int
+    n_negative_eigenvalues: int
     iterations: int
     factorizations: int
     failed_factorizations: int
     load_steps: int
     relaxation_steps: int
-    saddles_left: int
+    saddles_escaped: int
     residual: float
     at_roundoff: bool
-    progress: float
+    load_fraction: float
     largest_membrane_strain: float
     largest_bending_strain: float
     wall_time: float
@@ -127,7 +127,7 @@ class Equilibrium(Kept, OfOneBody):
         with self._values.growth_in_core():
             return strains_of(self.scene, self._state, self._values.whole.thickness)
 
-    def touching(self, contact: BodyContact | Contact) -> Touching:
+    def contact_state(self, contact: BodyContact | Contact) -> ContactState:
         """The pairs of a contact that touch, and their forces."""
         return touching_in(self.scene, self._values, contact, self._state)
 
@@ -152,15 +152,15 @@ class Equilibrium(Kept, OfOneBody):
 
     def __repr__(self) -> str:
         moved = float(np.linalg.norm(np.asarray(detached(self.displacements)), axis=1).max(initial=0.0))
-        kind = "stable" if self.stable else f"unstable in {self.unstable_directions} directions"
-        if not self.stable and self.unstable_directions == 0:
+        kind = "stable" if self.stable else f"unstable in {self.n_negative_eigenvalues} directions"
+        if not self.stable and self.n_negative_eigenvalues == 0:
             kind = "not known to be stable"
-        if self.progress < 1.0:
-            kind += f", {self.progress:.1%} of the way"
+        if self.load_fraction < 1.0:
+            kind += f", {self.load_fraction:.1%} of the way"
         energies = ", ".join(f"{name} {value:.4g}" for name, value in self.energies.items())
         strain = Largest(self.largest_membrane_strain, self.largest_bending_strain)
         crossings = told(self.scene.mesh, np.asarray(detached(self.positions))[None])
-        extra = f", {self.saddles_left} saddles left" if self.saddles_left else ""
+        extra = f", {self.saddles_escaped} saddles left" if self.saddles_escaped else ""
         extra += f", {self.relaxation_steps} relaxation steps" if self.relaxation_steps else ""
         ended = " at round-off" if self.at_roundoff else ""
         return (

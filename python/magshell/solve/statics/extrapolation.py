@@ -1,4 +1,4 @@
-"""Richardson extrapolation from nested meshes: ms.extrapolated."""
+"""Richardson extrapolation from nested meshes: ms.richardson_extrapolation."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ..._runtime.frozen import immutable
 from ...errors import NotConverged
 from ...mesh.nesting import Nesting, nesting
 from ...mesh.tetrahedra.tet_mesh import TetMesh
-from ...mesh.triangles.six_node_mesh import SixNodeMesh
+from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 
 _USUAL_ORDER, _OF_SIX_NODES = 2.0, 4.0
@@ -56,7 +56,7 @@ class Extrapolation:
         return f"Extrapolation of {len(self.values)} meshes: {_told(self.value, self.error, self.order)}"
 
 
-def extrapolated(
+def richardson_extrapolation(
     solve: Callable[..., Any], meshes: Sequence[Any], *, order: float | None = None
 ) -> Extrapolation:
     """What `solve` tends to as the mesh becomes finer, and how far it still is from that.
@@ -90,7 +90,7 @@ def extrapolated(
     ...     rest = ms.equilibrium(scene, remanent_magnetization=(4e4, 0, 0), applied_flux_density=(0, 0, 2e-3))
     ...     return rest.positions[mesh.nearest_vertex((0.1, 0.01, 0)), 2]
     >>> coarse = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
-    >>> found = ms.extrapolated(tip, [coarse, coarse.refined()])
+    >>> found = ms.richardson_extrapolation(tip, [coarse, coarse.refined()])
     >>> bool(found.error < 0.01 * found.value)
     True
     """
@@ -99,7 +99,7 @@ def extrapolated(
         raise ValueError(f"solve must be a function of a mesh, got {solve!r:.60}")
     given = None if order is None else positive("order", "", order)
     if given is None and len(meshes) == 2:
-        given = _OF_SIX_NODES if isinstance(meshes[0], SixNodeMesh) else _USUAL_ORDER
+        given = _OF_SIX_NODES if isinstance(meshes[0], QuadraticTriangleMesh) else _USUAL_ORDER
     names = [f"meshes[{k}]" for k in range(len(meshes))]
     nests = [
         nesting(coarse, fine, (names[k], names[k + 1]))
@@ -180,9 +180,9 @@ def _at_same_points(name: str, values: list[Any], meshes: list[Any], nests: list
 def _checked_meshes(meshes) -> list[Any]:
     listed = list(meshes) if isinstance(meshes, Sequence) else [meshes]
     for k, mesh in enumerate(listed):
-        if not isinstance(mesh, TriangleMesh | SixNodeMesh | TetMesh):
+        if not isinstance(mesh, TriangleMesh | QuadraticTriangleMesh | TetMesh):
             raise ValueError(
-                f"meshes[{k}] must be a TriangleMesh, a SixNodeMesh or a TetMesh, got {type(mesh).__name__}"
+                f"meshes[{k}] must be a TriangleMesh, a QuadraticTriangleMesh or a TetMesh, got {type(mesh).__name__}"
             )
     if len(listed) not in (2, 3):
         raise ValueError(f"meshes must be two or three, the coarsest first, got {len(listed)}")

@@ -1,4 +1,4 @@
-"""Several equilibria of one scene at the same controls: ms.equilibria."""
+"""Several equilibria of one scene at the same controls: ms.find_equilibria."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ...errors import Interrupted, NotConverged
 from ...model.scene.scene import Scene
 from ..options import MixedNewton, Newton
 from .designs import numbers_only
-from .equilibria import Equilibria
+from .equilibria import EquilibriumSet
 from .equilibrium import Equilibrium
 from .single_solve import Search, Solution, find, inputs_of, solve
 from .start import starting_point
@@ -40,7 +40,7 @@ _USUAL = 0.05  # of the size, then
 
 @grouped(solver=MixedNewton)
 @solve_entry
-def equilibria(
+def find_equilibria(
     scene: Scene,
     *,
     remanent_magnetization: Numbers | None = None,
@@ -48,7 +48,7 @@ def equilibria(
     load_factor: float = 1.0,
     gravity_factor: float = 1.0,
     field_factor: float = 1.0,
-    motion_factor: float = 1.0,
+    support_factor: float = 1.0,
     thickness: Numbers | None = None,
     young_modulus: Numbers | None = None,
     poisson_ratio: Numbers | None = None,
@@ -57,14 +57,14 @@ def equilibria(
     vertex_loads: Numbers | None = None,
     values: dict[Any, Any] | None = None,
     start: Starting | None = None,
-    unstable: bool = False,
+    include_unstable: bool = False,
     attempts: int = 24,
-    same_within: float | None = None,
-    at_rest: bool = False,
+    distinct_tolerance: float | None = None,
+    ignore_velocity_forces: bool = False,
     seed: int = 0,
     solver: Newton | None = None,
     progress: bool | Callable[[float, float], None] = True,
-) -> Equilibria:
+) -> EquilibriumSet:
     """The equilibria of a scene that can be found at the same controls, the lowest energy first: is it bistable?
 
     The first is that of ms.equilibrium. From each that is known others are looked for in turns: by Newton's method
@@ -73,15 +73,17 @@ def equilibria(
     what was found, never a proof that there are no others: `attempts` more find more. Far beyond its first instability a
     thin sheet has equilibria beyond count.
 
-    Controls, values and at_rest as in ms.equilibrium, for one load case.
+    Controls, values and ignore_velocity_forces as in ms.equilibrium, for one load case.
 
     start: an equilibrium, Equilibria, positions (n_v, 3) m, or a list of these: where to look as well, for saddles too if
         they are asked for.
-    unstable: hand back saddles too; `unstable_directions` tells them. Their energy over that of a well beside them is
+    include_unstable: hand back saddles too; `n_negative_eigenvalues` tells them. Their energy over that of a
+        well beside them is
         what a snap has to be given at least. Deep wells have theirs far away: a `start` that looks like one finds it.
     attempts: how many searches are made after the first. One takes from ten to, far from everything, thousands of
         factorizations; `solver` limits it.
-    same_within: m, the largest distance between two equilibria that count as one, vertex by vertex; 1e-4 of the scene's
+    distinct_tolerance: m, the largest distance between two equilibria that count as one, vertex by vertex;
+        1e-4 of the scene's
         size by default. Mirror images are two.
     seed: of the random pushes.
     progress: show a bar once it has taken two seconds; or a function of the share of the attempts made, and a residual.
@@ -93,20 +95,22 @@ def equilibria(
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(16, 2))
     >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
     >>> push = ms.Clamp(mesh.edges_at(x=0.1), displacement=(-2e-3, 0, 0))
-    >>> found = ms.equilibria(ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0)), push]))
+    >>> found = ms.find_equilibria(ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0)), push]))
     >>> len(found), [bool(each.positions[mesh.nearest_vertex((0.05, 0.01, 0)), 2] > 0) for each in found].count(True)
     (2, 1)
     """
-    flag("unstable", unstable)
+    flag("include_unstable", include_unstable)
     attempts = count("attempts", attempts)
-    tolerance = None if same_within is None else positive("same_within", "m", same_within)
+    tolerance = (
+        None if distinct_tolerance is None else positive("distinct_tolerance", "m", distinct_tolerance)
+    )
     design = {
         "remanent_magnetization": remanent_magnetization,
         "applied_flux_density": applied_flux_density,
         "load_factor": load_factor,
         "gravity_factor": gravity_factor,
         "field_factor": field_factor,
-        "motion_factor": motion_factor,
+        "support_factor": support_factor,
         "thickness": thickness,
         "young_modulus": young_modulus,
         "poisson_ratio": poisson_ratio,
@@ -116,17 +120,19 @@ def equilibria(
         "values": values,
     }
     with told("equilibria", progress) as (advance, note):
-        search = Search(MixedNewton() if solver is None else solver, True, advance, at_rest, note)
-        inputs = inputs_of(scene, design, at_rest)
+        search = Search(
+            MixedNewton() if solver is None else solver, True, advance, ignore_velocity_forces, note
+        )
+        inputs = inputs_of(scene, design, ignore_velocity_forces)
         starts = _listed(start)
         for each in starts:
             starting_point(scene, each, inputs)  # raises before any work
         hunt = _Hunt(scene, numbers_only(design), search, tolerance, count("seed", seed, least=0))
         try:
-            hunt.run(starts, attempts, unstable)
-            return Equilibria([_again(inputs, each, search) for each in hunt.sorted(unstable)])
+            hunt.run(starts, attempts, include_unstable)
+            return EquilibriumSet([_again(inputs, each, search) for each in hunt.sorted(include_unstable)])
         except Interrupted as error:
-            kept = Equilibria(hunt.sorted(unstable)) if hunt.known else error.last_good
+            kept = EquilibriumSet(hunt.sorted(include_unstable)) if hunt.known else error.last_good
             raise Interrupted(
                 f"interrupted after {len(hunt.known)} equilibria were found, saddles counted", kept
             ) from error
@@ -140,7 +146,7 @@ class _Hunt:
     ):
         self.known: list[Equilibrium] = []
         self._scene, self._search, self._design = scene, search, design
-        self._inputs = inputs_of(scene, design, search.at_rest)
+        self._inputs = inputs_of(scene, design, search.ignore_velocity_forces)
         self._random = np.random.default_rng(seed)
         self._rest = scene._model.points(scene._model.rest_state())
         self._size = float(np.linalg.norm(np.ptp(self._rest, axis=0)))
@@ -246,7 +252,7 @@ class _Hunt:
             if np.linalg.norm(points - self._points(known), axis=1).max() <= self._tolerance:
                 return False
         self.known.append(found)
-        kind = "stable" if found.stable else f"{found.unstable_directions} unstable directions"
+        kind = "stable" if found.stable else f"{found.n_negative_eigenvalues} unstable directions"
         log.info("equilibria: %d found, %s, energy %.6g J", len(self.known), kind, found.energy)
         return True
 
@@ -258,7 +264,7 @@ def _again(inputs, found: Equilibrium, search: Search) -> Equilibrium:
     """The equilibrium with the inputs as they were handed in, gradients and all."""
     if not inputs.leaves:
         return found
-    options = Search(search.solver, False, None, search.at_rest).options()
+    options = Search(search.solver, False, None, search.ignore_velocity_forces).options()
     again: Solution = solve(inputs, found._state, found._turns, inputs.controls, inputs.controls, options)
     return again.equilibrium
 
@@ -266,7 +272,7 @@ def _again(inputs, found: Equilibrium, search: Search) -> Equilibrium:
 def _listed(start) -> list[Any]:
     if start is None:
         return []
-    if isinstance(start, Equilibria | list | tuple) and not _is_positions(start):
+    if isinstance(start, EquilibriumSet | list | tuple) and not _is_positions(start):
         return list(start)
     return [start]
 

@@ -1,4 +1,4 @@
-"""Paths of equilibria through limit points: ms.follow."""
+"""Paths of equilibria through limit points: ms.follow_path."""
 
 from __future__ import annotations
 
@@ -55,11 +55,11 @@ class CriticalPoint:
 
 @immutable
 @dataclass(frozen=True, repr=False)
-class Path(Filmed, OfOneBody):
+class EquilibriumPath(Filmed, OfOneBody):
     """A path of equilibria, stable and unstable. `path[body]` has those of one body.
 
     parameters: (n,), 0 at the controls of the start, 1 at the new ones. positions: (n, n_v, 3) m.
-    unstable_directions: (n,), zero where the equilibrium is stable. critical: CriticalPoints, in order.
+    n_negative_eigenvalues: (n,), zero where the equilibrium is stable. critical: CriticalPoints, in order.
     remanent_magnetization: (n_f, 3) or (3,) A/m, or None.
     largest_membrane_strain, largest_bending_strain: (n,), magnitudes, 1, of what `strains` has. Beyond 0.2 the sheet
         leaves the model, of which ms.LargeStrainWarning warns.
@@ -68,7 +68,7 @@ class Path(Filmed, OfOneBody):
     scene: Scene
     parameters: np.ndarray
     positions: np.ndarray
-    unstable_directions: np.ndarray
+    n_negative_eigenvalues: np.ndarray
     critical: tuple[CriticalPoint, ...]
     remanent_magnetization: Any
     largest_membrane_strain: np.ndarray
@@ -162,7 +162,7 @@ class Path(Filmed, OfOneBody):
     @property
     def stable(self) -> np.ndarray:
         """(n,), bool."""
-        return self.unstable_directions == 0
+        return self.n_negative_eigenvalues == 0
 
     def __len__(self) -> int:
         return len(self.parameters)
@@ -187,7 +187,7 @@ class Path(Filmed, OfOneBody):
 
 @grouped(solver=MixedNewton)
 @solve_entry
-def follow(
+def follow_path(
     scene: Scene,
     *,
     remanent_magnetization: Numbers | None = None,
@@ -195,29 +195,29 @@ def follow(
     load_factor: float = 1.0,
     gravity_factor: float = 1.0,
     field_factor: float = 1.0,
-    motion_factor: float = 1.0,
+    support_factor: float = 1.0,
     values: dict[Any, Any] | None = None,
     start: Equilibrium | None = None,
     until: Callable[[float, np.ndarray], bool] | None = None,
     first_step: float = 0.05,
-    largest_step: float = 0.02,
-    lowest_parameter: float = -np.inf,
+    max_step: float = 0.02,
+    min_parameter: float = -np.inf,
     max_points: int = 1000,
     locate_critical: bool = True,
     solver: Newton | None = None,
     progress: bool = True,
-) -> Path:
+) -> EquilibriumPath:
     """Follows a path of equilibria by arc length, from `start` as its controls go towards the new ones.
 
     The path parameter is 0 at the controls of `start` (an Equilibrium of this scene; by default the rest shape,
     unloaded) and 1 at those given here; it may turn back on the way, and the path with it. The path ends where the
-    parameter passes 1 or `lowest_parameter`, or where until(parameter, positions) says so. Controls as in ms.equilibrium.
+    parameter passes 1 or `min_parameter`, or where until(parameter, positions) says so. Controls as in ms.equilibrium.
 
     values: as in ms.equilibrium. Where `start` was found with other places of field sources, obstacles or supports, or with
         other activations of muscles, those move along the path, on straight lines from the start's to these; everything
         else has to be the same.
 
-    first_step: of the parameter. largest_step: root mean square displacement between points, over the mesh's size.
+    first_step: of the parameter. max_step: root mean square displacement between points, over the mesh's size.
     locate_critical: find limit points and bifurcations between points whose numbers of unstable directions differ.
     progress: show a bar once a path has taken two seconds.
 
@@ -230,21 +230,21 @@ def follow(
     >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
     >>> load = ms.EdgeLoad(mesh.edges_at(x=0.1), (-0.4, 0, 0))
     >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[load])
-    >>> path = ms.follow(scene)  # straight, beyond where it buckles
+    >>> path = ms.follow_path(scene)  # straight, beyond where it buckles
     >>> path.critical[0].kind
     'bifurcation'
     """
     solver = MixedNewton() if solver is None else solver
     if not isinstance(solver, Newton):
         raise ValueError(f"solver must be a MixedNewton or a Newton, got {type(solver).__name__}")
-    first_step, largest_step = (
+    first_step, max_step = (
         positive("first_step", "", first_step),
-        positive("largest_step", "", largest_step),
+        positive("max_step", "", max_step),
     )
     max_points = count("max_points", max_points, least=2)
-    lowest_parameter = number("lowest_parameter", lowest_parameter)
-    if not lowest_parameter < 0:
-        raise ValueError(f"lowest_parameter must be below 0, where the path starts, got {lowest_parameter}")
+    min_parameter = number("min_parameter", min_parameter)
+    if not min_parameter < 0:
+        raise ValueError(f"min_parameter must be below 0, where the path starts, got {min_parameter}")
     if until is not None and not callable(until):
         raise ValueError(f"until must be a function of (parameter, positions), got {until!r}")
     if start is not None and not isinstance(start, Equilibrium):
@@ -257,14 +257,14 @@ def follow(
         load_factor=load_factor,
         gravity_factor=gravity_factor,
         field_factor=field_factor,
-        motion_factor=motion_factor,
+        support_factor=support_factor,
     )
     state, turns, from_, _ = starting_point(scene, start, inputs)
     moving = AlongPath(inputs, start)
     options = _core.PathOptions()
     options.newton = solver._newton_options()
-    options.first_step, options.largest_step = first_step, largest_step
-    options.lowest_parameter, options.max_points = max(lowest_parameter, -1e300), max_points
+    options.first_step, options.max_step = first_step, max_step
+    options.min_parameter, options.max_points = max(min_parameter, -1e300), max_points
     options.locate_critical = locate_critical
 
     began = time.perf_counter()
@@ -316,18 +316,18 @@ def _advance(bar):
     return advance
 
 
-def _path(inputs: Inputs, moving: AlongPath, found, from_, wall_time: float) -> Path:
+def _path(inputs: Inputs, moving: AlongPath, found, from_, wall_time: float) -> EquilibriumPath:
     scene = inputs.scene
     model = scene._model
     points = found.points
     strain = StrainHistory.of([_largest(model, moving.values(point.parameter), point) for point in points])
-    return Path(
+    return EquilibriumPath(
         scene=scene,
         parameters=np.array([point.parameter for point in points]),
         positions=np.array([model.positions(point.state) for point in points]).reshape(
             len(points), scene.mesh.n_vertices, 3
         ),
-        unstable_directions=np.array([point.unstable_directions for point in points], dtype=int),
+        n_negative_eigenvalues=np.array([point.n_negative_eigenvalues for point in points], dtype=int),
         critical=tuple(_critical(model, point) for point in found.critical),
         remanent_magnetization=inputs.given_magnetization,
         largest_membrane_strain=strain.membrane,

@@ -50,13 +50,13 @@ def _unnoted(text: str) -> None:
 class Search:
     """How to look. Raises ValueError where an option is no such thing.
 
-    progress, note: what is called as it goes on. at_rest: without forces of motion.
+    progress, note: what is called as it goes on. ignore_velocity_forces: without forces of motion.
     """
 
     solver: Newton = field(default_factory=MixedNewton)
     require_stable: bool = True
     progress: Callable[[float, float], None] | None = None
-    at_rest: bool = False
+    ignore_velocity_forces: bool = False
     note: Callable[[str], None] = _unnoted
 
     def __post_init__(self) -> None:
@@ -64,7 +64,7 @@ class Search:
             raise ValueError(f"solver must be a MixedNewton or a Newton, got {type(self.solver).__name__}")
         if not isinstance(self.require_stable, bool):
             raise ValueError(f"require_stable must be True or False, got {self.require_stable!r}")
-        flag("at_rest", self.at_rest)
+        flag("ignore_velocity_forces", self.ignore_velocity_forces)
 
     def options(self) -> _core.StaticsOptions:
         options = self.solver._options()
@@ -81,14 +81,14 @@ def find(
 ) -> Solution:
     """The equilibrium at the arguments of ms.equilibrium, cases apart. Raises as it does."""
     search = Search() if search is None else search
-    inputs = inputs_of(scene, arguments, search.at_rest)
+    inputs = inputs_of(scene, arguments, search.ignore_velocity_forces)
     state, turns, from_, at_rest = starting_point(scene, start, inputs)
     moving = None
     if isinstance(start, Equilibrium) and not at_rest:
-        at_rest = all_can_move(inputs, start)
+        ignore_velocity_forces = all_can_move(inputs, start)
         # Obstacles and supports push bodies along, and pass through them where they jump.
         moving = AlongPath(inputs, start, at_once=True) if scene.obstacles and not at_rest else None
-        moving = AlongPath(inputs, start) if at_rest else moving
+        moving = AlongPath(inputs, start) if ignore_velocity_forces else moving
     options = search.options()
     options.start_at_rest = at_rest
     options.keep_factor = keep_factor
@@ -100,7 +100,7 @@ def find(
     return solve(inputs, state, turns, from_, inputs.controls, options, search.progress, moving)
 
 
-def inputs_of(scene: Scene, arguments: dict[Any, Any], at_rest: bool = False) -> Inputs:
+def inputs_of(scene: Scene, arguments: dict[Any, Any], ignore_velocity_forces: bool = False) -> Inputs:
     """The arguments of ms.equilibrium, checked against the scene."""
     given = dict(arguments)
     shell = {name: given.pop(name, None) for name in SHELL_NAMES}
@@ -117,7 +117,7 @@ def inputs_of(scene: Scene, arguments: dict[Any, Any], at_rest: bool = False) ->
         flux_density,
         replaced=replaced,
         differentiable=True,
-        without_forces_of_motion=at_rest,
+        without_forces_of_motion=ignore_velocity_forces,
         **factors,
     )
 
@@ -141,22 +141,22 @@ def solve(
     began = time.perf_counter()
     with inputs.in_core():
         found = _core.find_equilibrium(scene._model, state, turns, from_, to, options, progress, entries)
-        if moving is not None and found.progress < 1.0:
-            inputs = inputs.with_values(moving.values(found.progress))
+        if moving is not None and found.load_fraction < 1.0:
+            inputs = inputs.with_values(moving.values(found.load_fraction))
     with inputs.in_core():
         energies = _energies(scene, found)
         result = _result(scene, inputs, found, energies, time.perf_counter() - began)
     log.debug(
         "equilibrium: %s, %.4g of the way, %d iterations, %d factorizations, residual %.2g, %.3g s",
         found.outcome.name,
-        found.progress,
+        found.load_fraction,
         found.iterations,
         found.factorizations,
         found.residual,
         result.wall_time,
     )
     if found.outcome == _core.Outcome.interrupted or energies is None:
-        raise Interrupted(f"interrupted at {found.progress:.3g} of the way to the new controls", result)
+        raise Interrupted(f"interrupted at {found.load_fraction:.3g} of the way to the new controls", result)
     if found.outcome == _core.Outcome.failed:
         raise NotConverged(why_not(inputs, found, options.start_at_rest), result)
     positions = scene._model.positions(found.state)
@@ -195,16 +195,16 @@ def _result(
         applied_flux_density=_flux_density(inputs, found),
         energies=dict.fromkeys(scene._model.term_names, np.nan) if energies is None else energies,
         stable=found.stable,
-        unstable_directions=found.unstable_directions,
+        n_negative_eigenvalues=found.n_negative_eigenvalues,
         iterations=found.iterations,
         factorizations=found.factorizations,
         failed_factorizations=found.failed_factorizations,
         load_steps=found.load_steps,
         relaxation_steps=found.relaxation_steps,
-        saddles_left=found.saddles_left,
+        saddles_escaped=found.saddles_escaped,
         residual=found.residual,
         at_roundoff=found.at_roundoff,
-        progress=found.progress,
+        load_fraction=found.load_fraction,
         largest_membrane_strain=strain.membrane,
         largest_bending_strain=strain.bending,
         wall_time=wall_time,
@@ -237,7 +237,7 @@ def _outputs(inputs: Inputs, found):
 
 
 def _flux_density(inputs: Inputs, found):
-    if found.progress == 1.0 and is_tensor(inputs.given_flux_density):
+    if found.load_fraction == 1.0 and is_tensor(inputs.given_flux_density):
         return inputs.given_flux_density
     flux_density = inputs.scene._control_layout.of(found.controls, "scene", "applied_flux_density")
     return like(flux_density[0].copy(), *inputs.given)

@@ -12,7 +12,7 @@ from ..._runtime.solver_entry_point import grouped, solve_entry
 from ...model.scene.scene import Scene
 from ..options import MixedNewton, Newton
 from .cases import find_all, split, starts_of
-from .equilibria import Equilibria
+from .equilibria import EquilibriumSet
 from .equilibrium import Equilibrium
 from .single_solve import Search, find
 
@@ -30,7 +30,7 @@ def equilibrium(
     load_factor: Any = 1.0,
     gravity_factor: Any = 1.0,
     field_factor: Any = 1.0,
-    motion_factor: Any = 1.0,
+    support_factor: Any = 1.0,
     thickness: Numbers | None = None,
     young_modulus: Numbers | None = None,
     poisson_ratio: Numbers | None = None,
@@ -38,9 +38,9 @@ def equilibrium(
     curvature_scale: Numbers | None = None,
     vertex_loads: Numbers | None = None,
     values: dict[Any, Any] | None = None,
-    start: Equilibrium | Equilibria | np.ndarray | None = None,
+    start: Equilibrium | EquilibriumSet | np.ndarray | None = None,
     require_stable: bool = True,
-    at_rest: bool = False,
+    ignore_velocity_forces: bool = False,
     solver: Newton | None = None,
     progress: bool | Callable[[float, float], None] = True,
 ) -> Equilibrium | Any:  # Equilibria where there are load cases
@@ -48,7 +48,7 @@ def equilibrium(
 
     remanent_magnetization: A/m, rest frame, world axes: (n_f, 3), or (3,) on every face. Needed in a scene with a field.
     applied_flux_density: T, (3,): the value of the scene's UniformField. (k, 3): k load cases, and so many equilibria.
-    load_factor, gravity_factor, field_factor, motion_factor: on the loads, gravity, the field sources, and on how far
+    load_factor, gravity_factor, field_factor, support_factor: on the loads, gravity, the field sources, and on how far
         supports with a prescribed motion have gone; (k,) with load cases.
     thickness, young_modulus, poisson_ratio, mass_density, curvature_scale: stand in for the shell's own in this solve.
     vertex_loads: N, (n_v, 3): stand in for all forces of the scene's loads.
@@ -63,7 +63,8 @@ def equilibrium(
         obstacles and supports go to their new places on straight ways, in load steps so short that no point of a body
         passes through an obstacle; where that cannot be had, NotConverged says which vertex would.
     require_stable: leave saddles downhill. False accepts any equilibrium; `stable` says which kind it is.
-    at_rest: of a scene with friction or water, the equilibrium without them, which act on what moves only. By default such
+    ignore_velocity_forces: of a scene with friction or water, the equilibrium without them, which act on what
+        moves only. By default such
         a scene is refused: with friction, where it comes to rest depends on how it got there, which ms.simulate tells.
     solver: MixedNewton() by default.
     progress: show a bar once it has taken two seconds; or a function, called now and then with how far the controls have
@@ -90,7 +91,7 @@ def equilibrium(
         "load_factor": load_factor,
         "gravity_factor": gravity_factor,
         "field_factor": field_factor,
-        "motion_factor": motion_factor,
+        "support_factor": support_factor,
         "thickness": thickness,
         "young_modulus": young_modulus,
         "poisson_ratio": poisson_ratio,
@@ -100,7 +101,9 @@ def equilibrium(
         "values": values,
     }
     with told("equilibrium", progress) as (advance, note):
-        search = Search(MixedNewton() if solver is None else solver, require_stable, advance, at_rest, note)
+        search = Search(
+            MixedNewton() if solver is None else solver, require_stable, advance, ignore_velocity_forces, note
+        )
         cases = split(arguments)
         if cases is None:
             return find(scene, arguments, start, search).equilibrium

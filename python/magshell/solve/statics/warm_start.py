@@ -17,7 +17,7 @@ from ...model.scene.scene import Scene
 from ..options import MixedNewton, Newton
 from .cases import join, of_case, split, starts_of
 from .designs import between, numbers_only, packed, unpacked
-from .equilibria import Equilibria
+from .equilibria import EquilibriumSet
 from .equilibrium import Equilibrium
 from .single_solve import Search, Solution, find, inputs_of
 from .start import Origin
@@ -68,7 +68,7 @@ class WarmStart(Frozen):
         self._design: list[dict[Any, Any]] = []
 
     @property
-    def equilibria(self) -> Equilibrium | Equilibria | None:
+    def equilibria(self) -> Equilibrium | EquilibriumSet | None:
         """Those of the last design."""
         return join([each.equilibrium for each in self._last], self._of_cases) if self._last else None
 
@@ -88,7 +88,7 @@ class WarmStart(Frozen):
                     raise
                 last_good = error.last_good
                 if not isinstance(error, EquilibriumJumped):
-                    last_good = Equilibria([*(each.equilibrium for each in solutions), last_good])
+                    last_good = EquilibriumSet([*(each.equilibrium for each in solutions), last_good])
                 raise of_case(error, k, len(cases), last_good) from error
         designs = [numbers_only(arguments) for arguments in cases or [design]]
         remember(self, _last=solutions, _of_cases=cases is not None, _design=designs)
@@ -152,7 +152,7 @@ class WarmStart(Frozen):
             there = self._step(last, arguments)
         except NotConverged:
             return None
-        if there.equilibrium.saddles_left or there.equilibrium.relaxation_steps:
+        if there.equilibrium.saddles_escaped or there.equilibrium.relaxation_steps:
             return None
         return there if self._continues(last, there) else None
 

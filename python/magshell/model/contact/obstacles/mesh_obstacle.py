@@ -16,7 +16,7 @@ from .obstacle import Obstacle, Surface
 
 if TYPE_CHECKING:
     from ...._input.kinds import Numbers
-    from ....mesh.triangles.six_node_mesh import SixNodeMesh
+    from ....mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 
 
 MOST_CELLS = 256  # cells; 140 MB of samples
@@ -51,7 +51,7 @@ class MeshObstacle(Obstacle):
 
     def __init__(
         self,
-        mesh: TriangleMesh | SixNodeMesh,
+        mesh: TriangleMesh | QuadraticTriangleMesh,
         faces: Numbers | None = None,
         resolution: int = 64,
         *,
