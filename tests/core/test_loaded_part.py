@@ -52,7 +52,7 @@ def test_single_zeros_between_nodes_stay() -> None:
 def test_of_a_matrix_that_is_none() -> None:
     with pytest.raises(ValueError, match=r"values\[9\] is nan"):
         _core.loaded_part(5, STARTS, ROWS, [*VALUES[:9], np.nan], [0, 1, 0, 0, 0])
-    with pytest.raises(ValueError, match="forces as many as unknowns"):
+    with pytest.raises(ValueError, match="forces 5, one per row of the matrix"):
         _core.loaded_part(5, STARTS, ROWS, VALUES, [0, 1, 0])
     with pytest.raises(ValueError, match="outside the matrix"):
         _core.loaded_part(5, STARTS, [*ROWS[:9], 7], VALUES, [0, 1, 0, 0, 0])

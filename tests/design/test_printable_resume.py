@@ -103,7 +103,7 @@ def test_begun_anew_it_takes_nothing_from_an_old_file(tmp_path):
 def test_a_callback_sees_each_stage_and_stops(tmp_path):
     seen = []
     whole = searched(mixed, callback=seen.append)
-    assert seen == whole.history
+    assert tuple(seen) == whole.history
     file = tmp_path / "run.pt"
     stopped = searched(mixed, callback=lambda stage: stage.name == "hold", checkpoint=file)
     assert stopped.reason == "callback" and stopped.not_printable > 0

@@ -248,7 +248,7 @@ def test_supports_that_push_bodies_through_each_other_are_told():
         supports=[ms.Pin(all_of, body=lower), ms.Pin(all_of, displacement=(0, 0, -4e-3), body=upper)],
         contacts=[ms.Contact(lower, upper)],
     )
-    with pytest.raises(ms.NotConverged, match=r"bodies cannot follow: face .* in each other's way"):
+    with pytest.raises(ms.NotConverged, match=r"bodies block each other: face .* in each other's way"):
         ms.equilibrium(scene)
 
 
@@ -261,7 +261,7 @@ def test_a_relaxation_that_ends_early_tells_what_touches():
         gravity=(0, 0, -1e5),
         allow_rigid_motions=True,
     )
-    hardest = r"not at rest after 1 steps; bodies touch: face \d+ of body [01] and face \d+ of body [01] push"
+    hardest = r"no equilibrium after 1 relaxation steps; bodies touch: face \d+ of body [01] and face \d+ of body [01] push"
     with pytest.raises(ms.NotConverged, match=hardest):
         ms.equilibrium(scene, solver=ms.MixedNewton(max_iterations=4, max_relaxation_steps=1))
 

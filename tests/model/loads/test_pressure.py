@@ -120,11 +120,11 @@ def test_a_free_border_has_none_and_a_held_one_has():
     for scene in (flap, uneven):
         rest = ms.equilibrium(scene)
         assert rest.stable
-        with pytest.raises(ValueError, match="pressure has no potential here"):
+        with pytest.raises(ValueError, match="pressure has no potential, so the stiffness is not symmetric"):
             ms.vibration_modes(scene, rest)
-        with pytest.raises(ValueError, match="pressure has no potential here"):
+        with pytest.raises(ValueError, match="pressure has no potential, so the stiffness is not symmetric"):
             ms.linear_buckling(scene)
-        with pytest.raises(ValueError, match="pressure has no potential here"):
+        with pytest.raises(ValueError, match="pressure has no potential, so the stiffness is not symmetric"):
             ms.follow_path(scene)
     assert ms.follow_path(held).parameters[-1] == pytest.approx(1.0)
 
