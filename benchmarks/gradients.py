@@ -114,7 +114,7 @@ def _sheet(faces: int, bending: str) -> tuple[ms.Scene, dict[str, Any], dict[str
         **{name: np.array(getattr(sheet, name)) for name in sheet._replaceable},
         "remanent_magnetization": np.tile((2e4, 0.0, 5e3), (mesh.n_faces, 1)),
         "applied_flux_density": np.array((0.0, 0.0, 5e-4)),
-        **{f"{name}_factor": np.array(1.0) for name in ("load", "gravity", "field", "motion")},
+        **{f"{name}_factor": np.array(1.0) for name in ("load", "gravity", "field", "support")},
     }
     values = {
         clamp: {"displacement": np.array((0.0, 0.0, 1e-3)), "rotation": np.array((0.0, -0.02, 0.0))},
@@ -141,7 +141,7 @@ def _solid(cells: tuple[int, int, int]) -> tuple[ms.Scene, dict[str, Any], dict[
     scene = ms.Scene(solid, supports=[pin], loads=[load], field=[ms.UniformField()], gravity=(0.0, 0.0, -1.0))
     inputs = {
         "applied_flux_density": np.array((0.0, 0.0, 0.01)),
-        **{f"{name}_factor": np.array(1.0) for name in ("load", "gravity", "field", "motion")},
+        **{f"{name}_factor": np.array(1.0) for name in ("load", "gravity", "field", "support")},
     }
     values = {
         solid: {

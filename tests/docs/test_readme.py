@@ -17,7 +17,7 @@ def test_quick_start(tmp_path, monkeypatch) -> None:
     risen, distance = (
         float(re.search(rf"{words} ([\d.]+) m", section)[1]) for words in ("has risen:", "rms:")
     )
-    assert names["rest"].positions[:, 2].max() == pytest.approx(risen, abs=5e-5)
+    assert names["result"].positions[:, 2].max() == pytest.approx(risen, abs=5e-5)
     assert names["best"].objective ** 0.5 == pytest.approx(distance, abs=0.05)  # mm
     assert (tmp_path / "strip.png").stat().st_size > 10_000
 

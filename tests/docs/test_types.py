@@ -79,5 +79,7 @@ def test_what_is_wrong_is_complained_of(tmp_path):
 def test_share_of_what_has_its_types(tmp_path):
     """Of all public names and what they hold; what is not typed completely says so to a strict checker."""
     told = run_checker(tmp_path, "--ignoreexternal", "--verifytypes", "magshell")["typeCompleteness"]
-    assert sum(told["exportedSymbolCounts"].values()) > 4000
+    assert (
+        sum(told["exportedSymbolCounts"].values()) > 3400
+    )  # fewer than that: not all of the package was looked at
     assert told["completenessScore"] == 1.0

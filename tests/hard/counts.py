@@ -27,7 +27,7 @@ LAST_RELEASE = Path(__file__).with_name("counts.json")
 FAMILY_GROWTH, CASE_GROWTH = 1.05, 1.5  # largest count over that of the last release, of a sum and of a case
 NUDGES = 2  # times that `--write` solves a case on a nudged mesh
 COUNTED = ("factorizations", "iterations")
-SOLVES = ("equilibrium", "simulate", "follow")
+SOLVES = ("equilibrium", "simulate", "follow_path")
 
 Counts = dict[
     str, dict[str, list[int]]

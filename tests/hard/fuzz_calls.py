@@ -232,17 +232,17 @@ def _solves(s: Sample) -> Iterator[Call]:
         seed=0,
         solver=quick,
     )
-    yield Call("equilibria", ms.find_equilibria, {**magnetic, **replaced, **hunt}, cost=3)
+    yield Call("find_equilibria", ms.find_equilibria, {**magnetic, **replaced, **hunt}, cost=3)
     meshes = [s.mesh, s.mesh.refined()]
     yield Call(
-        "extrapolated",
+        "richardson_extrapolation",
         ms.richardson_extrapolation,
         {"solve": lambda mesh: mesh.size, "meshes": meshes, "order": 2.0},
     )
     yield Call("TriangleMesh.refined", s.mesh.refined, {"surface": ms.shapes.ball(1.0)})
     options = {"start": None, "until": None, "first_step": 0.5, "max_step": 0.5, "min_parameter": -1.0}
     yield Call(
-        "follow",
+        "follow_path",
         ms.follow_path,
         {**magnetic, **options, "max_points": 3, "locate_critical": True, "solver": quick, "progress": False},
         cost=2,
@@ -293,8 +293,8 @@ def _solves(s: Sample) -> Iterator[Call]:
         lambda start, **a: ms.WarmStart(s.magnetic, start=start, solver=quick)(**a),
         {"start": None, **{k: v for k, v in magnetic.items() if k != "scene"}},
     )
-    yield Call("Path.equilibrium", s.path.equilibrium, {"index": 0})
-    yield Call("Equilibria", ms.EquilibriumSet, {"cases": [s.rest, s.rest]})
+    yield Call("EquilibriumPath.equilibrium", s.path.equilibrium, {"index": 0})
+    yield Call("EquilibriumSet", ms.EquilibriumSet, {"cases": [s.rest, s.rest]})
     state = {
         "time": 0.0,
         "state": s.state.state,

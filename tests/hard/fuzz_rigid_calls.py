@@ -18,13 +18,13 @@ def rigid_calls(s: Sample) -> Iterator[Call]:
         "magnetic_moment": (1e-3, 0, 0),
     }
     yield Call(
-        "Rigid",
+        "RigidBody",
         lambda **a: ms.Scene([s.shell, ms.RigidBody(**a)], field=s.dipoles, allow_rigid_motions=True),
         {"vertices": mesh.vertices_where(lambda x: x[:, 0] > 0.05), "body": s.shell, **rigid},
     )
     spin = {"velocity": (0, 0, 1.0), "angular_velocity": (1.0, 0, 0)}
     yield Call(
-        "Rigid, free",
+        "RigidBody, free",
         lambda **a: ms.Scene(ms.RigidBody(**a), field=s.dipoles, allow_rigid_motions=True),
         {**rigid, **spin},
     )

@@ -111,7 +111,7 @@ def _actuators() -> Iterator[Call]:
     yield Call("Cavity of liquid", acting(sheet, ms.Cavity), {**around, "volume": 1e-4, "bulk_modulus": 1e5})
     groups = np.arange(mesh.n_tetrahedra) % 2
     yield Call(
-        "Cells",
+        "PneumaticCells",
         acting(solid, ms.PneumaticCells),
         {"groups": groups, "stiffness": 1e4, "volume_ratio": [1.1, 0.9]},
     )
@@ -178,7 +178,7 @@ def _solids() -> Iterator[Call]:
     yield Call("StableNeoHookean", ms.StableNeoHookean, {"log_barrier": True, **moduli})
     yield Call("StVenantKirchhoff", ms.StVenantKirchhoff, moduli)
     yield Call("Corotated", ms.Corotated, moduli)
-    yield Call("Projective", ms.ProjectiveMaterial, moduli)
+    yield Call("ProjectiveMaterial", ms.ProjectiveMaterial, moduli)
     exponents = dict.fromkeys(("fibre_exponent", "cross_fibre_exponent", "fibre_shear_exponent"), 2.0)
     fibres = {"stiffness": 1e3, "bulk_modulus": 1e5, "fibres": (1.0, 0.0, 0.0)}
     yield Call("Guccione", ms.Guccione, {**exponents, **fibres})

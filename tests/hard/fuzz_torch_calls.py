@@ -68,7 +68,7 @@ def _objectives(s: Sample) -> Iterator[Call]:
         },
     )
     yield Call(
-        "Ink",
+        "PrintableSet",
         ms.PrintableSet,
         {
             "strength": 1.0,

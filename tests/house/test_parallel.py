@@ -28,7 +28,7 @@ def test_sleeps(k):
 @pytest.fixture
 def folder(tmp_path):
     """A folder of tests with the same hooks."""
-    for name in ("conftest.py", "parallel.py"):
+    for name in ("conftest.py", "support/parallel.py"):
         shutil.copy(HERE / name, tmp_path)
     (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n    alone: as here\n    slow: as here\n")
     return tmp_path

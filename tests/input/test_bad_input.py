@@ -91,7 +91,7 @@ test_scene_is_refused = refused(
         (
             "shell",
             lambda: ms.Scene(MESH),
-            "bodies must hold Shell, Solid, Rigid, Skeleton objects, got TriangleMesh",
+            "bodies must hold Shell, Solid, RigidBody, Skeleton objects, got TriangleMesh",
         ),
         ("no supports", lambda: scene(supports=None), "supports must hold Pin, Clamp, .* got NoneType"),
         ("a string", lambda: scene(supports="clamp"), "supports must hold .* objects, got str"),

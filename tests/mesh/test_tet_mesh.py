@@ -60,7 +60,7 @@ REFUSED = [
     ("out of range", lambda: one(tetrahedra=[[0, 1, 2, 4]]), "tetrahedron 0 names vertex 4, but .* 0 to 3"),
     ("below range", lambda: one(tetrahedra=[[0, 1, 2, -1]]), "tetrahedron 0 names vertex -1"),
     ("twice", lambda: one(tetrahedra=[[0, 1, 2, 2]]), r"tetrahedron 0 \(0, 1, 2, 2\) names a vertex twice"),
-    ("unused", lambda: one(TWO[0]), "1 vertex belongs to no tetrahedron: 4. .*mended"),
+    ("unused", lambda: one(TWO[0]), "1 vertex belongs to no tetrahedron: 4. .*repaired"),
     (
         "flat",
         lambda: one(CORNERS * [1, 1, 1e-12]),

@@ -95,7 +95,7 @@ def test_points_of_a_path(tmp_path):
     points = ms.EquilibriumSet(path.equilibrium(k) for k in range(len(path)))
     assert len(points) > 2
     assert same(facts(reloaded(points, tmp_path)), facts(points))
-    with pytest.raises(ValueError, match=r"got Path: save its points"):
+    with pytest.raises(ValueError, match=r"got EquilibriumPath: save its points"):
         ms.save(tmp_path / "path.npz", path)
 
 
@@ -211,7 +211,7 @@ def test_what_is_no_file_of_results(tmp_path):
     with pytest.raises(FileNotFoundError):
         ms.load(tmp_path / "nowhere.npz", scene)
     with pytest.raises(
-        ValueError, match="result must be an Equilibrium, Equilibria or a Trajectory, got list"
+        ValueError, match="result must be an Equilibrium, EquilibriumSet or a Trajectory, got list"
     ):
         ms.save(tmp_path / "list.npz", [1, 2])
 

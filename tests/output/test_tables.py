@@ -65,7 +65,8 @@ def test_tensors(results):
 
 def test_bad_input(results, monkeypatch):
     with pytest.raises(
-        ValueError, match=r"result must be an Equilibrium, Equilibria, a Path or a Trajectory, got Scene"
+        ValueError,
+        match=r"result must be an Equilibrium, EquilibriumSet, an EquilibriumPath or a Trajectory, got Scene",
     ):
         ms.to_xarray(SCENE)
     with pytest.raises(ValueError, match=r'per must be "state" or "vertex", got \'face\''):

@@ -129,7 +129,11 @@ def test_what_is_said_names_the_way_to_another_value() -> None:
             "gravity",
             r'values={scene: {"gravity": \.\.\.}}; else make another, Scene\(\.\.\.\)',
         ),
-        (MADE["body contact"], "reach", r'values={body_contact: {"reach": \.\.\.}}'),
+        (
+            MADE["body contact"],
+            "activation_distance",
+            r'values={body_contact: {"activation_distance": \.\.\.}}',
+        ),
         (MADE["flat"], "faces", r"Make another, TriangleMesh\(\.\.\.\)"),
         (MADE["Newton"], "tolerance", r"dataclasses\.replace\(newton, tolerance=\.\.\.\)"),
         (OBJECTS["trajectory"], "positions", "start="),

@@ -85,7 +85,9 @@ def test_it_is_as_a_rigid_part_of_a_solid():
         np.arange(solid.mesh.n_vertices), body=solid, mass=free.mass, inertia=free.inertia, center=free.center
     )
     plate = ms.Shell(PLATE, **SOFT)
-    same = dict(friction_coefficient=0.3, contact_stiffness=1e5, reach=1e-4, sticking_speed=1e-3)
+    same = dict(
+        friction_coefficient=0.3, contact_stiffness=1e5, activation_distance=1e-4, sticking_speed=1e-3
+    )
     touch = ms.Contact(part, plate, min_distance=5e-4, **same)
     held = ms.Pin(np.arange(PLATE.n_vertices), body=plate)
     scenes.append(

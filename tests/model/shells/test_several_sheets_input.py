@@ -21,7 +21,7 @@ HEAVY = ms.Scene([A, B], supports=HELD, gravity=(0, 0, -1))
         (lambda: ms.Scene([]), "at least one Shell"),
         (
             lambda: ms.Scene([A, A.mesh]),
-            "bodies must hold Shell, Solid, Rigid, Skeleton objects, got TriangleMesh",
+            "bodies must hold Shell, Solid, RigidBody, Skeleton objects, got TriangleMesh",
         ),
         (lambda: ms.Scene([A, B], supports=[ms.Pin([0])]), r"2 bodies, so a Pin must say.*body="),
         (lambda: ms.Scene([A, B], supports=HELD, loads=[ms.PointLoad([0], M)]), "a PointLoad must say"),

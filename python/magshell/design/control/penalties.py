@@ -6,6 +6,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..._input.tensors import positive_number
+from .. import objectives
 from ._arguments import tensor
 from .signals import oscillation
 
@@ -62,7 +63,7 @@ def field_limit(flux_density: Numbers, limit: float, sharpness: float | None = N
 
     For MMA and GCMMA, with fields that are not bounded by their parameters: Fourier series. flux_density: (n, 3) T.
     limit: T. One constraint a component, (3 n,); with a sharpness, a single one, as in `ms.objectives.limit`, which itself
-    caps |B|.
+    limits |B|.
 
     >>> import magshell as ms
     >>> import numpy as np
@@ -71,7 +72,7 @@ def field_limit(flux_density: Numbers, limit: float, sharpness: float | None = N
     True
     """
     flux_density = tensor("flux_density", "T", flux_density, ("n", 3))
-    return limit(flux_density.reshape(-1, 1), positive_number("limit", "T", limit), sharpness)
+    return objectives.limit(flux_density.reshape(-1, 1), positive_number("limit", "T", limit), sharpness)
 
 
 def low_frequency_penalty(

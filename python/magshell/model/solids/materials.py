@@ -66,7 +66,8 @@ class SolidMaterial(Frozen):
 
     @property
     def _core_name(self) -> str:
-        return type(self).__name__
+        """The name of the energy in the core, which is that of the class without `Material`."""
+        return type(self).__name__.removesuffix("Material")
 
     def replaced(self, **values: Any) -> SolidMaterial:
         """The same material with other values."""

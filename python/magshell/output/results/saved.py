@@ -104,8 +104,8 @@ _CONTENTS = "contents"
 def save(path: str | Path, result: Equilibrium | EquilibriumSet | Trajectory) -> None:
     """Writes a result into one file, an .npz of arrays and of JSON text, from which `load` makes it again.
 
-    result: an Equilibrium, Equilibria, or a Trajectory; of a Path its points, `path.equilibrium(k)`. Tensors become arrays,
-        and gradients do not survive.
+    result: an Equilibrium, EquilibriumSet, or a Trajectory; of an EquilibriumPath its points, `path.equilibrium(k)`. Tensors
+        become arrays, and gradients do not survive.
 
     The file has no scene, only a digest of each of its parts: the script that makes the scene is what to keep beside it.
     numpy reads it as well: `np.load(path)["positions"]`, m. Written beside its place and then renamed.
@@ -126,10 +126,10 @@ def save(path: str | Path, result: Equilibrium | EquilibriumSet | Trajectory) ->
     """
     if type(result) not in _KINDS.values():
         points = ": save its points, ms.EquilibriumSet(path.equilibrium(k) for k in ...)"
-        why = points if type(result).__name__ == "Path" else ""
+        why = points if type(result).__name__ == "EquilibriumPath" else ""
         why = ": several are ms.EquilibriumSet([...])" if isinstance(result, list | tuple) else why
         raise ValueError(
-            f"result must be an Equilibrium, Equilibria or a Trajectory, got {type(result).__name__}{why}"
+            f"result must be an Equilibrium, EquilibriumSet or a Trajectory, got {type(result).__name__}{why}"
         )
     scene, arrays = result.scene, []
     held = to_plain(_fields(result, scene), arrays, "the result")

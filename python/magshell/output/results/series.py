@@ -109,7 +109,7 @@ def write_series(
 ) -> Path:
     """Writes a motion for ParaView: strip.pvd, and in a folder strip/ beside it one VTU a state (the extra `io`).
 
-    what: a Trajectory, a Path, Equilibria, a mesh with positions, or whatever else `plot` takes.
+    what: a Trajectory, an EquilibriumPath, EquilibriumSet, a mesh with positions, or whatever else `plot` takes.
     positions: (n, n_v, 3) m, where `what` has none. times: (n,) s; by default its own, else 0, 1, 2, ...
     velocities: (n, n_v, 3) m/s; by default its own.
     remanent_magnetization, applied_flux_density, field: as in `plot`.

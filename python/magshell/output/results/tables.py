@@ -113,7 +113,7 @@ def _states(result) -> tuple[str | None, np.ndarray | None]:
     """The coordinate that its states lie along, and where they are."""
     if not isinstance(result, _RESULTS):
         raise ValueError(
-            f"result must be an Equilibrium, Equilibria, a EquilibriumPath or a Trajectory, got {type(result).__name__}"
+            f"result must be an Equilibrium, EquilibriumSet, an EquilibriumPath or a Trajectory, got {type(result).__name__}"
         )
     if isinstance(result, Equilibrium):
         return None, None

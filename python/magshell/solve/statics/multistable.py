@@ -75,8 +75,8 @@ def find_equilibria(
 
     Controls, values and ignore_velocity_forces as in ms.equilibrium, for one load case.
 
-    start: an equilibrium, Equilibria, positions (n_v, 3) m, or a list of these: where to look as well, for saddles too if
-        they are asked for.
+    start: an equilibrium, EquilibriumSet, positions (n_v, 3) m, or a list of these: where to look as well, for saddles too
+        if they are asked for.
     include_unstable: hand back saddles too; `n_negative_eigenvalues` tells them. Their energy over that of a
         well beside them is
         what a snap has to be given at least. Deep wells have theirs far away: a `start` that looks like one finds it.

@@ -85,10 +85,10 @@ def find(
     state, turns, from_, at_rest = starting_point(scene, start, inputs)
     moving = None
     if isinstance(start, Equilibrium) and not at_rest:
-        ignore_velocity_forces = all_can_move(inputs, start)
+        at_rest = all_can_move(inputs, start)
         # Obstacles and supports push bodies along, and pass through them where they jump.
         moving = AlongPath(inputs, start, at_once=True) if scene.obstacles and not at_rest else None
-        moving = AlongPath(inputs, start) if ignore_velocity_forces else moving
+        moving = AlongPath(inputs, start) if at_rest else moving
     options = search.options()
     options.start_at_rest = at_rest
     options.keep_factor = keep_factor

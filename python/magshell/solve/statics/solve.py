@@ -59,7 +59,7 @@ def equilibrium(
         {scene: {"gravity": value}}. Of applied_flux_density and the factors, the keywords are short forms of
         {scene: {name: value}}. The scene is not analysed again. `scene.objects` lists the objects.
     start: an earlier Equilibrium of this scene, from whose controls the solve goes to the new ones; or positions
-        (n_v, 3) m. By default the rest shape, unloaded. Load cases may have Equilibria, one each. From an Equilibrium,
+        (n_v, 3) m. By default the rest shape, unloaded. Load cases may have an EquilibriumSet. From an Equilibrium,
         obstacles and supports go to their new places on straight ways, in load steps so short that no point of a body
         passes through an obstacle; where that cannot be had, NotConverged says which vertex would.
     require_stable: leave saddles downhill. False accepts any equilibrium; `stable` says which kind it is.
