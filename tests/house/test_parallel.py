@@ -28,9 +28,11 @@ def test_sleeps(k):
 @pytest.fixture
 def folder(tmp_path):
     """A folder of tests with the same hooks."""
+    (tmp_path / "support").mkdir()
     for name in ("conftest.py", "support/parallel.py"):
-        shutil.copy(HERE / name, tmp_path)
-    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n    alone: as here\n    slow: as here\n")
+        shutil.copy(HERE / name, tmp_path / name)
+    options = "pythonpath = support\nmarkers =\n    alone: as here\n    slow: as here\n"
+    (tmp_path / "pytest.ini").write_text(f"[pytest]\n{options}")
     return tmp_path
 
 

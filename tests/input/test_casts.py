@@ -25,7 +25,7 @@ OF_OTHER_NAMES = {  # what the message calls them
 }
 NOT_NUMBERS = {  # anything; Python's own indices; a truth as well as a count
     ("multistart", "starts"),
-    ("Path.equilibrium", "index"),
+    ("EquilibriumPath.equilibrium", "index"),
     ("Style", "arrows"),
 }
 SLOW = 30  # pictures and films

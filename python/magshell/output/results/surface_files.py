@@ -40,8 +40,8 @@ def write_surface(
     """Writes a shape as triangles to binary STL or to OBJ: for a printer, a slicer or a renderer.
 
     path: ends in .stl or .obj.
-    what: an Equilibrium, a Trajectory, an EquilibriumPath, EquilibriumSet, a Scene, a Shell, a Solid or a mesh. Solids are their surface,
-        which is closed; of quadratic elements four triangles a face.
+    what: an Equilibrium, a Trajectory, an EquilibriumPath, EquilibriumSet, a Scene, a Shell, a Solid or a mesh. Solids are
+        their surface, which is closed; of quadratic elements four triangles a face.
     thickness: None: sheets as they are, without one; "own": as thick as the shells are; or m, a number or (n_f,): closed
         surfaces with both sides, half of the thickness to either, and walls along the border.
     index: which state of several, by default the last.
