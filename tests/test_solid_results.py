@@ -111,10 +111,12 @@ def test_shells_beside_solids_have_their_own_rows(order):
     assert len(ms.follow(scene)) > 1
 
 
-def test_strains_of_sheets_are_refused_where_there_are_none():
-    rest = ms.equilibrium(pulled(bar()))
-    with pytest.raises(ValueError, match=r"result\[solid\]\.strains\(\)"):
-        rest.strains()
+def test_strains_of_a_result_with_one_solid_are_those_of_the_solid():
+    scene = pulled(bar())
+    result = ms.equilibrium(scene)
+    (solid,) = scene.bodies
+    for own, of_body in zip(result.strains(), result[solid].strains(), strict=True):
+        np.testing.assert_array_equal(own, of_body)
 
 
 def test_a_face_of_a_quadratic_solid_is_not_held_by_its_corners_alone():

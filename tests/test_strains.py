@@ -227,7 +227,8 @@ def test_far_beyond_the_model_it_warns_at_the_callers_line():
         found = in_field(1000.0, strip(cells=(10, 2), field=ms.UniformField()))
     assert found.stable and found.largest_membrane_strain > 2.0
     assert "BEYOND THE MODEL" in repr(found)
-    assert [warning.filename for warning in caught] == [__file__]
+    strains = [warning for warning in caught if warning.category is ms.LargeStrainWarning]
+    assert [warning.filename for warning in strains] == [__file__]
 
 
 def test_it_warns_once_a_scene_and_again_where_strains_have_doubled():
@@ -236,7 +237,7 @@ def test_it_warns_once_a_scene_and_again_where_strains_have_doubled():
         for flux_density in (50.0, 51.0, 52.0, 400.0):
             found = in_field(flux_density, scene)
             assert found.largest_membrane_strain > 0.2
-    assert len(caught) == 2
+    assert sum(warning.category is ms.LargeStrainWarning for warning in caught) == 2
 
 
 def test_small_strains_warn_of_nothing():

@@ -210,7 +210,10 @@ def simulate(
     where = f"the motion, at {result.times[most]:.4g} s,"
     warn_of_caps(scene, positions, inputs.values.whole, bending[most], where)
     _warn(result)
-    _warn_of_fields(result)
+    try:  # a field may be a function of the caller's, in which Ctrl-C can come
+        _warn_of_fields(result)
+    except KeyboardInterrupt as stopped:
+        raise Interrupted("interrupted while the sampling of the field was checked", result) from stopped
     return result
 
 

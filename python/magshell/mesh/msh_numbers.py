@@ -16,7 +16,8 @@ class MshNumbers:
     """
 
     def __init__(self, name: str, section: bytes, is_text: bool, size: int):
-        self.name, self.is_text = name, is_text
+        self.name: str = name
+        self.is_text: bool = is_text
         self._data, self._size, self._at = section, size, 0
         self._words = _words(section) if is_text else np.zeros(0)
 

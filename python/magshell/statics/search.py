@@ -169,7 +169,10 @@ def solve(
     layout = scene._control_layout
     field_factor = float(layout.of(found.controls, "scene", "field_factor")[0])
     flux_density = layout.of(found.controls, "scene", "applied_flux_density")[0]
-    warn_of_sampling(inputs.values, positions, field_factor, flux_density, "this equilibrium")
+    try:  # a field may be a function of the caller's, in which Ctrl-C can come
+        warn_of_sampling(inputs.values, positions, field_factor, flux_density, "this equilibrium")
+    except KeyboardInterrupt as stopped:
+        raise Interrupted("interrupted while the sampling of the field was checked", result) from stopped
     return Solution(result, found, inputs)
 
 
