@@ -200,7 +200,7 @@ def _values_of(scene: ms.Scene, owner, moving: bool) -> dict[str, object]:
         values = {"gravity": scene.gravity, "vertex_loads": loads}
         absent = {name for name, value in values.items() if not np.any(value)}
     elif isinstance(owner, ms.Contact):
-        values = dict(zip(names, owner._law(*scene._values.touching(owner)), strict=True))
+        values = dict(zip(names, owner._law(*scene._values.contact_bodies(owner)), strict=True))
         absent = set() if scene.has_forces_of_motion else {"friction_coefficient"}
     elif isinstance(owner, ms.BodyContact):
         values = {name: getattr(owner, name) for name in names}

@@ -9,7 +9,7 @@ import numpy as np
 from .._input.quantity import quantity
 from .._runtime.frozen import Frozen
 from .._runtime.keywords import CONTROLS, FLUX_DENSITY, controls_of, nearest_first
-from ..model.scene.time_series import changes_at_once, names_in_time, row_in_time
+from ..model.scene.time_series import may_jump, names_in_time, row_in_time
 
 if TYPE_CHECKING:
     from .._input.kinds import Numbers
@@ -110,7 +110,7 @@ class Action(Frozen):
         return [self._course(before, now, steps)]
 
     def _course(self, before: np.ndarray, now: np.ndarray, steps: int) -> np.ndarray:
-        if self._of_scene or changes_at_once(self.owner):
+        if self._of_scene or may_jump(self.owner):
             return np.broadcast_to(now, (steps, *self.shape))
         shares = np.linspace(0.0, 1.0, steps + 1).reshape(-1, *(1 for _ in self.shape))
         return (1.0 - shares) * before + shares * now

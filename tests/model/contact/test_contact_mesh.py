@@ -5,7 +5,7 @@ import pytest
 from body_contact_scenes import SOFT
 
 import magshell as ms
-from magshell.model.scene.contact_state import touching_in
+from magshell.model.scene.contact_state import compute_contact_state
 
 SIDE, GAP = 0.02, 0.5e-4  # m; the gap is half the reach
 PRESSURE = -0.5 * (2 * np.log(0.5) - 1) * SOFT["young_modulus"]  # of the barrier there
@@ -16,7 +16,7 @@ def borne(lower, upper):
     sheets = [ms.Shell(mesh, **SOFT) for mesh in (lower, upper)]
     touch = ms.Contact(*sheets)
     scene = ms.Scene(sheets, contacts=[touch], allow_rigid_motions=True)
-    return touching_in(scene, scene._values, touch, scene._model.rest_state()).normal_force
+    return compute_contact_state(scene, scene._values, touch, scene._model.rest_state()).normal_force
 
 
 @pytest.mark.parametrize("below", [4, 16])

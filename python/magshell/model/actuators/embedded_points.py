@@ -15,7 +15,7 @@ from ..solids.solid import Solid
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
-    from ..rigid.equimomental_points import Place
+    from ..rigid.equimomental_points import RigidBodyPoints
 
 
 _OUTSIDE = 1e-6  # of a body's size: a point farther from every element is outside
@@ -29,7 +29,7 @@ _CORNERS_OF_FACES = np.concatenate([np.eye(3), 0.5 * (np.eye(3) + np.roll(np.eye
 
 
 def riding_points(
-    points: Numbers, bodies: Bodies, places: list[Place]
+    points: Numbers, bodies: Bodies, places: list[RigidBodyPoints]
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """points: [(body, (3,) m)]; places: of a scene's rigid parts. Of each, vertices of the scene (then of rigid parts, ten
     each) and weights, which add up to 1. Raises ValueError where a point lies outside its body."""

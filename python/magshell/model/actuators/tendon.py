@@ -18,7 +18,7 @@ from .embedded_points import riding_points
 
 if TYPE_CHECKING:
     from ..._input.kinds import Computed, Numbers
-    from ..rigid.equimomental_points import Place
+    from ..rigid.equimomental_points import RigidBodyPoints
 
 
 _SMOOTHING = 1e-3  # of the length at rest
@@ -121,7 +121,9 @@ class Tendon(Actuator):
         )
         return float(self.tension) + float(self.stiffness) / shares * pull
 
-    def _riding(self, scene_bodies: Bodies, places: list[Place]) -> list[tuple[np.ndarray, np.ndarray]]:
+    def _riding(
+        self, scene_bodies: Bodies, places: list[RigidBodyPoints]
+    ) -> list[tuple[np.ndarray, np.ndarray]]:
         """Of each point the core's vertices that it rides on, and their weights."""
         return riding_points(self._points, scene_bodies, places)
 

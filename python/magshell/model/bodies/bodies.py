@@ -330,7 +330,7 @@ def _parts(body) -> tuple[Any, ...]:
     return body.links if isinstance(body, Skeleton) else (body,)
 
 
-class Whole:
+class CombinedSheets:
     """What faces of several sheets, or of none, are made of, one sheet after another."""
 
     def __init__(self, mesh: TriangleMesh, sheets: tuple[Shell, ...]):

@@ -178,7 +178,7 @@ class Contact(Owner):
         )
 
     def _add_numbers(self, label: str, values: Values, numbers: dict[Any, Any]) -> None:
-        for name, number in zip(self._replaceable, self._law(*values.touching(self)), strict=True):
+        for name, number in zip(self._replaceable, self._law(*values.contact_bodies(self)), strict=True):
             numbers[label, name] = number
 
     def _by_thickness(self, label: str, sheets: Sequence[Shell | Solid], gradient: Gradient) -> float:

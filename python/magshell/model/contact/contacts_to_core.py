@@ -19,7 +19,7 @@ from .body_contact import BodyContact, side_of, touches_with_shape
 
 if TYPE_CHECKING:
     from ..bodies.bodies import Bodies
-    from ..rigid.equimomental_points import Place
+    from ..rigid.equimomental_points import RigidBodyPoints
     from ..scene.scene import Scene
     from ..shells.shell import Shell
     from .contact import Contact
@@ -132,7 +132,7 @@ def check_apart(scene: Scene, state: np.ndarray) -> None:
 
 
 def check_shapes(
-    contacts: Sequence[Contact | BodyContact], parts: Sequence[RigidBody], places: list[Place]
+    contacts: Sequence[Contact | BodyContact], parts: Sequence[RigidBody], places: list[RigidBodyPoints]
 ) -> None:
     """Obstacles keep out vertices of sheets and solids: a contact that would seem to be about the shape of a rigid part
     that has none of these has to say what it is about."""

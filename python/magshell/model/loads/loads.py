@@ -176,7 +176,7 @@ class EdgeCouple(Owner):
             raise ValueError(f"couple_per_length [N] must be a number or have shape (3,), got {array.shape}")
         self.couple_per_length: np.ndarray = quantity("couple_per_length", "N", array, array.shape)
 
-    def _edge_couples(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
+    def _edge_moments(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
         """The edges (k,) and their couples (k,), N m. Raises ValueError for a solid, whose edges do not turn."""
         if not isinstance(mesh, TriangleMesh | QuadraticTriangleMesh):
             raise ValueError(
@@ -186,9 +186,9 @@ class EdgeCouple(Owner):
         return edges, along @ np.atleast_1d(self.couple_per_length)
 
     def _add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
-        key, turned = ("couples", "couples"), values.scene._couple_edges
+        key, turned = ("couples", "couples"), values.scene._moment_edges
         part = values.scene._bodies.of(self)
-        edges, couples = self._edge_couples(part.mesh)
+        edges, couples = self._edge_moments(part.mesh)
         n_edges = values.scene.mesh.n_edges
         by_edge = np.bincount(part.first_edge + edges, weights=couples, minlength=n_edges)
         numbers[key] = numbers.get(key, 0.0) + by_edge[turned]
@@ -196,7 +196,7 @@ class EdgeCouple(Owner):
     def _gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
         part = values.scene._bodies.of(self)
         edges, along = self._along(part.mesh)
-        of_edges = np.searchsorted(values.scene._couple_edges, part.first_edge + edges)
+        of_edges = np.searchsorted(values.scene._moment_edges, part.first_edge + edges)
         return {"couple_per_length": gradient.value("couples", "couples")[of_edges] @ along}
 
     def replaced(self, *, couple_per_length: Numbers) -> EdgeCouple:

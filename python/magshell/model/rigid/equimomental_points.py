@@ -27,7 +27,7 @@ _MOMENTS = np.concatenate(  # (10, 10): of unit masses there: mass, first and se
 )
 
 
-class Place(NamedTuple):
+class RigidBodyPoints(NamedTuple):
     """A rigid part in its scene: what its values do not change.
 
     vertices: (k,), the scene's. points: its rows among all points. rest: (10, 3) m, where they are at rest.
@@ -91,9 +91,9 @@ class Place(NamedTuple):
         return {"owner": owner, "points": points, "vertices": self.vertices.tolist(), "magnetic": magnetic}
 
 
-def places(bodies: Bodies) -> list[Place]:
+def places(bodies: Bodies) -> list[RigidBodyPoints]:
     """Where each rigid part of a scene is. Raises ValueError on vertices that do not make one."""
-    found: list[Place] = []
+    found: list[RigidBodyPoints] = []
     of_part: dict[int, int] = {}
     n_v = bodies.mesh.n_vertices
     for k, part in enumerate(bodies.rigid):
@@ -137,7 +137,7 @@ def _vertices(part: RigidBody, bodies) -> np.ndarray:
 
 def _place(
     part: RigidBody, skeleton: Skeleton | None, rest: np.ndarray, vertices: np.ndarray, first: int
-) -> Place:
+) -> RigidBodyPoints:
     middle = rest.mean(axis=0) if len(rest) else np.zeros(3)
     center = middle if part.center is None else part.center
     tensor, axes, length = part.inertia_tensor, np.eye(3), 0.0
@@ -155,7 +155,7 @@ def _place(
             "Fixed): nothing tells how it turns"
         )
     points = center + length * _POINTS @ axes.T
-    return Place(vertices, slice(first, first + 10), points, center, axes, length, np.zeros((0, 3)))
+    return RigidBodyPoints(vertices, slice(first, first + 10), points, center, axes, length, np.zeros((0, 3)))
 
 
 def check_rigid(scene: Scene, given: np.ndarray, settled: np.ndarray, name: str, size: float) -> None:

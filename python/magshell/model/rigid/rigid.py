@@ -175,10 +175,10 @@ class RigidBody(Owner):
     def _add_numbers(self, label: str, values: Values, numbers: dict[Any, Any]) -> None:
         if self.magnetic_moment is not None:
             numbers[label, "magnetic_moment"] = self.magnetic_moment
-            numbers[label, "center"] = values.rigid_place(self).center_of(self)
+            numbers[label, "center"] = values.rigid_points(self).center_of(self)
 
     def _gradients(self, label: str, values: Values, gradient: Gradient) -> dict[str, np.ndarray]:
-        place, found = values.rigid_place(self), {}
+        place, found = values.rigid_points(self), {}
         by_center = np.zeros(3)
         if gradient.has(label, "magnetic_moment"):
             found["magnetic_moment"] = gradient.value(label, "magnetic_moment")[0]

@@ -1,4 +1,4 @@
-"""Defines what results say of contact: forces, gaps and slip."""
+"""Computes the state of a contact for results: forces, gaps and slip."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ if TYPE_CHECKING:
     from .scene import Scene
 
 
-class Standing(NamedTuple):
-    """An obstacle at a time [s], with the velocity (3,) m/s of its center and its spin (3,) rad/s."""
+class ObstacleState(NamedTuple):
+    """An obstacle at a time [s], with the velocity (3,) m/s of its center and its angular velocity (3,) rad/s."""
 
     obstacle: Obstacle
     time: float
     velocity: np.ndarray
     spin: np.ndarray
 
-    def velocities(self, places: np.ndarray) -> np.ndarray:
-        """(k, 3) m/s, of its own points that are there."""
+    def velocities(self, points: np.ndarray) -> np.ndarray:
+        """Return the velocities of the obstacle's material points at these positions, (k, 3) m/s."""
         center = self.obstacle.center + self.obstacle.pose(self.time)[0]
-        return self.velocity + np.cross(self.spin, places - center)
+        return self.velocity + np.cross(self.spin, points - center)
 
 
-def standing(obstacle: Obstacle, time: float | None) -> Standing:
-    """As a motion has it at a time, or as an equilibrium has it, which knows none."""
+def obstacle_state(obstacle: Obstacle, time: float | None) -> ObstacleState:
+    """Return the state of an obstacle at a time of a motion; with None its state in an equilibrium, where it rests."""
     if time is not None:
-        return Standing(obstacle, time, *obstacle.rates(time))
-    return Standing(variant(obstacle, motion=None), 0.0, np.zeros(3), np.zeros(3))
+        return ObstacleState(obstacle, time, *obstacle.rates(time))
+    return ObstacleState(variant(obstacle, motion=None), 0.0, np.zeros(3), np.zeros(3))
 
 
 def pairs_with_obstacles(
@@ -46,50 +46,54 @@ def pairs_with_obstacles(
     velocities: np.ndarray,
     time: float | None,
 ) -> dict[str, np.ndarray]:
-    """What touching_pairs of the core has of bodies; positions and velocities (n_v, 3)."""
+    """Return the contact pairs with obstacles, in the arrays that the core's `touching_pairs` returns for pairs of
+    bodies.
+
+    positions, velocities: (n_v, 3). time: s; None in an equilibrium.
+    """
     vertices, weights = scene._bodies.contact_points(contact)
-    numbers = values.current(contact)._law(*values.touching(contact))
+    numbers = values.current(contact)._law(*values.contact_bodies(contact))
     stiffness, smoothing, offset, coefficient, sticking_speed = numbers
     corners = np.where(weights != 0.0, vertices, 0)
-    places = np.einsum("pk,pkc->pc", weights, positions[corners])
+    points = np.einsum("pk,pkc->pc", weights, positions[corners])
     moves = np.einsum("pk,pkc->pc", weights, velocities[corners])
     found: dict[str, list[np.ndarray]] = {}
-    for body in (standing(values.current(each), time) for each in contact.obstacles):
-        distances = body.obstacle.signed_distance(places, body.time)
-        touching = np.flatnonzero(distances < offset)
-        at = places[touching]
+    for body in (obstacle_state(values.current(each), time) for each in contact.obstacles):
+        distances = body.obstacle.signed_distance(points, body.time)
+        active = np.flatnonzero(distances < offset)
+        at = points[active]
         normals = body.obstacle.normals(at, body.time)
-        forces = stiffness * _pushed(offset - distances[touching], smoothing)
-        relative = moves[touching] - body.velocities(at)
+        forces = stiffness * _smoothed_depth(offset - distances[active], smoothing)
+        relative = moves[active] - body.velocities(at)
         sliding = relative - np.sum(relative * normals, axis=1)[:, None] * normals
-        shares = np.pad(weights[touching], ((0, 0), (0, 1)))
+        of_vertices = np.pad(weights[active], ((0, 0), (0, 1)))
         rows = {
             "pairs": np.pad(
-                np.where(weights[touching] != 0.0, vertices[touching], -1),
+                np.where(weights[active] != 0.0, vertices[active], -1),
                 ((0, 0), (0, 1)),
                 constant_values=-1,
             ),
-            "distances": distances[touching],
+            "distances": distances[active],
             "normals": normals,
             "normal_forces": forces,
             "friction_forces": -coefficient * forces[:, None] * _per_speed(sliding, sticking_speed) * sliding,
             "sliding_velocities": sliding,
-            "weights": shares,
-            "forces": shares[:, :, None] * (forces[:, None] * normals)[:, None, :],
-            "swapped": np.zeros(len(touching), dtype=bool),
+            "weights": of_vertices,
+            "forces": of_vertices[:, :, None] * (forces[:, None] * normals)[:, None, :],
+            "swapped": np.zeros(len(active), dtype=bool),
         }
         for name, each in rows.items():
             found.setdefault(name, []).append(each)
     return {name: np.concatenate(each) for name, each in found.items()}
 
 
-def _pushed(depth: np.ndarray, smoothing: float) -> np.ndarray:
-    """S'(depth) [m]."""
+def _smoothed_depth(depth: np.ndarray, smoothing: float) -> np.ndarray:
+    """Return the derivative S'(depth) [m] of the penalty S: quadratic in the depth up to `smoothing`, then linear."""
     return np.where(depth < smoothing, depth**2 / (2.0 * smoothing), depth - 0.5 * smoothing)
 
 
 def _per_speed(sliding: np.ndarray, sticking_speed: float) -> np.ndarray:
-    """c(u)/u with both coefficients 1, (k, 1) s/m."""
+    """Return c(u)/u, the regularised Coulomb law per sliding speed u for a friction coefficient of 1, (k, 1) s/m."""
     speeds = np.linalg.norm(sliding, axis=1)[:, None]
     inside = (2.0 - speeds / sticking_speed) / sticking_speed
     return np.where(speeds < sticking_speed, inside, 1.0 / np.maximum(speeds, sticking_speed))
@@ -98,20 +102,28 @@ def _per_speed(sliding: np.ndarray, sticking_speed: float) -> np.ndarray:
 @immutable
 @dataclass(frozen=True)
 class ContactState:
-    """What of a contact touches in one state.
+    """The forces, gaps and slip of one contact in one state.
 
-    pairs: (k, 4), the scene's vertices. Of bodies: of a vertex and a face, or of two edges; of three or two, with -1
-        behind, those of a vertex with an edge or another vertex, which take back what several faces would count twice. Of
-        obstacles: those of a point of the body, one or three.
-    distances: (k,) m, between the parts of each pair. normals: (k, 3), from its second part, or the obstacle, to the first.
-    normal_forces: (k,) N, with which they push each other apart; negative where they take something back.
-    friction_forces: (k, 3) N, on the first part; the second has the opposite. sliding_velocities: (k, 3) m/s, of the first
-        part along the second. Both are zero in what is at rest. Of lagged friction, that which normal forces of this state
-        would make, not those of the beginning of the step.
-    coefficient: the largest that friction may be, of the normal force; zero without friction. sticking_speed: m/s.
-    forces: (n_v, 3) N, on every vertex of the scene, with which they push each other apart; and what turns edges that are
-        nearly parallel, as their pairs fade there, which comes to nothing on each edge. friction: (n_v, 3) N, likewise
-        what rubs. normal_force_magnitudes: (n_v,) N, what vertices have of the normal forces, without regard to direction.
+    pairs: (k, 4), vertices of the scene. A pair of bodies is a vertex and a face, or two edges. Pairs of three or two
+        vertices, padded with -1, are a vertex with an edge or with another vertex; they correct for contacts that
+        several
+        faces would count more than once. A pair with an obstacle is a point of the body: one vertex, or three of a
+        face.
+    distances: (k,) m, between the two parts of each pair. normals: (k, 3), from the second part, or the obstacle, to
+    the
+        first.
+    normal_forces: (k,) N, repulsive; negative for correction pairs.
+    friction_forces: (k, 3) N, on the first part; the second has the opposite. sliding_velocities: (k, 3) m/s, of the
+    first
+        part along the second. Both are zero at rest. With lagged friction these are the forces for the normal forces of
+        this
+        state, not for those of the beginning of the step.
+    coefficient: the largest ratio of friction to normal force; zero without friction. sticking_speed: m/s.
+    forces: (n_v, 3) N, the contact forces on every vertex of the scene. They include the moments on nearly parallel
+    edges,
+        where the energy of a pair fades out; these have no resultant on an edge. friction: (n_v, 3) N, the friction
+        forces.
+    normal_force_magnitudes: (n_v,) N, the normal forces that act on each vertex, added without regard to direction.
     """
 
     pairs: np.ndarray
@@ -125,41 +137,47 @@ class ContactState:
     forces: np.ndarray
     friction: np.ndarray
     normal_force_magnitudes: np.ndarray
-    _pushes: np.ndarray  # (n_v, 3) N, of the normal forces alone, without what turns nearly parallel edges
-    _direction: np.ndarray  # (k,), 1 where the first part is of the contact's first body or at an obstacle
+    _pushes: np.ndarray  # (n_v, 3) N, the normal forces alone, without the moments on nearly parallel edges
+    _direction: (
+        np.ndarray
+    )  # (k,), 1 if the first part is on the contact's first body or at an obstacle, else -1
 
     @property
     def normal_force(self) -> float:
-        """N, of all pairs together."""
+        """The sum of the normal forces of all pairs, N."""
         return float(self.normal_forces.sum())
 
     @property
     def friction_force(self) -> np.ndarray:
-        """(3,) N, of all pairs together: on the first body of the contact, or on what touches an obstacle. What a body does
-        to itself comes to nothing that has a meaning."""
+        """The resultant friction force on the first body of the contact, or on the body at an obstacle, (3,) N.
+
+        In a self-contact the forces of a pair are internal and their sum has no meaning.
+        """
         return self._direction @ self.friction_forces
 
     @property
     def smallest_distance(self) -> float:
-        """m; infinite where nothing touches."""
+        """The smallest distance of a pair, m; infinite if there is no contact."""
         return float(self.distances.min(initial=np.inf))
 
     @property
     def sliding_speeds(self) -> np.ndarray:
-        """(k,) m/s."""
+        """The sliding speeds of the pairs, (k,) m/s."""
         return np.linalg.norm(self.sliding_velocities, axis=1)
 
     @property
     def friction_ratios(self) -> np.ndarray:
-        """(k,), of each pair's friction to Coulomb's bound, `coefficient` times its normal force: below 1 it sticks. Zero
-        without friction."""
+        """The ratio of each pair's friction to Coulomb's bound, `coefficient` times its normal force, (k,).
+
+        A pair sticks where the ratio is below 1. All ratios are zero without friction.
+        """
         bound = self.coefficient * np.abs(self.normal_forces)
         sizes = np.linalg.norm(self.friction_forces, axis=1)
         return np.divide(sizes, bound, out=np.zeros(len(sizes)), where=bound > 0.0)
 
     @property
     def is_sliding(self) -> np.ndarray:
-        """(k,), whether a pair with friction slides at its sticking speed or faster; without friction everything does."""
+        """The pairs that slide at the sticking speed or faster, (k,) bool; without friction all of them."""
         return self.sliding_speeds >= (self.sticking_speed if self.coefficient > 0.0 else 0.0)
 
     def __repr__(self) -> str:
@@ -167,10 +185,10 @@ class ContactState:
         rubs = ""
         if self.coefficient > 0.0 and len(self.pairs):
             rubs = f", {np.count_nonzero(self.is_sliding)} of them slip"
-        return f"Touching: {len(self.pairs)} pairs{near}, {self.normal_force:.4g} N{rubs}"
+        return f"ContactState: {len(self.pairs)} pairs{near}, {self.normal_force:.4g} N{rubs}"
 
 
-def touching_in(
+def compute_contact_state(
     scene: Scene,
     values: Any,
     contact: BodyContact | Contact,
@@ -178,12 +196,15 @@ def touching_in(
     velocities: np.ndarray | None = None,
     time: float | None = None,
 ) -> ContactState:
-    """values: of the solve that found the state. velocities: (n_v, 3) m/s, or with those of the points of rigid parts, and
-    time, s, of a motion. Raises ValueError where the contact is none of the scene's."""
+    """Compute the state of one contact of a scene.
+
+    values: those of the solve that found the state. In a motion, velocities: (n_v, 3) m/s, or with those of the points of
+    rigid bodies appended; time: s. Raises ValueError if the contact is not one of the scene's.
+    """
     velocities = np.zeros((scene.mesh.n_vertices, 3)) if velocities is None else velocities
     if isinstance(contact, Contact) and any(each is contact for each in scene._obstacle_contacts):
         found = pairs_with_obstacles(scene, values, contact, scene._model.positions(state), velocities, time)
-        *_, coefficient, sticking_speed = values.current(contact)._law(*values.touching(contact))
+        *_, coefficient, sticking_speed = values.current(contact)._law(*values.contact_bodies(contact))
         return _gathered(scene, found, coefficient, sticking_speed)
     numbers = [k for k, each in enumerate(scene._body_contacts) if each is contact]
     if not numbers:
@@ -203,7 +224,7 @@ def _gathered(scene, found: dict[Any, Any], coefficient: float, sticking_speed: 
     there = pairs >= 0
 
     def on_vertices(rows: np.ndarray) -> np.ndarray:
-        """rows: (k, 4) or (k, 4, 3)."""
+        """Sum rows of the pairs' vertices, (k, 4) or (k, 4, 3), to the vertices of the scene."""
         sums = np.zeros((scene._bodies.n_rows, *rows.shape[2:]))
         np.add.at(sums, pairs[there], rows[there])
         return sums[: scene.mesh.n_vertices]

@@ -1,14 +1,16 @@
-"""The error of magnetic forces on sheets whose three-node faces sample a field once, and a warning where it is large.
+"""Estimates the error of magnetic forces on three-node faces, which sample the field once, and warns where it is large.
 
-A face with the magnetic moment m at its barycenter x_b feels the force F = (dB/dx)^T m. Over a face on which the field
-changes, the mean of F at six points (Dunavant, degree 4) tells how far the one at the barycenter is off,
+A face with the magnetic moment m at its barycenter x_b has the force F = (dB/dx)^T m. Over a face on which the field
+changes, the mean of F at six points (Dunavant, degree 4) shows how far the one at the barycenter is off,
 
     error = |sum F(x_b) - sum mean F| / max(|sum mean F|, sum |mean F| / 10, sum |m x B| / extent),
 
-of each body: relative to the resultant force, or to the forces and couples that act where these cancel in it. The error of
-one point falls with the square of the edges, that of six points with their fourth power: of two parallel magnets 10 mm
-wide and 0.2 mm apart the estimate is 16.4, 5.0, 1.96 and 1.04 % with 16, 32, 48 and 64 cells, the error itself 15.7, 5.0,
-1.97 and 1.04 %.
+for each body: relative to the resultant force, or to the forces and moments that act where these cancel in it. The
+error
+of one point falls with the square of the edge length, that of six points with its fourth power: for two parallel
+magnets
+10 mm wide and 0.2 mm apart the estimate is 16.4, 5.0, 1.96 and 1.04 % with 16, 32, 48 and 64 cells, the error itself
+15.7, 5.0, 1.97 and 1.04 %.
 """
 
 from __future__ import annotations
@@ -23,13 +25,17 @@ from ... import _core
 from ..._runtime.warning_stacklevel import callers_level
 from ...errors import FieldSamplingWarning
 from ..solids.solid import Solid
-from .magnetization import carriers
+from .magnetization import magnetized_bodies
 
 if TYPE_CHECKING:
     from .values import Values
 
-TRUSTED = 0.01  # [-] of a body's magnetic force; fixed by test_a_warning_comes_where_the_force_is_off_by_more_than_1_percent
-_CANCELLING = 0.1  # [-] of the sum of the forces: what is left of them where they cancel counts no less
+# [-] Largest error of a body's magnetic force without a warning; fixed by
+# test_a_warning_comes_where_the_force_is_off_by_more_than_1_percent
+TRUSTED = 0.01
+# [-] Smallest reference for the error, as a fraction of the sum of the forces' magnitudes: where forces cancel, the
+# resultant is too small to refer to.
+_CANCELLING = 0.1
 _MOST_NAMED = 4  # faces in a warning
 _A, _B = 0.445948490915965, 0.091576213509771
 _POINTS = np.array(  # (6, 3) barycentric coordinates of Dunavant's rule of degree 4
@@ -39,7 +45,10 @@ _WEIGHTS = np.repeat([0.223381589678011, 0.109951743655322], 3)
 
 
 class SamplingError(NamedTuple):
-    """The error of the magnetic force on one body. error: relative; faces: (n,) by how much each has of it, most first."""
+    """The relative error of the magnetic force on one body.
+
+    faces: (n,), in the order of their part in the error, the largest first.
+    """
 
     body: Any
     error: float
@@ -49,10 +58,10 @@ class SamplingError(NamedTuple):
 def warn_of_sampling(
     values: Values, positions: np.ndarray, field_factor: float, flux_density: Any, where: str
 ) -> None:
-    """Warns where the force on a body is off by more than a hundredth.
+    """Warn if the magnetic force on a body is off by more than 1 %.
 
-    values: with the sources as they are there. positions: (n_v, 3) m. field_factor: on the sources. flux_density: (3,) T of
-    a uniform field, or None.
+    values: with the field sources as in this state. positions: (n_v, 3) m. field_factor: of the sources. flux_density:
+    (3,) T of a uniform field, or None.
     """
     worst = max(
         sampling_errors(values, positions, field_factor, flux_density),
@@ -77,7 +86,7 @@ def warn_of_sampling(
 def sampling_errors(
     values: Values, positions: np.ndarray, field_factor: float, flux_density: Any
 ) -> Iterator[SamplingError]:
-    """Yields the error of each body with three-node faces that a field acts on which varies in space."""
+    """Yield the error of each body with magnetized three-node faces, if a field varies in space."""
     fields = [
         each._core
         for each in map(values.current, values.scene.fields)
@@ -107,22 +116,26 @@ def sampling_errors(
 
 
 def _forces(fields, scales, points, moments) -> tuple[np.ndarray, np.ndarray]:
-    """B [T] at points (n, 3) and the forces [N] on moments [A m2] there."""
+    """Return the flux density B [T] at points (n, 3) and the forces [N] on magnetic moments [A m2] there."""
     flux, gradient, _ = _core.sample_fields(fields, scales, points, np.zeros_like(points), 1)
     return flux, np.einsum("nij,ni->nj", gradient, moments)
 
 
 def _magnetized_faces(values, positions) -> Iterator[tuple[Any, np.ndarray, np.ndarray]]:
-    """(Shell or Skin, (n, 3, 3) m corners of its faces there, (n, 3) A m2 their moments there)."""
+    """Yield for each body with magnetized three-node faces: the Shell or Skin, the corners of its faces, their moments.
+
+    The corners are (n, 3, 3) m, the magnetic moments (n, 3) A m2, both in the deformed state.
+    """
     scene = values.scene
     labels = {id(each): label for each, label in scene._labels}
-    for number, carrier, _ in carriers(scene):
-        span, now = scene._bodies.spans[number], values.current(carrier)
+    for number, magnetized, _ in magnetized_bodies(scene):
+        span, now = scene._bodies.spans[number], values.current(magnetized)
         body = scene.bodies[number]
         if not isinstance(body, Solid) and span.mesh.order == 2:
             continue
-        faces = span.mesh.faces[carrier.faces] if isinstance(body, Solid) else span.mesh.faces
-        magnetization = scene._value_layout.of(values.numbers, labels[id(carrier)], "remanent_magnetization")
+        faces = span.mesh.faces[magnetized.faces] if isinstance(body, Solid) else span.mesh.faces
+        label = labels[id(magnetized)]
+        magnetization = scene._value_layout.of(values.numbers, label, "remanent_magnetization")
         rest, corners = span.mesh.rest_positions[faces], positions[span.vertices][faces]
         frame, volumes = _frames(rest)
         turned, _ = _frames(corners)
@@ -131,7 +144,7 @@ def _magnetized_faces(values, positions) -> Iterator[tuple[Any, np.ndarray, np.n
 
 
 def _frames(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(a_1, a_2, n) of faces as columns (n, 3, 3), and their areas (n,) m2 [Chen22] (20)."""
+    """Return the frames (a_1, a_2, n) of faces as columns, (n, 3, 3), and their areas (n,) m2 [Chen22] (20)."""
     a1, a2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     across = np.cross(a1, a2)
     area2 = np.linalg.norm(across, axis=1)

@@ -1,5 +1,7 @@
-"""The magnetization of a solve: of all faces at once (of six-node sheets, their elements), of each body by itself, or their
-own."""
+"""Remanent magnetization of a solve: one array for the faces of all bodies, or an array for each shell and skin.
+
+Of sheets of six-node elements the rows are elements, not faces.
+"""
 
 from __future__ import annotations
 
@@ -18,8 +20,8 @@ _NAME = "remanent_magnetization"
 
 
 def check_given_once(scene: Scene, given: Any, replaced: dict[object, dict[Any, Any]]) -> None:
-    """Raises ValueError where it is given twice, or without a field, or not for every shell and skin."""
-    replacing = any(_NAME in replaced.get(carrier, {}) for _, carrier, _ in carriers(scene))
+    """Raise ValueError if the magnetization is given twice, or without a field, or not for every shell and skin."""
+    replacing = any(_NAME in replaced.get(each, {}) for _, each, _ in magnetized_bodies(scene))
     if not scene.fields:
         if given is not None or replacing:
             raise ValueError(
@@ -28,21 +30,20 @@ def check_given_once(scene: Scene, given: Any, replaced: dict[object, dict[Any, 
         return
     if given is not None and replacing:
         raise ValueError("remanent_magnetization was given twice: as an argument and in values")
-    for k, carrier, _ in carriers(scene):
-        if (
-            given is None
-            and _NAME not in replaced.get(carrier, {})
-            and carrier.remanent_magnetization is None
-        ):
+    for k, each, _ in magnetized_bodies(scene):
+        if given is None and _NAME not in replaced.get(each, {}) and each.remanent_magnetization is None:
             whose = f" of body {k}" if len(scene.bodies) > 1 else ""
-            skin = "" if carrier is scene.bodies[k] else ", of its skin,"
+            skin = "" if each is scene.bodies[k] else ", of its skin,"
             raise ValueError(f"the scene has a field, so remanent_magnetization{whose}{skin} [A/m] is needed")
 
 
 def check_on_skins(scene: Scene, given: np.ndarray) -> None:
-    """Raises ValueError where one of all faces (3,), or of single ones (n_f of all, 3), is of none that can have one."""
+    """Raise ValueError if a magnetization is given for faces that cannot have one.
+
+    given: A/m, (3,) for all faces, or (n_f of all, 3).
+    """
     if given.ndim == 1:
-        if given.any() and scene.bodies and not any(True for _ in carriers(scene)):
+        if given.any() and scene.bodies and not any(True for _ in magnetized_bodies(scene)):
             raise ValueError(
                 "remanent_magnetization was given for all faces, but the scene has no Shell, and no Solid with a skin"
                 + _of_solids(scene)
@@ -51,7 +52,7 @@ def check_on_skins(scene: Scene, given: np.ndarray) -> None:
     bare = np.zeros(scene._bodies.n_magnetized, dtype=bool)
     for body, span in zip(scene.bodies, scene._bodies.spans, strict=True):
         bare[span.rows] = isinstance(body, Solid)
-    for _, _, faces in carriers(scene):
+    for _, _, faces in magnetized_bodies(scene):
         bare[faces] = False
     idle = bare & given.any(axis=1)
     if idle.any():
@@ -62,39 +63,40 @@ def check_on_skins(scene: Scene, given: np.ndarray) -> None:
 
 
 def _of_solids(scene: Scene) -> str:
-    """Say how solids are magnetized throughout, in a message that begins with what has gone wrong."""
+    """Return the end of an error message that says how solids are magnetized throughout."""
     if any(isinstance(body, Solid) and body.remanent_magnetization is not None for body in scene.bodies):
         return '. A Solid magnetized throughout takes it as values={solid: {"remanent_magnetization": ...}}'
     return ". A Solid is magnetized throughout by Solid(..., remanent_magnetization=...)"
 
 
-def of_carriers(scene: Scene, magnetization: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-    """(core owner, its rows) of shells and skins, of one for all faces (n_f of all, 3)."""
+def magnetization_rows(scene: Scene, magnetization: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield (core owner, its rows) for each shell and skin, from the magnetization of all faces (n_f of all, 3)."""
     labels = {id(each): label for each, label in scene._labels}
-    for _, carrier, faces in carriers(scene):
-        yield labels[id(carrier)], magnetization[faces]
+    for _, body, faces in magnetized_bodies(scene):
+        yield labels[id(body)], magnetization[faces]
 
 
 def gradient_by_all(scene: Scene, gradient: Any) -> np.ndarray:
-    """(n_f of all, 3): the transpose of `of_carriers`."""
+    """Return the gradient by the magnetization of all faces, (n_f of all, 3): the transpose of `magnetization_rows`."""
     labels = {id(each): label for each, label in scene._labels}
     found = np.zeros((scene._bodies.n_magnetized, 3))
-    for _, carrier, faces in carriers(scene):
-        found[faces] = gradient.value(labels[id(carrier)], _NAME)
+    for _, body, faces in magnetized_bodies(scene):
+        found[faces] = gradient.value(labels[id(body)], _NAME)
     return found
 
 
 def of_all_bodies(scene: Scene, replaced: dict[object, dict[Any, Any]]) -> Any:
-    """(n_f of all, 3) A/m where it was not an argument, zero on what has none: a tensor in its graph where there is one,
-    None without a field.
+    """Return the magnetization of all faces, (n_f of all, 3) A/m, from the bodies' own and replaced values.
 
-    For what has been checked.
+    It is zero on faces that have none, and None without a field. If any value is a tensor, so is the result, in its
+    graph.
+    The values must have been checked before.
     """
     if not scene.fields or not scene.bodies:
         return None
     parts = [
-        (replaced.get(carrier, {}).get(_NAME, carrier.remanent_magnetization), faces)
-        for _, carrier, faces in carriers(scene)
+        (replaced.get(body, {}).get(_NAME, body.remanent_magnetization), faces)
+        for _, body, faces in magnetized_bodies(scene)
     ]
     n_rows = scene._bodies.n_magnetized
     if not any(is_tensor(given) for given, _ in parts):
@@ -110,8 +112,8 @@ def of_all_bodies(scene: Scene, replaced: dict[object, dict[Any, Any]]) -> Any:
     return rows
 
 
-def carriers(scene: Scene) -> Iterator[tuple[int, Any, np.ndarray]]:
-    """Yields (number of the body, Shell or Skin, its rows among those of all (k,)) of what faces are magnetized with."""
+def magnetized_bodies(scene: Scene) -> Iterator[tuple[int, Any, np.ndarray]]:
+    """Yield (number of the body, Shell or Skin, its rows (k,) among those of all faces) where faces can be magnetized."""
     for k, (body, span) in enumerate(zip(scene.bodies, scene._bodies.spans, strict=True)):
         if not isinstance(body, Solid):
             yield k, body, span.first_row + np.arange(body.mesh.n_elements)

@@ -1,4 +1,6 @@
-"""Where the contact of bodies is not smooth: closest points that go over a fold or a border of a surface."""
+"""Finds contacts of bodies that are not smooth: a closest point is about to cross a sharp edge or a border of a
+surface.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +14,18 @@ from .contact_state import ContactState
 if TYPE_CHECKING:
     from .scene import Scene
 
-_NEXT = np.array([[1, 2], [2, 3], [3, 1]])  # of a point and a triangle, the sides of this
+_NEXT = np.array([[1, 2], [2, 3], [3, 1]])  # sides of the triangle in a pair (point, three corners)
 
 
 def near_body_kinks(
-    scene: Scene, touching: ContactState, smoothing: float, positions: np.ndarray
+    scene: Scene, contact: ContactState, smoothing: float, positions: np.ndarray
 ) -> np.ndarray:
-    """Vertices (k,) of the first parts of pairs whose closest points are nearer than the smoothing [m] to where they change
-    over to a neighbour that turns away by more than LARGEST_SMOOTH_TURN, or to nothing. positions: of all points."""
-    pairs = touching.pairs[touching.normal_forces > 0.0]
+    """Find the pairs whose closest points are nearer than `smoothing` [m] to a sharp edge or a border.
+
+    An edge is sharp if its faces turn by more than LARGEST_SMOOTH_TURN. positions: (n, 3) m, of all points.
+    Returns the vertices (k,) of the first parts of these pairs.
+    """
+    pairs = contact.pairs[contact.normal_forces > 0.0]
     pairs = pairs[(pairs >= 0).all(axis=1)]
     if not len(pairs):
         return np.zeros(0, dtype=np.int32)
@@ -35,7 +40,7 @@ def near_body_kinks(
 
 
 def _over_sides(pairs, positions, smoothing, sharp) -> np.ndarray:
-    """Points (k,) whose foot on the plane of a triangle is by a sharp side of it."""
+    """Return the points (k,) whose projection onto the plane of a triangle is near a sharp side of it."""
     point, corners = positions[pairs[:, 0]], positions[pairs[:, 1:]]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     across /= np.linalg.norm(across, axis=1, keepdims=True)
@@ -46,16 +51,17 @@ def _over_sides(pairs, positions, smoothing, sharp) -> np.ndarray:
         length = np.linalg.norm(along, axis=1)
         inwards = np.cross(across, along) / length[:, None]
         near = np.abs(np.sum((point - a) * inwards, axis=1)) < smoothing
-        place = np.sum((point - a) * along, axis=1) / length
-        near &= (place > -smoothing) & (place < length + smoothing)
+        distance = np.sum((point - a) * along, axis=1) / length
+        near &= (distance > -smoothing) & (distance < length + smoothing)
         is_sharp = np.isin(_keys(np.sort(pairs[:, [first, second]], axis=1), len(positions)), sharp)
         found.append(pairs[near & is_sharp, 0])
     return np.concatenate(found)
 
 
 def _over_ends(pairs, positions, smoothing, sharp) -> np.ndarray:
-    """Ends (k,) of first edges, of which one of the two closest points, on lines without end, is by an end with a sharp
-    edge."""
+    """Return the vertices (k,) of first edges where a closest point of the two (infinite) lines is near an end on a
+    sharp edge.
+    """
     if not len(pairs):
         return np.zeros(0, dtype=np.int64)
     a, b = (positions[pairs[:, k + 1]] - positions[pairs[:, k]] for k in (0, 2))
@@ -65,22 +71,22 @@ def _over_ends(pairs, positions, smoothing, sharp) -> np.ndarray:
     room = aa * bb - ab**2
     crossing = room > 1e-3 * aa * bb
     room = np.where(crossing, room, 1.0)
-    places = ((bb * of_a - ab * of_b) / room, (ab * of_a - aa * of_b) / room)
+    closest = ((bb * of_a - ab * of_b) / room, (ab * of_a - aa * of_b) / room)
     ends = np.unique(np.stack([sharp // len(positions), sharp % len(positions)]))
     near = np.zeros(len(pairs), dtype=bool)
-    for place, length, first in zip(places, (np.sqrt(aa), np.sqrt(bb)), (0, 2), strict=True):
+    for at, length, first in zip(closest, (np.sqrt(aa), np.sqrt(bb)), (0, 2), strict=True):
         for end, node in ((0.0, first), (1.0, first + 1)):
-            near |= (np.abs(place - end) * length < smoothing) & np.isin(pairs[:, node], ends)
+            near |= (np.abs(at - end) * length < smoothing) & np.isin(pairs[:, node], ends)
     return pairs[near & crossing, :2].ravel()
 
 
 def _keys(vertices: np.ndarray, n: int) -> np.ndarray:
-    """One number for each row of vertices."""
+    """Return one number for each row of vertices, the same for equal rows."""
     return np.ravel_multi_index(tuple(vertices.T.astype(np.int64)), (n,) * vertices.shape[1])
 
 
 def _sharp_edges(faces: np.ndarray, positions: np.ndarray) -> np.ndarray:
-    """Keys (k,) of the edges at which faces turn by more than LARGEST_SMOOTH_TURN, and of borders."""
+    """Return the sorted keys (k,) of borders and of edges at which faces turn by more than LARGEST_SMOOTH_TURN."""
     x0, x1, x2 = np.moveaxis(positions[faces], 1, 0)
     normals = np.cross(x1 - x0, x2 - x0)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)

@@ -1,4 +1,6 @@
-"""Sizes and material values that no soft body has: most often a unit that was mistaken, which a warning says once."""
+"""Warns of sizes and material values that no soft body has, most often a mistaken unit; once per scene and kind of
+value.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,7 @@ if TYPE_CHECKING:
     from .scene import Scene
     from .values import Values
 
-# Far outside of what there is, so that models without units and limits of theory pass; fixed by
+# The limits are far outside of all real bodies, so that models without units and limits of theory pass; fixed by
 # test_usual_sizes_and_materials_are_not_warned_of and its neighbours.
 MOST_OF_EXTENT = 3.0  # [-] thickness of a sheet over its extent: from 1 on it is no sheet
 LEAST_OF_EXTENT = 1e-8  # [-] a layer of one atom on a metre has 1e-10
@@ -27,7 +29,7 @@ MOST_FLUX_DENSITY = 30.0  # T: what moves soft robots has 0.1, the strongest mag
 
 
 def warn_of_units(scene: Scene, values: Values) -> None:
-    """Warn of bodies whose sizes, stiffness, density or magnetization are absurd, once a scene and kind of value."""
+    """Warn of bodies whose size, stiffness, density or magnetization is absurd; once per scene and kind of value."""
     for k, body in enumerate(values.sheets):
         whose = f" of body {k}" if len(values.sheets) > 1 else ""
         if isinstance(body, Shell):
@@ -69,7 +71,7 @@ def _warn_of_thickness(scene: Scene, shell: Shell, whose: str) -> None:
 
 
 def _held(body: Any, name: str) -> np.ndarray | None:
-    """A value of a body, None where it or its material has none of this name."""
+    """Return a value of a body; None if it or its material has no such value."""
     return getattr(body, name, None)
 
 

@@ -1,4 +1,4 @@
-"""With what forces supports hold a scene."""
+"""Computes the forces with which supports hold a scene."""
 
 from __future__ import annotations
 
@@ -20,28 +20,31 @@ if TYPE_CHECKING:
 @immutable
 @dataclass(frozen=True)
 class Reaction:
-    """What one support does to the bodies in one state. NaN in a state that no time step led to.
+    """The forces and the torque of one support on the bodies in one state. They are NaN in a state that no time step
+    led to.
 
-    vertices: (k,), the scene's, that it holds. forces: (k, 3) N, on them. force: (3,) N, their sum.
-    positions: (k, 3) m, where they are.
+    vertices: (k,), the scene's vertices that it holds. forces: (k, 3) N, on them. force: (3,) N, their sum.
+    positions: (k, 3) m, of these vertices.
 
-    Where several supports hold a vertex along one direction, the force along it is that of the first in scene.supports:
-    the sum over all supports is what holds the scene.
+    If several supports hold a vertex along one direction, the force along it is counted for the first of them in
+    scene.supports: only the sum over all supports is the force that holds the scene.
     """
 
     vertices: np.ndarray
     forces: np.ndarray
     positions: np.ndarray
-    _couple: np.ndarray  # (3,) N m, of the directions that it holds
+    _couple: np.ndarray  # (3,) N m, the moment on the edge directions that it holds
 
     @property
     def force(self) -> np.ndarray:
-        """(3,) N, of all points together."""
+        """The resultant force on all vertices, (3,) N."""
         return self.forces.sum(axis=0)
 
     def torque(self, point: Numbers = (0.0, 0.0, 0.0)) -> np.ndarray:
-        """(3,) N m about a point (3,) m: of the forces, and of the couple with which a Clamp or a SymmetryPlane holds the
-        sheet's direction across edges."""
+        """Return the torque about a point (3,) m, (3,) N m.
+
+        It includes the moment with which a Clamp or a SymmetryPlane holds the sheet's direction across edges.
+        """
         about = quantity("point", "m", point, (3,))
         return np.cross(self.positions - about, self.forces).sum(axis=0) + self._couple
 
@@ -51,7 +54,11 @@ class Reaction:
 
 
 def reaction_in(scene: Scene, support: Support, state: np.ndarray, held: np.ndarray) -> Reaction:
-    """held: (m, 3) N, of the constraints' held nodes. Raises ValueError where the support is none of the scene's."""
+    """Return the reaction of one support in a state.
+
+    held: (m, 3) N, the forces on the nodes that the constraints hold. Raises ValueError if the scene has no such
+    support.
+    """
     if not any(each is support for each in scene.supports):
         raise ValueError(f"support must be one of scene.supports, got {support!r:.80}")
     constraints = scene._constraints

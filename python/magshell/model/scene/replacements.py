@@ -1,4 +1,4 @@
-"""What a solve may replace of its scene's values, and how it is asked for."""
+"""Collects and checks the values that a solve's arguments replace in its scene."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .scene import Scene
 
 
-# Those of a scene's one body that have a keyword of their own.
+# Values of a shell that a solve of a scene with one body takes as keywords of their own.
 SHELL_NAMES = tuple(
     name for name in Shell._replaceable if name not in ("remanent_magnetization", *Shell._in_time)
 )
@@ -29,9 +29,10 @@ def requested(
     in_time: bool = False,
     **shell: Any,
 ) -> dict[object, dict[str, object]]:
-    """{object of the scene: {name: value}} from a solve's arguments. Raises ValueError on what has no place.
+    """Collect the values that a solve's arguments replace: {object of the scene: {name: value}}.
 
-    moving: the scene has inertia in this solve; in_time: values may change during it.
+    moving: the scene has inertia in this solve. in_time: values may change during it.
+    Raises ValueError for a value that the scene or the solve does not have.
     """
     asked: dict[object, dict[str, object]] = {}
     if values is not None and not isinstance(values, dict):
@@ -57,7 +58,7 @@ def requested(
 
 
 def checked(scene: Scene, owner: Any, name: str, value: Any) -> Any:
-    """The values that no constructor checks."""
+    """Return a value of the scene itself after a check of its shape; constructors check those of other objects."""
     if owner is not scene:
         return value
     unit, shape = {"gravity": ("m/s2", (3,)), "vertex_loads": ("N", (scene.mesh.n_vertices, 3))}[name]

@@ -1,4 +1,4 @@
-"""A scene: one shell or several, how they are held, and what acts on them."""
+"""The scene: one or several bodies, their supports, and everything that acts on them."""
 
 from __future__ import annotations
 
@@ -40,19 +40,19 @@ from ..rigid.equimomental_points import places
 from ..rigid.joints import Joint
 from ..rigid.rigid import RigidBody
 from ..rigid.skeleton import Skeleton, skeleton_inputs
-from ..shells.obtuse_faces import Caps
+from ..shells.obtuse_faces import ObtuseFaces
 from ..shells.shell import Shell
 from ..solids.solid import Solid
 from ..supports.constraints import free_rigid_motions, gather
 from ..supports.supports import Clamp, Pin, SymmetryPlane
-from .first_look import look_at
+from .new_scene_checks import check_new_scene
 from .parameter_layout import Layout
 from .scene_to_core import (
     actuator_inputs,
     body_inputs,
-    couple_directions,
-    couple_edges,
     face_inputs,
+    moment_directions,
+    moment_edges,
     muscle_inputs,
 )
 from .values import Values
@@ -67,21 +67,23 @@ _ACTUATORS = "Muscle, Cavity, Cells and Tendon objects"
 
 
 class Scene(Drawn):
-    """What is modelled. What a scene lacks costs nothing; it can be solved many times, and keeps for that what its matrix
-    needs and, up to 256 MB, the memory of its last factorization.
+    """A model: bodies, their supports, and the loads, actuators, fields and contacts that act on them.
 
-    bodies: a Shell or a Solid, or several, which feel each other through ties and contacts only, Rigid parts and
-        Skeletons. Positions and faces of a result are those of one body after another, `result[body]` has those of one.
+    A scene can be solved many times. For that it stores the structure of its matrix and, up to 256 MB, the memory of its
+    last factorization. Kinds of objects that a scene does not have cost nothing.
+
+    bodies: a Shell or a Solid, or several of them, rigid bodies and Skeletons; bodies interact through ties and contacts
+        only. Positions and faces of a result are those of one body after another, `result[body]` has those of one.
     ties: Tie objects: bodies that are welded to each other.
-    supports: Pin, Clamp and SymmetryPlane objects; with several bodies they say by `body=` which one they hold.
-    loads: PointLoad, EdgeLoad, AreaLoad, EdgeCouple, Pressure and SurfaceTension objects; likewise.
-    actuators: Muscle, Cavity, Cells and Tendon objects.
+    supports: Pin, Clamp and SymmetryPlane objects; with several bodies `body=` says which one a support holds.
+    loads: PointLoad, EdgeLoad, AreaLoad, EdgeCouple, Pressure and SurfaceTension objects; with several bodies likewise.
+    actuators: Muscle, Cavity, PneumaticCells and Tendon objects.
     field: None, an applied field, or several that superpose. A UniformField takes its value when the scene is solved.
     gravity: (3,), m/s2; needs the mass density of all bodies.
-    contacts: Contact objects, each with the obstacles or the bodies that it is about, and SelfContact objects. Bodies pass
-        through each other, and themselves, where no contact says otherwise.
-    water: what the sheet moves through, in ms.simulate only.
-    allow_rigid_motions: accept a scene that supports do not hold entirely, because a field or gravity does.
+    contacts: Contact objects, each with its obstacles or its bodies, and SelfContact objects. Bodies pass through each
+        other, and through themselves, where there is no contact.
+    water: the water that the sheet moves through, in ms.simulate only.
+    allow_rigid_motions: accept a scene that the supports do not hold entirely, because a field or gravity does.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -149,7 +151,7 @@ class Scene(Drawn):
         self._build(allow_rigid_motions)
 
     def __getstate__(self) -> dict[Any, Any]:
-        """What a copy, or another process, makes the scene from again."""
+        """Return the constructor's arguments, from which a copy or another process makes the scene again."""
         return {
             "bodies": self._bodies.listed,
             "ties": self.ties,
@@ -168,9 +170,9 @@ class Scene(Drawn):
 
     def _build(self, allow_rigid_motions: bool) -> None:
         bodies, mesh = self._bodies, self.mesh
-        edges = couple_edges(bodies, self.loads)
-        self._couple_directions = couple_directions(bodies, edges)
-        constraints = gather(bodies, self.supports, self._couple_directions)
+        edges = moment_edges(bodies, self.loads)
+        self._moment_directions = moment_directions(bodies, edges)
+        constraints = gather(bodies, self.supports, self._moment_directions)
         self._rigid = places(bodies)
         check_shapes(self._obstacle_contacts, self.rigid_parts, self._rigid)
         for k, part in enumerate(self.rigid_parts):
@@ -195,11 +197,11 @@ class Scene(Drawn):
                 f"the supports leave {called(bodies.listed)} free: {'; '.join(free)}. Hold {it}, or say "
                 "allow_rigid_motions=True if a field or gravity does"
             )
-        n_directions, n_couples = len(constraints.directions), len(edges)
+        n_directions, n_moments = len(constraints.directions), len(edges)
         surfaces, body_contacts = body_contact_inputs(self._body_contacts, bodies)
-        self._constraints, self._couple_edges = constraints, edges
+        self._constraints, self._moment_edges = constraints, edges
         self._turn, self._solving = threading.RLock(), False
-        self._warned_of_caps = False
+        self._warned_of_obtuse_faces = False
         self._warned_of_strain = 0.0
         self._warned_of_units: set[str] = set()
         self._model = _core.Model(
@@ -212,7 +214,7 @@ class Scene(Drawn):
             held_frames=constraints.held_frames,
             moves=len(constraints.moves),
             couples=np.stack(
-                [*bodies.sheets_of(edges), n_directions - n_couples + np.arange(n_couples)], axis=1
+                [*bodies.sheets_of(edges), n_directions - n_moments + np.arange(n_moments)], axis=1
             ).astype(np.int32),
             gravity=bool(self.gravity.any()),
             **face_inputs(self),
@@ -228,13 +230,13 @@ class Scene(Drawn):
         )
         self._value_layout = Layout(self._model.parameters)
         self._control_layout = Layout(self._model.controls)
-        # What the core holds now: a solve with other values puts its own there.
+        # The values that the core has at the moment; a solve with other values sets its own.
         self._values = self._in_core = Values(self)
         self._model.set_values(self._values.numbers)
-        look_at(self)
+        check_new_scene(self)
 
     def _held_by_joints(self) -> np.ndarray:
-        """The vertices of links that joints hold to the world."""
+        """Return the vertices of links that joints hold to the world."""
         held = [
             place.vertices
             for part, place in zip(self.rigid_parts, self._rigid, strict=True)
@@ -248,7 +250,7 @@ class Scene(Drawn):
 
     @property
     def _labels(self) -> list[tuple[object, str]]:
-        """Every object of it with the name that the core has for its values."""
+        """The objects of the scene, each with the name under which the core has its values."""
         kinds = (
             ("body", self.bodies),
             ("skin", self._bodies.skins),
@@ -267,7 +269,7 @@ class Scene(Drawn):
 
     @contextmanager
     def _exclusive(self):
-        """One solve at a time: the core keeps the magnetization and the last evaluated state."""
+        """Allow one solve at a time: the core stores the magnetization and the last evaluated state."""
         with self._turn:
             if self._solving:
                 raise RuntimeError("the scene is being solved: what a solve calls cannot solve it again")
@@ -278,44 +280,44 @@ class Scene(Drawn):
                 remember(self, _solving=False)
 
     @cached_property
-    def _caps(self) -> Caps:
-        return Caps(self._values.whole, self._model.recut_faces)
+    def _obtuse_faces(self) -> ObtuseFaces:
+        return ObtuseFaces(self._values.all_sheets, self._model.recut_faces)
 
     @property
     def bodies(self) -> tuple[Shell | Solid, ...]:
-        """Shells and solids, in the order of their vertices."""
+        """The shells and solids, in the order of their vertices."""
         return self._bodies.shells
 
     @property
     def ties(self) -> tuple[Tie, ...]:
-        """What welds bodies."""
+        """The ties that weld bodies to each other."""
         return self._bodies.ties
 
     @property
     def rigid_parts(self) -> tuple[RigidBody, ...]:
-        """Rigid parts and links."""
+        """The rigid bodies, links of skeletons among them."""
         return self._bodies.rigid
 
     @property
     def joints(self) -> tuple[Joint, ...]:
-        """Of all skeletons."""
+        """The joints of all skeletons."""
         return self._bodies.joints
 
     @property
     def shell(self) -> Shell:
-        """The one body. Raises ValueError where there are several."""
+        """The only body of the scene. Raises ValueError if there are several."""
         if len(self.bodies) != 1:
             raise ValueError(f"the scene has {len(self.bodies)} bodies: say which, scene.bodies[k]")
         return self.bodies[0]
 
     @property
     def mesh(self) -> TriangleMesh:
-        """Of all bodies: vertices, edges and faces of one after another."""
+        """The mesh of all bodies: their vertices, edges and faces, one body after another."""
         return self._bodies.mesh
 
     @property
     def objects(self) -> tuple[Any, ...]:
-        """Every object of it, always in the same order. What a solve's `values` may name beside the scene itself."""
+        """The objects that the `values` of a solve may name besides the scene itself, always in the same order."""
         water = () if self.water is None else (self.water,)
         return (
             *self.bodies,
@@ -333,18 +335,18 @@ class Scene(Drawn):
 
     @property
     def has_uniform_field(self) -> bool:
-        """Whether solves need an applied_flux_density."""
+        """The field has a uniform part, so solves need an applied_flux_density."""
         return any(isinstance(f, UniformField) for f in self.fields)
 
     @property
     def has_forces_of_motion(self) -> bool:
-        """Whether forces act on it that no energy has: friction, water."""
+        """The scene has forces without an energy, which act on moving bodies only: friction, water."""
         rubs = any(contact.friction_coefficient is not None for contact in self.contacts)
         return self.water is not None or rubs
 
     @property
     def n_dofs(self) -> int:
-        """Free position components and edge rotations."""
+        """The number of free degrees of freedom: position components and edge rotations."""
         return self._model.free_size
 
     def __repr__(self) -> str:
@@ -370,7 +372,7 @@ class Scene(Drawn):
         return "\n".join(lines)
 
     def _whose(self, item) -> str:
-        """For the repr of a scene with several bodies."""
+        """Return the end of a line of the repr that names the body of an item, if the scene has several."""
         if len(self.bodies) < 2 or item.body is None:
             return ""
         return f" (body {self._bodies.number(item.body)})"
@@ -388,7 +390,10 @@ def _refuse_support(parts, held: np.ndarray) -> None:
 
 
 def _refuse_idle_magnetization(scene: Scene) -> None:
-    """A skin does nothing but feel a field, and weigh if it has a mass density."""
+    """Raise ValueError for a skin or a magnetized solid that has no effect because the scene has no field.
+
+    Without a field a skin still adds mass if it has a mass density.
+    """
     if scene.fields:
         return
     for k, body in enumerate(scene.bodies):

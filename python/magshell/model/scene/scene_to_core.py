@@ -1,4 +1,4 @@
-"""Translates a scene for the core."""
+"""Translates a scene to the input of the core."""
 
 from __future__ import annotations
 
@@ -26,15 +26,18 @@ if TYPE_CHECKING:
     from .scene import Scene
 
 
-def couple_edges(bodies: Bodies, loads: Iterable[Load]) -> np.ndarray:
-    """The scene's edges that couples turn, ascending, (k,)."""
-    places = [(load, bodies.of(load)) for load in loads if isinstance(load, EdgeCouple)]
-    edges = [span.first_edge + load._edge_couples(span.mesh)[0] for load, span in places]
+def moment_edges(bodies: Bodies, loads: Iterable[Load]) -> np.ndarray:
+    """Return the edges of the scene on which an EdgeCouple acts, ascending, (k,)."""
+    loaded = [(load, bodies.of(load)) for load in loads if isinstance(load, EdgeCouple)]
+    edges = [span.first_edge + load._edge_moments(span.mesh)[0] for load, span in loaded]
     return np.unique(np.concatenate(edges)) if edges else np.zeros(0, dtype=np.int64)
 
 
-def couple_directions(bodies: Bodies, edges: np.ndarray) -> np.ndarray:
-    """What each couple's edge angle is measured to: outwards in the plane of its face at rest, (k, 3)."""
+def moment_directions(bodies: Bodies, edges: np.ndarray) -> np.ndarray:
+    """Return the directions from which the angles of such edges are measured, (k, 3).
+
+    They point outwards in the plane of the edge's face in the rest shape.
+    """
     of, own = bodies.split(edges)
     directions = np.zeros((len(edges), 3))
     for k in np.unique(of):
@@ -43,15 +46,18 @@ def couple_directions(bodies: Bodies, edges: np.ndarray) -> np.ndarray:
 
 
 def body_inputs(scene: Scene, directed_edges: np.ndarray) -> dict[str, list[dict[Any, Any]]]:
-    """Sheets, solids, skins, rigid parts. directed_edges: (k, 2), the scene's edges and the rows of their directions."""
+    """Return the input of sheets, solids, skins and rigid bodies.
+
+    directed_edges: (k, 2), edges of the scene and the rows of their fixed directions.
+    """
     return {
         "sheets": _sheets(scene, directed_edges),
         "six_node_sheets": _six_node_sheets(scene, directed_edges),
         "solids": _solids(scene),
         "skins": _skins(scene),
         "rigid": [
-            place.as_input(f"rigid {k}", bool(scene.fields) and part.magnetic_moment is not None)
-            for k, (part, place) in enumerate(zip(scene.rigid_parts, scene._rigid, strict=True))
+            points.as_input(f"rigid {k}", bool(scene.fields) and part.magnetic_moment is not None)
+            for k, (part, points) in enumerate(zip(scene.rigid_parts, scene._rigid, strict=True))
         ],
     }
 
@@ -67,7 +73,7 @@ def muscle_inputs(scene: Scene) -> list[dict[Any, Any]]:
 
 
 def face_inputs(scene: Scene) -> dict[str, list[dict[Any, Any]]]:
-    """Energies of faces, and pressures."""
+    """Return the input of face energies and of pressures."""
     bodies, n_skins = scene._bodies, len(_skins(scene))
     return {
         "face_energies": [
@@ -82,7 +88,7 @@ def face_inputs(scene: Scene) -> dict[str, list[dict[Any, Any]]]:
 
 
 def actuator_inputs(scene: Scene) -> dict[str, list[dict[Any, Any]]]:
-    """Volumes and tendons."""
+    """Return the input of enclosed volumes and of tendons."""
     bodies = scene._bodies
     volumes = [
         each._core_input(label, bodies)
@@ -98,7 +104,7 @@ def actuator_inputs(scene: Scene) -> dict[str, list[dict[Any, Any]]]:
 
 
 def _directed_by_body(scene, directed_edges: np.ndarray) -> list[np.ndarray]:
-    """Of each body, its edges and the rows of their directions, (k, 2)."""
+    """Return for each body its edges with a fixed direction and the rows of these directions, (k, 2)."""
     of, edges = scene._bodies.split(directed_edges[:, 0])
     pairs = np.stack([edges, directed_edges[:, 1]], axis=1).astype(np.int32)
     return [pairs[of == k] for k in range(len(scene.bodies))]
@@ -148,7 +154,7 @@ def _growth(shell: Shell) -> dict[Any, Any]:
 
 
 def _surface_acts(scene, body: int) -> bool:
-    """Whether water, or a face energy, acts on the surface of a body."""
+    """Return whether water or a face energy acts on the surface of a body."""
     return scene.water is not None or any(
         scene._bodies.of(load).bodies.start == body for load in scene.loads if isinstance(load, FaceEnergy)
     )
@@ -167,7 +173,7 @@ def _solids(scene) -> list[dict[Any, Any]]:
 
 
 def _skins(scene) -> list[dict[Any, Any]]:
-    """Those that feel a field; what they weigh their solids know."""
+    """Return the input of skins in a field; the mass of a skin is in the input of its solid."""
     if not scene.fields:
         return []
     bodies = scene._bodies

@@ -1,4 +1,4 @@
-"""What a solve is asked for, checked against its scene."""
+"""Collects the inputs of a solve and checks them against its scene."""
 
 from __future__ import annotations
 
@@ -25,10 +25,11 @@ if TYPE_CHECKING:
 
 
 class Leaf(NamedTuple):
-    """A tensor among the inputs that requires a gradient, and what it is: a value of `owner`, or the solve's own; what has
-    `by_knots` is a value in time.
+    """An input tensor that requires a gradient.
 
-    refusal: why it gets none, which NoGradient says when it is asked for.
+    owner: the object whose value it is; None for an argument of the solve itself. An owner with a method `by_knots`
+    stands
+    for a value over time. refusal: why there is no gradient; NoGradient says so when it is asked for.
     """
 
     tensor: Any
@@ -42,14 +43,15 @@ class Leaf(NamedTuple):
 
 
 class Inputs:
-    """The controls, the magnetization and the scene's values of one solve. Raises ValueError where they do not fit.
+    """The load parameters, the magnetization and the scene's values of one solve. Raises ValueError if they do not fit.
 
     given_magnetization: of all bodies, a copy of what was given; a tensor is that tensor, in its graph.
-    magnetization: (n_f of all, 3) A/m, where it was an argument.
+    magnetization: (n_f of all, 3) A/m, if it was an argument; else None.
 
-    `replaced`: {object of the scene: {name: value}}. `leaves`: the tensors that a gradient goes back to; without
-    `differentiable` they are refused. `moving`: the solve is in time. `without_forces_of_motion`: friction and water, if
-    there are, are left out.
+    `replaced`: {object of the scene: {name: value}}. `leaves`: the tensors that gradients are computed for; unless
+    `differentiable` is true, such tensors are refused. `moving`: the solve is a motion. `without_forces_of_motion`:
+    leave
+    friction and water out, if there are any.
     """
 
     def __init__(
@@ -98,21 +100,23 @@ class Inputs:
 
     @property
     def tensors(self) -> list[Any]:
-        """Those of the leaves."""
+        """The tensors of the leaves."""
         return [leaf.tensor for leaf in self.leaves]
 
     def take(self, name: str, value: Any, owner: Any = None) -> Any:
-        """The numbers of another input, which joins the leaves if it asks for a gradient."""
+        """Return the numbers of a further input; it joins the leaves if it requires a gradient."""
         return self._numbers(name, value, owner)
 
     def refuse(self, name: str, tensor: torch.Tensor, why: str) -> None:
-        """Where a tensor asks for a gradient that there is not, whoever takes gradients is told."""
+        """Record that a tensor has no gradient by this input, and why: NoGradient says so when the gradient is asked
+        for.
+        """
         if wants_gradient(tensor):
             self.leaves = [leaf for leaf in self.leaves if leaf.tensor is not tensor or leaf.name != name]
             self.leaves.append(Leaf(tensor, None, name, why))
 
     def _numbers(self, name: str, value, owner=None):
-        """A tensor's numbers; anything else as it came."""
+        """Return the numbers of a tensor; anything else is returned as it is."""
         if is_tensor(value):
             self.given.append(value)
         if not self._differentiable:
@@ -148,14 +152,16 @@ class Inputs:
         return flux_density
 
     def with_values(self, values: Values) -> Inputs:
-        """The same but for the values of the scene."""
+        """Return a copy of these inputs with other values of the scene."""
         there = copy.copy(self)
         there.values = values
         return there
 
     @contextmanager
     def in_core(self) -> Iterator[None]:
-        """The scene's core with this magnetization in it, for one solve; those of other threads wait."""
+        """Hold the scene's core with the values of this solve, as a context manager; solves of other threads wait
+        meanwhile.
+        """
         with self.values.in_core():
             yield
 
@@ -163,6 +169,6 @@ class Inputs:
 def plain_inputs(
     scene: Scene, remanent_magnetization: Numbers, applied_flux_density: Numbers, values: Any, **factors: Any
 ) -> Inputs:
-    """Of a solve whose values may be replaced, without gradients."""
+    """Return the inputs of a solve without gradients, in which values of the scene may be replaced."""
     replaced = requested(scene, None, values) if isinstance(scene, Scene) else None
     return Inputs(scene, remanent_magnetization, applied_flux_density, replaced=replaced, **factors)

@@ -1,4 +1,4 @@
-"""Values of a scene's objects over the time of a motion: arrays at the ends of steps, and functions of the time."""
+"""Parameters prescribed over the time of a motion: an array with one row per step end, or a function of the time."""
 
 from __future__ import annotations
 
@@ -20,12 +20,14 @@ from ..supports.supports import Support
 if TYPE_CHECKING:
     from .scene import Scene
 
-_JUMPING = (AppliedField, Joint, Actuator, Shell)  # their values may change at once, others move
+# Parameters of these classes may jump between steps. Those of supports and obstacles may not: a jump would be an infinite
+# velocity.
+_MAY_JUMP = (AppliedField, Joint, Actuator, Shell)
 
 
 @dataclass(frozen=True)
-class Course:
-    """A value as a caller gives it over time. row: its shape at one time."""
+class TimeSeries:
+    """One parameter of one object, prescribed over the time of a motion. row: the shape of its value at one time."""
 
     owner: Any
     name: str
@@ -34,14 +36,18 @@ class Course:
     row: tuple[int, ...]
 
     def check(self, steps: int) -> None:
-        """Raises ValueError unless it is a function, or numbers for every end of a step; fields may change at once."""
+        """Raise ValueError unless the value is a function of the time, or an array of the right shape.
+
+        An array has a row for each end of a step (steps + 1); a parameter that may jump may also have one for each
+        step.
+        """
         if callable(self.value):
             return
         shape = shape_of(self._label, self.value)
         if shape == self.row:
             return
         allowed = {"(steps + 1, ...)": (steps + 1, *self.row)}
-        if changes_at_once(self.owner):
+        if may_jump(self.owner):
             allowed["(steps, ...)"] = (steps, *self.row)
         if shape not in allowed.values():
             wanted = " or ".join(f"{name} = {each}" for name, each in allowed.items())
@@ -72,17 +78,20 @@ _UNITS = {
 }
 
 
-def over_time(
+def split_time_series(
     scene: Scene, replaced: dict[object, dict[Any, Any]]
-) -> tuple[dict[object, dict[Any, Any]], list[Course]]:
-    """What of the values of a solve is the same all the time, and what is not. Raises ValueError on what cannot change."""
+) -> tuple[dict[object, dict[Any, Any]], list[TimeSeries]]:
+    """Split the values of a solve into constant ones, {object: {name: value}}, and time series.
+
+    Raises ValueError for a time series of a parameter that cannot change during a motion.
+    """
     still: dict[object, dict[Any, Any]] = {}
-    courses: list[Course] = []
+    courses: list[TimeSeries] = []
     for owner, named in replaced.items():
         for name, value in named.items():
             row = row_in_time(owner, name)
             if row is not None and (callable(value) or len(shape_of(name, value)) == len(row) + 1):
-                courses.append(Course(owner, name, _unit(owner, name), value, row))
+                courses.append(TimeSeries(owner, name, _unit(owner, name), value, row))
                 continue
             refuse_functions(owner, name, value, in_time=True)
             still.setdefault(owner, {})[name] = value
@@ -91,17 +100,20 @@ def over_time(
             raise ValueError(
                 f"{owner!r} moves by its motion: give its center and rotation over time, or a motion, not both"
             )
-        if changes_at_once(owner):
+        if may_jump(owner):
             continue
-        constant = still.pop(owner, {})  # of its place: the same all the time
-        courses += [Course(owner, name, _UNITS[name], value, (3,)) for name, value in constant.items()]
+        constant = still.pop(owner, {})  # the constant part of its pose; it joins the path
+        courses += [TimeSeries(owner, name, _UNITS[name], value, (3,)) for name, value in constant.items()]
         if isinstance(owner, Obstacle):
-            still[owner] = {"center": np.zeros(3), "rotation": np.zeros(3)}  # all of its place is on its path
+            still[owner] = {"center": np.zeros(3), "rotation": np.zeros(3)}  # the path holds the whole pose
     return still, courses
 
 
 def refuse_functions(owner: Any, name: str, value: Any, in_time: bool) -> None:
-    """Raises ValueError on a function where there must be numbers."""
+    """Raise ValueError if a value is a function where only numbers are allowed.
+
+    in_time: the solve is a motion, so other values of this object may be functions of the time.
+    """
     if not callable(value):
         return
     kind, can = type(owner).__name__, names_in_time(owner)
@@ -114,26 +126,26 @@ def refuse_functions(owner: Any, name: str, value: Any, in_time: bool) -> None:
 
 
 def row_in_time(owner: Any, name: str) -> tuple[int, ...] | None:
-    """The shape of a value that may change during a motion, at one time."""
+    """Return the shape that a parameter has at one time; None if it may not change during a motion."""
     return np.shape(getattr(owner, name, np.zeros(3))) if name in names_in_time(owner) else None
 
 
-def changes_at_once(owner: Any) -> bool:
-    """Whether values of an object may jump during a motion; others move."""
-    return isinstance(owner, _JUMPING)
+def may_jump(owner: Any) -> bool:
+    """Return whether the parameters of an object may change discontinuously during a motion."""
+    return isinstance(owner, _MAY_JUMP)
 
 
-def values_between(before: Any, after: Any, share: float) -> dict[str, np.ndarray]:
-    """The values that may move of an object that is `before`, and then `after`, a share of the way: on straight lines."""
+def values_between(before: Any, after: Any, fraction: float) -> dict[str, np.ndarray]:
+    """Interpolate linearly the time-varying values of an object between its states `before` and `after`."""
     at = [each._move.as_arguments() if isinstance(each, Support) else vars(each) for each in (before, after)]
     named = {}
     for name in names_in_time(after):
         ends = [np.zeros(3) if each[name] is None and name != "center" else each[name] for each in at]
         if all(end is not None for end in ends):
-            named[name] = (1.0 - share) * ends[0] + share * ends[1]
+            named[name] = (1.0 - fraction) * ends[0] + fraction * ends[1]
     return named
 
 
 def names_in_time(owner: Any) -> tuple[str, ...]:
-    """The values of an object that may change during a motion."""
+    """Return the names of the values of an object that may change during a motion."""
     return getattr(owner, "_in_time", ())

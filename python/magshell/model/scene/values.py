@@ -1,4 +1,4 @@
-"""The numbers of a scene as the core takes them, some replaced for one solve; gradients on the way back."""
+"""The values of a scene's parameters for one solve, as the core takes them, and the gradients by them."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ import numpy as np
 
 from ..._input.quantity import quantity
 from ..._runtime.frozen import remember, variant
-from ..bodies.bodies import Whole, joined
+from ..bodies.bodies import CombinedSheets, joined
 from ..shells.shell import Shell
 from ..supports.constraints import Constraints, gather
-from .magnetization import gradient_by_all, of_carriers
+from .magnetization import gradient_by_all, magnetization_rows
 
 if TYPE_CHECKING:
     from ..contact.body_contact import BodyContact
     from ..contact.contact import Contact
     from ..contact.obstacles.obstacle import Obstacle
+    from ..rigid.equimomental_points import RigidBodyPoints
     from ..rigid.joints import Joint
     from ..rigid.rigid import RigidBody
     from ..solids.skin import Skin
@@ -29,12 +30,13 @@ if TYPE_CHECKING:
 
 
 class Values:
-    """A scene's values, its own or with `replaced`: {object of the scene: {name: array}}.
+    """The values of a scene's parameters in one solve: the scene's own, except those in `replaced`.
 
-    The scene itself has the names "gravity" and "vertex_loads". magnetization: (n_f of all, 3) A/m, of a scene in a field,
-    in place of the bodies' own.
-    replaced: a copy of what was given. numbers: (n,), all of them, in the core's layout.
-    Raises ValueError where a value does not fit.
+    replaced: {object of the scene: {name: array}}; the scene itself has the names "gravity" and "vertex_loads".
+    magnetization: (n_f of all, 3) A/m, in place of the bodies' own; only for a scene in a field.
+
+    The attribute `replaced` is a copy of what was given; `numbers`, (n,), holds all values in the order of the core.
+    Raises ValueError if a value does not fit its object.
     """
 
     def __init__(
@@ -71,16 +73,16 @@ class Values:
             own_points = np.zeros((10 * len(self.rigid) + scene._bodies.n_on_surfaces, 3))
             numbers["loads", "forces"] = joined([numbers["loads", "forces"], own_points])
         if magnetization is not None:
-            for label, rows in of_carriers(scene, magnetization):
+            for label, rows in magnetization_rows(scene, magnetization):
                 numbers[label, "remanent_magnetization"] = rows
         for label, name in scene._value_layout:
-            if name == "remanent_magnetization":  # of sheets that a solve gives none
+            if name == "remanent_magnetization":  # zero for sheets whose magnetization nobody gave
                 numbers.setdefault((label, name), 0.0)
         self.numbers = scene._value_layout.packed(numbers)
 
     @contextmanager
     def in_core(self) -> Iterator[None]:
-        """The scene's core with these values in it; solves of other threads wait."""
+        """Hold the scene's core with these values set, as a context manager; solves of other threads wait meanwhile."""
         scene = self.scene
         with scene._exclusive():
             if scene._in_core is not self:
@@ -90,7 +92,9 @@ class Values:
 
     @contextmanager
     def growth_in_core(self) -> Iterator[None]:
-        """For who looks at strains: as `in_core` where sheets grow, and only then."""
+        """Hold the core as `in_core` does, but only if a sheet can grow: strains are then measured from the grown
+        shape.
+        """
         if any(self.current(body)._in_time for body in self.scene._bodies.sheets):
             with self.in_core():
                 yield
@@ -98,11 +102,14 @@ class Values:
             yield
 
     def same_as(self, other: Values) -> bool:
+        """Return whether other values have the same numbers."""
         return np.array_equal(self.numbers, other.numbers)
 
     def gradients(self, owner: Any, gradient: Gradient) -> dict[str, np.ndarray]:
-        """By the values of one object of the scene, from the core's gradients; a row for each of its parts. Found once
-        for all names of an object."""
+        """Return the gradients by the values of one object of the scene, {name: array}, from the core's gradient.
+
+        The arrays have one row for each part of the object. They are computed once for all names of the object.
+        """
         if owner not in gradient.of_owners:
             gradient.of_owners[owner] = self._gradients(owner, gradient)
         return gradient.of_owners[owner]
@@ -120,38 +127,41 @@ class Values:
 
     @property
     def contacts(self) -> list[tuple[Any, ...]]:
-        """(contact with obstacles, its label, the sheets that touch) of all, as they are in this solve."""
+        """The contacts with obstacles as they are in this solve: (contact, its label, the bodies it acts on)."""
         labels = [
             (each, label) for each, label in self.scene._labels if each in self.scene._obstacle_contacts
         ]
         return [(self.current(each), label, self.touching(each)) for each, label in labels]
 
     @property
-    def whole(self) -> Shell | Whole:
-        """All sheets as one, for what looks at their faces; unless they are flat and alone, without their mesh."""
+    def all_sheets(self) -> Shell | CombinedSheets:
+        """The face values of all sheets, one sheet after another; a single flat sheet is returned itself.
+
+        It has a mesh only if all bodies of the scene are sheets of three-node faces.
+        """
         sheets = tuple(self.current(body) for body in self.scene._bodies.sheets)
         flat = self.scene._bodies.flat_sheets_alone
         if flat and len(sheets) == 1:
             return sheets[0]
-        return Whole(self.scene.mesh if flat else None, sheets)
+        return CombinedSheets(self.scene.mesh if flat else None, sheets)
 
-    def touching(self, contact: Contact | BodyContact) -> tuple[Any, ...]:
-        """The sheets that a contact is about, as they are in this solve."""
+    def contact_bodies(self, contact: Contact | BodyContact) -> tuple[Any, ...]:
+        """Return the shells and solids that a contact acts on, as they are in this solve."""
         return self.sheets[self.scene._bodies.of(contact).bodies]
 
     def part_of(self, sheet: Shell | Solid) -> Any:
-        """Where one of `sheets` stands among them."""
+        """Return the index ranges of one of `sheets` among all bodies."""
         return next(
             span for span, each in zip(self.scene._bodies.spans, self.sheets, strict=True) if each is sheet
         )
 
     def part_of_skin(self, skin: Skin) -> Any:
-        """Where the solid that has it, as it is in this solve, stands among the bodies."""
+        """Return the index ranges of the solid that has this skin in this solve."""
         return self.part_of(next(each for each in self.sheets if getattr(each, "skin", None) is skin))
 
     @property
     def vertex_masses(self) -> np.ndarray:
-        """Of all bodies, (n_v,), kg. Raises ValueError where one has no mass density."""
+        """The masses of the vertices of all bodies, (n_v,) kg. Raises ValueError if a body has no mass density."""
         for k, sheet in enumerate(self.sheets):
             if sheet.mass_density is None and len(self.sheets) > 1:
                 raise ValueError(f"body {k} of the scene has no mass_density [kg/m3]")
@@ -159,59 +169,68 @@ class Values:
 
     @property
     def masses(self) -> np.ndarray:
-        """Of all vertices and of the points of rigid parts, kg: for inertia."""
+        """The inertial masses of all vertices, then of the points of rigid bodies, (n,) kg."""
         return joined([self.vertex_masses, *self._masses_of_rigid()])
 
     @property
     def _weighed_masses(self) -> np.ndarray:
-        """What gravity pulls at each of them by, kg: of sheets and rigid parts, their masses."""
-        self.vertex_masses  # noqa: B018 - says which body has no density
+        """The masses that gravity acts on, in the order of `masses`, kg; of sheets and rigid bodies, their inertial
+        masses.
+        """
+        self.vertex_masses  # noqa: B018 - raises an error that names a body without density
         return joined([*(body._weighed_masses for body in self.sheets), *self._masses_of_rigid()])
 
     def _masses_of_rigid(self) -> list[np.ndarray]:
-        masses = [place.masses(part) for place, part in zip(self.scene._rigid, self.rigid, strict=True)]
+        masses = [points.masses(part) for points, part in zip(self.scene._rigid, self.rigid, strict=True)]
         return [*masses, np.zeros(self.scene._bodies.n_on_surfaces)]
 
-    def rigid_place(self, part: RigidBody) -> Any:
-        """Where one of `rigid` is."""
-        return next(place for place, each in zip(self.scene._rigid, self.rigid, strict=True) if each is part)
+    def rigid_points(self, part: RigidBody) -> RigidBodyPoints:
+        """Return the points that represent one of `rigid`."""
+        return next(
+            points for points, each in zip(self.scene._rigid, self.rigid, strict=True) if each is part
+        )
 
-    def started_by(self, part: RigidBody) -> list[Any]:
-        """The places of all that starts with one of `rigid`."""
+    def started_by(self, part: RigidBody) -> list[RigidBodyPoints]:
+        """Return the points of all rigid bodies that start with the velocity of one of `rigid`."""
         scene = self.scene
         own = next(each for each, now in zip(scene.rigid_parts, self.rigid, strict=True) if now is part)
         return [scene._rigid[k] for k in scene._bodies.started_by(own)]
 
-    def moved_by(self, joint: Joint) -> list[Any]:
-        """The places of all that one of the joints carries."""
+    def moved_by(self, joint: Joint) -> list[RigidBodyPoints]:
+        """Return the points of all rigid bodies that one of the joints moves."""
         scene = self.scene
         own = next(each for each in scene.joints if self.current(each) is joint)
         return [scene._rigid[k] for k in scene._bodies.moved_by(own)]
 
     def by_inertia_and_weight(self, gradient: Gradient) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """By `masses`, and by `weighed_masses`; None where they have no part."""
+        """Return the gradients by `masses`, first of the inertia, then of the weight; None where there is no such
+        force.
+        """
         by_weights = self.by_weights(gradient)
         return gradient.others.get("mass"), None if by_weights is None else by_weights @ self.gravity
 
     def by_masses(self, gradient: Gradient) -> np.ndarray | None:
-        """By `masses`, of gravity and of inertia, where they are the same; None where they have no part."""
+        """Return the gradient by `masses` where gravity and inertia act on the same masses; None if neither acts."""
         by_masses, by_weighed = self.by_inertia_and_weight(gradient)
         if by_weighed is None:
             return by_masses
         return by_weighed + (0.0 if by_masses is None else by_masses)
 
     def by_weights(self, gradient: Gradient) -> np.ndarray | None:
-        """By the weights of `masses`, (n, 3); None where nothing is heavy."""
+        """Return the gradient by the weights of `masses`, (n, 3); None if the scene has no gravity."""
         if ("gravity", "forces") not in self.scene._value_layout:
             return None
         return gradient.value("gravity", "forces")
 
     def current(self, item: Any) -> Any:
-        """An object of the scene as it is in this solve."""
+        """Return an object of the scene with its values in this solve."""
         return self._now.get(item, item)
 
     def with_objects(self, now: dict[Any, Any]) -> Values:
-        """These with other objects, {object of the scene: as it is}, whose numbers are their own alone."""
+        """Return a copy in which objects of the scene are replaced, {object of the scene: its replacement}.
+
+        Only the numbers of these objects differ; they are computed when they are first needed.
+        """
         other = copy(self)
         other._now = {**self._now, **now}
         other._others = now, self.numbers
@@ -220,7 +239,9 @@ class Values:
 
     @cached_property
     def numbers(self) -> np.ndarray:
-        """Of `with_objects`, found when asked for: of a motion every state may have its own."""
+        """The numbers of a copy made by `with_objects`, computed when first needed: a motion makes a copy for every
+        state.
+        """
         now, before = self._others
         numbers: dict[tuple[str, str], np.ndarray] = {}
         for owner, label in self.scene._labels:
@@ -228,26 +249,26 @@ class Values:
                 now[owner]._add_numbers(label, self, numbers)
         return self.scene._value_layout.packed(numbers, before)
 
-    def kept(self) -> dict[Any, Any]:
-        """What `again` makes them from in another process, or after the scene was made anew."""
+    def to_state(self) -> dict[Any, Any]:
+        """Return the data from which `from_state` restores the values, in another process or for a copy of the scene."""
         return {"replaced": self.replaced, "numbers": self.numbers}
 
     @classmethod
-    def again(cls, scene: Scene, kept: dict[Any, Any]) -> Values:
-        """Raises ValueError where they do not fit the scene."""
-        values = cls(scene, kept["replaced"])
-        values.numbers = quantity("values", "SI", kept["numbers"], (scene._value_layout.size,))
+    def from_state(cls, scene: Scene, state: dict[Any, Any]) -> Values:
+        """Restore the values from the data of `to_state`. Raises ValueError if they do not fit the scene."""
+        values = cls(scene, state["replaced"])
+        values.numbers = quantity("values", "SI", state["numbers"], (scene._value_layout.size,))
         return scene._values if not values.replaced and values.same_as(scene._values) else values
 
     def move(self, obstacle: Obstacle, path: Any) -> None:
-        """Has an obstacle, whose own place is the origin in `numbers`, follow a path."""
+        """Let an obstacle follow a path. In `numbers` its pose stays the identity: the path holds all of its motion."""
         self._now[obstacle] = obstacle._on(path)
 
     def _moved(self) -> Constraints:
-        """The same constraints with other moves."""
+        """Return the scene's constraints with the support displacements of this solve."""
         scene = self.scene
         supports = [self.current(support) for support in scene.supports]
-        moved = gather(scene._bodies, supports, scene._couple_directions)
+        moved = gather(scene._bodies, supports, scene._moment_directions)
         if not np.array_equal(moved.held_nodes, scene._constraints.held_nodes):
             raise ValueError(
                 "a support that stays cannot be moved by a solve: "
@@ -257,9 +278,10 @@ class Values:
 
 
 class Gradient:
-    """The core's gradient of a number by all values and controls of a scene.
+    """The core's gradient of a scalar by all values and load parameters of a scene.
 
-    values: (n,); controls: (m,), or (knots, m) of a motion; others: by what a motion has beside them, by name.
+    values: (n,). controls: (m,), or (time points, m) of a motion. others: {name: gradient} by the further inputs of a
+    motion.
     """
 
     def __init__(
@@ -267,24 +289,26 @@ class Gradient:
     ):
         self._scene, self._values, self._controls = scene, values, controls
         self.others: dict[Any, Any] = others or {}
-        self.of_owners: dict[Any, Any] = {}  # by the values of objects, as they were asked for
+        self.of_owners: dict[Any, Any] = {}  # cache of Values.gradients: {object: {name: array}}
 
     def has(self, owner: str, name: str) -> bool:
+        """Return whether the scene has such a value."""
         return (owner, name) in self._scene._value_layout
 
     def value(self, owner: str, name: str) -> np.ndarray:
+        """Return the gradient by one value of an object, (rows, width), or (rows,) for single numbers."""
         return self._scene._value_layout.of(self._values, owner, name)
 
     def control(self, owner: str, name: str) -> np.ndarray:
-        """By a control, (knots, rows, width) of a motion."""
+        """Return the gradient by a load parameter; of a motion (time points, rows, width)."""
         return self._scene._control_layout.of(self._controls, owner, name)
 
-    def of_controls(self, place: slice) -> np.ndarray:
-        """By what stands there in the vectors of controls."""
-        return self._controls[..., place]
+    def of_controls(self, part: slice) -> np.ndarray:
+        """Return the gradient by a slice of the vector of load parameters."""
+        return self._controls[..., part]
 
     def own(self, name: str) -> np.ndarray:
-        """By what a solve itself was given: a control, or one of the others."""
+        """Return the gradient by an argument of the solve itself: a load parameter, the magnetization, one of `others`."""
         if name in self.others:
             return self.others[name]
         if name == "remanent_magnetization":

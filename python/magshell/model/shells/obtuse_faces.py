@@ -33,7 +33,7 @@ TRUSTED_SHARE = 0.03
 _MOST_NAMED = 4  # faces in a warning
 
 
-class Caps:
+class ObtuseFaces:
     """Those of a sheet that stretch as they tilt. Costs nothing where there are none."""
 
     def __init__(self, shell: Shell, recut: Numbers = ()):
@@ -77,17 +77,17 @@ class Caps:
         return ((normals[ends] - normals[starts]) * along).sum(axis=1) / (along**2).sum(axis=1)
 
 
-def warn_of_caps(
+def warn_of_obtuse_faces(
     scene: Scene, positions: np.ndarray, shell: Shell, bending_energy: float, where: str
 ) -> None:
     """Says once a scene that caps stiffen the sheet where it is bent like this. where: the result, in words."""
-    if scene._warned_of_caps or not scene.bodies or not scene._bodies.flat_sheets_alone:
+    if scene._warned_of_obtuse_faces or not scene.bodies or not scene._bodies.flat_sheets_alone:
         return
-    caps = scene._caps
+    caps = scene._obtuse_faces
     shares = caps.held_back(positions, shell, bending_energy)
     if shares.sum() <= TRUSTED_SHARE:
         return
-    remember(scene, _warned_of_caps=True)
+    remember(scene, _warned_of_obtuse_faces=True)
     worst = np.argsort(-shares, kind="stable")
     worst = worst[shares[worst] > 0.01 * shares.max()]
     warnings.warn(

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...model.scene.contact_state import touching_in
+from ...model.scene.contact_state import compute_contact_state
 from ...solve.dynamics.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -38,7 +38,9 @@ def contact_loads(result: SolveResult, index: int) -> ContactLoads:
     scene, moving = result.scene, isinstance(result, Trajectory)
     values, state = result._values_at(index), result._state_at(index)
     found = [
-        result.contact_state(contact, index) if moving else touching_in(scene, values, contact, state)
+        result.contact_state(contact, index)
+        if moving
+        else compute_contact_state(scene, values, contact, state)
         for contact in scene.contacts
     ]
     forces, pushed = np.zeros((scene.mesh.n_vertices, 3)), np.zeros(scene.mesh.n_vertices)

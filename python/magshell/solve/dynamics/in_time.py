@@ -9,7 +9,7 @@ import numpy as np
 from ...model.actuators.actuator import Actuator
 from ...model.contact.obstacles import Obstacle
 from ...model.fields.field import AppliedField
-from ...model.scene.time_series import Course
+from ...model.scene.time_series import TimeSeries
 from ...model.shells.shell import Shell
 from ...model.supports.supports import Support
 from .obstacle_paths import ObstaclePath, check_supports
@@ -25,7 +25,7 @@ class InTime:
     obstacle: its poses at the knots (knots, 4, 3)}. varied: {(actuator, shell or field, name): (knots, ...)}.
     """
 
-    def __init__(self, asked: MotionInputs, courses: list[Course]):
+    def __init__(self, asked: MotionInputs, courses: list[TimeSeries]):
         self._asked = asked
         self._layout = list(asked.inputs.scene._value_layout)
         self._places: dict[tuple[int, str], list[slice]] = {}
@@ -51,7 +51,7 @@ class InTime:
         self.rows: np.ndarray = np.concatenate(rows, axis=1)
         self._add_obstacles([each for each in courses if isinstance(each.owner, Obstacle)])
 
-    def _add(self, course: Course, width: int) -> int:
+    def _add(self, course: TimeSeries, width: int) -> int:
         """Finds the places of a value in the core; how many there are."""
         owner, values = course.owner, self._asked.inputs.values
         labels = [label for each, label in self._asked.inputs.scene._labels if each is owner]
@@ -70,7 +70,7 @@ class InTime:
             end += width
         return len(labels)
 
-    def _add_obstacles(self, courses: list[Course]) -> None:
+    def _add_obstacles(self, courses: list[TimeSeries]) -> None:
         values, obstacles = self._asked.inputs.values, self._asked.inputs.scene.obstacles
         for k, obstacle in enumerate(obstacles):
             if its_own := {each.name: each.value for each in courses if each.owner is obstacle}:
@@ -82,7 +82,7 @@ class InTime:
 class _Values:
     """Owns the numbers of a course: by_knots is their gradient."""
 
-    def __init__(self, in_time: InTime, course: Course):
+    def __init__(self, in_time: InTime, course: TimeSeries):
         self._places, self._key = in_time._places, (id(course.owner), course.name)
 
     def by_knots(self, gradient: Any) -> np.ndarray:

@@ -26,7 +26,7 @@ from .trajectory import MotionState, Trajectory
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
-    from ...model.scene.time_series import Course
+    from ...model.scene.time_series import TimeSeries
     from ..options import AdjointStorage
 
 
@@ -66,7 +66,7 @@ class MotionInputs:
         maxwell_time: Numbers,
         integrator: Integrator,
         solver: Newton,
-        courses: Iterable[Course] = (),
+        courses: Iterable[TimeSeries] = (),
         **controls: Any,
     ):
         self.inputs, self.integrator = inputs, integrator

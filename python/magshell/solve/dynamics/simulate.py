@@ -20,8 +20,8 @@ from ...model.scene.field_sampling import warn_of_sampling
 from ...model.scene.replacements import requested
 from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs
-from ...model.scene.time_series import over_time
-from ...model.shells.obtuse_faces import warn_of_caps
+from ...model.scene.time_series import split_time_series
+from ...model.shells.obtuse_faces import warn_of_obtuse_faces
 from ...model.shells.shell import Shell
 from ...model.shells.strains import StrainHistory, warn_if_large
 from ..adjoint.dynamic import MotionAdjoint
@@ -156,7 +156,7 @@ def simulate(
         mass_density=mass_density,
         curvature_scale=curvature_scale,
     )
-    replaced, courses = over_time(scene, replaced)
+    replaced, courses = split_time_series(scene, replaced)
     uniform = np.zeros(3) if scene.has_uniform_field else None
     if integrator is None:
         integrator = ImplicitEuler() if scene.contacts else TRBDF2()
@@ -218,7 +218,7 @@ def simulate(
     most = int(np.argmax(bending))
     positions = np.asarray(detached(result.positions[most]), dtype=np.float64)
     where = f"the motion, at {result.times[most]:.4g} s,"
-    warn_of_caps(scene, positions, inputs.values.whole, bending[most], where)
+    warn_of_obtuse_faces(scene, positions, inputs.values.all_sheets, bending[most], where)
     _warn(result)
     try:  # a field may be a function of the caller's, in which Ctrl-C can come
         _warn_of_fields(result)
@@ -271,7 +271,7 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
     rigid, n_v = bool(scene.rigid_parts), scene.mesh.n_vertices
     recorded = len(found.kinetic_energy)
     ended = asked.clock.after(found.steps_done)
-    thickness = values.whole.thickness
+    thickness = values.all_sheets.thickness
     with values.growth_in_core():
         strain = StrainHistory.of(found.largest_strains(model, thickness))
     by_term = np.array(found.energies).reshape(recorded, -1)

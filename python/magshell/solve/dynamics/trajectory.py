@@ -24,7 +24,7 @@ from ...model.contact.contacts_to_core import near_kinks
 from ...model.fields.field import AppliedField
 from ...model.results.result_lookup import OfOneBody, result_of
 from ...model.results.solid_result import told_strains
-from ...model.scene.contact_state import ContactState, touching_in
+from ...model.scene.contact_state import ContactState, compute_contact_state
 from ...model.scene.nonsmooth_contacts import near_body_kinks
 from ...model.scene.reactions import Reaction, reaction_in
 from ...model.scene.scene import Scene
@@ -178,10 +178,10 @@ class Trajectory(Filmed, OfOneBody):
             for each, now in pairs
             if isinstance(now.motion, ObstaclePath | ReadPath)
         }
-        return {**plain_arrays(vars(self)), "_values": {**self._values.kept(), "paths": paths}}
+        return {**plain_arrays(vars(self)), "_values": {**self._values.to_state(), "paths": paths}}
 
     def __setstate__(self, kept: dict[Any, Any]) -> None:
-        values = Values.again(kept["scene"], kept["_values"])
+        values = Values.from_state(kept["scene"], kept["_values"])
         for obstacle, path in kept["_values"]["paths"].items():
             values.move(obstacle, path)
         Filmed.__setstate__(self, {**kept, "_values": values})
@@ -236,7 +236,7 @@ class Trajectory(Filmed, OfOneBody):
         """
         positions, now, bodies = detached(self.positions), self._values.current, self.scene._bodies
         placed = [
-            (now(each), [now(obstacle) for obstacle in each.obstacles], self._values.touching(each), bodies)
+            (now(each), [now(obstacle) for obstacle in each.obstacles], self._values.contact_bodies(each), bodies)
             for each in self.scene._obstacle_contacts
         ]
         found = {}
@@ -283,7 +283,7 @@ class Trajectory(Filmed, OfOneBody):
             [np.asarray(detached(each)[index], dtype=np.float64) for each in (self.velocities, *own)]
         )
         state, time = self._state_at(index), float(self.times[index])
-        return touching_in(self.scene, self._values, contact, state, velocities, time)
+        return compute_contact_state(self.scene, self._values, contact, state, velocities, time)
 
     def reaction(self, support: Pin | Clamp | SymmetryPlane, index: int = -1) -> Reaction:
         """With what forces a support of the scene held it in a recorded state, by default the last, inertia and damping

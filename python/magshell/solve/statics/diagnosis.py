@@ -112,7 +112,7 @@ def _places(inputs, found) -> tuple[list[str], np.ndarray]:
 
 
 def _advice(inputs, found, at_rest: bool, near: np.ndarray) -> str:
-    scene, shell = inputs.scene, inputs.values.whole
+    scene, shell = inputs.scene, inputs.values.all_sheets
     free = [f"rigid part {k}" for k, part in enumerate(scene.rigid_parts) if part.vertices is None]
     if free and "singular" in found.reason:
         return (

@@ -15,7 +15,7 @@ from ...model.contact.body_contact import BodyContact
 from ...model.contact.contact import Contact
 from ...model.results.result_lookup import OfOneBody, result_of
 from ...model.results.solid_result import told_strains
-from ...model.scene.contact_state import ContactState, touching_in
+from ...model.scene.contact_state import ContactState, compute_contact_state
 from ...model.scene.reactions import Reaction, reaction_in
 from ...model.scene.scene import Scene
 from ...model.scene.values import Values
@@ -77,10 +77,10 @@ class Equilibrium(Kept, OfOneBody):
 
     def __getstate__(self) -> dict[Any, Any]:
         """What a copy, another process or a file makes it from again: tensors as arrays, without their gradients."""
-        return {**plain_arrays(vars(self)), "_values": self._values.kept()}
+        return {**plain_arrays(vars(self)), "_values": self._values.to_state()}
 
     def __setstate__(self, kept: dict[Any, Any]) -> None:
-        values = Values.again(kept["scene"], kept["_values"])
+        values = Values.from_state(kept["scene"], kept["_values"])
         Kept.__setstate__(self, {**kept, "_values": values})
 
     def __getitem__(self, body: Any) -> Any:
@@ -125,11 +125,11 @@ class Equilibrium(Kept, OfOneBody):
         if (solid := self._one_solid()) is not None:
             return solid.strains()
         with self._values.growth_in_core():
-            return strains_of(self.scene, self._state, self._values.whole.thickness)
+            return strains_of(self.scene, self._state, self._values.all_sheets.thickness)
 
     def contact_state(self, contact: BodyContact | Contact) -> ContactState:
         """The pairs of a contact that touch, and their forces."""
-        return touching_in(self.scene, self._values, contact, self._state)
+        return compute_contact_state(self.scene, self._values, contact, self._state)
 
     def reaction(self, support: Pin | Clamp | SymmetryPlane) -> Reaction:
         """With what forces a support of the scene holds it.

@@ -24,7 +24,7 @@ from ...model.results.solid_result import told_strains
 from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs, plain_inputs
 from ...model.scene.values import Values
-from ...model.shells.obtuse_faces import warn_of_caps
+from ...model.shells.obtuse_faces import warn_of_obtuse_faces
 from ...model.shells.strains import StrainHistory, strains_of, warn_if_large
 from ..options import MixedNewton, Newton
 from .along_path import AlongPath
@@ -100,7 +100,7 @@ class EquilibriumPath(Filmed, OfOneBody):
         if (solid := self._one_solid()) is not None:
             return solid.strains(index)
         with self._values_at(index).growth_in_core():
-            return strains_of(self.scene, self._state_at(index), self._inputs.values.whole.thickness)
+            return strains_of(self.scene, self._state_at(index), self._inputs.values.all_sheets.thickness)
 
     def __getitem__(self, body: Any) -> Any:
         """What it says of one body of the scene, a row for each point; points themselves: `equilibrium`."""
@@ -294,7 +294,7 @@ def follow_path(
     if len(bending):
         most = int(np.argmax(bending))
         where = f"the path, at parameter {path.parameters[most]:.4g},"
-        warn_of_caps(scene, path.positions[most], inputs.values.whole, bending[most], where)
+        warn_of_obtuse_faces(scene, path.positions[most], inputs.values.all_sheets, bending[most], where)
     strain = StrainHistory(path.largest_membrane_strain, path.largest_bending_strain)
     k = strain.worst
     warn_if_large(path, strain.at(k), f"the path, at point {k}, parameter {path.parameters[k]:.4g}", (k,))
@@ -303,7 +303,7 @@ def follow_path(
 
 def _bending_energies(scene: Scene, found, controls) -> list[float]:
     """Of its points, where faces are to be looked at for which that matters."""
-    if not scene._bodies.flat_sheets_alone or not scene._caps.faces.size:
+    if not scene._bodies.flat_sheets_alone or not scene._obtuse_faces.faces.size:
         return []
     return [scene._model.energies(point.state, controls).get("bending", 0.0) for point in found.points]
 
@@ -347,7 +347,7 @@ def _path(inputs: Inputs, moving: AlongPath, found, from_, wall_time: float) -> 
 
 def _largest(model, values: Values, point) -> tuple[Any, ...]:
     with values.growth_in_core():
-        return model.largest_strains(point.state, values.whole.thickness)
+        return model.largest_strains(point.state, values.all_sheets.thickness)
 
 
 def _critical(model, found) -> CriticalPoint:

@@ -20,7 +20,7 @@ from ...model.scene.field_sampling import warn_of_sampling
 from ...model.scene.replacements import SHELL_NAMES, requested
 from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs
-from ...model.shells.obtuse_faces import warn_of_caps
+from ...model.shells.obtuse_faces import warn_of_obtuse_faces
 from ...model.shells.strains import Largest, largest_of, warn_if_large
 from ..adjoint.static import Adjoint
 from ..options import MixedNewton, Newton
@@ -160,8 +160,8 @@ def solve(
     if found.outcome == _core.Outcome.failed:
         raise NotConverged(why_not(inputs, found, options.start_at_rest), result)
     positions = scene._model.positions(found.state)
-    warn_of_caps(
-        scene, positions, inputs.values.whole, result.energies.get("bending", 0.0), "this equilibrium"
+    warn_of_obtuse_faces(
+        scene, positions, inputs.values.all_sheets, result.energies.get("bending", 0.0), "this equilibrium"
     )
     warn_if_large(
         result, Largest(result.largest_membrane_strain, result.largest_bending_strain), "the equilibrium"
@@ -189,7 +189,7 @@ def _result(
 ) -> Equilibrium:
     points, edge_rotations, driving = _outputs(inputs, found)
     n_v = scene.mesh.n_vertices
-    strain = largest_of(scene, found.state, inputs.values.whole.thickness)
+    strain = largest_of(scene, found.state, inputs.values.all_sheets.thickness)
     return Equilibrium(
         scene=scene,
         positions=points[:n_v] if scene.rigid_parts else points,

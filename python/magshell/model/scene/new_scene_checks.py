@@ -1,4 +1,4 @@
-"""What a scene that was just made is warned of."""
+"""Checks a scene when it is made, and warns of what is likely a mistake."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from .scene import Scene
 
 
-def look_at(scene: Scene) -> None:
+def check_new_scene(scene: Scene) -> None:
     """Warn of contact between neighbours, of sizes that no body has, and of solids one cell thick.
 
-    Raises ValueError as `check_neighbours`.
+    Raises ValueError in the cases of `check_neighbours`.
     """
     check_neighbours(scene, warns=True)
     warn_of_units(scene, scene._values)
@@ -28,7 +28,7 @@ def look_at(scene: Scene) -> None:
 
 
 def _held(scene: Scene) -> np.ndarray:
-    """(n_v, 3, 3): the projections onto the directions in which supports hold each vertex."""
+    """Return the projections onto the directions in which supports hold each vertex, (n_v, 3, 3)."""
     bodies, constraints = scene._bodies, scene._constraints
     found = np.zeros((len(bodies.original), 3, 3))
     of_vertices = constraints.held_nodes[:, 0] < len(found)
