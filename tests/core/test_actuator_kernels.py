@@ -51,7 +51,10 @@ def single_cells(element):
 
 
 def few_and_large_cells(element):
-    """One of them small enough to be coupled in the matrix alone; all are coupled or none."""
+    """Return a scene with one large cell and two small ones in a second object.
+
+    A small cell alone is coupled in the sparse matrix and needs no low-rank column. An object's cells are treated all alike.
+    """
     body = beam(element)
     groups = np.where(body.mesh.tetrahedron_barycenters[:, 0] < 0.02, 0, -1)
     small = ms.PneumaticCells(body, [np.arange(3), np.arange(5, 7)], stiffness=[1e5, 3e5], volume_ratio=1.4)
@@ -116,23 +119,26 @@ def test_energy_gradient_and_hessian_are_those_of_torch(name, element):
     found = model.positions(model.gradient(state, on) - model.gradient(state, off))
     assert np.abs(found.ravel() - gradient.numpy()).max() < 1e-11 * np.abs(gradient.numpy()).max()
 
-    def whole(at):
+    def full_hessian(at):
         *pattern, values = model.hessian(state, at, reduced=False)
         columns, stiffness = model.low_rank(reduced=False)
         return symmetric(*pattern, values).toarray() + columns * stiffness @ columns.T
 
-    hessian = whole(on) - whole(off)
+    hessian = full_hessian(on) - full_hessian(off)
     way = model.full_vector(np.random.default_rng(3).standard_normal(x.shape))
     expected = torch.autograd.functional.hvp(by_torch, flat, torch.from_numpy(model.positions(way).ravel()))[
         1
     ].numpy()
     product = model.positions(hessian @ way).ravel()
-    assert np.abs(product - expected).max() < 1e-10 * np.abs(expected).max() + 1e-15 * np.abs(whole(on)).max()
-    assert np.abs(hessian - hessian.T).max() < 1e-15 * np.abs(whole(on)).max()
+    assert (
+        np.abs(product - expected).max()
+        < 1e-10 * np.abs(expected).max() + 1e-15 * np.abs(full_hessian(on)).max()
+    )
+    assert np.abs(hessian - hessian.T).max() < 1e-15 * np.abs(full_hessian(on)).max()
 
 
 @pytest.mark.parametrize("name, element", CASES, ids=" ".join)
-def test_no_force_and_no_torque_on_the_whole(name, element):
+def test_actuators_exert_no_net_force_and_no_net_torque(name, element):
     scene = KINDS[name](element)
     model, x = scene._model, moved(scene)
     state = model.state(x, np.zeros(scene.mesh.n_edges))

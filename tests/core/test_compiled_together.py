@@ -1,5 +1,8 @@
-"""Files that are compiled as one: what is local to one has no name of what is local to another of its folder. Constants
-would not compile; of functions with other parameters, the wrong one might be taken without a word."""
+"""Names that are local to files compiled as one translation unit are distinct within a folder.
+
+Two constants of the same name would not compile. Of two functions of the same name with different parameters, the wrong
+one might be called without any message.
+"""
 
 import re
 from collections import defaultdict
@@ -12,7 +15,7 @@ OTHER = re.compile(r"([A-Za-z_]\w*)\s*(?:\(|=|\{|\[|$)")
 
 
 def folders() -> dict[str, set[str]]:
-    """Folder -> its files that are compiled alone, as CMakeLists.txt says."""
+    """Return the files of each folder that are compiled alone, as CMakeLists.txt lists them."""
     build = (ROOT / "CMakeLists.txt").read_text()
     found = {f"magshell/{name}": set() for name in re.search(r"foreach\(folder ([\w ]+)\)", build)[1].split()}
     for call in re.findall(r"^compile_together\(\w+ (.+)\)", build, re.MULTILINE):
@@ -22,7 +25,7 @@ def folders() -> dict[str, set[str]]:
 
 
 def outermost(text: str) -> str:
-    """What a namespace's text holds, without what is in braces within."""
+    """Return the text of a namespace without the contents of inner braces."""
     depth, kept = 1, []
     for sign in text:
         depth += {"{": 1, "}": -1}.get(sign, 0)
@@ -34,7 +37,7 @@ def outermost(text: str) -> str:
 
 
 def local_names(text: str) -> set[str]:
-    """Of nameless namespaces: types, constants, functions."""
+    """Return the names of types, constants and functions in anonymous namespaces."""
     text = ASIDE.sub(" ", text)
     names = set()
     for opened in re.finditer(r"\bnamespace\s*\{", text):

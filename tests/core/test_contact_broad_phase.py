@@ -1,4 +1,4 @@
-"""What is near on surfaces: all of it, in the same order, against every pair; crossings against ipctk."""
+"""Broad phase of contact: nearby pairs against all pairs, their order, and crossings against ipctk."""
 
 import itertools
 
@@ -14,17 +14,17 @@ KINDS = ("point_triangle", "edge_edge", "point_edge", "point_point")
 
 def grid(cells, height=0.0, size=1.0, shift=(0.0, 0.0), irregular=0.2, seed=0):
     mesh = ms.meshes.rectangle(size, size, cells=cells, irregular=irregular)
-    places = mesh.rest_positions + np.array([*shift, height])
-    return places, mesh.faces
+    positions = mesh.rest_positions + np.array([*shift, height])
+    return positions, mesh.faces
 
 
 def stacked(*parts):
-    """(positions, faces of each part) of parts with their nodes one after another."""
+    """Return the positions of all parts in one array, and each part's faces numbered accordingly."""
     positions, surfaces, count = [], [], 0
-    for places, faces in parts:
-        positions.append(places)
+    for points, faces in parts:
+        positions.append(points)
         surfaces.append(faces + count)
-        count += len(places)
+        count += len(points)
     return np.concatenate(positions), surfaces
 
 
@@ -33,7 +33,7 @@ def broad_phase(positions, surfaces, contacts):
 
 
 def all_pairs(surfaces, a, b):
-    """Nodes of every pair of a point and a triangle, and of two edges, without a common node: sets by kind."""
+    """Return every point-triangle pair and every edge-edge pair without a common node, as two sets of nodes."""
     points, edges = set(), set()
     sides = {
         s: {tuple(sorted(e)) for f in surfaces[s].tolist() for e in itertools.combinations(f, 2)}
@@ -79,7 +79,7 @@ def test_every_pair_that_is_near_is_found_once(contact, margin) -> None:
             assert set(nodes[1:]) == set(surfaces[other][faces[1]])
 
 
-def test_the_way_holds_every_pair_that_is_near_somewhere_on_it() -> None:
+def test_pairs_along_a_path_include_every_pair_near_on_it() -> None:
     begin, surfaces = stacked(grid((4, 4)), grid((4, 4), 0.3, 0.6, (0.1, 0.3)))
     rng = np.random.default_rng(0)
     end = (
@@ -98,7 +98,7 @@ def test_the_way_holds_every_pair_that_is_near_somewhere_on_it() -> None:
     assert not (found["kind"] > EDGE_EDGE).any()
 
 
-def test_what_is_found_does_not_depend_on_threads_nor_on_what_was_asked_before() -> None:
+def test_broad_phase_does_not_depend_on_threads_or_earlier_queries() -> None:
     positions, surfaces = stacked(grid((24, 24)), grid((30, 20), 0.01))
     contacts, margins = [(0, 1), (0, 0), (1, 1)], [0.03, 0.02, 0.02]
     folded = positions.copy()
@@ -122,7 +122,7 @@ def test_what_is_found_does_not_depend_on_threads_nor_on_what_was_asked_before()
 
 
 def pressure_on(columns, positions, law):
-    """Energy and force up on everything of pairs, of points and triangles and what takes back double counts."""
+    """Return the energy of point-triangle pairs and of their overcount corrections, and its forces (n_v, 3) in N."""
     energy, forces = 0.0, np.zeros_like(positions)
     for kind, nodes, area in zip(columns["kind"], columns["nodes"], columns["area"], strict=True):
         if kind == EDGE_EDGE:
@@ -155,14 +155,14 @@ def test_a_flat_mesh_is_as_good_as_a_plane(cells) -> None:
 def test_a_point_is_pushed_away_wherever_it_is_on_a_crumpled_sheet() -> None:
     law = {"stiffness": 1.0, "reach": 0.3, "thickness": 0.0, "smoothing": 1.0, "penalty": False}
     rng = np.random.default_rng(4)
-    places, faces = grid((4, 4))
-    places = places + np.c_[np.zeros((25, 2)), 0.2 * rng.standard_normal(25)]
+    vertices, faces = grid((4, 4))
+    vertices = vertices + np.c_[np.zeros((25, 2)), 0.2 * rng.standard_normal(25)]
     for height in np.repeat([0.02, 1e-4], 60):
-        spot = places[faces[rng.integers(len(faces))]].T @ rng.dirichlet(
+        spot = vertices[faces[rng.integers(len(faces))]].T @ rng.dirichlet(
             np.ones(3)
         ) + height * rng.standard_normal(3)
         tip = spot + 0.1 * np.array([[0.0, 0, 0], [1.0, 0.1, 3], [-0.3, 1, 3]])
-        positions, surfaces = stacked((tip, np.array([[0, 1, 2]])), (places, faces))
+        positions, surfaces = stacked((tip, np.array([[0, 1, 2]])), (vertices, faces))
         found = broad_phase(positions, surfaces, [(0, 1)]).near(positions, [0.3])
         of_tip = {name: column[found["nodes"][:, 0] == 0] for name, column in found.items()}
         energy, _ = pressure_on(of_tip, positions, law)
@@ -174,7 +174,7 @@ def test_a_point_is_pushed_away_wherever_it_is_on_a_crumpled_sheet() -> None:
         assert energy >= (0.9 if height > 1e-3 else 0.99) * nearest > 0.0
 
 
-def test_neighbours_on_a_sheet_leave_each_other_room_and_layers_do_not() -> None:
+def test_adjacent_cells_of_a_sheet_have_smaller_thickness_than_layers() -> None:
     # A strip of cells of 5 mm, folded at rest to two layers 4 mm apart, with 1 mm and a reach of 3 mm.
     mesh = ms.meshes.rectangle(0.1, 0.02, cells=(20, 4))
     along = mesh.rest_positions[:, 0]
@@ -244,7 +244,7 @@ def test_crossings_are_those_of_ipctk(seed) -> None:
         assert expected <= got and got
 
 
-def test_what_only_lies_near_does_not_cross() -> None:
+def test_surfaces_that_are_only_near_do_not_cross() -> None:
     positions, surfaces = stacked(grid((4, 4)), grid((4, 4), 1e-9), grid((4, 4), 0.0, 1.0, (1.5, 0.0)))
     phase = broad_phase(positions, surfaces, [(0, 1), (0, 2), (0, 0)])
     assert len(phase.crossings(positions)["contact"]) == 0

@@ -1,4 +1,4 @@
-"""Bodies that touch gain no energy, whatever the integrator: steps that would are taken by implicit Euler."""
+"""Energy in contact: no integrator lets it grow; a step that would is repeated with implicit Euler."""
 
 import numpy as np
 import pytest
@@ -6,11 +6,11 @@ import pytest
 import magshell as ms
 
 INTEGRATORS = [ms.ImplicitEuler(), ms.TRBDF2(), ms.SDIRK2(), ms.SDIRK3()]
-GAINS = 2e-3  # of the energy at hand, that rounding and errors of smooth motion may add up to
+GAINS = 2e-3  # [-] largest relative gain that round-off and the time integration error may cause
 
 
 def thrown(speed: float = 3.0, young_modulus: float = 1e6) -> tuple[ms.Scene, np.ndarray]:
-    """A cube above a held one, and velocities with which it is thrown at it, faster than steps can follow."""
+    """Return a scene of a cube above a held one, and velocities that throw it faster than the time steps resolve."""
     material = ms.NeoHookean(young_modulus=young_modulus, poisson_ratio=0.3)
     box = ms.meshes.box((0.02, 0.02, 0.01), cells=(2, 2, 1))
     lower = ms.Solid(box, material=material, mass_density=1e3, element="linear")
@@ -41,7 +41,7 @@ def test_an_impact_gains_no_energy(integrator, time_step) -> None:
     assert np.max(motion.energy) <= (1 + GAINS) * motion.energy[0]
 
 
-def test_steps_that_implicit_euler_took_are_told() -> None:
+def test_fallback_steps_of_implicit_euler_are_reported() -> None:
     scene, velocities = thrown()
     options = {"steps": 12, "velocities": velocities, "progress": False}
     coarse = ms.simulate(scene, time_step=5e-4, integrator=ms.TRBDF2(), **options)
@@ -52,7 +52,7 @@ def test_steps_that_implicit_euler_took_are_told() -> None:
 
 @pytest.mark.parametrize("keep", ["stages", "checkpoints"])
 def test_gradients_go_through_steps_that_implicit_euler_took(keep) -> None:
-    """By the speeds: adjoint against differences along one direction."""
+    """Compare the gradient by the initial speeds with differences along one direction."""
     import torch
 
     scene, velocities = thrown()
@@ -74,8 +74,8 @@ def test_gradients_go_through_steps_that_implicit_euler_took(keep) -> None:
     assert float((given.grad.numpy() * along).sum()) == pytest.approx(expected, rel=1e-5)
 
 
-def test_what_supports_put_in_is_no_gain() -> None:
-    """A plate that is pushed onto a block leaves its energy in it: that is no reason to damp a smooth motion."""
+def test_work_of_supports_is_not_taken_for_an_energy_gain() -> None:
+    """Check that a plate pushed onto a block is not damped: its supports do the work that raises the energy."""
     scene, _ = thrown()
     lower, upper = scene.bodies
     top = np.flatnonzero(upper.mesh.rest_positions[:, 2] > 0.0205)

@@ -1,4 +1,4 @@
-"""Pairs that touch: distances, energies, gradients and Hessians against ipctk, differences and what must hold."""
+"""Energies of contact pairs: distances, gradients and Hessians against ipctk, differences and exact properties."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ AREA, PARALLEL = 0.3, 0.05  # m2; m4: a twentieth makes many pairs of edges near
 
 
 def barrier(gap, reach):
-    """b and two derivatives, by the formula of contact/barrier.h [m, 1, 1/m]."""
+    """Return b(gap) and its first two derivatives by the formula of contact/barrier.h, in m, 1 and 1/m."""
     y = gap / reach
     value = -reach * (1 - y) ** 2 * np.log(y)
     slope = 2 * (1 - y) * np.log(y) - (1 - y) ** 2 / y
@@ -18,7 +18,7 @@ def barrier(gap, reach):
 
 
 def by_ipctk(kind, x, law, parallel):
-    """Energy, gradient (12,) and Hessian (12, 12) of one pair from ipctk's distances and mollifier, by the chain rule."""
+    """Compute energy, gradient (12,) and Hessian (12, 12) of one pair from ipctk's distances and mollifier."""
     ipctk = pytest.importorskip("ipctk", reason="the oracle of contact is not installed")
     squared = getattr(ipctk, f"{kind}_distance")(*x)
     by_squared = getattr(ipctk, f"{kind}_distance_gradient")(*x)
@@ -99,7 +99,9 @@ def test_derivatives_are_those_of_differences(kind, penalty) -> None:
     parallel = PARALLEL if kind == "edge_edge" else 0.0
 
     def part(name):
-        return lambda places: _core.pair_energies(kind, places, AREA, parallel, law)[name].reshape(len(x), -1)
+        return lambda positions: _core.pair_energies(kind, positions, AREA, parallel, law)[name].reshape(
+            len(x), -1
+        )
 
     def median(
         got, expected
@@ -197,11 +199,11 @@ def test_derivatives_of_friction(kind) -> None:
     along = rng.standard_normal((len(x), 4, 3))
     numbers = np.array([0.4, 0.7, 0.2])  # kinetic, static, m/s
 
-    def rub(places=x, velocities=v, friction=numbers, of=law):
-        return _core.pair_frictions(kind, places, AREA, parallel, of, velocities, tuple(friction), along)
+    def friction_of(positions=x, velocities=v, friction=numbers, of=law):
+        return _core.pair_frictions(kind, positions, AREA, parallel, of, velocities, tuple(friction), along)
 
-    def force(places=x, velocities=v):
-        return rub(places, velocities)["force"].reshape(len(x), 12)
+    def force(positions=x, velocities=v):
+        return friction_of(positions, velocities)["force"].reshape(len(x), 12)
 
     def most(got, expected):
         error = np.abs(got - expected).reshape(len(x), -1).max(1) / np.abs(expected).reshape(len(x), -1).max(
@@ -209,7 +211,7 @@ def test_derivatives_of_friction(kind) -> None:
         )
         return np.quantile(error, 0.97)
 
-    at = rub()
+    at = friction_of()
     assert most(at["by_velocity"], differences(lambda each: force(velocities=each), v)) < 1e-6
     by_place = differences(force, x, 1e-7)
     assert most(at["by_place"], by_place) < 1e-5
@@ -221,11 +223,14 @@ def test_derivatives_of_friction(kind) -> None:
     assert np.allclose(np.einsum("nij,nj->ni", at["secant"], v.reshape(-1, 12)), force(), atol=1e-10)
     for column in range(3):
         step = 1e-6 * np.eye(3)[column]
-        high, low = rub(friction=numbers + step)["force"], rub(friction=numbers - step)["force"]
+        high, low = (
+            friction_of(friction=numbers + step)["force"],
+            friction_of(friction=numbers - step)["force"],
+        )
         expected = ((high - low) * along).sum((1, 2)) / 2e-6
         assert np.abs(at["along_law"][:, column] - expected).max() < 1e-6 * np.abs(expected).max()
-    # Through the normal force alone: by the stiffness.
-    stiffer = rub(of=law | {"stiffness": 1.001 * law["stiffness"]})["force"]
+    # The stiffness enters through the normal force only.
+    stiffer = friction_of(of=law | {"stiffness": 1.001 * law["stiffness"]})["force"]
     by_stiffness = _core.pair_energies_by_law(
         kind, x, AREA, parallel, law, 0.0 * along, at["along_normal_force"]
     )[:, 0]

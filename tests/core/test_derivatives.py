@@ -1,7 +1,7 @@
-"""Every term's gradient against differences of its energy, its Hessian against differences of its gradient.
+"""Gradients of every energy term against differences of its energy, Hessians against differences of its gradient.
 
-One row a term. Every unknown is differenced, and the gradient's own direction as well. The states are far
-from rest: stretched, compressed, and folded to within a tenth of a degree of lying flat on themselves.
+There is one row per term. Differences are taken along every degree of freedom and along the gradient itself. The states
+are far from rest: stretched, compressed, and folded to within a tenth of a degree of lying flat on themselves.
 """
 
 import numpy as np
@@ -28,7 +28,10 @@ def curved_mesh(size):
 
 
 def shell(mesh, thickness=0.02, **options):
-    """thickness in units of the mesh's size: thin makes the membrane all there is, thick the bending."""
+    """Return a shell whose thickness is given in units of the mesh's size.
+
+    A thin one is dominated by membrane energy, a thick one by bending energy.
+    """
     size = mesh.size
     return ms.Shell(mesh, thickness=thickness * size, young_modulus=1e6, poisson_ratio=0.35, **options)
 
@@ -42,7 +45,7 @@ def elastic(thickness, bending):
 
 
 def capped_mesh(size):
-    """Two faces with an angle of 165 degrees, whose stretch is measured on other triangles than their own."""
+    """Return a mesh with two faces of an angle of 165 degrees, whose strain is measured on other triangles."""
     mesh = flat_mesh(size)
     long = mesh.interior_edges[[1, -2]]
     faces = mesh.edge_faces[long, 0]
@@ -68,7 +71,7 @@ def capped(thickness):
 
 
 def soft(mesh, **options):
-    """A sheet whose own energy is nothing beside that of what acts on it."""
+    """Return a shell whose elastic energy is negligible beside that of what acts on it."""
     return ms.Shell(mesh, thickness=1e-2 * mesh.size, young_modulus=1e-9, **options)
 
 
@@ -128,7 +131,7 @@ def loads(size):
     return Problem(ms.Scene(soft(mesh), loads=acting, allow_rigid_motions=True), Controls(load_factor=1.3))
 
 
-def couple(bending):
+def edge_moment(bending):
     def build(size):
         mesh = curved_mesh(size)
         ends = mesh.edges_where(lambda midpoints: midpoints[:, 0] > 0.9 * size, boundary_only=True)
@@ -149,7 +152,7 @@ def clamped(size):
 
 
 def turned(mesh):
-    """By 0.9 rad about an axis that is none of the world's."""
+    """Return a rotation by 0.9 rad about an axis that is oblique to the world's axes."""
     axis = np.array([1.0, 2.0, -1.0]) / np.sqrt(6.0)
     return rotation_matrix(0.9 * axis)
 
@@ -184,7 +187,7 @@ IN_FIELD = Controls(applied_flux_density=np.array(FIELD))
 IN_SOURCES = Controls(applied_flux_density=np.zeros(3), field_factor=1.0)
 IN_BOTH = Controls(applied_flux_density=np.array(FIELD), field_factor=0.8)
 
-# name -> (how to build it at a size, the term that must carry nearly all of the energy, or None)
+# name -> (builder for a given size, the term that must have nearly all of the energy, or None)
 TERMS = {
     "membrane": (elastic(1e-6, "midedge"), "membrane"),
     "membrane beside caps": (capped(1e-6), "membrane"),
@@ -200,8 +203,8 @@ TERMS = {
     "superposed fields": (magnetic(everything_magnetic, "mixed", IN_BOTH), "magnetic"),
     "gravity": (gravity, "gravity"),
     "loads": (loads, "loads"),
-    "edge couple, midedge": (couple("midedge"), "couple"),
-    "edge couple, hinge": (couple("hinge"), "couple"),
+    "edge couple, midedge": (edge_moment("midedge"), "couple"),
+    "edge couple, hinge": (edge_moment("hinge"), "couple"),
     "clamped edges": (clamped, "bending"),
     "oblique symmetry planes": (oblique_symmetry, None),
     "curvature scale": (scaled_curvature, "bending"),
@@ -213,7 +216,7 @@ TERMS = {
 
 
 def bent(problem, rng, amplitude=0.12):
-    """Random moves of a good part of an edge, on top of stretch and compression along the axes."""
+    """Return a state with random displacements of about a tenth of an edge, on top of stretches along the axes."""
     mesh = problem.scene.mesh
     strain = np.diag([1.35, 0.7, 1.1]) + 0.1 * rng.normal(size=(3, 3))
     spacing = mesh.edge_lengths.min()
@@ -222,7 +225,7 @@ def bent(problem, rng, amplitude=0.12):
 
 
 def folded(degrees):
-    """The flattened sheet in two halves, one turned onto the other about an edge in its middle."""
+    """Return a function that makes a state folded by an angle about an edge in the middle of the flattened sheet."""
 
     def state(problem, rng):
         mesh = problem.scene.mesh
@@ -241,14 +244,14 @@ def folded(degrees):
         positions = np.where(on_right[:, None], (flat - start) @ rotation.T + start, flat)
         left_open = np.pi - abs(np.radians(degrees))
         positions = positions + 0.05 * left_open * mesh.edge_lengths.min() * rng.normal(size=positions.shape)
-        assert abs(abs(fold_angle(mesh, positions, crease)) - np.pi + left_open) < 0.5 * left_open
+        assert abs(abs(dihedral_angle(mesh, positions, crease)) - np.pi + left_open) < 0.5 * left_open
         return problem.model.state(positions, 0.3 * rng.normal(size=mesh.n_edges))
 
     return state
 
 
 def crease_edge(mesh):
-    """The interior edge nearest to the middle of the mesh."""
+    """Return the interior edge nearest to the middle of the mesh."""
     inner = mesh.interior_edges
     center = mesh.rest_positions.mean(axis=0)
     return inner[np.argmin(np.linalg.norm(mesh.edge_midpoints[inner] - center, axis=1))]
@@ -258,7 +261,7 @@ def face_tip(mesh, face, edge):
     return np.setdiff1d(mesh.faces[face], mesh.edges[edge])[0]
 
 
-def fold_angle(mesh, positions, edge):
+def dihedral_angle(mesh, positions, edge):
     start, end = positions[mesh.edges[edge]]
     left, right = (positions[face_tip(mesh, face, edge)] for face in mesh.edge_faces[edge])
     normal_left, normal_right = np.cross(end - start, left - start), np.cross(right - start, end - start)
@@ -274,7 +277,7 @@ STATES = {
     "folded by -179.9 degrees": folded(-179.9),
 }
 
-# Relative. What is asked for is 1e-7 and 1e-6; what is left of the differences' own error is a few 1e-11.
+# [-] Relative errors. The project requires 1e-7 and 1e-6; the differences themselves are accurate to a few 1e-11.
 GRADIENT_TOLERANCE = 1e-9
 HESSIAN_TOLERANCE = 1e-9
 
@@ -283,7 +286,7 @@ HESSIAN_TOLERANCE = 1e-9
 
 
 def steps(problem):
-    """(n,) the unit of each unknown: a length of the mesh for positions, 1 for rotations and directions."""
+    """Return the unit of each unknown: a length of the mesh for positions, 1 for rotations and directors, (n,)."""
     size = problem.scene.mesh.edge_lengths.min()
     units = np.ones(problem.model.size)
     units[: 3 * problem.scene.mesh.n_vertices] = size
@@ -291,7 +294,7 @@ def steps(problem):
 
 
 def difference(function, q, direction, step):
-    """d function(q + t direction)/dt, central and of fourth order by Richardson's extrapolation."""
+    """Compute d function(q + t direction)/dt by central differences, fourth order by Richardson extrapolation."""
 
     def central(h):
         return (function(q + h * direction) - function(q - h * direction)) / (2.0 * h)
@@ -300,13 +303,13 @@ def difference(function, q, direction, step):
 
 
 def best_difference(function, q, direction, exact, weights=1.0):
-    """The smallest error over a sweep of steps: a wrong derivative is wrong with every one of them."""
+    """Return the smallest error over several step sizes; a wrong derivative is wrong with every one of them."""
     found = [difference(function, q, direction, step) for step in (1e-3, 3e-4, 1e-4, 3e-5)]
     return min(np.max(np.abs((value - exact) * weights)) for value in found)
 
 
 def worst_errors(problem, q):
-    """Of the gradient and of the Hessian, relative to their largest entries in units of energy."""
+    """Return the errors of the gradient and of the Hessian, relative to their largest entries in units of energy."""
     units = steps(problem)
     gradient = problem.gradient(q)  # first: a couple counts full circles from the last evaluated state
     hessian = problem.hessian(q)
@@ -315,7 +318,7 @@ def worst_errors(problem, q):
     directions = np.concatenate([np.diag(units), [by_gradient / np.abs(by_gradient).max() * units]])
     largest = np.abs(by_gradient).max()
     scaled_hessian = hessian * units * units[:, None]
-    # A Hessian that is nothing beside the forces over a unit's length is round-off, and compared to those.
+    # A Hessian far below force over unit length is round-off: its error is then measured relative to the forces.
     largest_hessian = max(np.abs(scaled_hessian).max(), largest)
     gradient_error = max(best_difference(problem.energy, q, d, gradient @ d) for d in directions) / largest
     hessian_error = (
@@ -345,8 +348,8 @@ def test_derivatives_hold_at_a_millimetre_and_at_a_kilometre(term, size, rng):
 
 
 @pytest.mark.parametrize("term", [name for name, (_, carrier) in TERMS.items() if carrier])
-def test_the_term_under_test_carries_the_energy(term, rng):
-    """Else an error in it would drown in another's derivatives."""
+def test_tested_term_dominates_the_energy(term, rng):
+    """Check that one term dominates the energy; otherwise the derivatives of others would hide an error in it."""
     build, carrier = TERMS[term]
     problem = build(1.0)
     energies = problem.model.energies(bent(problem, rng), problem.controls)
@@ -355,8 +358,8 @@ def test_the_term_under_test_carries_the_energy(term, rng):
 
 
 @pytest.mark.parametrize("term", TERMS)
-def test_the_free_hessian_is_the_whole_one_turned_and_cut(term, rng):
-    """Supports oblique to the axes turn their nodes into frames of their own."""
+def test_free_hessian_is_the_full_one_rotated_and_restricted(term, rng):
+    """Check the free Hessian where supports oblique to the axes rotate their nodes into local frames."""
     build, _ = TERMS[term]
     problem = build(1.0)
     q = bent(problem, rng)

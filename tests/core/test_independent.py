@@ -1,7 +1,7 @@
-"""The core against formulas written down a second time, in torch, and differentiated by it.
+"""The core's shell energies against the same formulas written a second time in torch and differentiated by it.
 
-Nothing here is shared with the core: strains come from deformation gradients and second fundamental forms in
-space, angles from face normals, and the magnetic energy from a matrix inverse, as the paper has them.
+The two share no code: here strains come from deformation gradients and second fundamental forms in space, angles from
+face normals, and the magnetic energy from a matrix inverse, as in the paper.
 """
 
 import numpy as np
@@ -12,22 +12,22 @@ import magshell as ms
 
 torch = pytest.importorskip("torch")
 
-# The term that carries the sheet's energy -> thickness [m] and modulus [Pa] that make it so.
+# Dominant energy term -> thickness [m] and modulus [Pa] that make it dominate.
 CARRIERS = {"membrane": (1e-3, 1e8), "bending": (30.0, 1e6), "magnetic": (1e-2, 1e-3)}
 MAGNETIZATION = (3e4, -2e4, 5e4)  # A/m
 FLUX_DENSITY = (0.03, -0.05, 0.08)  # T
 
 
 def make_mesh():
-    """Irregular, curved, with boundary."""
+    """Return an irregular, curved mesh with a boundary."""
     mesh = ms.meshes.rectangle(1.0, 0.7, cells=(3, 3), irregular=0.2, seed=11)
     x, y, _ = mesh.rest_positions.T
     return ms.TriangleMesh(np.stack([x, y, 0.25 * x**2 - 0.2 * y * x + 0.1 * y**2], axis=1), mesh.faces)
 
 
-def make_problem(bending, carrier):
+def make_problem(bending, dominant_term):
     mesh = make_mesh()
-    thickness, modulus = CARRIERS[carrier]
+    thickness, modulus = CARRIERS[dominant_term]
     draw = np.random.default_rng(8).uniform
     sheet = ms.Shell(
         mesh,
@@ -63,14 +63,14 @@ class Formulas:
         self.rest_angles = self.angles(self.rest)
 
     def frame(self, x):
-        """(a_1 a_2 n) of every face, [Chen22] (20)."""
+        """Compute the columns (a_1, a_2, n) of every face's frame, [Chen22] (20)."""
         corners = x[self.faces]
         a1, a2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
         normal = torch.linalg.cross(a1, a2)
         return a1, a2, normal / torch.linalg.norm(normal, dim=1, keepdim=True)
 
     def rest_edge_shapes(self):
-        """t~ (x) t~ / (A~ |a~|) for the edges of every face, (n_f, 3, 3, 3)."""
+        """Compute t~ (x) t~ / (A~ |a~|) for the three edges of every face, (n_f, 3, 3, 3)."""
         corners = self.rest[self.faces]
         edges = torch.roll(corners, -2, dims=1) - torch.roll(corners, -1, dims=1)
         turned = torch.linalg.cross(edges, self.rest_normal[:, None].expand_as(edges))
@@ -81,13 +81,16 @@ class Formulas:
         return torch.stack(self.frame(x), dim=2) @ self.inverse
 
     def plane_stress(self, strain):
-        """(1 - nu) tr G^2 + nu (tr G)^2, over 1 - nu^2."""
+        """Compute ((1 - nu) tr G^2 + nu (tr G)^2) / (1 - nu^2), the density of plane stress over E/2."""
         nu = torch.tensor(self.shell.poisson_ratio)
         trace = torch.einsum("fii->f", strain)
         return ((1 - nu) * torch.einsum("fij,fji->f", strain, strain) + nu * trace**2) / (1 - nu**2)
 
     def membrane(self, z):
-        """[Chen22] (22) with the Green strain of F_0 in the rest plane, which is what (18) comes to."""
+        """Compute the membrane energy, [Chen22] (22), in J.
+
+        The strain is the Green strain of F_0 in the rest plane, to which (18) reduces.
+        """
         f = self.deformation_gradient(z[: 3 * self.n_vertices].reshape(-1, 3))
         stretch = f.transpose(1, 2) @ f - torch.eye(3, dtype=torch.float64)
         in_plane = torch.eye(3, dtype=torch.float64) - torch.einsum(
@@ -98,7 +101,10 @@ class Formulas:
         return 0.5 * torch.sum(modulus * self.area * self.plane_stress(green))
 
     def bending(self, z):
-        """[Chen22] (23) with (19), delta as in the table of the two discretisations."""
+        """Compute the bending energy, [Chen22] (23) with (19), in J.
+
+        delta is that of the table of the two discretisations.
+        """
         x, rotations = z[: 3 * self.n_vertices].reshape(-1, 3), z[3 * self.n_vertices :]
         angles = self.angles(x)
         deltas = [
@@ -111,7 +117,7 @@ class Formulas:
         return 0.5 * torch.sum(modulus * self.area * self.plane_stress(shapes))
 
     def magnetic(self, z):
-        """[Chen22] (24)."""
+        """Compute the magnetic energy, [Chen22] (24), in J."""
         f = self.deformation_gradient(z[: 3 * self.n_vertices].reshape(-1, 3))
         magnetization = torch.tensor(MAGNETIZATION, dtype=torch.float64)
         flux_density = torch.tensor(FLUX_DENSITY, dtype=torch.float64)
@@ -127,7 +133,7 @@ class Formulas:
         return turn + (0.0 if self.hinge else sign * rotations[e])
 
     def angles(self, x):
-        """The angle from the normal of each face to what is beyond each of its edges, about that edge."""
+        """Compute the angle between each face's normal and the normal beyond each of its edges, about that edge."""
         _, _, normal = self.frame(x)
         found = {}
         for e, pair in enumerate(self.mesh.edge_faces.tolist()):
@@ -146,7 +152,7 @@ class Formulas:
         return found
 
     def continuation(self, e):
-        """Out of the edge's face, in the face's plane: what a clamp holds the face to."""
+        """Return the vector out of the edge's face within its plane, to which a clamp holds the face."""
         f = int(self.mesh.edge_faces[e].max())
         start, end = self.mesh.edges[e] if f == self.mesh.edge_faces[e, 0] else self.mesh.edges[e][::-1]
         _, _, normal = self.frame(self.rest)
@@ -154,7 +160,10 @@ class Formulas:
 
 
 def in_callers_order(problem, vector):
-    """(3 n_v + n_e,): zero for rotations that the core has none of. Columns of a matrix likewise."""
+    """Return a core vector in the caller's order, (3 n_v + n_e,), or a matrix with its rows so ordered.
+
+    Rotations of edges that the core has no unknown for are zero.
+    """
     order = problem.order
     known = order >= 0
     mesh = problem.scene.mesh
@@ -164,7 +173,7 @@ def in_callers_order(problem, vector):
 
 
 def deformed(problem, rng):
-    """Positions and rotations in the caller's order, and the core's state; clamps are moved as well."""
+    """Return positions and rotations in the caller's order, and the core's state; clamps are moved as well."""
     mesh = problem.scene.mesh
     strain = np.diag([1.3, 0.75, 1.1]) + 0.1 * rng.normal(size=(3, 3))
     positions = mesh.rest_positions @ strain.T + 0.03 * rng.normal(size=(mesh.n_vertices, 3))
@@ -173,9 +182,9 @@ def deformed(problem, rng):
 
 
 @pytest.mark.parametrize("bending", ["midedge", "hinge"])
-@pytest.mark.parametrize("carrier", CARRIERS)
-def test_energies_gradients_and_hessians(carrier, bending, rng):
-    problem, clamped = make_problem(bending, carrier)
+@pytest.mark.parametrize("dominant_term", CARRIERS)
+def test_energies_gradients_and_hessians_agree_with_torch(dominant_term, bending, rng):
+    problem, clamped = make_problem(bending, dominant_term)
     formulas = Formulas(problem.scene, clamped)
     z, q = deformed(problem, rng)
     z = torch.tensor(z, requires_grad=True)
@@ -183,7 +192,7 @@ def test_energies_gradients_and_hessians(carrier, bending, rng):
     energies = problem.model.energies(q, problem.controls)
     for name in CARRIERS:
         assert energies[name] == pytest.approx(getattr(formulas, name)(z).item(), rel=1e-12)
-        assert name == carrier or abs(energies[name]) < 1e-2 * abs(energies[carrier])
+        assert name == dominant_term or abs(energies[name]) < 1e-2 * abs(energies[dominant_term])
 
     def total(unknowns):
         return sum(getattr(formulas, name)(unknowns) for name in CARRIERS)

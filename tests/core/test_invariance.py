@@ -1,4 +1,4 @@
-"""What must not change the answer: rigid motions, numbering, mirrors, units, threads, symmetry."""
+"""Transformations that must not change the answer: rigid motions, numbering, mirrors, units, threads, symmetry."""
 
 import numpy as np
 import pytest
@@ -28,12 +28,12 @@ def strip(cells=(10, 3), curved=True):
 
 
 def clamped_edges(mesh, x):
-    """Edges whose ends had x = 0 before the mesh was moved, by the strip's own coordinates x (n_v,)."""
+    """Return the edges at x = 0, x (n_v,) being the strip's own coordinate before it was moved."""
     return mesh.edges_between(np.flatnonzero(np.abs(x) < 1e-9))
 
 
 def cantilever(mesh, x, rotation=None, bending="midedge", **options):
-    """A clamped strip with a line load on its free end; x (n_v,) along the strip, m."""
+    """Return a scene of a clamped strip with a line load on its free end; x (n_v,) along the strip, m."""
     rotation = np.eye(3) if rotation is None else rotation
     ends = mesh.edges_between(np.flatnonzero(np.abs(x - x.max()) < 1e-9))
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, bending=bending, **options)
@@ -72,7 +72,7 @@ def free_sheet(mesh, bending):
 @pytest.mark.parametrize("bending", BENDINGS)
 @settings(max_examples=20, deadline=None)
 @given(rotation=rotations, shift=st.tuples(*[st.floats(-1, 1)] * 3))
-def test_elastic_energy_does_not_see_rigid_motions(bending, rotation, shift):
+def test_elastic_energy_is_invariant_under_rigid_motions(bending, rotation, shift):
     problem = free_sheet(strip(), bending)
     model = problem.model
     positions, turns = random_state(problem, np.random.default_rng(1))
@@ -89,7 +89,7 @@ def test_elastic_energy_does_not_see_rigid_motions(bending, rotation, shift):
 @pytest.mark.parametrize("bending", BENDINGS)
 @settings(max_examples=8, deadline=None)
 @given(rotation=rotations, shift=st.tuples(*[st.floats(-0.3, 0.3)] * 3))
-def test_turning_everything_turns_the_equilibrium(bending, rotation, shift):
+def test_rotating_the_scene_rotates_the_equilibrium(bending, rotation, shift):
     mesh = strip()
     x = mesh.rest_positions[:, 0]
     here = at_rest(cantilever(mesh, x, bending=bending))
@@ -101,7 +101,7 @@ def test_turning_everything_turns_the_equilibrium(bending, rotation, shift):
 
 
 def loads_work(result, shift, rotation):
-    """What a shift of the origin adds to the potential of dead loads: - F . shift."""
+    """Return the potential - F . shift that a shift of the origin adds to dead loads, in J."""
     mesh = result.scene.mesh
     total = sum(load.vertex_forces(mesh).sum(axis=0) for load in result.scene.loads)
     return -(rotation @ total) @ np.asarray(shift)
@@ -159,7 +159,7 @@ def test_the_side_of_the_normals_does_not_matter(bending):
 
 @pytest.mark.parametrize("bending", BENDINGS)
 def test_a_mirrored_scene_has_the_mirrored_equilibrium(bending):
-    """M . B is what counts, so both are mirrored like any vector here."""
+    """Check a mirrored scene; both M and B are mirrored as vectors, since only M . B enters the energy."""
     mirror = np.diag([1.0, -1.0, 1.0])
     mesh = strip()
     x = mesh.rest_positions[:, 0]
@@ -168,10 +168,10 @@ def test_a_mirrored_scene_has_the_mirrored_equilibrium(bending):
     assert np.abs(there.positions - here.positions @ mirror).max() < 1e-10 * mesh.size
 
 
-@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")  # a field as much stronger as it is stiffer
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")  # the field is scaled with the modulus
 @pytest.mark.parametrize(("size", "stiffness"), [(1e-3, 1.0), (1e3, 1e-4), (1.0, 1e5)])
 def test_similar_sheets_deform_alike(size, stiffness):
-    """Lengths by s, modulus by k: line loads by k s, M_r B by k."""
+    """Check scaling by s in length and k in modulus: line loads scale by k s, M_r B by k."""
     mesh = strip()
     x = mesh.rest_positions[:, 0]
     here = at_rest(cantilever(mesh, x))
@@ -231,7 +231,10 @@ def test_any_number_of_threads_gives_the_same_bits(bending, thread_counts, rng):
 
 
 def test_any_number_of_threads_gives_the_same_bits_on_a_large_sheet(thread_counts, rng):
-    """One thread goes from part to neighbouring part, several take colour after colour of a stretch of them."""
+    """Compare bits of one and several threads on a mesh with more element blocks than one batch of colours holds.
+
+    One thread goes through neighbouring blocks in turn, several take the colours of a batch one after another.
+    """
     mesh = ms.meshes.rectangle(0.1, 0.1, cells=(110, 110), irregular=0.2)  # more parts than a stretch holds
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
     scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
@@ -249,7 +252,7 @@ def test_any_number_of_threads_gives_the_same_bits_on_a_large_sheet(thread_count
 
 
 def dome(cells, quarter):
-    """A shallow dome on a square, or the quarter x, y >= 0 of it."""
+    """Return a shallow dome on a square, or the quarter x, y >= 0 of it."""
     n = cells if quarter else 2 * cells
     mesh = ms.meshes.rectangle(
         1.0 if quarter else 2.0, 1.0 if quarter else 2.0, cells=(n, n), diagonals="crossed"
@@ -259,13 +262,13 @@ def dome(cells, quarter):
 
 
 def rim(mesh):
-    """Edges on x = 1, y = 1 and their mirror images."""
+    """Find the edges on x = 1, y = 1 and their mirror images."""
     outer = np.abs(mesh.edge_midpoints[:, :2]).max(axis=1) > 1.0 - 1e-9
     return np.flatnonzero(outer)
 
 
 def sagging(mesh, plain, supports, rotation, weight):
-    """The dome held at its rim, under its weight and in a field along its axis."""
+    """Compute the equilibrium of the dome held at its rim, under its weight and in a field along its axis."""
     sheet = ms.Shell(mesh, thickness=0.02, young_modulus=1e6, poisson_ratio=0.3, mass_density=1e3)
     scene = ms.Scene(
         sheet,
@@ -302,7 +305,10 @@ def test_a_quarter_with_symmetry_planes_is_the_whole(rotation):
 
 
 def test_a_dome_snaps_through_wherever_its_symmetry_planes_point():
-    """The way there is a relaxation, whose metric must not turn with the frames of the held vertices."""
+    """Check that snap-through does not depend on the frames of held vertices.
+
+    The dome is found by a relaxation, whose metric must not rotate with those frames.
+    """
     here, there = quarter_dome(np.eye(3), 1.0), quarter_dome(OBLIQUE, 1.0)
     assert here.displacements[:, 2].min() < -0.25
     assert np.abs(there.positions - here.positions @ OBLIQUE.T).max() < 1e-6
@@ -323,7 +329,7 @@ def test_welded_parts_are_one_sheet():
 
 @pytest.mark.parametrize("bending", BENDINGS)
 @pytest.mark.parametrize("angle", [np.pi / 2, -3.0])
-def test_turning_a_clamp_turns_a_sheet_for_nothing(bending, angle):
+def test_rotating_a_clamp_rotates_the_sheet_without_energy(bending, angle):
     mesh = strip((6, 3))
     edges = clamped_edges(mesh, mesh.rest_positions[:, 0])
     rotation, center = angle * np.array([0.48, 0.6, 0.64]), (0.2, -0.1, 0.05)

@@ -1,4 +1,4 @@
-"""Functions that element kernels compute in all lanes of a pack at once."""
+"""Functions that element kernels compute in all lanes of a SIMD vector at once."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def test_logarithm_of_what_has_none_or_an_infinite_one():
 
 
 def test_a_lane_does_not_depend_on_its_neighbours():
-    """Of numbers that need different care, one at a time and in any company."""
+    """Compare logarithms of special and ordinary numbers alone with those next to any others in a vector."""
     numbers = np.array([0.0, -1.0, 5e-324, 1e-310, 0.7, 1.4, np.inf, np.nan, 1e308, 1.0, 0.5])
     alone = np.concatenate([_core.lane_logarithms([number]) for number in numbers])
     for shift in range(len(numbers)):

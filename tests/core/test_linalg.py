@@ -16,7 +16,7 @@ BACKENDS = _core.factor_backends()
 
 
 def lower(matrix):
-    """The lower triangle by columns, sorted, its whole diagonal kept."""
+    """Return the lower triangle as sorted columns with every diagonal entry stored: starts, rows, values."""
     matrix = sp.csc_matrix(matrix)
     pattern = abs(sp.tril(matrix)).sign() + sp.identity(matrix.shape[0])
     pattern = sp.csc_matrix(pattern)
@@ -45,7 +45,7 @@ def laplacian(cells):
 
 
 def shell_like(cells, seed, unknowns=3):
-    """A grid of vertices with several unknowns each, random entries, no definiteness."""
+    """Return a random symmetric indefinite matrix of a grid of vertices with several unknowns each."""
     graph = abs(laplacian(cells)).sign() @ abs(laplacian(cells)).sign()
     pattern = sp.csc_matrix(sp.kron(graph, np.ones((unknowns, unknowns))))
     generator = np.random.default_rng(seed)
@@ -54,7 +54,7 @@ def shell_like(cells, seed, unknowns=3):
 
 
 def dominant(matrix):
-    """The same pattern, made positive definite."""
+    """Return a positive definite matrix with the same pattern."""
     matrix = sp.csc_matrix(matrix - sp.diags(matrix.diagonal()))
     return sp.csc_matrix(matrix + sp.diags(np.asarray(abs(matrix).sum(axis=1)).ravel() + 0.1))
 
@@ -119,7 +119,7 @@ def test_definite_matrices_are_solved_to_rounding(name, backend):
 
 @pytest.mark.parametrize("name", ["laplacian", "shell-like", "random"])
 def test_the_solution_is_that_of_superlu(name):
-    """An independent factorization that every build has."""
+    """Compare with an independent factorization that every installation has."""
     matrix = sp.csc_matrix(DEFINITE[name])
     rhs = np.random.default_rng(0).standard_normal(matrix.shape[0])
     np.testing.assert_allclose(factorized(matrix)[0].solve(rhs), splu(matrix).solve(rhs), rtol=1e-9)
@@ -165,7 +165,7 @@ def test_many_right_hand_sides_of_an_indefinite_matrix():
 
 @pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("ordering", _core.factor_orderings())
-def test_every_ordering(ordering, backend):
+def test_every_ordering_solves_to_rounding(ordering, backend):
     matrix = sp.csc_matrix(DEFINITE["laplacian"])
     factor, _ = factorized(matrix, backend, ordering=ordering)
     rhs = np.ones(matrix.shape[0])
@@ -199,7 +199,7 @@ def test_a_factor_recovers_from_a_failure(backend):
 
 
 def test_many_bodies_in_one_matrix_are_solved_on_any_number_of_threads():
-    """Each is small beside the whole, and goes through both substitutions by itself."""
+    """Solve for many bodies, each of which is small and passes both substitutions as a block of its own."""
     bodies = [shell_like(6, seed) for seed in range(20)]
     matrix = sp.csc_matrix(sp.block_diag(bodies))
     rhs = np.random.default_rng(14).standard_normal(matrix.shape[0])
@@ -275,7 +275,7 @@ def test_a_singular_matrix_is_reported(matrix):
 
 @pytest.mark.parametrize("corner", [0.0, 1e-13, 1e-10, 1e-7])
 def test_a_saddle_point_with_a_small_corner_is_solved(corner):
-    """Pivots that are tiny in their own front only: growth that refinement has to undo."""
+    """Solve a system whose pivots are tiny only within their own front, so that refinement must undo the growth."""
     cells = 30
     stiffness = dominant(shell_like(cells, 50))
     size, constraints = stiffness.shape[0], 400
@@ -295,7 +295,7 @@ def test_a_saddle_point_with_a_small_corner_is_solved(corner):
     assert backward_error(matrix, factor.solve(rhs), rhs) < 1e-12
 
 
-def test_pivot_growth_tells_definite_from_hard():
+def test_pivot_growth_distinguishes_definite_from_ill_conditioned():
     assert factorized(dominant(shell_like(10, 40)))[1].pivot_growth == pytest.approx(1.0, rel=0.5)
     assert factorized(shell_like(10, 40))[1].pivot_growth > 2.0
 

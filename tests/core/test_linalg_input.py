@@ -1,4 +1,4 @@
-"""What the factorizations of sparse symmetric matrices refuse."""
+"""Input that the factorizations of sparse symmetric matrices refuse."""
 
 import numpy as np
 import pytest

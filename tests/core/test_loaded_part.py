@@ -1,4 +1,4 @@
-"""Linear theory solves what a load is coupled with, and leaves the rest of a scene at rest."""
+"""Linear theory solves for the unknowns that a load is coupled with, and leaves the rest of a scene at rest."""
 
 import numpy as np
 import pytest
@@ -8,12 +8,12 @@ from magshell import _core
 from magshell.model.scene.solve_inputs import plain_inputs
 from magshell.solve.linear.rest import RestStiffness
 
-# Unknowns 0, 2, 4 and 1, 3: an entry of zero stands between them.
+# Unknowns 0, 2, 4 are coupled, and 1, 3; a stored zero lies between the two groups.
 STARTS, ROWS = [0, 4, 6, 8, 9, 10], [0, 1, 2, 4, 1, 3, 2, 4, 3, 4]
 VALUES = [4.0, 0.0, 1.0, 0.0, 5.0, 2.0, 6.0, 3.0, 7.0, 8.0]
 
 
-def test_of_a_matrix() -> None:
+def test_loaded_part_is_the_coupled_block_of_a_matrix() -> None:
     def part(*forces):
         return _core.loaded_part(5, STARTS, ROWS, VALUES, forces)
 
@@ -39,7 +39,7 @@ def test_of_a_matrix() -> None:
 
 
 def test_single_zeros_between_nodes_stay() -> None:
-    """Unknowns 0, 1 and 2, 3 have the same rows below, and are ordered as one if they keep them; 4 is by itself."""
+    """Check that unknowns 0, 1 and 2, 3 keep their common rows, so that each pair is ordered as one; 4 is alone."""
     starts, rows = [0, 5, 9, 11, 12, 13], [0, 1, 2, 3, 4, 1, 2, 3, 4, 2, 3, 3, 4]
     values = [9.0, 0, 1, 0, 0, 9, 0, 0, 0, 9, 0, 9, 9]
     unknowns, starts, rows, kept = _core.loaded_part(5, starts, rows, values, [1, 1, 1, 1, 1])
@@ -49,7 +49,7 @@ def test_single_zeros_between_nodes_stay() -> None:
     assert kept.tolist() == [9, 0, 1, 0, 9, 0, 0, 9, 0, 9, 9]
 
 
-def test_of_a_matrix_that_is_none() -> None:
+def test_malformed_matrices_are_refused() -> None:
     with pytest.raises(ValueError, match=r"values\[9\] is nan"):
         _core.loaded_part(5, STARTS, ROWS, [*VALUES[:9], np.nan], [0, 1, 0, 0, 0])
     with pytest.raises(ValueError, match="forces 5, one per row of the matrix"):
@@ -58,9 +58,9 @@ def test_of_a_matrix_that_is_none() -> None:
         _core.loaded_part(5, STARTS, [*ROWS[:9], 7], VALUES, [0, 1, 0, 0, 0])
 
 
-def plate(bending: str, place=lambda x: x, loads=None, supports=None, **options) -> ms.Scene:
+def plate(bending: str, map_positions=lambda x: x, loads=None, supports=None, **options) -> ms.Scene:
     flat = ms.meshes.rectangle(1.0, 1.0, cells=(4, 4), irregular=0.2)
-    flat = ms.TriangleMesh(place(flat.rest_positions), flat.faces)
+    flat = ms.TriangleMesh(map_positions(flat.rest_positions), flat.faces)
     mesh = ms.QuadraticTriangleMesh.of(flat) if bending == "midedge2" else flat
     sheet = ms.Shell(mesh, thickness=0.01, young_modulus=1e6, poisson_ratio=0.3, bending=bending)
     held = [ms.Clamp(mesh.boundary_edges)] if supports is None else supports(mesh)
@@ -77,7 +77,7 @@ def arched(x: np.ndarray) -> np.ndarray:
 
 
 def solved_sizes(monkeypatch) -> list[int]:
-    """Of every matrix that a load is solved with from now on."""
+    """Return a list that receives the size of every matrix that a load is solved with from now on."""
     sizes, solve = [], _core.Model.small_deflection
 
     def counted(*args):
@@ -94,12 +94,12 @@ BENDINGS = ["hinge", "midedge", "midedge2"]
 
 @pytest.mark.parametrize("bending", BENDINGS)
 @pytest.mark.parametrize("load", [(0, 0, 1.0), (1.0, 0.5, 0), (1.0, 0, 1.0)])
-@pytest.mark.parametrize("place", [raised(0.0), raised(0.37), arched])
-def test_the_same_as_of_the_whole(bending, load, place, monkeypatch) -> None:
-    scene = plate(bending, place, [ms.AreaLoad(load)])
+@pytest.mark.parametrize("map_positions", [raised(0.0), raised(0.37), arched])
+def test_loaded_part_gives_the_solution_of_the_full_matrix(bending, load, map_positions, monkeypatch) -> None:
+    scene = plate(bending, map_positions, [ms.AreaLoad(load)])
     sizes = solved_sizes(monkeypatch)
     found = ms.linear_response(scene)
-    falls_apart = place is not arched and 0 in (load[0], load[2])
+    falls_apart = map_positions is not arched and 0 in (load[0], load[2])
     assert (sizes[0] < scene.n_dofs) == falls_apart
 
     inputs = plain_inputs(scene, None, None, None, load_factor=1.0)
@@ -117,8 +117,8 @@ def test_the_same_as_of_the_whole(bending, load, place, monkeypatch) -> None:
 
 
 @pytest.mark.parametrize("bending", BENDINGS)
-def test_a_plate_that_is_held_across_alone(bending) -> None:
-    """It may slide in its plane, where nothing pushes it."""
+def test_plate_held_across_its_plane_only_needs_no_load_in_it(bending) -> None:
+    """Check a plate held across its plane only: it is free to slide in the plane, where nothing pushes it."""
 
     def across(mesh) -> list:
         rim = np.unique(mesh.nodes_of_edges[mesh.boundary_edges])
@@ -136,8 +136,8 @@ def test_a_plate_that_is_held_across_alone(bending) -> None:
 
 
 @pytest.mark.parametrize(("along", "still"), [((1.0, 0, 0), [2]), ((0, 0, 1.0), [0, 1])])
-def test_what_moves_with_its_supports(along, still) -> None:
-    """An end that is pulled in its plane stretches the sheet, and one that is lifted bends it."""
+def test_moving_supports_load_only_the_coupled_part(along, still) -> None:
+    """Check that an end pulled in its plane only stretches the sheet, and one that is lifted only bends it."""
 
     def supports(mesh) -> list:
         return [ms.Clamp(mesh.edges_at(x=0.0)), ms.Clamp(mesh.edges_at(x=1.0), displacement=along)]

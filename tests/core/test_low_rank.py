@@ -1,4 +1,4 @@
-"""A factorization with dense columns beside its sparse matrix: solutions and inertia against numpy."""
+"""Factorization of a sparse matrix plus a low-rank part of dense columns: solutions and inertia against numpy."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ SIZE = 40
 
 
 def banded(rng, definite: bool) -> np.ndarray:
-    """Symmetric, with a sparse pattern; positive definite or with eigenvalues of both signs."""
+    """Return a random symmetric sparse matrix, positive definite or with eigenvalues of both signs."""
     a = np.diag(rng.uniform(1.0, 2.0, SIZE) * (1.0 if definite else rng.choice([-1.0, 1.0], SIZE)))
     for k in (1, 2, 7):
         off = (0.15 if definite else 0.6) * rng.standard_normal(SIZE - k)
@@ -55,7 +55,10 @@ def test_solutions_and_inertia(stiffness, definite):
 
 
 def test_a_sparse_part_that_is_next_to_singular_alone():
-    """As a balloon's at the largest pressure: the columns make it regular, and digits are not lost with it."""
+    """Solve where only the columns make the matrix regular, without loss of digits.
+
+    The tangent of a balloon at its largest pressure is of this kind.
+    """
     rng = np.random.default_rng(4)
     a = banded(rng, True)
     lowest, vectors = np.linalg.eigh(a)
@@ -81,7 +84,7 @@ def test_columns_of_one_factorization_are_not_those_of_the_next():
     assert np.allclose(a @ factor.solve(rhs), rhs) and not np.allclose(bordered, factor.solve(rhs))
 
 
-def test_bad_columns():
+def test_columns_of_wrong_shape_are_refused():
     factor, values = factor_of(banded(np.random.default_rng(0), True))
     with pytest.raises(ValueError, match=r"columns must have shape"):
         factor.factorize(values, np.zeros((SIZE - 1, 1)), np.ones(1))

@@ -1,4 +1,4 @@
-"""Where the mean volume of each element is too soft there is a warning, and nowhere else."""
+"""Warnings about elements of mean volume: given where they are too soft, and nowhere else."""
 
 import warnings
 
@@ -19,7 +19,7 @@ def box(*cells, **given):
 
 
 def fin(cells):
-    """A thick block with a fin that is so many cells thick and ten cells long."""
+    """Return a mesh of a thick block with a fin ten cells long and `cells` cells thick."""
     mesh = ms.meshes.box((1.0, 0.4, 0.5), cells=(20, 8, 10))
     x, _, z = mesh.tetrahedron_barycenters.T
     kept = (x < 0.5) | ((z > 0.2) & (z < 0.2 + 0.05 * cells))
@@ -80,31 +80,31 @@ SLICES = {
 
 @pytest.mark.parametrize("hold", SLICES.values(), ids=SLICES)
 def test_a_slice_in_plane_strain_may_be_one_cell_thick_where_it_is_held_and_nowhere_else(hold):
-    """Cells along x, y and z; held along y on both of its sides."""
+    """Check slices held along y on both sides; cells are counted along x, y and z."""
 
-    def told(cells, supports):
+    def warnings_of(cells, supports):
         solid = ms.Solid(ms.meshes.box((0.1, 0.01, 0.04), cells), material=SOFT)
         with warnings.catch_warnings(record=True) as found:
             warnings.simplefilter("always")
             ms.Scene(solid, supports=supports(solid.mesh), allow_rigid_motions=True)
         return [str(each.message) for each in found]
 
-    assert not told((10, 1, 4), hold)
-    assert not told((20, 1, 2), hold)
-    (free_plate,) = told((10, 1, 4), lambda mesh: [])
-    (held_at_one_end,) = told((10, 1, 4), lambda mesh: [ms.Pin(mesh.vertices_at(x=0.0))])
-    (thin_bar,) = told((40, 1, 1), hold)  # one cell through its height, in which it bends
+    assert not warnings_of((10, 1, 4), hold)
+    assert not warnings_of((20, 1, 2), hold)
+    (free_plate,) = warnings_of((10, 1, 4), lambda mesh: [])
+    (held_at_one_end,) = warnings_of((10, 1, 4), lambda mesh: [ms.Pin(mesh.vertices_at(x=0.0))])
+    (thin_bar,) = warnings_of((40, 1, 1), hold)  # one cell through its height, in which it bends
     assert all("one cell thick" in text for text in (free_plate, held_at_one_end, thin_bar))
 
 
 @pytest.mark.parametrize("name", THIN)
-def test_one_cell_through_a_thickness_is_warned_of(name):
+def test_slender_region_one_cell_thick_is_warned_of(name):
     mesh = THIN[name]()
     with pytest.warns(
         ms.MeshQualityWarning, match=r"a slender region about \[[^\]]*\] m is one cell thick \("
-    ) as told:
+    ) as warned:
         free(ms.Solid(mesh, material=SOFT))
-    assert told[0].filename == __file__ and len(told) == 1
+    assert warned[0].filename == __file__ and len(warned) == 1
     with warnings.catch_warnings():  # not where each point has its own volume
         warnings.simplefilter("error")
         free(ms.Solid(mesh, material=SOFT, element="linear"))
@@ -120,10 +120,10 @@ def test_no_warning_without_reason(name):
 
 
 def test_a_fin_is_named_by_its_place_and_a_solve_does_not_warn_again():
-    with pytest.warns(ms.MeshQualityWarning) as told:
+    with pytest.warns(ms.MeshQualityWarning) as warned:
         solid = ms.Solid(fin(1), material=SOFT)
         free(solid)
-    place = np.fromstring(str(told[0].message).split("[")[1].split("]")[0], sep=",")
+    place = np.fromstring(str(warned[0].message).split("[")[1].split("]")[0], sep=",")
     assert place == pytest.approx((0.75, 0.2, 0.225), abs=0.01)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -135,8 +135,11 @@ def test_a_fin_is_named_by_its_place_and_a_solve_does_not_warn_again():
 
 
 @pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
-def test_one_cell_is_too_soft_and_two_are_not():
-    """The end of a bar that is bent, against a finer mesh; nor is one cell with a vertex inside."""
+def test_bent_bar_of_one_cell_is_too_soft_and_of_two_is_not():
+    """Compare the end deflection of a bent bar with that of a finer mesh.
+
+    One cell through the thickness is too soft; two are not, and neither is one with a vertex inside.
+    """
 
     def deflection(cells, diagonals="alternating"):
         solid = ms.Solid(ms.meshes.box((0.1, 0.01, 0.01), cells, diagonals), material=SOFT)
@@ -154,15 +157,15 @@ def test_one_cell_is_too_soft_and_two_are_not():
 @pytest.mark.parametrize(
     ("mesh", "free"), [(few(1), 3), (few(2), 2), (few(3), 1), (box(1, 1, 1), 1), (box(2, 1, 1), 0)]
 )
-def test_shapes_of_isochoric_material_that_cost_nothing_are_counted(mesh, free):
-    """The eigenvalues of the Hessian at rest that are zero, beside six of rigid motions."""
+def test_zero_energy_modes_of_isochoric_material_are_counted(mesh, free):
+    """Count the zero eigenvalues of the Hessian at rest beyond the six of rigid motions."""
     material = ms.NeoHookean("isochoric", **MODULI)
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always")
         solid = ms.Solid(mesh, material=material)
         ms.Solid(mesh, material=SOFT)  # of so few none is slender
-    assert len(told) <= 1
-    said = [str(each.message) for each in told if "cost no energy" in str(each.message)]
+    assert len(warned) <= 1
+    said = [str(each.message) for each in warned if "cost no energy" in str(each.message)]
     assert len(said) == (free > 0) and all(f"has {free} shape" in text for text in said)
     for each, count in ((solid, 6 + free), (ms.Solid(mesh, material=SOFT), 6)):
         scene = ms.Scene(each, allow_rigid_motions=True)

@@ -51,7 +51,7 @@ def set_muscle(model, activation, direction, strength=STRENGTH):
 
 
 def torch_force(model, form, x, activation, direction, strength=STRENGTH):
-    """The forces from the tension of each point: V T n (x) g . m; by torch from energies where there are some."""
+    """Compute the forces from the tension T of each point, V T n (x) g . m, in torch."""
     gradients, volumes = shape_gradients(model.nodes, model.tetrahedra)
     f = torch.einsum("tni,tpnj->tpij", x[torch.tensor(np.array(model.tetrahedra))], gradients)
     y = f @ (direction / direction.norm())
@@ -125,7 +125,7 @@ def test_the_gradient_by_all_that_it_is_made_of(element, form):
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("element", ELEMENTS)
 def test_fibres_without_length_pull_nowhere(element, form):
-    """Where |F m| = 0 there is no direction: the mean over all, and a finite Hessian."""
+    """Check zero force and a finite Hessian where |F m| = 0, so that the fibre has no direction."""
     model = model_of(element, form, activation=0.9)
     x = np.zeros_like(model.nodes)
     assert not model.gradient(x).any()

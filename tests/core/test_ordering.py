@@ -9,18 +9,18 @@ from magshell import _core, num_threads, set_num_threads
 
 
 def pattern_of(mesh: ms.TriangleMesh, bending: str) -> tuple[tuple, np.ndarray]:
-    """(size, column starts, rows) of a sheet clamped at an edge of its border, and where its unknowns are."""
+    """Return (size, column starts, rows) of a sheet clamped at a border edge, and the points of its unknowns."""
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, bending=bending)
     scene = ms.Scene(sheet, supports=[ms.Clamp(np.flatnonzero((mesh.edge_faces < 0).any(axis=1))[:1])])
     *pattern, _ = scene._model.hessian(scene._model.rest_state(), scene._control_layout.zeros())
     return tuple(pattern), scene._model.free_points
 
 
-def rolled_up(turns: float) -> ms.TriangleMesh:
-    """Planes cut it many times, so that the shortest cuts do not follow them."""
+def rolled_up(n_windings: float) -> ms.TriangleMesh:
+    """Return a rolled-up strip; straight planes cut it many times, so the shortest cuts do not follow planes."""
     mesh = ms.meshes.rectangle(1.0, 0.1, cells=(200, 10))
     x, y, _ = mesh.rest_positions.T
-    angle = 2.0 * np.pi * turns * x
+    angle = 2.0 * np.pi * n_windings * x
     radius = 0.05 + 0.002 * angle
     return ms.TriangleMesh(np.stack([radius * np.cos(angle), y, radius * np.sin(angle)], axis=1), mesh.faces)
 
@@ -57,14 +57,14 @@ METIS = {
 
 @pytest.mark.parametrize("bending", ["midedge", "hinge"])
 @pytest.mark.parametrize("name", MESHES)
-def test_as_few_operations_as_others_need(name, bending):
+def test_best_ordering_needs_few_operations_beside_amd_and_metis(name, bending):
     pattern, points = pattern_of(MESHES[name](), bending)
     best = _core.analyze(*pattern, points=points).flops
     assert best <= 1.1 * _core.analyze(*pattern, ordering="amd").flops
     assert best <= 1.12 * METIS.get((name, bending), np.inf)
 
 
-# Operations that Eigen's AMD needs, which knows nothing of unknowns with the same neighbours before it finds them.
+# Operations that Eigen's AMD needs; it is not told which unknowns have the same neighbours.
 AMD = {
     ("square", "midedge"): 1.591e8,
     ("irregular", "hinge"): 1.002e8,
@@ -81,8 +81,8 @@ def test_minimum_degree_needs_as_few_operations_as_another(name, bending):
     assert _core.analyze(*pattern, ordering="amd").flops <= 1.2 * AMD[name, bending]
 
 
-def test_minimum_degree_puts_what_knows_all_last():
-    """An arrow: no fill with its head last, all with it first."""
+def test_minimum_degree_puts_the_dense_row_of_an_arrow_last():
+    """Order an arrow matrix: no fill with its head last, all of it with the head first."""
     n = 3000
     starts = np.append(np.append(0, n), n + 1 + np.arange(n - 1))
     rows = np.append(np.arange(n), np.arange(1, n))
@@ -99,7 +99,7 @@ def test_dissection_beats_minimum_degree_on_a_large_sheet():
 
 
 def pattern_of_solid(mesh: ms.TetMesh, held: float = 0.05) -> tuple[tuple, np.ndarray]:
-    """As of a sheet, of a solid held at its end, a share of its length."""
+    """Return the same for a solid held over the fraction `held` of its length at one end."""
     solid = ms.Solid(mesh, material=ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.3))
     x = solid.mesh.rest_positions[:, 0]
     scene = ms.Scene(solid, supports=[ms.Pin(np.flatnonzero(x <= x.min() + held * np.ptp(x)))])
@@ -108,13 +108,13 @@ def pattern_of_solid(mesh: ms.TetMesh, held: float = 0.05) -> tuple[tuple, np.nd
 
 
 def test_dissection_of_a_solid_needs_less_than_metis():
-    """METIS 5.1 needs 7.22e9 operations; cuts at the median alone took 1.36 times as many."""
+    """Compare with METIS 5.1, which needs 7.22e9 operations; cuts at the median alone took 1.36 times as many."""
     pattern, points = pattern_of_solid(ms.meshes.from_distance(ms.shapes.ball(0.5), 0.12))
     assert _core.analyze(*pattern, points=points).flops < 7.22e9
 
 
-# What METIS 5.1's order needs in operations as sums of squares of columns, before fronts are joined, and what share of it
-# ours may need with joined fronts. The beam took 1.33 while sides were made alike to the last node.
+# Size [m], cells, operations that METIS 5.1's ordering needs (sum of squared column counts, before fronts are joined), and
+# the largest admissible ratio of ours with joined fronts to them. The beam took 1.33 when halves had to be exactly equal.
 BOXES = {
     "cube": ((1.0, 1.0, 1.0), (10, 10, 10), 8.71e9, 1.02),
     "beam": ((5.0, 1.0, 1.0), (40, 8, 8), 3.41e10, 1.16),
@@ -130,7 +130,7 @@ def test_boxes_of_tetrahedra(name):
 
 
 def test_a_rod_of_tetrahedra_is_ordered_by_minimum_degree():
-    """Dissection needs 1.6 times as many operations there."""
+    """Check the choice for a rod, where dissection needs 1.6 times as many operations."""
     pattern, points = pattern_of_solid(ms.meshes.box((15.0, 1.0, 1.0), (60, 4, 4)))
     best = _core.analyze(*pattern, points=points).flops
     amd = _core.analyze(*pattern, ordering="amd").flops
@@ -175,7 +175,7 @@ def test_useless_points_do_no_harm(bending, places):
 
 
 def test_parts_that_do_not_hang_together():
-    """Side by side, far apart, and in one place."""
+    """Order two disconnected parts side by side, far apart, and in one place."""
     (size, starts, rows), points = pattern_of(ms.meshes.rectangle(0.1, 0.1, cells=(20, 20)), "midedge")
     two = 2 * size, np.append(starts, starts[1:] + starts[-1]), np.append(rows, rows + size)
     one = _core.analyze(size, starts, rows, ordering="dissection", points=points).flops
@@ -186,7 +186,7 @@ def test_parts_that_do_not_hang_together():
 
 
 def test_unknowns_numbered_in_any_order():
-    """Also coordinate by coordinate, where members of two nodes take turns."""
+    """Order randomly renumbered unknowns, and those numbered coordinate by coordinate."""
     (size, starts, rows), points = pattern_of(ms.meshes.rectangle(0.1, 0.1, cells=(8, 8)), "midedge")
     columns = np.repeat(np.arange(size), np.diff(starts))
     generator = np.random.default_rng(1)

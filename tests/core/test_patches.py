@@ -1,4 +1,4 @@
-"""States with a closed answer: uniform strain, uniform curvature, magnetization as a dead load."""
+"""States with a closed-form answer: uniform strain, uniform curvature, magnetization as a dead load."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def free(shell):
 
 
 def plane_stress(strain, nu):
-    """(1 - nu) tr G^2 + nu (tr G)^2, over 1 - nu^2: twice the energy over stiffness and area."""
+    """Compute ((1 - nu) tr G^2 + nu (tr G)^2) / (1 - nu^2), twice the energy over stiffness and area."""
     return ((1 - nu) * np.trace(strain @ strain) + nu * np.trace(strain) ** 2) / (1 - nu**2)
 
 
@@ -70,7 +70,7 @@ CURVATURES = {
 @pytest.mark.parametrize("nu", [-0.5, 0.0, 0.3, 0.5])
 @pytest.mark.parametrize("shape", CURVATURES)
 def test_uniform_curvature_has_the_energy_of_a_plate(shape, nu):
-    """The bending patch test, small enough for the plan to stay what it is. Exact on any mesh."""
+    """Check the bending patch test, exact on any mesh, with a curvature so small that the plan hardly changes."""
     problem = free(sheet(poisson_ratio=nu))
     mesh = problem.scene.mesh
     curvature = 1e-3 * np.array(CURVATURES[shape])  # 1/m
@@ -91,7 +91,7 @@ def test_uniform_curvature_has_the_energy_of_a_plate(shape, nu):
 
 @pytest.mark.parametrize("nu", [0.0, 0.4])
 def test_a_rolled_sheet_has_the_energy_of_a_cylinder(nu):
-    """D/2 kappa^2 A: bent by a half circle without stretch; the mesh converges to it in the second order."""
+    """Compare with D/2 kappa^2 A of a sheet bent to a half circle without stretch; convergence is of second order."""
     length, width = 0.3, 0.2
     radius = length / np.pi
     stiffness = YOUNG * THICKNESS**3 / (12.0 * (1 - nu**2))
@@ -118,7 +118,7 @@ FLUX_DENSITY = np.array([2e-3, -1e-3, 3e-3])  # T
 
 
 def edge_traction(mesh, rotation):
-    """The boundary edges and h (M . outward conormal) B on each [N/m]."""
+    """Return the boundary edges and the line load h (M . outward conormal) B on each, in N/m."""
     edges = mesh.boundary_edges
     conormals = continuations(mesh, edges)
     return edges, THICKNESS * (conormals @ rotation @ TANGENTIAL)[:, None] * (rotation @ FLUX_DENSITY)
@@ -166,7 +166,10 @@ def test_a_magnetized_strip_is_a_strip_under_its_edge_load():
 @pytest.mark.parametrize("bending", ["midedge", "hinge"])
 @pytest.mark.parametrize("flipped", [False, True])
 def test_a_couple_bends_a_strip_to_a_circle_about_its_axis(bending, flipped):
-    """Small: tip height C L^2 / (2 D). A vector turns as the right hand does, whatever the normals."""
+    """Compare a small tip height with C L^2 / (2 D).
+
+    A moment vector rotates the edge by the right-hand rule, whichever side the normals point to.
+    """
     mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
     mesh = mesh.flipped() if flipped else mesh
     shell = ms.Shell(mesh, thickness=THICKNESS, young_modulus=YOUNG, poisson_ratio=0.0, bending=bending)
@@ -196,7 +199,7 @@ def test_loads_are_what_they_say_in_total():
     for load, expected in totals.values():
         np.testing.assert_allclose(load.vertex_forces(mesh).sum(axis=0), expected, rtol=1e-12)
     assert shell.vertex_masses.sum() == pytest.approx(1e3 * THICKNESS * area, rel=1e-12)
-    # Their potentials fall by force times way.
+    # Their potentials decrease by force times displacement.
     scene = ms.Scene(
         shell, loads=[load for load, _ in totals.values()], gravity=(0, 0, -9.81), allow_rigid_motions=True
     )

@@ -1,4 +1,4 @@
-"""What a solution leaves of a system: more digits than the solution has, and what is refused."""
+"""The residual of a linear system, in more digits than the solution has, and the input that is refused."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ N = 40
 
 @pytest.fixture
 def system():
-    """A factor of a full symmetric matrix, its values, the matrix."""
+    """Return a factor of a full symmetric matrix, its values, and the matrix."""
     generator = np.random.default_rng(5)
     matrix = generator.standard_normal((N, N))
     matrix = matrix + matrix.T + 20.0 * np.eye(N)
@@ -22,7 +22,7 @@ def system():
 @pytest.mark.skipif(
     np.finfo(np.longdouble).eps >= np.finfo(float).eps, reason="this machine has no more digits than a double"
 )
-def test_where_all_but_the_last_digits_cancel(system):
+def test_residual_is_exact_where_all_but_the_last_digits_cancel(system):
     factor, values, matrix = system
     x = np.random.default_rng(6).standard_normal(N)
     exact = matrix.astype(np.longdouble) @ x.astype(np.longdouble)
@@ -32,7 +32,7 @@ def test_where_all_but_the_last_digits_cancel(system):
     assert np.abs(factor.residual(values, x, rhs) - wanted).max() <= 0.01 * np.abs(wanted).max()
 
 
-def test_other_sizes_are_refused(system):
+def test_vectors_and_values_of_other_sizes_are_refused(system):
     factor, values, _ = system
     x = np.zeros(N)
     with pytest.raises(ValueError, match=r"must have shape \(40,\), got 39 and 40"):

@@ -1,4 +1,5 @@
-"""Small loads on sheets of long radii: the residual ends at the positions' round-off, so a solve must."""
+"""Small loads on shells of large radius: the residual cannot fall below round-off of the positions, so the
+solve ends there."""
 
 import numpy as np
 import pytest
@@ -42,7 +43,10 @@ def test_fine_roof_takes_small_steps() -> None:
 @pytest.mark.parametrize("links", [50, 200])
 @pytest.mark.parametrize("integrator", [ms.ImplicitEuler(), ms.TRBDF2()], ids=repr)
 def test_long_chains_of_links_move_at_the_usual_tolerance(links: int, integrator) -> None:
-    """The places of later links feel how exactly angles are read off places 10 m away, times the length of the chain."""
+    """Check the joint angles of long chains against a looser tolerance.
+
+    The error of the angles, read off positions 10 m away, moves the last links by that error times the length of the chain.
+    """
     scene = tree(links, 1)
     moves = [
         ms.simulate(

@@ -1,4 +1,4 @@
-"""There are no second derivatives, and whoever asks for one is told: a silent zero would be a wrong number."""
+"""Second derivatives do not exist here: each request raises an error, as a silent zero would be a wrong number."""
 
 import numpy as np
 import pytest
@@ -72,7 +72,7 @@ def test_a_gradient_penalty_is_refused_but_the_gradient_can_be_read(way, loss):
 
 
 def test_a_gradient_by_what_is_not_an_input_of_the_solve_is_refused_too():
-    """The weight of a loss: the gradient depends on it through what comes back to the solve only."""
+    """Check the weight of a loss, on which the gradient depends only through what comes back to the solve."""
     field, weight = FIELD.clone().requires_grad_(), torch.ones((), dtype=torch.float64, requires_grad=True)
     (first,) = torch.autograd.grad(weight * height(at_rest(field)), field, create_graph=True)
     with pytest.raises(ms.NoGradient):
@@ -97,7 +97,7 @@ def test_first_derivatives_may_be_taken_again_and_twice():
 
 
 def test_a_design_that_was_changed_in_place_since_has_its_gradient():
-    """As optimizers change it, between the solve and the gradient of another term, say."""
+    """Check a design that an optimizer changes between the solve and the gradient of another term."""
     field = FIELD.clone().requires_grad_()
     expected = torch.autograd.grad(height(at_rest(field)), field)[0]
     positions = at_rest(field)
@@ -118,7 +118,7 @@ def test_torch_checks_the_first_derivative_and_is_refused_the_second():
 
 
 def test_differences_of_gradients_as_the_message_advises():
-    """H v against second differences of the value."""
+    """Compare H v from differences of gradients with second differences of the value."""
 
     def gradient(field):
         field = field.clone().requires_grad_()

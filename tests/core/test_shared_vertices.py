@@ -17,8 +17,8 @@ def scene(*pins):
     return ms.Scene(sheet, supports=[ms.Clamp(MESH.edges_at(x=0.0)), *pins])
 
 
-def test_two_pins_move_one_vertex_along_axes_of_their_own():
-    """As one does that moves it along both; with gradients each by its own."""
+def test_pins_along_different_axes_move_one_vertex_together():
+    """Compare with one pin that moves the vertex along both axes; each pin has its own gradient."""
     one = ms.equilibrium(scene(ms.Pin(END, "xz", displacement=(1e-3, 0, 2e-3))))
     a, b = ms.Pin(END, "x", displacement=(1e-3, 0, 0)), ms.Pin(END, "z", displacement=(0, 0, 2e-3))
     two = scene(a, b)
@@ -51,7 +51,7 @@ def test_each_vertex_has_the_pins_that_hold_it():
 
 
 def test_oblique_directions_keep_their_moves():
-    """Of two that move and one that stays, on a frame of its own."""
+    """Check the local frame of a vertex with two moving directions and a fixed oblique one."""
     slant = np.array([[0.0, 0.6, 0.8]])
     moves = [RigidMove(np.zeros(3), np.zeros(3), by, None) for by in (np.eye(3)[0], np.array([0, -0.8, 0.6]))]
     along = [np.eye(3)[:1], np.array([[0.0, -0.8, 0.6]])]
@@ -69,11 +69,11 @@ def test_oblique_directions_keep_their_moves():
         (("xz", (1e-3, 0, 1e-3)), ("yz", (0, 0, 2e-3))),
     ],
 )
-def test_two_places_along_one_axis_are_refused(first, second):
+def test_contradicting_moves_along_one_axis_are_refused(first, second):
     with pytest.raises(ValueError, match=r"two supports move vertex \d+ to different places"):
         scene(*(ms.Pin(END, along, displacement=by) for along, by in (first, second)))
 
 
-def test_one_place_along_a_shared_axis_is_allowed():
+def test_equal_moves_along_a_shared_axis_are_allowed():
     pins = [ms.Pin(END, "xz", displacement=(1e-3, 0, 1e-3)), ms.Pin(END, "yz", displacement=(0, 2e-4, 1e-3))]
     assert np.allclose(ms.equilibrium(scene(*pins)).displacements[END], (1e-3, 2e-4, 1e-3))

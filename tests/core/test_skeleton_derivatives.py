@@ -1,4 +1,4 @@
-"""Accelerations of a chain of four joints, a ball joint among them, and their derivatives, against Pinocchio's (K4b)."""
+"""Accelerations of a chain of four joints, one a ball joint, and their derivatives against Pinocchio's (K4b)."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from scipy.spatial.transform import Rotation
 
 import magshell as ms
 
-STEPS = (3.2e-2, 1.6e-2, 8e-3, 4e-3, 2e-3)  # s, extrapolated to none
+STEPS = (3.2e-2, 1.6e-2, 8e-3, 4e-3, 2e-3)  # s, extrapolated to zero
 CLOSE = 1e-6  # of the largest entry
-DIFFERENCED = 3e-6  # likewise: differences over 0.04 of accelerations that are known to 1e-8
+DIFFERENCED = 3e-6  # of the largest entry; differences over 0.04 of accelerations that are known to 1e-8
 
 
 class Posed:
-    """The chain in a pose, that being its rest shape. tilt: of the coordinates, on the right."""
+    """The chain in a pose that is its rest shape. tilt: change of the coordinates, applied on the right."""
 
     def __init__(self, pose, rates, torques, tilt=(0.0,) * 6):
         self.links, self.joints, self.turns = [], [], []
@@ -51,7 +51,7 @@ class Posed:
         self.scene = ms.Scene(ms.Skeleton(self.links, self.joints), gravity=(0, 0, -9.81))
 
     def accelerations(self, values=None):
-        """(6,), of ball joints in the child's frame; tensors where the values are."""
+        """Compute the accelerations (6,), those of ball joints in the child's frame; tensors where the values are."""
         found = []
         for time_step in STEPS:
             move = ms.simulate(
@@ -67,7 +67,7 @@ class Posed:
         return found[0]
 
     def _change(self, move):
-        """Of the rates over the step, joint by joint in all six places."""
+        """Yield the change of each joint's rates over the step, placed among all six."""
         place = 0
         for joint, link, turn in zip(self.joints, self.links, self.turns, strict=True):
             rate, turned = move[joint].rate, move[link].rotation
@@ -105,7 +105,7 @@ def test_accelerations_and_their_derivatives_are_those_of_pinocchio(state):
 
 @pytest.mark.parametrize("state", STATES, ids=["first", "second"])
 def test_gradients_of_accelerations_are_those_of_pinocchio(state):
-    """By the adjoint of one step, extrapolated."""
+    """Check the adjoint of one step, extrapolated to a step of zero."""
     pose, rates, torques, _, _, _, by_rates, by_torques = map(np.array, state)
     posed = Posed(pose, rates, torques)
     for kind, wanted in (("rate", by_rates), ("torque", by_torques)):

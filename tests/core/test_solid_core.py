@@ -1,4 +1,4 @@
-"""Solids in the core: patch test, homogeneous states, gradients by every constant, threads, and states it refuses."""
+"""Solids in the core: patch test, homogeneous states, gradients by every constant, threads, and refused states."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ F = np.array([[1.1, 0.2, -0.1], [0.05, 0.9, 0.15], [-0.2, 0.1, 1.2]])
 
 
 def irregular_box(cells=(3, 3, 3), size=(1.0, 1.0, 1.0), shake=0.2, seed=0):
-    """A box whose inner vertices are moved by this share of the spacing."""
+    """Return a box whose inner vertices are moved by at most the fraction `shake` of the spacing."""
     mesh = ms.meshes.box(size, cells=cells)
     x = np.array(mesh.rest_positions)
     inner = np.setdiff1d(np.arange(len(x)), mesh.surface_vertices)
@@ -48,8 +48,8 @@ def materials():
 
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
 @pytest.mark.parametrize("name", materials())
-def test_t1_patch(name, element):
-    """Boundary at x = F X + c: every node lies there, and every element has the stress of F."""
+def test_patch_of_uniform_deformation_is_exact_t1(name, element):
+    """Check the patch test: with its boundary at x = F X + c, every node lies there and every element has F's stress."""
     solid = ms.Solid(irregular_box(), material=materials()[name], element=element)
     mesh = solid.mesh
     goal = mesh.rest_positions @ F.T + (0.3, -0.2, 0.1)
@@ -65,7 +65,7 @@ def test_t1_patch(name, element):
 
 
 def uniaxial(energy, stretch):
-    """Transverse stretch that is free of stress, and the nominal stress along, from W(stretch, t) alone."""
+    """Compute the transverse stretch without transverse stress, and the nominal stress, from W(stretch, t)."""
 
     def double(number):
         return torch.tensor(number, dtype=torch.float64)
@@ -96,7 +96,7 @@ def closed_form(name, young=1e6, nu=0.45):
 @pytest.mark.parametrize("stretch", [0.7, 1.5])
 @pytest.mark.parametrize("name", ["ln J", "isochoric", "corotated"])
 def test_t2a_homogeneous_states(name, stretch, element):
-    """A bar between sliding ends: the transverse stretch and the stress along are those of the energy alone."""
+    """Compare a bar between sliding ends with the transverse stretch and the stress that follow from the energy."""
     solid = ms.Solid(irregular_box((2, 2, 2)), material=materials()[name], element=element)
     mesh = solid.mesh
     x = mesh.rest_positions
@@ -114,7 +114,7 @@ def test_t2a_homogeneous_states(name, stretch, element):
 
 @pytest.mark.parametrize("material, element", MADE)
 def test_gradient_by_every_constant(material, element):
-    """lambda . dg/dk of the core against torch's second derivatives, a value for each of several elements."""
+    """Compare lambda . dg/dk of the core with torch's second derivatives, each element with its own values."""
     box = irregular_box((1, 1, 1))
     nodes, tetrahedra = box.rest_positions, box.tetrahedra
     if element != "linear":
@@ -200,7 +200,7 @@ def test_stable_materials_come_back_from_inversion(name):
 
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
 def test_steps_leave_no_element_inside_out(element):
-    """A block pressed to half its height in one call."""
+    """Check a block pressed to half its height in one call."""
     solid = ms.Solid(
         irregular_box((3, 3, 3)),
         material=ms.NeoHookean(young_modulus=1e6, poisson_ratio=0.3),

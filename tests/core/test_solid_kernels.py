@@ -1,4 +1,4 @@
-"""The elastic energies of tetrahedra: every material and element against torch's own derivatives of the formulas."""
+"""Elastic energies of tetrahedra: every material and element against torch's derivatives of the formulas."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from solid_model import (
     torch_energy,
 )
 
-# Principal stretches, and what each node moves besides.
+# Principal stretches, and the size of each node's random displacement.
 WORKING = {
     "mild": ((1.1, 0.95, 1.02), 0.02),
     "large": ((1.7, 0.6, 0.9), 0.05),
@@ -58,7 +58,7 @@ def test_energy_gradient_and_hessian_are_the_formulas(material, shape, element):
 @pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize("material", STABLE)
 def test_gradient_of_a_flat_element_is_the_formula_however_its_nodes_are_rounded(material, seed):
-    """det F is zero but for round-off here, and so are the pivots that torch.linalg.det would divide by."""
+    """Check states with det F zero up to round-off, where torch.linalg.det would divide by pivots that vanish too."""
     model, x, energy = case(material, "linear", "flat")
     x = x * (1 + 2.0**-52 * np.random.default_rng(seed).integers(-2, 3, x.shape))
     at = torch.tensor(x, requires_grad=True)
@@ -128,7 +128,7 @@ def test_the_projective_energy_resists_small_changes_of_volume_with_a_third_of_l
 
 @pytest.mark.parametrize("principal", [(3.0, 2.0, 0.9), (4.0, 1.5, 0.4), (0.2, 0.1, 0.05), (2.0, 1.0, -0.9)])
 def test_the_projective_energy_far_from_rest_is_the_formula(principal):
-    """Also where the smallest stretch takes the lower root."""
+    """Compare with torch, also where the smallest stretch takes the lower root."""
     nodes, tetrahedra = sample_element("linear")
     model = SolidModel(nodes, tetrahedra, "Projective")
     energy, x = torch_energy(model, "Projective", False), deformed(nodes, principal)

@@ -1,4 +1,4 @@
-"""Drag and thrust on single faces, [Chen22] (42)-(44): against published numbers, a second formula, differences."""
+"""Drag and thrust on single faces, [Chen22] (42)-(44): against published numbers, a second formula, and differences."""
 
 import numpy as np
 import pytest
@@ -63,7 +63,7 @@ def make(tables=None, **changes):
 
 
 def random_faces(rng, count=40):
-    """Corners of centimetres, speeds and accelerations of order one: each (n, 3, 3)."""
+    """Return corners of centimetres, velocities and accelerations of order one, each (n, 3, 3)."""
     return 0.01 * rng.standard_normal((count, 3, 3)), *rng.standard_normal((2, count, 3, 3))
 
 
@@ -87,7 +87,7 @@ orientations = pytest.mark.parametrize("face", FACES.values(), ids=FACES)
 
 
 def forces_at(angles, face, **water):
-    """(drag, thrust) over 1/2 rho A |v|^2, by direction of flow and by the normal against it."""
+    """Return drag and thrust over 1/2 rho A |v|^2, along the flow and against it along the normal."""
     flow = SPEED * np.stack([np.cos(angles), 0 * angles, -np.sin(angles)], axis=1)
     x = np.broadcast_to(face, (len(angles), 3, 3))
     v = np.broadcast_to(-flow[:, None], x.shape)  # the water is at rest
@@ -101,7 +101,7 @@ def forces_at(angles, face, **water):
 
 
 @orientations
-def test_published_numbers(face):
+def test_drag_and_thrust_have_the_published_values(face):
     drag, thrust = forces_at(G1_ANGLES, face)
     np.testing.assert_allclose(drag, 2 * G1[:, 2], rtol=0, atol=1e-12)
     np.testing.assert_allclose(thrust, 2 * G1[:, 3], rtol=0, atol=1e-12)
@@ -109,15 +109,15 @@ def test_published_numbers(face):
 
 
 @orientations
-def test_published_tables(face):
+def test_diffpd_tables_give_the_published_values(face):
     drag, thrust = forces_at(G1_ANGLES, face, **DIFFPD)
     np.testing.assert_allclose(drag, G1[:, 4], rtol=0, atol=1e-12)
     np.testing.assert_allclose(thrust[1:], G1[1:, 5], rtol=0, atol=1e-12)
-    assert thrust[0] == 0  # of a thrust that jumps from one side to the other, the middle
+    assert thrust[0] == 0  # the thrust jumps from one side to the other; its mean is taken
     np.testing.assert_allclose(ms.Water(**DIFFPD).coefficients(G1_ANGLES), G1[:, 4:].T, rtol=0, atol=1e-12)
 
 
-def test_half_of_it_is_softcon():
+def test_half_the_drag_is_that_of_softcon():
     table = (G1_ANGLES, np.sin(G1_ANGLES) ** 2)
     by_factor, by_table = ms.Water(drag_coefficient=0.5), ms.Water(attack_table=table)
     softcon = [0.0, 0.030153689607045786, 0.06698729810778065, 0.24999999999999994]
@@ -128,7 +128,7 @@ def test_half_of_it_is_softcon():
 
 @orientations
 def test_face_on_is_twice_rho_a_v2(face):
-    """Unoriented, one of the two faces would feel nothing."""
+    """Check both orientations: with oriented faces one of the two would have no force."""
     drag, thrust = forces_at(np.array([np.pi / 2]), face)
     assert drag + thrust == pytest.approx(4.0, rel=1e-14)
 
@@ -163,14 +163,14 @@ def test_a_moving_frame(rng):
 
 
 @waters
-def test_drag_takes_energy(tables, rng):
+def test_drag_dissipates_energy(tables, rng):
     x, v, _ = random_faces(rng)
     still = make(tables, velocity=(0, 0, 0))
     assert ((still.force(x, v) * v.mean(axis=1)).sum(axis=1) < 0).all()
 
 
 @waters
-def test_nothing_acts_on_what_moves_with_the_water(tables, rng):
+def test_faces_moving_with_the_water_have_no_force(tables, rng):
     x, _, _ = random_faces(rng)
     water = make(tables)
     found = kernel(water, x, np.broadcast_to(water.velocity, x.shape), np.zeros_like(x))
@@ -201,7 +201,7 @@ def test_no_nan_along_or_head_on(tables, angle):
 
 
 def test_a_smooth_table_is_differentiable_head_on():
-    """The Jacobian there is the limit of those around it, from wherever one comes."""
+    """Check that the Jacobian head on is the limit of those around it from every side."""
     water = make(WATERS["a smooth table"], velocity=(0, 0, 0))
     still = np.zeros((1, 3, 3))
 
@@ -217,12 +217,12 @@ def test_a_smooth_table_is_differentiable_head_on():
 
 
 def packed(x, v, w):
-    """Positions (9), mean velocity (3), mean acceleration (3) of each face: (n, 15)."""
+    """Return positions (9), mean velocity (3) and mean acceleration (3) of each face as rows (n, 15)."""
     return np.concatenate([x.reshape(-1, 9), v.mean(axis=1), w.mean(axis=1)], axis=1)
 
 
 def jacobian_of(water, x, v, w):
-    """Of the force on the whole face by what `packed` returns: (n, 3, 15)."""
+    """Return the Jacobian of the force on each face by the variables of `packed`, (n, 3, 15)."""
     found = kernel(water, x, v, w)
     by_position = found["by_position"].transpose(0, 2, 1, 3).reshape(-1, 3, 9)
     return 3 * np.concatenate([by_position, found["by_velocity"], found["by_acceleration"]], axis=2)
@@ -236,7 +236,7 @@ def force_of(water, z):
 
 @waters
 def test_jacobians_against_differences(tables, rng):
-    """In every direction, and in the one in which each component changes most."""
+    """Compare along every direction and along the one in which each component changes most."""
     faces = random_faces(rng, 20)
     water, z, jacobian = make(tables), packed(*faces), jacobian_of(make(tables), *faces)
     scale = np.repeat([0.01, 1.0, 1.0], [9, 3, 3])  # of positions, velocities, accelerations
@@ -267,7 +267,10 @@ def test_gradients_against_differences(tables, rng):
 
 
 def formula(x, v, w, rho, velocity, drag_coefficient, thrust_coefficient, added_mass, c_drag, c_thrust):
-    """[Chen22] (42)-(44) for one face as printed, in torch, n turned against the flow; c_... are functions of phi."""
+    """Compute [Chen22] (42)-(44) for one face as printed, in torch; c_... are functions of phi.
+
+    The normal n is turned against the flow.
+    """
     import torch
 
     across = torch.linalg.cross(x[1] - x[0], x[2] - x[0])
@@ -310,7 +313,7 @@ def test_a_second_formula(name, rng):
 
 
 def test_added_mass_resists_along_the_normal():
-    """5 kg/m2 on 0.055 m2, whatever way the face is oriented, and nothing along the face."""
+    """Check 5 kg/m2 on 0.055 m2 for both orientations: a force along the normal and none within the face."""
     for face in FACES.values():
         w = np.broadcast_to([3.0, -1.0, 2.0], (1, 3, 3))
         force = ms.Water(added_mass=5.0).force(face[None], np.zeros((1, 3, 3)), w)
@@ -318,7 +321,7 @@ def test_added_mass_resists_along_the_normal():
 
 
 def test_a_plate_that_falls():
-    """v_T tanh(t / T) of the docstring, with a heavy coat of water and coefficients of a table."""
+    """Compare with v_T tanh(t / T) of the docstring, with a heavy added mass and coefficients of a table."""
     areal_mass, gravity, added_mass = 1.2, 9.81, 0.8
     water = ms.Water(drag_coefficient=0.6, added_mass=added_mass, **DIFFPD)
     c_d, c_t = (float(c) for c in water.coefficients(np.pi / 2))
@@ -326,7 +329,7 @@ def test_a_plate_that_falls():
     time = terminal * (areal_mass + added_mass) / (areal_mass * gravity)
 
     def acceleration(_, velocity):
-        """From the kernel's force, which is linear in the acceleration."""
+        """Compute the acceleration from the kernel's force, which is linear in it."""
         v = np.broadcast_to([0, 0, velocity[0]], (1, 3, 3))
         at_rest, moved = (
             water.force(FACE[None], v, np.broadcast_to([0, 0, w], (1, 3, 3)))[0, 2] for w in (0.0, 1.0)

@@ -8,7 +8,7 @@ namespace magshell {
 namespace {
 
 // [-] growth of the tree's boxes that makes a new tree worth its time; changes time only, fixed by
-// test_what_is_found_does_not_depend_on_threads_nor_on_what_was_asked_before
+// test_broad_phase_does_not_depend_on_threads_or_earlier_queries
 constexpr double grown = 1.5;
 // [tasks] for a few threads, as tasks differ in size; plain-words: ok
 constexpr std::size_t enough_tasks = 32;

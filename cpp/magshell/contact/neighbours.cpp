@@ -10,7 +10,7 @@ namespace {
 
 constexpr double endless = std::numeric_limits<double>::infinity();
 // [-] longest path between neighbours over their distance; along a half circle the ratio is 1.6. Fixed by
-// test_neighbours_on_a_sheet_leave_each_other_room_and_layers_do_not
+// test_adjacent_cells_of_a_sheet_have_smaller_thickness_than_layers
 constexpr double way_round = 3.0;
 
 }  // namespace

@@ -8,7 +8,7 @@
 namespace magshell {
 namespace {
 
-// Dofs up to which a faster, possibly worse ordering is used: the better one takes longer than it saves. See test_the_same_as_of_the_whole.
+// Dofs up to which a faster, possibly worse ordering is used: the better one takes longer than it saves. See test_loaded_part_gives_the_solution_of_the_full_matrix.
 constexpr Index few_dofs = 20000;
 
 // RAII guard that counts edge rotations from the reference shape, for which the Hessian has fewer entries.

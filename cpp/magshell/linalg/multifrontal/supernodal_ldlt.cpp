@@ -23,7 +23,7 @@ using slabs::width;
 namespace {
 
 // [-] pivot growth that costs half of the digits: checked before success is reported; fixed by
-// test_pivot_growth_tells_definite_from_hard
+// test_pivot_growth_distinguishes_definite_from_ill_conditioned
 constexpr double doubtful_growth = 1e8;
 
 }  // namespace

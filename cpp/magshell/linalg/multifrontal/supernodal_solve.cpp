@@ -11,7 +11,7 @@ namespace magshell {
 namespace {
 
 // [-] pivot growth from which solutions are refined: below it they have at least 12 digits; fixed by
-// test_pivot_growth_tells_definite_from_hard
+// test_pivot_growth_distinguishes_definite_from_ill_conditioned
 constexpr double refined_from_growth = 1e4;
 constexpr int most_refinements = 8;  // [-] fixed by test_a_singular_matrix_is_reported
 // [-] relative residual of a refined solution; test_a_saddle_point_with_a_small_corner_is_solved

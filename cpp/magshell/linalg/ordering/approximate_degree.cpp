@@ -104,7 +104,7 @@ class Elimination {
     // Orders nodes with very many neighbours last: they would be in every list.
     void put_aside_what_knows_many(const NodeGraph& graph) {
         // [-] Factor of the square root of all unknowns, and least number, of neighbours that count as very many, as in AMD;
-        // fixed by test_minimum_degree_puts_what_knows_all_last
+        // fixed by test_minimum_degree_puts_the_dense_row_of_an_arrow_last
         constexpr double dense_factor = 10.0, least_dense = 16.0;
         const double many = std::max(least_dense, dense_factor * std::sqrt(static_cast<double>(left_)));
         for (Index i = 0; i < graph.size(); ++i)

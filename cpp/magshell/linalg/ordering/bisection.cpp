@@ -116,7 +116,7 @@ struct Way {
 // compared with making a cut.
 bool worth_trying(Index separator, std::size_t nodes) {
     // [unknowns cubed per node] elimination time that a cut is worth; fixed by
-    // test_as_few_operations_as_others_need
+    // test_best_ordering_needs_few_operations_beside_amd_and_metis
     constexpr double as_long = 2e4;
     return std::pow(static_cast<double>(separator), 3) > as_long * static_cast<double>(nodes);
 }
@@ -209,7 +209,7 @@ std::vector<Index> bisect(const NodeGraph& graph, const std::vector<Index>& node
     }
     // Cuts that look best before refinement are smoother, and so are the parts that they leave: a later
     // candidate must be clearly cheaper.
-    // [-] Largest cost of such a candidate relative to the best so far; fixed by test_as_few_operations_as_others_need
+    // [-] Largest cost of such a candidate relative to the best so far; fixed by test_best_ordering_needs_few_operations_beside_amd_and_metis
     constexpr double so_much_less = 0.9;
     std::vector<Side> best_sides;
     std::vector<Index> best_separator;

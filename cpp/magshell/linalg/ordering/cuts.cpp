@@ -12,7 +12,7 @@ namespace magshell {
 // the right, and to the right border the other way round. The weights of all borders are therefore cumulative
 // sums.
 Cut lightest_cut(const NodeGraph& graph, const std::vector<Index>& nodes, CutState& state) {
-    // [-] of the whole weight, from the middle; fixed by test_as_few_operations_as_others_need
+    // [-] of the whole weight, from the middle; fixed by test_best_ordering_needs_few_operations_beside_amd_and_metis
     constexpr double farthest = 0.2;
     const Index count = static_cast<Index>(nodes.size());
     std::vector<std::pair<double, Index>>

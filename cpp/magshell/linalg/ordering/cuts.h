@@ -21,7 +21,7 @@ struct Cut {
 
 /// Returns the cost of a separator that leaves one side larger than half by the fraction `off` of the whole.
 inline double cost_of_cut(double weight, double off) {
-    // [-] penalty of imbalance: weight factor of off^2; fixed by test_as_few_operations_as_others_need
+    // [-] penalty of imbalance: weight factor of off^2; fixed by test_best_ordering_needs_few_operations_beside_amd_and_metis
     constexpr double uneven = 8.0;
     return weight * (1.0 + uneven * off * off);
 }

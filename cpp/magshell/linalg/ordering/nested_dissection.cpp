@@ -109,7 +109,7 @@ void place_followers(const NodeGraph& graph, const std::vector<char>& leads, std
 
 std::vector<Index> nested_dissection(const NodeGraph& graph, const std::function<void()>& watch) {
     if (graph.size() == 0) return {};
-    // [nodes] size of a part that is not cut further; fixed by test_as_few_operations_as_others_need
+    // [nodes] size of a part that is not cut further; fixed by test_best_ordering_needs_few_operations_beside_amd_and_metis
     constexpr std::size_t few_nodes = 200;
     const std::vector<char> leads = leaders(graph);
     std::vector<Index> leading, number(graph.size(), -1);

@@ -67,7 +67,7 @@ AssemblyTree ordered_assembly_tree(const SparsePattern& pattern, const FactorOpt
     // Skips AMD, which takes a good part of the time of a factorization, where it cannot win. It beats nested
     // dissection where cuts are short compared with the whole, above all on narrow strips and rods, and may
     // where only the pattern is known.
-    // [operations per unknown] below which AMD is tried; fixed by test_as_few_operations_as_others_need
+    // [operations per unknown] below which AMD is tried; fixed by test_best_ordering_needs_few_operations_beside_amd_and_metis
     constexpr double few_operations = 5.5e4;
     // [unknowns] up to which the time of AMD is negligible; fixed by
     // test_minimum_degree_needs_as_few_operations_as_another

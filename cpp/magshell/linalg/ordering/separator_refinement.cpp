@@ -7,14 +7,14 @@
 namespace magshell {
 namespace {
 
-// [-] largest fraction of the whole weight on one side; fixed by test_as_few_operations_as_others_need
+// [-] largest fraction of the whole weight on one side; fixed by test_best_ordering_needs_few_operations_beside_amd_and_metis
 constexpr double largest_share = 0.6;
 // [-] fraction of the larger side of both up to which the sides count as balanced; same
-// test_as_few_operations_as_others_need
+// test_best_ordering_needs_few_operations_beside_amd_and_metis
 constexpr double alike_enough = 0.52;
-constexpr int most_passes = 3;  // [-] fixed by test_as_few_operations_as_others_need
+constexpr int most_passes = 3;  // [-] fixed by test_best_ordering_needs_few_operations_beside_amd_and_metis
 // [moves] without improvement before a pass ends, at most the separator's nodes; fixed by
-// test_as_few_operations_as_others_need
+// test_best_ordering_needs_few_operations_beside_amd_and_metis
 constexpr int most_moves_in_vain = 200;
 
 int number(Side side) {
