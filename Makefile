@@ -50,12 +50,13 @@ sanitize: $(VENV)/.with-test  ## tests against an extension that watches its mem
 processors: $(VENV)/.with-test  ## every test as other processors see it: an hour or two
 	PYTHON=$(CURDIR)/$(VENV)/bin/python PROCESSES=$(PROCESSES) scripts/other_processors.sh
 
-lint: $(VENV)/.with-dev  ## ruff and clang-format, changing nothing
+lint: $(VENV)/.lint  ## ruff, clang-format and plain words, changing nothing
 	$(VENV)/bin/ruff check $(pythons)
 	$(VENV)/bin/ruff format --check $(pythons)
 	$(VENV)/bin/clang-format --dry-run -Werror $(cpps)
+	$(VENV)/bin/python scripts/plain_words.py
 
-format: $(VENV)/.with-dev  ## put the sources into the form that lint wants
+format: $(VENV)/.lint  ## put the sources into the form that lint wants
 	$(VENV)/bin/ruff check --fix $(pythons)
 	$(VENV)/bin/ruff format $(pythons)
 	$(VENV)/bin/clang-format -i $(cpps)
@@ -85,6 +86,11 @@ $(VENV)/.wheel: $(sources) $(VENV)/.created
 	    $(PIP) wheel --verbose --no-deps --no-build-isolation --check-build-dependencies \
 	    --config-settings=build-dir=build/make --wheel-dir build/wheels .
 	$(PIP) install --quiet --no-deps --force-reinstall build/wheels/*.whl
+	touch $@
+
+# Linters need no built package; their versions are those of the extra 'dev'.
+$(VENV)/.lint: pyproject.toml $(VENV)/.created
+	$(PIP) install --quiet $$(grep -oE '(ruff|clang-format)==[0-9.]+' pyproject.toml)
 	touch $@
 
 # What one of pyproject.toml's extras brings beside it.

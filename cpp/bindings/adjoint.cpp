@@ -14,8 +14,8 @@ py::tuple pull_back_to_inputs(Model& model, const StaticsResult& equilibrium, co
     {
         const py::gil_scoped_release unlocked;
         const std::lock_guard lock(model.in_use());
-        gradient =
-            equilibrium_vjp(model, equilibrium, model.bodies().gradient_by_state(positions, rotations), by_driving);
+        gradient = equilibrium_vjp(model, equilibrium, model.bodies().gradient_by_state(positions, rotations),
+                                   by_driving);
     }
     return py::make_tuple(values_to_user(model, gradient.values), gradient.controls);
 }
