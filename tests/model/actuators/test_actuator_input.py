@@ -1,4 +1,4 @@
-"""Bad input to cavities, cells and tendons: what each mistake says."""
+"""Errors that cavities, cells and tendons raise for bad input."""
 
 import re
 
@@ -89,7 +89,7 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)
-def test_mistakes_that_constructors_tell(mistake):
+def test_constructors_refuse_bad_arguments(mistake):
     make, says = MISTAKES[mistake]
     with pytest.raises(ValueError, match=says):
         make()
@@ -157,14 +157,14 @@ IN_SCENES = {
 
 
 @pytest.mark.parametrize("mistake", IN_SCENES)
-def test_mistakes_that_scenes_tell(mistake):
+def test_scenes_refuse_bad_actuators(mistake):
     body, make, says = IN_SCENES[mistake]
     with pytest.raises(ValueError, match=says):
         held(body, actuators=[make()])
 
 
 def test_a_cavity_is_closed_by_a_body_that_is_tied_to_another():
-    """A cup of a solid with a sheet as its lid; turned round, the sheet does not go with the solid."""
+    """Close a cup of a solid with a shell as its lid; a lid with reversed faces is refused."""
     box = ms.meshes.box((0.03, 0.03, 0.03), cells=(3, 3, 3))
     at = box.tetrahedron_barycenters
     hole = (np.abs(at[:, :2] - 0.015).max(axis=1) < 0.005) & (at[:, 2] > 0.01)

@@ -30,14 +30,14 @@ def test_results_say_volume_and_pressure_by_the_law(law, element):
     assert found.stable and found.load_steps == 1
     assert float(inside.pressure) == pytest.approx(gauge_pressure_of(cavity, inside.volume, rest), rel=1e-12)
     assert (inside.volume > rest) == (float(inside.pressure) > 0)
-    # The same pressure prescribed leads to the same place.
+    # The same pressure, prescribed, leads to the same state.
     again = ms.Cavity(body, pressure=float(inside.pressure))
     same = ms.equilibrium(held(body, actuators=[again]))
     assert np.abs(same.positions - found.positions).max() < 1e-9 * 0.03
 
 
 def test_water_keeps_its_volume_and_takes_few_iterations():
-    """With a bulk modulus 22,000 times the solid's modulus: a constraint in all but name."""
+    """Check a cavity whose bulk modulus is 22,000 times the solid's modulus, close to a volume constraint."""
     body = hollow_block("quadratic")
     water = ms.Cavity(body, volume=1.5e-6)
     found = ms.equilibrium(held(body, actuators=[water]))
@@ -49,7 +49,7 @@ def test_water_keeps_its_volume_and_takes_few_iterations():
 
 
 def test_several_cavities_share_a_wall():
-    """A block with two hollows, of which one is under pressure and the other full of liquid."""
+    """Check a block with two hollows, one under pressure and the other full of liquid."""
     box = ms.meshes.box((0.05, 0.03, 0.03), cells=(5, 3, 3))
     at = box.tetrahedron_barycenters
     hollow = (np.abs(at[:, 1:] - 0.015).max(axis=1) < 0.005) & (
@@ -66,14 +66,14 @@ def test_several_cavities_share_a_wall():
     blown, filled = ms.Cavity(body, left, pressure=1e4), ms.Cavity(body, right, volume=1e-6)
     found = ms.equilibrium(held(body, actuators=[blown, filled]))
     assert float(found[filled].volume) == pytest.approx(1e-6, rel=1e-4)
-    # The wall between them is pushed over, and all around is pulled along: the liquid holds both back.
+    # The wall between them is pushed over, and the block is pulled along; the liquid resists both.
     assert abs(float(found[filled].pressure)) > 10.0 and float(found[blown].volume) > 1.001e-6
     alone = ms.equilibrium(held(body, actuators=[blown]))
     assert float(found[blown].volume) != pytest.approx(float(alone[blown].volume), rel=1e-5)
 
 
 def hollow_ball(cells=2) -> ms.Solid:
-    """Radii 0.5 and 1, nearly incompressible; its center held by planes of symmetry."""
+    """Return a nearly incompressible hollow ball of radii 0.5 and 1, to be held at its center by planes of symmetry."""
     ball = ms.meshes.ball(1.0, cells=cells)
     inner = np.linalg.norm(ball.rest_positions[ball.tetrahedra], axis=2).min(axis=1) < 0.49
     kept, numbered = np.unique(ball.tetrahedra[~inner], return_inverse=True)
@@ -89,7 +89,10 @@ def ball_scene(body, *actuators) -> ms.Scene:
 
 
 def pressure_of_thick_ball(volume_ratio):
-    """Neo-Hookean with mu = 1, incompressible: p = [2/l + 1/(2 l^4)] between the inner and the outer stretch."""
+    """Compute the pressure of an incompressible neo-Hookean thick ball, mu = 1.
+
+    p is the difference of 2/l + 1/(2 l^4) between the outer and the inner stretch l.
+    """
     inner = np.cbrt(volume_ratio)
     outer = np.cbrt(1.0 + (inner**3 - 1.0) / 8.0)
 
@@ -100,7 +103,10 @@ def pressure_of_thick_ball(volume_ratio):
 
 
 def test_a_balloon_blown_to_a_hundred_times_its_volume_passes_its_largest_pressure():
-    """By its volume all is stable; under that pressure it would be unstable beyond the largest. One layer of elements."""
+    """Follow a balloon by its volume, with one layer of elements.
+
+    All states are stable under a prescribed volume. Under a prescribed pressure those beyond the largest one would not be.
+    """
     body = hollow_ball()
     rest = ms.Cavity(body, pressure=0.0).rest_volume(ball_scene(body))
     liquid = ms.Cavity(body, volume=rest, bulk_modulus=1e3)
@@ -115,7 +121,7 @@ def test_a_balloon_blown_to_a_hundred_times_its_volume_passes_its_largest_pressu
     inside = path[liquid]
     assert inside.volume[-1] == pytest.approx(100.0 * rest, rel=1e-3)
     assert (path.n_negative_eigenvalues == 0).all() and not path.critical
-    # The polyhedron is a ball's but for its size.
+    # The polyhedron has the pressure of a ball up to its discretization.
     expected = pressure_of_thick_ball(inside.volume / rest)
     assert np.abs(inside.pressure - expected).max() < 0.06 * expected.max()
     top = np.argmax(inside.pressure)
@@ -124,7 +130,7 @@ def test_a_balloon_blown_to_a_hundred_times_its_volume_passes_its_largest_pressu
 
 @pytest.mark.parametrize("times", [0.8, 5.0, 100.0])
 def test_a_balloon_is_filled_in_one_call(times):
-    """Far beyond its largest pressure, or emptied: load steps fill in what is missing at rest."""
+    """Fill a balloon far beyond its largest pressure, or empty it; load steps change the volume from that at rest."""
     body = hollow_ball()
     rest = ms.Cavity(body, pressure=0.0).rest_volume(ball_scene(body))
     liquid = ms.Cavity(body, volume=times * rest, bulk_modulus=1e5)
@@ -133,7 +139,7 @@ def test_a_balloon_is_filled_in_one_call(times):
     assert float(found[liquid].volume) == pytest.approx(times * rest, rel=1e-4)
     expected = pressure_of_thick_ball(times)
     assert float(found[liquid].pressure) == pytest.approx(expected, abs=0.06)
-    # Half of it, under half of the load.
+    # Half of the added volume under half of the load.
     half = ms.equilibrium(ball_scene(body, liquid), load_factor=0.5)
     assert float(half[liquid].volume) == pytest.approx((0.5 + 0.5 * times) * rest, rel=1e-4)
     assert float(half[liquid].pressure) == pytest.approx(pressure_of_thick_ball(0.5 + 0.5 * times), abs=0.06)
@@ -156,7 +162,7 @@ def test_a_path_by_pressure_turns_round_at_the_largest():
     assert 2.0 * limits[0].parameter == pytest.approx(largest, rel=0.06)
     inside = path[air]
     assert inside.pressure == pytest.approx(2.0 * path.parameters) and inside.volume[-1] > 5.0 * rest
-    # At one of the unstable states the liquid has no negative direction, under the same forces.
+    # At one of these unstable states a liquid under the same forces has no negative eigenvalue.
     unstable = path.equilibrium(-1)
     liquid = ms.Cavity(
         body, volume=float(inside.volume[-1]) + 1e-3 * float(inside.pressure[-1]) * rest, bulk_modulus=1e3
@@ -167,7 +173,7 @@ def test_a_path_by_pressure_turns_round_at_the_largest():
 
 
 def test_a_path_by_a_pressure_that_is_a_value():
-    """As by a load factor on it: the balloon's largest pressure is a limit point."""
+    """Check that the path by a pressure in `values` finds the limit point at the balloon's largest pressure."""
     body = hollow_ball()
     air = ms.Cavity(body, pressure=0.0)
     scene = ball_scene(body, air)
@@ -187,7 +193,7 @@ def test_a_path_by_a_pressure_that_is_a_value():
 
 @pytest.mark.parametrize("times", [0.3, 100.0])
 def test_a_balloon_is_filled_from_one_at_rest(times):
-    """A start under the whole load already: the volume is stepped on the way to the new one, as under a growing load."""
+    """Start at an equilibrium under the full load: load steps then take the volume to its new value."""
     body = hollow_ball()
     rest = ms.Cavity(body, pressure=0.0).rest_volume(ball_scene(body))
     liquid = ms.Cavity(body, volume=rest, bulk_modulus=1e5)
@@ -199,7 +205,7 @@ def test_a_balloon_is_filled_from_one_at_rest(times):
     assert np.abs(found.positions - ms.equilibrium(scene, values=filled).positions).max() < 1e-6
     if times < 1.0:
         return
-    # Where it ends on the way, what it hands back is of that place.
+    # A solve that fails midway returns the state that it reached, with its volume.
     with pytest.raises(ms.NotConverged) as caught:
         ms.equilibrium(scene, start=start, values=filled, solver=ms.MixedNewton(max_iterations=3))
     left = caught.value.last_good
@@ -228,7 +234,7 @@ def test_a_path_by_the_amount_of_gas():
 
 @pytest.mark.parametrize("integrator", [ms.ImplicitEuler(), ms.TRBDF2(), ms.SDIRK2(), ms.SDIRK3()], ids=repr)
 def test_gas_in_motion(integrator):
-    """Let go from a smaller volume it swings about its rest; the pressure of every state is by its own volume."""
+    """Check a body released from a smaller volume: it swings about equilibrium, each pressure by its own volume."""
     body = box_sheet(size=0.03, thickness=1e-3)
     gas = ms.Cavity(body, gas_pressure=101325.0)
     scene = held(body, actuators=[gas])
@@ -274,8 +280,8 @@ def test_volumes_are_differentiable():
     assert float(amount.grad) == pytest.approx((above - below) / 200.0, rel=1e-5)
 
 
-def test_vibrations_feel_the_gas_in_them():
-    """A box full of liquid is stiffer in the mode that changes its volume, and none is softer."""
+def test_gas_stiffens_the_vibration_that_changes_its_volume():
+    """Check a box full of gas: the mode that changes its volume is stiffer, and no mode is softer."""
     body = box_sheet(size=0.03, thickness=1e-3, cells=(4, 4, 1))
     empty = ms.vibration_modes(held(body), count=4)
     gas = ms.Cavity(body, gas_pressure=101325.0)

@@ -24,8 +24,8 @@ def along(height=0.005, count=5, body=None):
     return np.stack([np.linspace(0, LENGTH, count), np.full(count, 0.005), np.full(count, height)], axis=1)
 
 
-def test_bordered_groups_are_what_coupled_ones_are():
-    """Groups of 33 and of 45 nodes, on both sides of where the matrix takes them in."""
+def test_low_rank_and_coupled_groups_give_the_same_result():
+    """Compare groups of 33 and 45 nodes, of which only the smaller is coupled within the sparse matrix."""
     body = bar()
     groups = [
         np.flatnonzero(np.abs(body.mesh.tetrahedron_barycenters[:, 0] - c) < 0.025) for c in (0.025, 0.075)
@@ -55,7 +55,7 @@ def test_groups_as_numbers_and_as_lists_are_the_same():
 
 
 def test_cells_of_a_gripper_in_motion():
-    """56 groups, each with a course of its own."""
+    """Simulate 56 groups, each with a volume ratio of its own over time."""
     body = bar(cells=(14, 2, 2))
     at = body.mesh.tetrahedron_barycenters
     number = (at[:, 0] * 140).astype(int) * 4 + (at[:, 1] > 0.005) * 2 + (at[:, 2] > 0.005)
@@ -102,7 +102,7 @@ def test_a_sliding_tendon_has_one_tension_and_a_fixed_one_many():
     assert np.ndim(found[slides][slides].tension) == 0
     tensions = found[holds][holds].tension
     assert tensions.shape == (3,) and np.ptp(tensions) > 0.01 * tensions.mean()
-    # By the forces that the body feels: held where it is, all that pulls is the tendon.
+    # In the held body only the tendon exerts forces.
     length = float(found[slides][slides].length)
     beyond = length - 0.09 - 0.5 * float(slides.smoothing)
     assert float(found[slides][slides].tension) == pytest.approx(20.0 * beyond, rel=1e-12)
@@ -177,8 +177,11 @@ def test_scenes_copy_and_print_their_actuators():
     assert SOFT["young_modulus"] == 1e5
 
 
-def test_a_tendon_rides_on_curved_elements():
-    """Points of the surface that six-node elements are, which flat faces do not reach; beside it they are refused."""
+def test_tendon_points_are_embedded_in_curved_elements():
+    """Attach a tendon to points of curved six-node elements, which flat faces do not contain.
+
+    Points beside the surface are refused.
+    """
     mesh = ms.meshes.cylinder(1.0, 2.0, angle=1.0, cells=(3, 4), order=2)
     sheet = ms.Shell(mesh, thickness=1e-2, young_modulus=1e6)
     s, t = 0.3, 0.25
@@ -203,8 +206,10 @@ def test_a_tendon_rides_on_curved_elements():
 
 
 def test_a_path_by_the_rest_length_of_a_tendon_passes_limit_points():
-    """A soft tendon to the ground pulls a shallow arch through: the path turns round twice, and ends at the new length on
-    the other side, where an equilibrium is."""
+    """Pull a shallow arch through with a soft tendon to the ground.
+
+    The path passes two limit points and ends at the new length in an equilibrium on the other side.
+    """
     mesh = ms.meshes.box((1.0, 0.1, 0.02), cells=(16, 1, 1))
     points = mesh.rest_positions.copy()
     points[:, 2] += 0.06 * np.sin(np.pi * points[:, 0])

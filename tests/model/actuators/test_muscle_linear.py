@@ -1,4 +1,4 @@
-"""Muscles and tendons in linear theory: vibrations about what they hold, and what only a solve can tell."""
+"""Muscles and tendons in linear theory: vibrations about an active state, and cases that linear theory refuses."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ EULER = np.pi**2 * 1e4 * 0.01**4 / 12 / 0.1**2  # N
 
 
 def strip(force=(1e-5, 0, 2e-7), **law):
-    """A bar of 10 x 1 x 1 cm, clamped at one end, with fibres along it: (scene, body, muscle)."""
+    """Return (scene, body, muscle) of a bar of 10 x 1 x 1 cm, clamped at one end, with fibres along it."""
     mesh = ms.meshes.box((0.1, 0.01, 0.01), cells=(6, 2, 2))
     body = ms.Solid(mesh, material=SOFT, mass_density=1e3)
     mesh = body.mesh
@@ -24,8 +24,8 @@ def strip(force=(1e-5, 0, 2e-7), **law):
 
 @pytest.mark.parametrize("law", [{"stiffness": 2e4}, {"peak_stress": 2e4}], ids=["stretch", "stress"])
 @pytest.mark.parametrize("activation", [0.15, 0.4])
-def test_vibrations_about_what_a_muscle_holds_are_those_of_small_motions(law, activation):
-    """The energy of a small shift along a mode, over what its velocity would have."""
+def test_vibrations_about_an_active_state_are_those_of_small_motions(law, activation):
+    """Compare the energy of a small displacement along a mode with its kinetic energy."""
     scene, body, muscle = strip(**law)
     rest = ms.equilibrium(scene, values={muscle: {"activation": activation}}, load_factor=0.0)
     modes = ms.vibration_modes(scene, rest, count=3)
@@ -46,7 +46,7 @@ def test_vibrations_about_what_a_muscle_holds_are_those_of_small_motions(law, ac
 
 
 def test_the_stiffness_of_an_idle_muscle_counts():
-    """Fibres of a modulus w along a bar of E: as stiff as E + w along itself."""
+    """Check that fibres of modulus w along a bar of modulus E make it as stiff as E + w along itself."""
     scene, _, muscle = strip(stiffness=2e4)
     tip = scene.mesh.rest_positions[:, 0] > 0.099
     linear = ms.linear_response(scene, load_factor=1e-3)
@@ -95,7 +95,7 @@ def test_a_tendon_of_constant_tension_is_a_load_and_a_spring_is_none():
     solved = ms.equilibrium(scene).displacements[tip].mean(axis=0)
     assert linear == pytest.approx(solved, rel=1e-2)
     assert linear[2] < 0
-    # A column under a force that always points to its foot carries four times what it would under one that does not.
+    # Under a force that always points to its foot a column carries four times the load of one under a fixed direction.
     axis = ms.Tendon([(0.0, 0.005, 0.005), (0.1, 0.005, 0.005)], body, tension=1.0)
     scene = ms.Scene(body, supports=scene.supports, actuators=[axis])
     assert ms.linear_buckling(scene).factors[0] == pytest.approx(EULER, rel=0.05)

@@ -1,4 +1,4 @@
-"""Muscles in motion: the force-velocity curve, its order in time, and what results, pictures and files say."""
+"""Muscles in motion: the force-velocity curve, its order in time, and results, pictures and files."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ torch = pytest.importorskip("torch")
 def twitching(
     steps: int, integrator, segments: int | None = None, time: float = 0.1
 ) -> tuple[ms.Trajectory, ms.Muscle]:
-    """A block whose free half is thrown while its muscle wakes up, over the time [s]."""
+    """Simulate a block whose free half is thrown while its muscle is activated, over `time` [s]."""
     mesh = ms.meshes.box((0.1, 0.04, 0.04), cells=(2, 1, 1))
     body = ms.Solid(
         mesh, material=ms.NeoHookean(young_modulus=2e4, poisson_ratio=0.3), mass_density=1e3, element="linear"
@@ -54,7 +54,7 @@ def test_the_force_velocity_curve_keeps_the_order_of_the_integrator(integrator, 
     assert found == pytest.approx(order, abs=0.25)
 
 
-def test_results_tell_the_tension_of_a_moving_muscle():
+def test_results_contain_the_tension_of_a_moving_muscle():
     move, muscle = twitching(40, ms.TRBDF2(), segments=2)
     for index in (0, 3, -1):
         states = move[muscle].states(index)
@@ -98,7 +98,7 @@ def test_pictures_and_files_have_the_muscles(tmp_path):
         ms.plot(ms.Scene(muscle.body, allow_rigid_motions=True), color="activation")
 
 
-def test_what_an_environment_sees_knows_the_actuators_then():
+def test_snapshots_of_an_environment_have_the_actuators_of_their_time():
     from magshell.envs.snapshot import Snapshot
 
     move, muscle = twitching(10, ms.ImplicitEuler())

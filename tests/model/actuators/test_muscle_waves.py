@@ -1,4 +1,4 @@
-"""Waves of activation: where they are when, many muscles at once, derivatives by everything."""
+"""Waves of activation: their position over time, many muscles at once, derivatives by every argument."""
 
 import numpy as np
 import pytest
@@ -44,8 +44,8 @@ def test_many_muscles_at_once_and_one_time():
     ).all()
 
 
-def test_numbers_that_change_in_time():
-    """Each row is the wave of its own numbers at its time."""
+def test_wave_arguments_may_change_in_time():
+    """Check that each row is the wave with the arguments at its time."""
     rng = np.random.default_rng(3)
     names = ("speed", "wavelength", "amplitude", "mean", "delay")
     numbers = {name: 0.2 + 0.1 * rng.random((21, 3)) for name in names}
@@ -91,7 +91,7 @@ def test_derivatives_by_all_arguments(kind, names):
         ({"wavelength": "long"}, "wavelength"),
     ],
 )
-def test_bad_waves(arguments, message):
+def test_waves_with_bad_arguments_are_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
         control.wave(TIMES, PLACES, speed=0.1, **arguments)
 

@@ -1,4 +1,4 @@
-"""Muscles in scenes: known answers, tables, fibres along lines, what results say, bad input."""
+"""Muscles in scenes: closed-form answers, tables, fibres along lines, results, bad input."""
 
 import copy
 import pickle
@@ -66,8 +66,10 @@ P3 = [(1.0, 1.0, 0.015), (0.5, 1.0, 0.01333333333), (1.0, 4.0, 0.01315068493), (
 
 @pytest.mark.parametrize("thicknesses, moduli, curvature", P3)
 def test_a_strip_with_one_layer_of_muscle_bends_as_timoshenkos_bilayer(thicknesses, moduli, curvature):
-    """nu = 0: a host of half of E1 and fibres of the other half, activated by 0.02, are a layer of E1 that would be
-    shorter by 0.01."""
+    """Compare a strip of host and muscle with Timoshenko's bilayer, nu = 0.
+
+    A host of E1/2 with fibres of E1/2 activated by 0.02 is a layer of E1 whose natural length is shorter by 0.01.
+    """
     t1 = thicknesses / (1 + thicknesses)
     counts = {1.0: 2, 0.5: 3, 0.2: 6}[thicknesses]
     mesh = ms.meshes.box((20.0, 0.5, 1.0), cells=(40, 1, counts))
@@ -124,14 +126,14 @@ def test_a_segment_pulls_where_it_is():
     )
 
 
-def test_fibres_may_be_a_function_of_the_place():
+def test_fibres_may_be_a_function_of_position():
     body = block("linear")
     turned = ms.Muscle(body, lambda x: np.stack([-x[:, 1], x[:, 0] + 1, 0 * x[:, 0]], axis=1), stiffness=1.0)
     at = body.mesh.tetrahedron_barycenters
     assert turned.fibres == pytest.approx(np.stack([-at[:, 1], at[:, 0] + 1, 0 * at[:, 0]], axis=1))
 
 
-def test_two_muscles_in_the_same_elements_add_up():
+def test_forces_of_muscles_in_the_same_elements_add_up():
     body = block("quadratic")
     whole = ms.Muscle(body, (1, 0, 0), peak_stress=4e4, activation=0.5)
     halves = [ms.Muscle(body, (3, 0, 0), peak_stress=2e4, activation=0.5) for _ in range(2)]
@@ -150,8 +152,8 @@ def test_a_scene_with_muscles_is_copied_and_pickled():
         assert "Muscle(in 12 tetrahedra" in repr(other)
 
 
-def test_inverted_elements_under_full_activation_find_their_way_back():
-    """A start with its elements turned inside out, where the host allows it."""
+def test_inverted_elements_under_full_activation_recover():
+    """Start from inverted elements, with a host that allows it."""
     body = ms.Solid(
         ms.meshes.box((1, 1, 1), cells=(2, 2, 2)),
         material=ms.StableNeoHookean(young_modulus=1e5, poisson_ratio=0.3),
@@ -186,7 +188,7 @@ def test_activations_at_the_ends_of_their_range(law, ends):
 
 
 def loaded_arch(force):
-    """A shallow arch, pinned at both ends, of muscle along it, under a force (N) downwards in its middle."""
+    """Return a shallow arch of muscle, pinned at both ends, under a downward force [N] in its middle."""
     mesh = ms.meshes.box((1.0, 0.1, 0.02), cells=(16, 1, 1))
     points = mesh.rest_positions.copy()
     points[:, 2] += 0.03 * np.sin(np.pi * points[:, 0])
@@ -204,7 +206,7 @@ def loaded_arch(force):
 
 
 def test_a_path_by_activation_ends_where_equilibria_are():
-    """Under a small load the muscle pulls the arch straight."""
+    """Check that the muscle straightens the arch under a small load, and that the path ends in an equilibrium."""
     scene, muscle, _ = loaded_arch(6e-4)
     lengthened = {muscle: {"activation": -0.002}}
     start = ms.equilibrium(scene, values=lengthened)
@@ -218,8 +220,10 @@ def test_a_path_by_activation_ends_where_equilibria_are():
 
 
 def test_a_path_by_activation_turns_round_where_the_arch_snaps():
-    """Under a large load the muscle shortens the arch until that carries the load no longer. The path passes this limit
-    point; equilibria stay before it next to the path, and behind it hang far below."""
+    """Shorten the arch under a large load until it no longer carries it.
+
+    The path passes this limit point. Equilibria before it stay next to the path; those behind it hang far below.
+    """
     scene, muscle, middle = loaded_arch(8e-3)
 
     def activated(parameter):
@@ -243,8 +247,10 @@ def test_a_path_by_activation_turns_round_where_the_arch_snaps():
 
 
 def test_vibrations_are_those_of_the_active_state():
-    """A bar with fibres of a target stretch along it: sqrt((E + w)/rho)/4L; with a pull along it, the tension of the
-    fibres cancels the host's pressure, so bending does not stiffen."""
+    """Compare a bar with fibres of a target stretch with sqrt((E + w)/rho)/4L.
+
+    With a pull along the bar the fibres' tension cancels the host's pressure, so bending does not stiffen.
+    """
     mesh = ms.meshes.box((1.0, 0.1, 0.1), cells=(10, 1, 1))
     body = ms.Solid(
         mesh, material=ms.StVenantKirchhoff(young_modulus=1e5, poisson_ratio=0.0), mass_density=1e3
@@ -291,7 +297,7 @@ class TestInput:
             ({"peak_stress": 1.0, "elements": [99]}, "elements must be in"),
         ],
     )
-    def test_a_muscle(self, arguments, message):
+    def test_muscle_refuses_bad_arguments(self, arguments, message):
         with pytest.raises(ValueError, match=message):
             ms.Muscle(self.body, (1, 0, 0), **arguments)
 
@@ -306,7 +312,7 @@ class TestInput:
             ((np.nan, 0, 0), "finite"),
         ],
     )
-    def test_its_fibres(self, fibres, message):
+    def test_muscle_refuses_bad_fibres(self, fibres, message):
         with pytest.raises(ValueError, match=message):
             ms.Muscle(self.body, fibres, peak_stress=1.0)
 
@@ -322,11 +328,11 @@ class TestInput:
             ([(0, 0), (1, 0)], 0.1, "shape"),
         ],
     )
-    def test_a_line(self, line, reach, message):
+    def test_fibres_along_refuses_a_bad_line(self, line, reach, message):
         with pytest.raises(ValueError, match=message):
             ms.fibres_along(line, self.body, reach=reach)
 
-    def test_a_scene(self):
+    def test_scene_refuses_muscles_that_do_not_fit(self):
         muscle = ms.Muscle(self.body, (1, 0, 0), peak_stress=1.0)
         other = block("linear")
         with pytest.raises(ValueError, match="a Muscle is about a body that is not in the scene"):

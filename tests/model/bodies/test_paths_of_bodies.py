@@ -1,4 +1,4 @@
-"""What a path says of one body of its scene, and a path along which nothing moves."""
+"""Results of a path for one body of its scene, and a path along which nothing moves."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ import magshell as ms
 from magshell.model.supports.supports import rotation_matrix
 
 
-def test_a_path_says_what_each_body_goes_through():
+def test_path_gives_the_results_of_each_body():
     mesh = ms.meshes.rectangle(0.1, 0.02, cells=(6, 2))
     strip = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
     solid = ms.Solid(
@@ -37,7 +37,10 @@ def test_a_path_says_what_each_body_goes_through():
 
 @pytest.mark.parametrize("held", ["clamped", "all"])
 def test_arc_length_where_nothing_moves_is_that_of_the_parameter(held):
-    """Magnetized along the field, across the sheet: forces are rounding, and were taken for a motion to measure by."""
+    """Follow a field along a magnetization across the sheet, where forces are round-off.
+
+    Arc length then must not be measured by that noise.
+    """
     turn = rotation_matrix(np.array([0.7, -1.1, 0.4]))
     flat = ms.meshes.rectangle(0.1, 0.02, cells=(20, 4))
     mesh = ms.TriangleMesh(flat.rest_positions @ turn.T, flat.faces)

@@ -1,4 +1,4 @@
-"""Bodies that are welded: against one body that is the same. Their gradients: test_every_gradient.py."""
+"""Welded bodies against the same as one body. Their gradients: test_every_gradient.py."""
 
 import copy
 
@@ -13,7 +13,7 @@ PLATE = {"thickness": 5e-4, "poisson_ratio": 0.3, "mass_density": 1e3}
 
 
 def halves(**options):
-    """A strip as two bodies, the second with its seam first."""
+    """Return a strip as two bodies and their tie; the second has its seam first."""
     half = ms.meshes.rectangle(LENGTH / 2, WIDTH, cells=(4, 2))
     left = ms.Shell(half, young_modulus=1e6, **PLATE)
     right = ms.Shell(half.transformed(translation=(LENGTH / 2, 0, 0)), young_modulus=1e6, **PLATE)
@@ -21,7 +21,7 @@ def halves(**options):
 
 
 def coated(young_modulus=3e6):
-    """A strip twice, one on the other."""
+    """Return two strips, one on the other, and their tie."""
     a, b = (ms.Shell(FULL, young_modulus=y, **PLATE) for y in (1e6, young_modulus - 1e6))
     return a, b, ms.Tie(a, b)
 
@@ -30,7 +30,7 @@ def clamped(mesh, body):
     return ms.Clamp(mesh.edges_at(x=0.0), body=body)
 
 
-def test_two_halves_stretch_as_one_strip():
+def test_tied_halves_stretch_as_one_strip():
     left, right, tie = halves()
     pull = ms.EdgeLoad(right.mesh.edges_at(x=LENGTH), (0.5, 0.1, 0), body=right)
     two = ms.Scene([left, right], ties=[tie], supports=[clamped(left.mesh, left)], loads=[pull])
@@ -47,7 +47,7 @@ def test_two_halves_stretch_as_one_strip():
 
 
 def test_a_seam_is_a_hinge():
-    """The second half hangs straight down from the seam."""
+    """Check that the second half hangs straight down from the seam."""
     left, right, tie = halves()
     held = ms.Clamp(left.mesh.edges_at(x=0.0), body=left)
     scene = ms.Scene(
@@ -91,7 +91,7 @@ def test_vibrations_of_a_coated_strip():
     assert np.allclose(*frequencies, rtol=1e-8)
 
 
-def test_what_holds_one_holds_the_other():
+def test_support_of_one_tied_body_holds_the_other():
     left, right, tie = halves()
     right_only = [ms.Clamp(right.mesh.edges_at(x=LENGTH), body=right)]
     with pytest.raises(ValueError, match="leave the sheets free: rotation about"):
@@ -102,7 +102,7 @@ def test_what_holds_one_holds_the_other():
     assert ms.Scene([left, right], ties=[tie], supports=[*right_only, pinned]).n_dofs > 0
 
 
-def test_points_that_touch_are_there_once():
+def test_coinciding_vertices_of_tied_bodies_are_counted_once():
     left, right, tie = halves()
     floor = ms.Contact(ms.obstacles.Plane((0, 0, 1.0), center=(0, 0, -1e-3)), contact_stiffness=5.0)
     scene = ms.Scene(
@@ -149,7 +149,7 @@ def test_a_tied_scene_does_not_pass_through_itself():
         (lambda a, b: "weld", "ties"),
     ],
 )  # fmt: skip
-def test_what_is_refused(make, message):
+def test_ties_that_do_not_fit_are_refused(make, message):
     left, right, _ = halves()
     with pytest.raises(ValueError, match=message):
         ms.Scene([left, right], ties=[make(left, right)], supports=[clamped(left.mesh, left)])
@@ -165,7 +165,7 @@ def test_bodies_that_do_not_touch_are_not_tied():
 
 
 @pytest.mark.parametrize("name", ["start", "velocities"])
-def test_vertices_that_are_one_have_one_place_and_velocity(name):
+def test_welded_vertices_have_one_position_and_velocity(name):
     a, b, tie = coated()
     scene = ms.Scene([a, b], ties=[tie], supports=[clamped(FULL, a)])
     rows = scene.mesh.rest_positions.copy() if name == "start" else np.zeros((scene.mesh.n_vertices, 3))
@@ -177,7 +177,10 @@ def test_vertices_that_are_one_have_one_place_and_velocity(name):
 
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
 def test_a_sheet_on_a_solid_stretches_with_it(element):
-    """Both of St. Venant-Kirchhoff's law and one Poisson ratio: lateral strains agree, and second Piola forces add up."""
+    """Stretch a bar and its coat, both St. Venant-Kirchhoff with one Poisson ratio.
+
+    Lateral strains agree, and second Piola-Kirchhoff forces add up.
+    """
     length, side, nu, strain = 0.02, 0.01, 0.3, 0.05  # strain: Green's, along the bar
     bar = ms.Solid(
         ms.meshes.box((length, side, side), cells=(3, 2, 2)),

@@ -1,4 +1,4 @@
-"""Contact of bodies with each other and with themselves: nothing passes, forces balance, derivatives fit the energy."""
+"""Contact between bodies and of a body with itself: no penetration, balance of forces, derivatives of the energy."""
 
 import numpy as np
 import pytest
@@ -11,14 +11,14 @@ TILTED = np.array([[1.0, 0, 0], [0, 0.8, -0.6], [0, 0.6, 0.8]])
 
 
 def state_in_contact(scene, seed=0, low=7e-5):
-    """Of all unknowns: the second body lowered, everything a little disordered."""
+    """Return a state with the second body lowered and all positions slightly perturbed."""
     positions = scene.mesh.rest_positions.copy()
     positions[scene.bodies[0].mesh.n_vertices :, 2] -= low
     positions += 4e-6 * np.random.default_rng(seed).standard_normal(positions.shape)
     return scene._model.state(positions, np.zeros(scene.mesh.n_edges))
 
 
-def whole(size, starts, rows, values):
+def symmetric_matrix(size, starts, rows, values):
     lower = sparse.csc_matrix((values, rows, starts), shape=(size, size))
     return lower + sparse.tril(lower, -1).T
 
@@ -29,7 +29,7 @@ def test_hessian_and_gradient_are_those_of_the_energy(law):
     model, controls = scene._model, scene._control_layout.zeros()
     q = state_in_contact(scene)
     assert model.refusal(q) == "" and model.energies(q, controls)["body contact"] > 0.0
-    hessian = whole(*model.hessian(q, controls, reduced=False))
+    hessian = symmetric_matrix(*model.hessian(q, controls, reduced=False))
     p, step = np.random.default_rng(1).standard_normal(len(q)), 1e-9
     above, below = (model.gradient(q + sign * step * p, controls) for sign in (1, -1))
     difference = (above - below) / (2 * step)
@@ -41,7 +41,7 @@ def test_hessian_and_gradient_are_those_of_the_energy(law):
 
 
 def test_reduced_hessian_is_that_of_the_free_unknowns():
-    """With nodes held in turned frames, others carried by a rigid part, and blocks that only contact adds."""
+    """Check nodes in rotated frames, nodes of a rigid body, and blocks that only contact adds."""
     turn = np.array([[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1.0]])
     mesh = PLATE.transformed(rotation=turn)
     lower, upper = ms.Shell(mesh, **SOFT), above(1.15e-3, mesh)
@@ -59,10 +59,10 @@ def test_reduced_hessian_is_that_of_the_free_unknowns():
     positions = scene.mesh.rest_positions.copy()
     positions[PLATE.n_vertices :, 2] -= 7e-5
     q = model.state(positions, np.zeros(scene.mesh.n_edges))
-    free = whole(*model.hessian(q, controls))
-    full = whole(*model.hessian(q, controls, reduced=False)).toarray()
+    free = symmetric_matrix(*model.hessian(q, controls))
+    full = symmetric_matrix(*model.hessian(q, controls, reduced=False)).toarray()
     lift = np.stack([model.expand(each) for each in np.eye(model.free_size)], axis=1)
-    # Carried nodes follow curves, whose bend adds to the last six rows and columns.
+    # Nodes of the rigid body move on curves; their curvature adds to its six rows and columns, the last ones.
     n = model.free_size - 6
     found, wanted = free.toarray(), lift.T @ full @ lift
     scale = np.abs(wanted).max()
@@ -84,7 +84,7 @@ def test_sheets_at_rest_on_each_other():
 
 
 def test_upper_sheet_lies_on_the_lower_with_its_whole_weight():
-    """Nothing else holds it: its weight is what touches, and a contact counts as a support."""
+    """Check that contact supports the weight of a sheet that nothing else holds."""
     lower, upper = ms.Shell(PLATE, **SOFT), above(1.2e-3)
     touch = ms.Contact(lower, upper)
     guided = ms.Pin(np.arange(upper.mesh.n_vertices), "xy", body=upper)
@@ -133,7 +133,7 @@ def test_ball_falls_onto_a_sheet_and_never_through(integrator):
 @pytest.mark.parametrize("lagged", [False, True])
 @pytest.mark.parametrize("slope, slides", [(0.3, False), (0.7, True)])
 def test_block_on_a_slope_sticks_or_slides(slope, slides, lagged):
-    """With the acceleration g (sin - mu cos) once it slides."""
+    """Check the acceleration g (sin - mu cos) of a sliding block, and a sticking one."""
     steep, friction = np.arctan(slope), 0.5
     plate = ms.Shell(ms.meshes.rectangle(0.1, 0.06, cells=(5, 3)), **SOFT)
     mesh = ms.meshes.box((0.03, 0.03, 0.01), cells=(2, 2, 1)).transformed(translation=(0.023, 0.017, 0.6e-3))
@@ -161,7 +161,7 @@ def test_block_on_a_slope_sticks_or_slides(slope, slides, lagged):
 
 
 def test_strip_folds_onto_itself():
-    """Its end is turned over and brought down onto its beginning."""
+    """Turn the end of a strip over and bring it down onto its beginning."""
     mesh = ms.meshes.rectangle(0.06, 0.01, cells=(24, 3))
     strip = ms.Shell(mesh, thickness=5e-4, young_modulus=1e6, mass_density=1e3)
     touch = ms.SelfContact(strip)
@@ -240,7 +240,7 @@ def test_starts_that_intersect_or_are_too_near_are_refused_with_their_faces():
             solve()
 
 
-def test_supports_that_push_bodies_through_each_other_are_told():
+def test_supports_that_push_bodies_through_each_other_raise_an_error():
     lower, upper = ms.Shell(PLATE, **SOFT), above(2e-3)
     all_of = np.arange(PLATE.n_vertices)
     scene = ms.Scene(
@@ -252,7 +252,7 @@ def test_supports_that_push_bodies_through_each_other_are_told():
         ms.equilibrium(scene)
 
 
-def test_a_relaxation_that_ends_early_tells_what_touches():
+def test_relaxation_that_ends_early_reports_contacts():
     touching = two_sheets(height=1.03e-3)
     scene = ms.Scene(
         touching.bodies,
@@ -283,8 +283,8 @@ def test_a_scene_whose_bodies_never_touch_has_the_bits_of_one_without_contact():
 
 
 @pytest.mark.parametrize("lagged", [False, True])
-def test_steps_taken_again_for_gradients_are_those_taken(lagged):
-    """While the pattern of the matrix grows with what comes near."""
+def test_recomputed_steps_are_those_first_taken(lagged):
+    """Check recomputed steps while the matrix pattern grows with new pairs."""
     torch = pytest.importorskip("torch")
     lower, upper = ms.Shell(PLATE, **SOFT), above(1.4e-3)
     scene = ms.Scene(

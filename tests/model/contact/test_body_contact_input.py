@@ -1,4 +1,4 @@
-"""Contacts of bodies that cannot be: each is told before any work starts."""
+"""Contacts between bodies that are impossible are refused before a solve starts."""
 
 import warnings
 
@@ -29,7 +29,7 @@ def simulated(scene, **given):
 
 
 def two_pieces(other) -> ms.Shell:
-    """One mesh of two sheets."""
+    """Return one shell whose mesh consists of two sheets."""
     points = np.concatenate([PLATE.rest_positions, other.rest_positions])
     return ms.Shell(
         ms.TriangleMesh(points, np.concatenate([PLATE.faces, other.faces + PLATE.n_vertices])), **SHEET
@@ -58,7 +58,7 @@ def test_a_minimal_distance_larger_than_that_of_two_faces():
 
 
 def fine(thickness=1e-3) -> ms.Shell:
-    """Edges of 0.5 mm."""
+    """Return a shell whose mesh has edges of 0.5 mm."""
     mesh = ms.meshes.rectangle(4e-3, 2e-3, cells=(8, 4))
     return ms.Shell(mesh, thickness=thickness, young_modulus=1e6, mass_density=1e3)
 
@@ -86,7 +86,7 @@ def test_a_minimal_distance_larger_than_that_of_neighbours_at_rest():
         )
 
 
-def test_a_thickness_larger_than_the_distance_of_neighbours_at_rest_is_told():
+def test_thickness_above_the_distance_of_neighbours_at_rest_is_warned_of():
     sheet = fine()
     touch = ms.SelfContact(sheet)
     with pytest.warns(
@@ -98,7 +98,7 @@ def test_a_thickness_larger_than_the_distance_of_neighbours_at_rest_is_told():
         simulated(scene)
 
 
-def test_what_touches_twice():
+def test_contacts_between_the_same_sides_are_refused():
     lower, upper = pair()
     touch = ms.Contact(lower, upper)
     for twice in (

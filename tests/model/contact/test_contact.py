@@ -1,4 +1,4 @@
-"""Normal contact: what rests is carried, what is pressed pushes back, what falls is stopped."""
+"""Normal contact: bodies at rest are carried, pressed bodies push back, falling bodies are stopped."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ import magshell as ms
 
 
 def normal_forces(contact: ms.Contact, obstacle, positions, sheet) -> np.ndarray:
-    """(n_v, 3) N on the vertices, by the documented law alone."""
+    """Compute the forces on the vertices by the documented law alone, (n_v, 3) in N."""
     depth = contact.offset - obstacle.signed_distance(positions)
     forces = force_at(depth, smoothing_of(sheet), contact.contact_stiffness)
     return forces[:, None] * obstacle.normals(positions)
@@ -49,8 +49,8 @@ def quarter(cells=(8, 8), young_modulus=1e5) -> ms.Shell:
     ],
     ids=repr,
 )
-def test_draped(obstacle):
-    """A quarter of a sheet; its symmetry planes push sideways only, so the obstacle carries all of the weight."""
+def test_obstacle_carries_the_weight_of_a_draped_sheet(obstacle):
+    """Check a quarter of a sheet, whose symmetry planes exert no vertical force."""
     sheet = quarter()
     sides = [ms.SymmetryPlane((1, 0, 0)), ms.SymmetryPlane((0, 1, 0))]
     contact = ms.Contact(obstacle, contact_stiffness=100.0)
@@ -64,8 +64,11 @@ def test_draped(obstacle):
 
 
 @pytest.mark.parametrize("samples, at", [(0, (1, 1, 1)), (1, (1, 1, 1)), (3, (4, 1, 1))])
-def test_points_on_faces_feel_a_peak_between_vertices(samples, at):
-    """A small ball under a point of a face: vertices alone let the sheet fall past it, as if nothing was there."""
+def test_sample_points_on_faces_detect_a_peak_between_vertices(samples, at):
+    """Drop a sheet on a small ball under a point of a face.
+
+    With contact at vertices alone the sheet falls past it freely.
+    """
     sheet = block_sheet(young_modulus=1e6)
     point = np.array(at) / sum(at) @ sheet.mesh.rest_positions[sheet.mesh.faces[2]]
     ball = ms.obstacles.Sphere(1e-3, center=point - [0, 0, 2e-3])
@@ -79,7 +82,7 @@ def test_points_on_faces_feel_a_peak_between_vertices(samples, at):
 
 
 def test_points_on_faces_share_the_load():
-    """On level ground a stiff sheet sinks evenly, so every point, on vertices and faces, carries the same."""
+    """Check that on level ground every point of a stiff sheet, on vertices and faces, carries the same load."""
     sheet = block_sheet(young_modulus=1e11)
     scene = block_on(ms.obstacles.Plane(), sheet=sheet, face_samples=3)
     motion = simulated(scene, 30, 0.1)
@@ -88,7 +91,7 @@ def test_points_on_faces_share_the_load():
     np.testing.assert_allclose(motion.positions[-1, :, 2], -depth, rtol=2e-3)
 
 
-def test_chosen_vertices_alone_touch():
+def test_contact_acts_on_chosen_vertices_only():
     sheet = block_sheet(young_modulus=1e6)
     edge = sheet.mesh.vertices_at(x=0.0)
     motion = simulated(block_on(ms.obstacles.Plane(), sheet=sheet, vertices=edge), 30, 1e-3)
@@ -98,7 +101,7 @@ def test_chosen_vertices_alone_touch():
 
 
 def test_pressed_between_two_plates():
-    """An arc is flattened by two plates that close in; they push equally hard, and it is as high as they allow."""
+    """Flatten an arc between two closing plates, which push equally hard and set its height."""
     mesh = ms.meshes.rectangle(0.04, 0.01, cells=(16, 2))
     radius, gap, closing, stiffness = 0.05, 2e-3, 1.0, 1e3
     angle = (mesh.rest_positions[:, 0] - 0.02) / radius
@@ -126,7 +129,7 @@ def test_pressed_between_two_plates():
 
 
 def dropped(integrator, time_step, time=0.02, stiffness=300.0):
-    """A soft sheet that meets the ground askew at 0.3 m/s."""
+    """Simulate a soft sheet that meets oblique ground at 0.3 m/s."""
     sheet = block_sheet((3, 3), young_modulus=1e6)
     ground = ms.obstacles.Plane(normal=(0.1, 0.2, 1.0), center=(0, 0, -3e-3))
     scene = block_on(ground, gravity=(0, 0, 0), sheet=sheet, contact_stiffness=stiffness)

@@ -1,4 +1,4 @@
-"""How much the forces of body contact at a given gap depend on the meshes: what BodyContact's docstring states."""
+"""Dependence of body contact forces at a given gap on the meshes, as BodyContact's docstring states it."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ PRESSURE = -0.5 * (2 * np.log(0.5) - 1) * SOFT["young_modulus"]  # of the barrie
 
 
 def borne(lower, upper):
-    """N, as the meshes stand."""
+    """Compute the normal force between two sheets with these meshes, in N."""
     sheets = [ms.Shell(mesh, **SOFT) for mesh in (lower, upper)]
     touch = ms.Contact(*sheets)
     scene = ms.Scene(sheets, contacts=[touch], allow_rigid_motions=True)
@@ -22,15 +22,15 @@ def borne(lower, upper):
 @pytest.mark.parametrize("below", [4, 16])
 @pytest.mark.parametrize("on_top", [4, 16])
 @pytest.mark.parametrize("aside", [(0, 0), (3e-4, 2e-4)])
-def test_what_lies_flat_bears_one_to_three_and_a_half_times_its_pressure(below, on_top, aside):
-    """Pairs of a vertex and a face make up the pressure; pairs of edges add to it, most where meshes coincide."""
+def test_flat_contact_bears_one_to_three_and_a_half_times_its_pressure(below, on_top, aside):
+    """Check that vertex-face pairs make up the pressure; edge pairs add to it, most where meshes coincide."""
     lower, upper = (ms.meshes.rectangle(SIDE, SIDE, cells=(n, n)) for n in (below, on_top))
     found = borne(lower, upper.transformed(translation=(*aside, 1e-3 + GAP)))
     assert 1.0 < found / (PRESSURE * SIDE**2) < 3.5
 
 
-def standing(cells, aside, low):
-    """A sheet on its edge along x, or, upside down, along y."""
+def upright(cells, aside, low):
+    """Return a sheet standing on its edge along x, or upside down along y."""
     mesh = ms.meshes.rectangle(SIDE, SIDE / 4, cells=(cells, cells // 4))
     along, up = mesh.rest_positions[:, 0] - SIDE / 2 + aside * SIDE / cells, mesh.rest_positions[:, 1]
     none = np.zeros(len(up))
@@ -39,7 +39,10 @@ def standing(cells, aside, low):
 
 
 def test_edges_that_cross_bear_in_proportion_to_the_area_of_their_faces():
-    """A crossing has no area of its own: meshes give it one, and more of it where vertices meet."""
+    """Check that the force of crossing edges scales with the area of their faces.
+
+    A crossing has no area of its own. The meshes give it one, which is larger where vertices meet.
+    """
     for aside in (0.0, 0.5):
-        forces = [borne(standing(n, aside, 0), standing(n, aside, -1e-3 - GAP)) for n in (4, 8)]
+        forces = [borne(upright(n, aside, 0), upright(n, aside, -1e-3 - GAP)) for n in (4, 8)]
         assert forces[0] / forces[1] == pytest.approx(4.0, rel=1e-3)

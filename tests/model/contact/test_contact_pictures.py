@@ -28,7 +28,7 @@ def ball_on_sheet():
 
 
 def integral(positions, faces, pressures):
-    """Linear on every face."""
+    """Integrate a function that is linear on every face."""
     x0, x1, x2 = np.moveaxis(positions[faces], 1, 0)
     areas = 0.5 * np.linalg.norm(np.cross(x1 - x0, x2 - x0), axis=1)
     return float(areas @ pressures[faces].mean(axis=1))
@@ -54,7 +54,7 @@ def test_a_pressure_integrates_to_the_normal_forces(fallen):
 
 
 def test_a_uniform_pressure_is_the_weight_over_the_area():
-    """A sheet that rests on a plate, flat: m g/A at every vertex, borders and corners too."""
+    """Check m g/A at every vertex of a sheet flat on a plate, at borders and corners too."""
     lower, upper = ms.Shell(PLATE, **SOFT), above(1.05e-3, ms.meshes.rectangle(0.01, 0.01, cells=(4, 4)))
     held = [ms.Pin(np.arange(PLATE.n_vertices), body=lower), ms.Pin([0, 4], "xy", body=upper)]
     scene = ms.Scene(
@@ -70,7 +70,7 @@ def test_a_uniform_pressure_is_the_weight_over_the_area():
     assert integral(rest[upper].positions, upper.mesh.faces, pressures) == pytest.approx(weight, rel=1e-8)
 
 
-def test_files_have_it(fallen, tmp_path):
+def test_files_contain_the_contact_pressure(fallen, tmp_path):
     _, motion = fallen
     ms.write_series(tmp_path / "fall.pvd", motion, progress=False)
     written = meshio.read(tmp_path / "fall" / "fall_8.vtu").point_data["contact_pressure"]
@@ -99,8 +99,8 @@ def test_pictures_show_pressure_and_forces(fallen):
     assert any("contact force" in text.get_text() for text in with_forces.figure.axes[-1].texts)
 
 
-def test_the_arrows_forces_balance(fallen):
-    """Normal forces and friction of two bodies come to nothing; those of the floor are what it bears."""
+def test_forces_of_the_arrows_balance(fallen):
+    """Check that the forces between two bodies sum to zero, and those of the floor to its load."""
     scene, motion = fallen
     state = states_of(motion)[-1]
     on_floor = motion.contact_state(scene.contacts[1])
@@ -122,7 +122,7 @@ def test_a_film_and_a_page_take_the_pressure(fallen, tmp_path):
     assert "contact pressure" in (tmp_path / "a.html").read_text()
 
 
-def test_what_has_no_contacts_is_refused():
+def test_contact_pictures_without_contacts_are_refused():
     sheet = ms.Scene(ms.Shell(PLATE, **SOFT), supports=[ms.Clamp(PLATE.edges_at(x=0.0))])
     for what in (PLATE, ms.equilibrium(sheet)):
         with pytest.raises(ValueError, match="scene with contacts"):

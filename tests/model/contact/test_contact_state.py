@@ -1,4 +1,4 @@
-"""What results say of contact: friction, reactions of supports, kinks; and that all of it balances."""
+"""Contact results: friction, reactions of supports, nonsmooth vertices, and the balance of all forces."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ def weight(scene):
 
 
 def inertia(scene, motion, k):
-    """(n, 3) N, of implicit Euler."""
+    """Compute the inertia forces of implicit Euler, (n, 3) in N."""
     step = motion.times[k] - motion.times[k - 1]
     return scene._values.masses[:, None] * (motion.velocities[k] - motion.velocities[k - 1]) / step
 
@@ -25,7 +25,10 @@ def torque(positions, forces):
 
 
 def test_supports_hold_what_rests_in_contact():
-    """Forces and torques of a clamp, with its couple, and a pin balance the weight; contact's own do themselves."""
+    """Check that forces and torques of a clamp, with its moment, and of a pin balance the weight.
+
+    Contact forces balance each other.
+    """
     scene = two_sheets()
     rest = ms.equilibrium(scene)
     reactions = [rest.reaction(support) for support in scene.supports]
@@ -57,7 +60,7 @@ def test_a_vertex_that_two_supports_hold_counts_once():
 
 
 @pytest.mark.parametrize("damping", [{}, {"stiffness_damping": 1e-3, "damping": 1e-3}])
-def test_supports_that_move_pull_what_they_speed_up(damping):
+def test_moving_supports_exert_the_inertia_forces(damping):
     scene = two_sheets()
     moved = ms.Clamp(PLATE.edges_at(x=0.0), displacement=(0, 0, -1e-3), body=scene.bodies[0])
     scene = ms.Scene(
@@ -83,8 +86,8 @@ def test_supports_that_move_pull_what_they_speed_up(damping):
     assert np.isnan(motion.reaction(moved, 0).force).all()
 
 
-def test_friction_of_what_slides_is_the_coefficient_times_the_normal_force():
-    """One sheet slides over another: the forces between them brake it, and the pins of the lower one bear them."""
+def test_friction_of_sliding_bodies_is_the_coefficient_times_the_normal_force():
+    """Check a sheet sliding over another, whose pins bear the forces between them."""
     lower, upper = ms.Shell(PLATE, **SOFT), above(1.09e-3)
     held = ms.Pin(np.arange(PLATE.n_vertices), body=lower)
     touch = ms.Contact(upper, lower, friction_coefficient=0.3, sticking_speed=1e-3)
@@ -107,7 +110,7 @@ def test_friction_of_what_slides_is_the_coefficient_times_the_normal_force():
     np.testing.assert_allclose(motion.reaction(held).force + weight(scene).sum(axis=0), own, atol=1e-12)
 
 
-def test_friction_of_what_sticks_stays_below_it():
+def test_friction_of_sticking_bodies_stays_below_the_limit():
     lower, upper = ms.Shell(PLATE, **SOFT), above(1.09e-3)
     held = ms.Pin(np.arange(PLATE.n_vertices), body=lower)
     touch = ms.Contact(lower, upper, friction_coefficient=0.5, static_friction_coefficient=0.8)
@@ -121,8 +124,8 @@ def test_friction_of_what_sticks_stays_below_it():
     assert found.friction_force[0] == pytest.approx(mass * 1.0, rel=0.05)  # on the lower one
 
 
-def test_obstacles_push_and_rub_likewise():
-    """A sheet that slides over a moving floor, and a sheet at rest on one: what touches balances weight and inertia."""
+def test_forces_of_obstacles_balance_weight_and_inertia():
+    """Check a sheet that slides over a moving floor, and a sheet at rest on one."""
     plane = ms.obstacles.Plane(motion=lambda t: (0.02 * t, 0, 0))
     scene = block_on(plane, friction_coefficient=0.4, sticking_speed=1e-4)
     contact, sheet = scene.contacts[0], scene.bodies[0]
@@ -164,7 +167,10 @@ def test_obstacles_are_asked_with_points_on_faces():
 
 
 def test_states_of_a_motion_are_those_that_it_had_where_bodies_are_tied():
-    """The directions that clamps hold stand behind the vertices, of which those that are welded count once."""
+    """Check the state of a motion with tied bodies and a clamp.
+
+    The directors of clamps are stored behind the vertices, of which welded ones count once.
+    """
     other = PLATE.transformed(translation=(0.02, 0, 0))
     sheets = [ms.Shell(PLATE, **SOFT), ms.Shell(other, **SOFT)]
     tie = ms.Tie(*sheets)
@@ -174,23 +180,23 @@ def test_states_of_a_motion_are_those_that_it_had_where_bodies_are_tied():
     np.testing.assert_array_equal(motion._state_at(-1), motion.end.state)
 
 
-def roof(turn):
-    """Two squares that meet at the line x = 0.01, z = 0."""
+def roof(angle):
+    """Return two rectangles that meet with an angle at the line x = 0.01, z = 0."""
     mesh = ms.meshes.rectangle(0.02, 0.02, cells=(2, 2))
     points = mesh.rest_positions.copy()
     away = points[:, 0] - 0.01
-    points[:, 2] = -np.abs(away) * np.tan(turn / 2)
+    points[:, 2] = -np.abs(away) * np.tan(angle / 2)
     return ms.TriangleMesh(points, mesh.faces)
 
 
-@pytest.mark.parametrize("turn, aside, sharp", [(1.0, 0.0, True), (1.0, 3e-3, False), (0.2, 0.0, False)])
-def test_a_fold_of_the_other_surface_is_a_kink(turn, aside, sharp):
-    """A corner of a tile that hangs over a ridge, by the border between the face and the edge, or beside it."""
-    lower = ms.Shell(roof(turn), **SOFT)
+@pytest.mark.parametrize("angle, aside, sharp", [(1.0, 0.0, True), (1.0, 3e-3, False), (0.2, 0.0, False)])
+def test_ridge_of_the_other_surface_makes_a_nonsmooth_vertex(angle, aside, sharp):
+    """Place the corner of a tile over a ridge, at or beside the border between its face and its edge."""
+    lower = ms.Shell(roof(angle), **SOFT)
     # straight above where the foot of the face ends, in the direction of the face's normal
-    normal = np.array([-np.sin(turn / 2), 0, np.cos(turn / 2)])
+    normal = np.array([-np.sin(angle / 2), 0, np.cos(angle / 2)])
     start = np.array([0.01, 0.007, 0.0]) + 1.05e-3 * normal
-    start -= aside * np.array([np.cos(turn / 2), 0, np.sin(turn / 2)])
+    start -= aside * np.array([np.cos(angle / 2), 0, np.sin(angle / 2)])
     tile = ms.meshes.rectangle(2e-3, 2e-3, cells=(1, 1))
     upright = np.stack(
         [tile.rest_positions[:, 2], tile.rest_positions[:, 0], tile.rest_positions[:, 1]], axis=1
@@ -207,8 +213,8 @@ def test_a_fold_of_the_other_surface_is_a_kink(turn, aside, sharp):
         np.testing.assert_array_equal(motion.nonsmooth_vertices[0], [lower.mesh.n_vertices])
 
 
-def test_what_opens_and_closes_is_no_kink():
-    """The middle of a sheet that falls on a plate: it touches, and leaves again."""
+def test_opening_and_closing_of_a_contact_is_smooth():
+    """Drop the middle of a sheet on a plate: it touches and leaves again."""
     mesh = ms.meshes.rectangle(0.06, 0.06, cells=(3, 3)).transformed(translation=(-0.02, -0.02, 0))
     lower, upper = ms.Shell(mesh, **SOFT), above(1.12e-3)
     touch = ms.Contact(upper, lower)
@@ -222,7 +228,7 @@ def test_what_opens_and_closes_is_no_kink():
     assert motion.nonsmooth_vertices == {}
 
 
-def test_results_refuse_what_is_not_of_the_scene():
+def test_results_refuse_objects_that_are_not_in_the_scene():
     scene = two_sheets()
     rest = ms.equilibrium(scene)
     with pytest.raises(ValueError, match=r"one of scene\.supports"):

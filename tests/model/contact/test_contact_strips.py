@@ -5,7 +5,7 @@ import pytest
 
 import magshell as ms
 
-# F5: (friction, angle, nodes): ratio of the tensions before and behind that many nodes, turning equally.
+# F5: (friction, angle, nodes) -> ratio of the tensions before and behind that many nodes, each turning by the same angle.
 CAPSTANS = {
     (0.3, np.pi, 16): 2.574853857,
     (0.3, np.pi, 64): 2.566861977,
@@ -15,7 +15,7 @@ CAPSTANS = {
 
 
 def tension_ratio(friction, angle, nodes, lagged) -> float:
-    """Of a strip that is drawn over a cylinder against a weight; its tensions [N] are told by its stretch."""
+    """Compute the ratio of tensions of a strip drawn over a cylinder against a weight, from its stretch."""
     radius, width, thickness, modulus, weight, tail = 0.02, 4e-3, 2e-5, 1e9, 0.02, 5
     turn = angle / nodes
     piece, pieces = 2 * radius * np.sin(turn / 2), nodes - 1 + 2 * tail
@@ -29,7 +29,9 @@ def tension_ratio(friction, angle, nodes, lagged) -> float:
     along = {s: np.array([np.cos(angle / 2), 0, -s * np.sin(angle / 2)]) for s in (-1, 1)}
     places = np.stack([radius * np.sin(on), mesh.rest_positions[:, 1], radius * np.cos(on)], axis=1)
     places += piece * (np.outer(before, along[-1]) + np.outer(behind, along[1]))
-    bent = ms.TriangleMesh(places, mesh.faces)  # at rest as it lies: nothing is bent but by the stretch
+    bent = ms.TriangleMesh(
+        places, mesh.faces
+    )  # its reference shape is the bent one: only the stretch bends it
     strip = ms.Shell(bent, thickness=thickness, young_modulus=modulus, mass_density=1e2)
     first, last = np.flatnonzero(node == 0), np.flatnonzero(node == pieces)
     touch = ms.Contact(
@@ -65,28 +67,32 @@ def tension_ratio(friction, angle, nodes, lagged) -> float:
 
 @pytest.mark.parametrize("lagged", [False, True], ids=["exact", "lagged"])
 @pytest.mark.parametrize("friction, angle, nodes", CAPSTANS)
-def test_capstan(friction, angle, nodes, lagged):
-    """F5. Round a whole turn the strip passes through itself: nothing keeps it from that here."""
+def test_strip_over_a_cylinder_has_the_capstan_tension_ratio(friction, angle, nodes, lagged):
+    """Compare with F5. Around a full circle the strip passes through itself, which nothing prevents here."""
     wanted = CAPSTANS[friction, angle, nodes]
     assert tension_ratio(friction, angle, nodes, lagged) == pytest.approx(wanted, rel=0.01)
 
 
 # F7: the exact elastica of a strip folded between plates at a distance D.
 FOLD_FORCE, FREE_LENGTH, FOLD_REACH = 2.871080044, 2.188439615, 0.8346268413  # F D^2 / (E I), and over D
-DISTANCE, WIDTH, TAIL = 0.05, 0.01, 0.35  # m, m, of the distance: what lies flat
+DISTANCE, WIDTH, TAIL = 0.05, 0.01, 0.35  # m, m, fraction of the distance that lies flat
 STRIP = {"thickness": 4e-4, "young_modulus": 1e7, "poisson_ratio": 0.0}
 STIFFNESS = 1e7 * 4e-4**3 / 12  # N m, of the strip
 
 
-def half_fold(reach, bottom=0.0, way=1.0, aside=0.0):
-    """From the middle of the fold on: straight at rest along z, and where it starts, bent towards -x."""
+def half_loop(reach, bottom=0.0, direction=1.0, aside=0.0):
+    """Return half of a folded strip from its middle on: its straight reference mesh and a start bent towards -x."""
     length = DISTANCE * (FREE_LENGTH / 2 + TAIL)
     mesh = ms.meshes.rectangle(length, WIDTH, cells=(16, 3))
     s, y = mesh.rest_positions[:, 0], mesh.rest_positions[:, 1]
     radius = DISTANCE / 2 - 1.2 * reach
     arc = np.minimum(s, np.pi / 2 * radius)
-    bent = [-radius * (1 - np.cos(arc / radius)) - (s - arc), y, bottom + way * radius * np.sin(arc / radius)]
-    straight = np.stack([0 * s + aside, y, bottom + way * s], axis=1)
+    bent = [
+        -radius * (1 - np.cos(arc / radius)) - (s - arc),
+        y,
+        bottom + direction * radius * np.sin(arc / radius),
+    ]
+    straight = np.stack([0 * s + aside, y, bottom + direction * s], axis=1)
     return ms.TriangleMesh(straight, mesh.faces), np.stack(bent, axis=1)
 
 
@@ -97,7 +103,7 @@ def plate_above() -> ms.Shell:
 
 
 def between_plates(reach):
-    mesh, start = half_fold(reach)
+    mesh, start = half_loop(reach)
     sheet, plate = ms.Shell(mesh, **STRIP), plate_above()
     touch = ms.Contact(sheet, plate, min_distance=0.0, activation_distance=reach)
     scene = ms.Scene(
@@ -109,9 +115,9 @@ def between_plates(reach):
 
 
 def against_its_mirror(reach):
-    """In one mesh of two pieces, the other one put over it."""
+    """Return a scene of one mesh with two pieces, the second mirrored above the first."""
     aside = 3 * DISTANCE
-    halves = [half_fold(reach), half_fold(reach, DISTANCE, -1.0, aside)]
+    halves = [half_loop(reach), half_loop(reach, DISTANCE, -1.0, aside)]
     count = halves[0][0].n_vertices
     points = np.concatenate([mesh.rest_positions for mesh, _ in halves])
     mesh = ms.TriangleMesh(points, np.concatenate([halves[0][0].faces, halves[1][0].faces + count]))
@@ -126,7 +132,7 @@ def against_its_mirror(reach):
 
 
 @pytest.mark.parametrize("setting", [between_plates, against_its_mirror])
-def test_fold(setting):
+def test_folded_strip_has_the_force_and_reach_of_the_elastica(setting):
     reach = 2e-4
     scene, touch, start, count = setting(reach)
     found = ms.equilibrium(scene, start=start)

@@ -1,4 +1,4 @@
-"""F1: a block on an incline sticks, creeps, slides and stops as Coulomb and the time integration say."""
+"""Friction of a block on an incline (F1): it sticks, creeps, slides and stops as Coulomb's law predicts."""
 
 import numpy as np
 import pytest
@@ -22,13 +22,13 @@ SECOND_ORDER = [ms.TRBDF2(), ms.SDIRK2(), ms.SDIRK3()]
 
 
 def on_tilted_gravity(friction, **contact):
-    """The plane is z = 0 and gravity is oblique. The scene, where the block rests, and the way down."""
+    """Return a scene with plane z = 0 and oblique gravity, the block's rest positions, and the downhill direction."""
     scene = block_on(ms.obstacles.Plane(), friction, gravity=TILTED, **contact)
     return scene, resting_on_plane(scene.shell, GRAVITY * np.cos(ANGLE)), np.array([1.0, 0.0, 0.0])
 
 
 def on_slope(friction, **contact):
-    """Gravity is vertical; the slope falls along x, and the sheet is laid on it."""
+    """Return a scene with vertical gravity and a slope along x, the block's rest positions, and the way downhill."""
     sheet = block_sheet()
     flat = resting_on_plane(sheet, GRAVITY * np.cos(ANGLE))
     turn = rotation_matrix(np.array([0.0, ANGLE, 0.0]))
@@ -38,13 +38,13 @@ def on_slope(friction, **contact):
     return scene, flat @ turn.T, DOWNHILL
 
 
-PLACES = pytest.mark.parametrize("place", [on_tilted_gravity, on_slope])
+PLACES = pytest.mark.parametrize("make_scene", [on_tilted_gravity, on_slope])
 FRICTIONS = pytest.mark.parametrize("lagged", [False, True], ids=["exact", "lagged"])
 
 
-def slid(place, friction, time=TIME, time_step=TIME_STEP, lagged=False, **options):
-    """Distances (n, n_v) m and speeds (n, n_v) m/s down the slope."""
-    scene, start, downhill = place(friction, lagged_friction=lagged)
+def slid(make_scene, friction, time=TIME, time_step=TIME_STEP, lagged=False, **options):
+    """Return distances (n, n_v) in m and speeds (n, n_v) in m/s down the slope."""
+    scene, start, downhill = make_scene(friction, lagged_friction=lagged)
     motion = simulated(scene, round(time / time_step), time_step, start=start, **options)
     return (motion.positions - start) @ downhill, motion.velocities @ downhill
 
@@ -56,15 +56,15 @@ def test_published_numbers_are_those_of_the_closed_form():
 
 @PLACES
 @FRICTIONS
-def test_slides_at_049_as_far_as_backward_euler(place, lagged):
-    distances, _ = slid(place, 0.49, lagged=lagged)
+def test_slides_at_049_as_far_as_backward_euler(make_scene, lagged):
+    distances, _ = slid(make_scene, 0.49, lagged=lagged)
     np.testing.assert_allclose(distances[-1], EULER_DISTANCE, rtol=1e-5)  # asked for: 1e-3
 
 
 @PLACES
 @FRICTIONS
-def test_sticks_at_050(place, lagged):
-    distances, speeds = slid(place, 0.5, lagged=lagged)
+def test_sticks_at_050(make_scene, lagged):
+    distances, speeds = slid(make_scene, 0.5, lagged=lagged)
     assert speeds.max() <= STICKING * (1 + 1e-6)
     assert distances[-1].max() <= STICKING * TIME
 
@@ -77,7 +77,10 @@ def test_methods_of_second_order_reach_the_continuous_distance(integrator):
 
 @pytest.mark.parametrize("integrator", SECOND_ORDER, ids=repr)
 def test_methods_of_second_order_stick(integrator):
-    """At 0.50 every speed above the sticking one keeps itself up: what the first step overshoots must not grow."""
+    """Check that the overshoot of the first step does not grow.
+
+    At mu = 0.50 friction balances any speed above the sticking speed.
+    """
     _, speeds = slid(on_tilted_gravity, 0.5, integrator=integrator)
     assert speeds.max() <= 3 * STICKING
     np.testing.assert_allclose(speeds[-1], speeds[2], rtol=1e-2)
@@ -87,8 +90,8 @@ def test_methods_of_second_order_stick(integrator):
 
 @pytest.mark.parametrize("friction", [0.505, 0.6, 1.0, 2.0])
 @FRICTIONS
-def test_what_sticks_creeps_by_the_formula(friction, lagged):
-    """e (1 - sqrt(1 - r)), where the slope asks for a share r = tan(alpha) / mu of what friction could hold."""
+def test_sticking_block_creeps_by_the_formula(friction, lagged):
+    """Compare with e (1 - sqrt(1 - r)), where the slope needs the fraction r = tan(alpha) / mu of the friction."""
     _, speeds = slid(on_tilted_gravity, friction, time=0.25, lagged=lagged)
     creep = STICKING * (1 - np.sqrt(1 - TANGENT / friction))
     np.testing.assert_allclose(speeds[-1], creep, rtol=1e-5)
@@ -120,7 +123,7 @@ def stopping(time_step, integrator, lagged=False):
 
 @FRICTIONS
 def test_stops_as_far_as_backward_euler(lagged):
-    """Step k ends at v0 - k mu g dt until the rest of the speed goes."""
+    """Check that step k ends at v0 - k mu g dt until the remaining speed is lost."""
     time_step = 1e-3
     times, distances, speeds = stopping(time_step, ms.ImplicitEuler(), lagged)
     slowing = STOPPING_FRICTION * GRAVITY
@@ -144,8 +147,8 @@ def test_stops_as_far_as_the_textbook_says(integrator):
 CREEP = 1e-3  # m/s, the sticking speed on ground that moves
 
 
-def carried(motion, friction, steps, integrator, velocities=None, at=(0.0, 0.0), **contact):
-    """A block on a plane that moves, for so many milliseconds."""
+def simulated_on_moving_plane(motion, friction, steps, integrator, velocities=None, at=(0.0, 0.0), **contact):
+    """Simulate a block on a moving plane for `steps` milliseconds."""
     scene = block_on(ms.obstacles.Plane(motion=motion), friction, sticking_speed=CREEP, **contact)
     start = resting_on_plane(scene.shell) + np.array([*at, 0.0])
     if velocities is not None:
@@ -155,9 +158,11 @@ def carried(motion, friction, steps, integrator, velocities=None, at=(0.0, 0.0),
 
 @FRICTIONS
 def test_a_conveyor_takes_a_block_along(lagged):
-    """The block gains mu g dt a step until it goes as fast as the belt."""
+    """Check that the block gains mu g dt per step until it has the speed of the belt."""
     belt, friction, steps = 0.1, 0.3, 60
-    motion = carried(lambda t: (belt * t, 0, 0), friction, steps, ms.ImplicitEuler(), lagged_friction=lagged)
+    motion = simulated_on_moving_plane(
+        lambda t: (belt * t, 0, 0), friction, steps, ms.ImplicitEuler(), lagged_friction=lagged
+    )
     expected = np.minimum(friction * GRAVITY * motion.times, belt)
     speeds = motion.velocities[:, :, 0]
     np.testing.assert_allclose(speeds, expected[:, None] * np.ones(9), rtol=0, atol=CREEP)
@@ -166,9 +171,14 @@ def test_a_conveyor_takes_a_block_along(lagged):
 
 @pytest.mark.parametrize("share", [0.9, 1.2])
 def test_a_belt_that_accelerates(share):
-    """Up to mu g the block follows, behind the belt by the speed of the creep; beyond, it keeps mu g."""
+    """Check the block on a belt that accelerates by a fraction of mu g.
+
+    Up to mu g the block lags behind the belt by its creep; beyond, it keeps the acceleration mu g.
+    """
     limit, steps = 0.3 * GRAVITY, 40
-    motion = carried(lambda t: (0.5 * share * limit * t**2, 0, 0), 0.3, steps, ms.ImplicitEuler())
+    motion = simulated_on_moving_plane(
+        lambda t: (0.5 * share * limit * t**2, 0, 0), 0.3, steps, ms.ImplicitEuler()
+    )
     time = motion.times[-1]
     behind = share * limit * time - motion.velocities[-1, :, 0]
     if share < 1:
@@ -178,8 +188,8 @@ def test_a_belt_that_accelerates(share):
 
 
 def on_a_disc(spin, friction, steps):
-    """Distances (n,) m of the middle of a block from the axis; it begins at the disc's own speed."""
-    motion = carried(
+    """Return the times and the distances (n,) in m of a block's middle from the axis; it starts at the disc's speed."""
+    motion = simulated_on_moving_plane(
         lambda t: ((0, 0, 0), (0, 0, spin * t)),
         friction,
         steps,
@@ -190,14 +200,14 @@ def on_a_disc(spin, friction, steps):
     return motion.times, np.linalg.norm(motion.positions[:, :, :2].mean(axis=1), axis=1)
 
 
-def test_a_disc_carries_a_block_around():
-    """It creeps outwards as the share w^2 r / (mu g) of the friction says."""
+def test_block_on_a_disc_creeps_outwards():
+    """Check the outward creep given by the fraction w^2 r / (mu g) of the friction."""
     times, distances = on_a_disc(4.0, 0.6, 200)
     creep = CREEP * (1 - np.sqrt(1 - 4.0**2 * 0.1 / (0.6 * GRAVITY)))
     assert (distances[-1] - distances[50]) / (times[-1] - times[50]) == pytest.approx(creep, rel=2e-2)
 
 
-def test_a_fast_disc_loses_a_block():
+def test_block_slides_off_a_fast_disc():
     _, distances = on_a_disc(12.0, 0.6, 200)
     assert distances[0] == pytest.approx(0.1)
     assert distances[-1] > 0.15

@@ -1,4 +1,4 @@
-"""A motion says where it is not differentiable: at sharp edges and in the middle of bodies, nowhere else."""
+"""Reported nonsmooth vertices of a motion: at sharp edges and in the middle of bodies, nowhere else."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ HALF_DIAGONAL = np.sqrt(0.5) * 0.1
 
 
 def ridge(**options):
-    """A box with an edge up, right under the middle of the sheet."""
+    """Return a box with an edge upwards, right under the middle of the sheet."""
     given = {"center": (0.01, 0.01, -HALF_DIAGONAL), "rotation": (0, np.pi / 4, 0), **options}
     return ms.obstacles.Box((0.1, 0.1, 0.1), **given)
 
@@ -21,12 +21,12 @@ def pressed_on(obstacle, steps=3, **options):
     return simulated(block_on(obstacle, sheet=SHEET, **options), steps, 1e-3, velocities=(0, 0, -1e-3))
 
 
-def test_a_sharp_edge_is_one():
+def test_sharp_edge_makes_a_nonsmooth_vertex():
     motion = pressed_on(ridge())
     assert list(motion.nonsmooth_vertices) == [
         1,
         2,
-    ]  # at the start it does not touch, and at last not any more
+    ]  # not in contact at the start and at the end
     for vertices in motion.nonsmooth_vertices.values():
         np.testing.assert_array_equal(vertices, MIDDLE)
 
@@ -58,8 +58,8 @@ def test_points_on_faces_count_by_their_vertices():
     assert set(SHEET.mesh.faces[face]) <= set(motion.nonsmooth_vertices[1])
 
 
-def test_it_looks_where_the_obstacle_was():
-    """Another center, a motion: the edge goes with them."""
+def test_nonsmooth_vertices_follow_a_moving_obstacle():
+    """Check that the edge moves with the obstacle's center and motion."""
     box = ridge(motion=lambda t: (2.5 * t, 0, 0))
     scene = block_on(box, sheet=SHEET)
     moved = {box: {"center": box.center + np.array([-5e-3, 0, 0])}}
@@ -67,13 +67,16 @@ def test_it_looks_where_the_obstacle_was():
     assert list(motion.nonsmooth_vertices) == [2]
 
 
-def test_there_is_none_without_contact():
+def test_motion_without_contact_has_no_nonsmooth_vertices():
     scene = ms.Scene(SHEET, water=ms.Water(), allow_rigid_motions=True)
     assert simulated(scene, 2, 1e-3).nonsmooth_vertices == {}
 
 
 def test_a_gradient_at_an_edge_is_that_of_a_side():
-    """A nanometre makes the edge push to the other side: the motion jumps, the gradients are exact on either side."""
+    """Check gradients on both sides of an edge.
+
+    A shift by a nanometre makes the edge push to the other side: the motion jumps, the gradients are exact on either side.
+    """
     torch = pytest.importorskip("torch")
     weights = torch.from_numpy(np.random.default_rng(1).standard_normal((SHEET.mesh.n_vertices, 3)))
     box = ridge()

@@ -1,4 +1,4 @@
-"""What obstacles say to bad input, and how they print."""
+"""Errors of obstacles for bad input, and how they print."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ LINE = [[0, 0, 0], [1, 0, 0], [2, 0, 0]]
 
 
 def two(first, second, shift):
-    """One mesh of two, the second moved along x [m]."""
+    """Return one mesh of two, the second moved along x [m]."""
     return (
         np.concatenate([first.rest_positions, second.rest_positions + np.array([shift, 0, 0])]),
         np.concatenate([first.faces, second.faces + first.n_vertices]),
@@ -21,7 +21,7 @@ def two(first, second, shift):
 
 
 def unwelded():
-    """A cube of six squares that do not share their corners."""
+    """Return a cube of six squares that do not share their corners."""
     vertices, faces = ob.Box((1, 1, 1)).surface()
     apart = vertices[faces].reshape(-1, 3)
     return apart, np.arange(len(apart)).reshape(-1, 3)

@@ -33,7 +33,7 @@ def test_normal_and_curvature_are_the_derivatives_of_the_distance(name):
 
 
 @pytest.mark.parametrize("name", MAKERS)
-def test_distance_grows_as_fast_as_the_way_along_the_normal(name):
+def test_distance_grows_with_unit_slope_along_the_normal(name):
     obstacle = made(name)
     points = spread_points(obstacle, 300, depth=0.0)
     np.testing.assert_allclose(obstacle.signed_distance(points), 0, atol=2e-4)
@@ -46,15 +46,15 @@ def test_distance_grows_as_fast_as_the_way_along_the_normal(name):
 
 
 @pytest.mark.parametrize("name", MAKERS)
-def test_nowhere_a_nan(name):
+def test_distances_and_derivatives_are_finite_everywhere(name):
     rng = np.random.default_rng(3)
     points = np.concatenate([np.zeros((1, 3)), 0.1 * AXES, WAVY, 40 * AXES, rng.uniform(-2, 2, (3000, 3))])
     found = core.distances(made(name)._core, points)
     assert all(np.isfinite(each).all() for each in found)
     np.testing.assert_allclose(np.linalg.norm(found[1], axis=1), 1, rtol=1e-12)
     shifts = np.abs(found[0][:, None] - found[0]) - np.linalg.norm(points[:, None] - points, axis=2)
-    # No two distances differ by more than their points do: of a mesh only near it, where its distance is no bound yet.
-    # Of ground, up to what a start from the sampled heights may miss where two places are equally near.
+    # Distances of two points differ by no more than the points are apart (not checked for meshes: far away only a bound).
+    # For hills up to the error of starting at the sampled heights where two points are equally near.
     slack = {"hills": 1e-3, "ball mesh": np.inf, "torus mesh": np.inf}.get(name, 1e-9)
     assert shifts.max() < slack
 
@@ -243,7 +243,7 @@ def test_distance_does_not_depend_on_where_the_body_is(name):
 
 
 def tumbling(time):
-    """About z at 3 rad/s after a tilt about x that swings."""
+    """Return a rotation about z at 3 rad/s after a swinging tilt about x."""
     tilt = 0.4 * np.sin(20 * time)
     turn = Rotation.from_rotvec([0, 0, 3 * time]) * Rotation.from_rotvec([tilt, 0, 0])
     return [np.sin(50 * time), 0.1 * time, time**2], turn.as_rotvec()
@@ -293,7 +293,7 @@ def test_a_displacement_alone_does_not_turn():
     np.testing.assert_allclose(moving.signed_distance([0, 0, 0], time=2.0), 0.2)
 
 
-def test_inside_turns_the_sign():
+def test_complement_changes_the_sign():
     points = spread_points(made("capsule"), 50, depth=0.1)
     ends = made("capsule").ends
     inside, outside = ob.Capsule(ends, 0.3, inside=True), made("capsule")

@@ -1,5 +1,7 @@
-"""Obstacles that move far between two equilibria push sheets along and do not pass through them: load steps, relaxation and
-paths keep every point on its side of an obstacle, or an error says that they could not."""
+"""Obstacles that move far between two equilibria push sheets along and do not pass through them.
+
+Load steps, relaxation and paths keep every point on its side of an obstacle, or raise an error.
+"""
 
 from functools import cache
 
@@ -20,7 +22,7 @@ def sheet():
 
 
 def over_a_sheet(obstacle, **law):
-    """A round sheet, clamped, with an obstacle above it."""
+    """Return a scene of a round, clamped sheet with an obstacle above it."""
     mesh = sheet().mesh
     middle = np.flatnonzero(np.hypot(*mesh.rest_positions[:, :2].T) < 0.7 * RADIUS)
     rim = ms.Clamp(np.flatnonzero(mesh.edge_faces[:, 1] < 0))
@@ -30,21 +32,21 @@ def over_a_sheet(obstacle, **law):
 
 
 SPAN = np.linspace(-0.06, 0.06, 5)[:, None] * (0.0, 1.0, 0.0)
-# Of each shape: one whose lowest point is at the origin of its own frame, less deep than it is to move.
+# One obstacle per shape, with its lowest point at the origin of its frame and less deep than the distance it is to move.
 SHAPES = {
-    "sphere": lambda **place: ob.Sphere(0.02, **raised(place, 0.02)),
-    "box": lambda **place: ob.Box((0.06, 0.08, 0.02), rounding=0.005, **raised(place, 0.01)),
-    "capsule": lambda **place: ob.Capsule(0.06, radius=0.02, **raised(place, 0.02)),
-    "tube": lambda **place: ob.Tube(SPAN, 0.02, inside=False, **raised(place, 0.02)),
-    "mesh": lambda **place: ob.MeshObstacle(
-        ms.meshes.spherical_cap(0.02, 0.0, np.pi, cells=(24, 12)), resolution=16, **raised(place, 0.02)
+    "sphere": lambda **pose: ob.Sphere(0.02, **raised(pose, 0.02)),
+    "box": lambda **pose: ob.Box((0.06, 0.08, 0.02), rounding=0.005, **raised(pose, 0.01)),
+    "capsule": lambda **pose: ob.Capsule(0.06, radius=0.02, **raised(pose, 0.02)),
+    "tube": lambda **pose: ob.Tube(SPAN, 0.02, inside=False, **raised(pose, 0.02)),
+    "mesh": lambda **pose: ob.MeshObstacle(
+        ms.meshes.spherical_cap(0.02, 0.0, np.pi, cells=(24, 12)), resolution=16, **raised(pose, 0.02)
     ),
-    "plane": lambda **place: ob.Plane((0.0, 0.0, -1.0), **place),
+    "plane": lambda **pose: ob.Plane((0.0, 0.0, -1.0), **pose),
 }
 
 
-def raised(place, by):
-    return {**place, "center": np.add(place["center"], (0.0, 0.0, by))}
+def raised(pose, by):
+    return {**pose, "center": np.add(pose["center"], (0.0, 0.0, by))}
 
 
 def above(shape):
@@ -75,7 +77,10 @@ def test_an_obstacle_that_moves_by_more_than_its_height_in_one_solve_pushes_the_
 
 
 def test_a_ball_that_moves_by_many_diameters_pushes_the_sheet_along():
-    """0.1 m with a radius of 0.05 m, from 0.05 m and from rest: the sheet was on the other side, without a force."""
+    """Move a ball of radius 0.05 m by 0.1 m, in steps and at once from rest.
+
+    A solve that loses the sheet on the other side would find no contact force.
+    """
     ball = ob.Sphere(0.05, center=(0.0, 0.0, 0.05 + TOUCHING))
     scene = over_a_sheet(ball)
     rest = ms.equilibrium(scene)
@@ -108,7 +113,7 @@ def test_a_warm_start_takes_a_sheet_along_with_an_obstacle_that_moves_far():
 
 
 def test_a_path_with_an_obstacle_that_moves_far_keeps_the_sheet_on_its_side():
-    """Steps of half of the way are shortened to those that lead no point through the ball."""
+    """Check that path steps of half the distance are shortened so that no point passes through the ball."""
     ball = above("sphere")
     scene = over_a_sheet(ball, contact_stiffness=100.0, smoothing=2e-3)
     start = ms.equilibrium(scene, values=moved(ball, 5e-3), start=ms.equilibrium(scene))
@@ -124,7 +129,7 @@ def test_a_path_with_an_obstacle_that_moves_far_keeps_the_sheet_on_its_side():
 
 
 def arm_under_a_strip():
-    """A strip held at one end, and a flat arm under it that turns about an axis beyond the other end."""
+    """Return a strip held at one end, and under it a flat arm that turns about an axis beyond the other end."""
     mesh = ms.meshes.rectangle(0.1, 0.02, cells=(20, 4))
     strip = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.3)
     arm = ob.Box((0.2, 0.06, 4e-3), rounding=1e-3, center=(0.15, 0.01, -2e-3 - TOUCHING))
@@ -150,8 +155,8 @@ def test_a_full_turn_of_an_obstacle_is_gone_through_in_load_steps():
     assert found.load_steps >= 12
 
 
-def test_a_load_that_would_carry_a_sheet_through_a_thin_plate_ends_before_it_or_says_so():
-    """A plate of 2 mm under a strip that a load of a moment bends by many times that."""
+def test_loaded_strip_does_not_pass_through_a_thin_plate():
+    """Load a strip above a plate of 2 mm with a load that would bend it by many times that."""
     mesh = ms.meshes.rectangle(0.1, 0.02, cells=(20, 4))
     strip = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.3)
     plate = ob.Box((0.3, 0.1, 2e-3), center=(0.0, 0.0, -2e-3))
@@ -173,7 +178,7 @@ def test_a_sheet_pressed_through_an_obstacle_that_is_too_soft_is_an_error():
     assert 0.0 < caught.value.last_good.load_fraction < 1.0
 
 
-def test_gradients_by_the_place_of_an_obstacle_that_moved_far_are_those_of_the_final_state():
+def test_gradients_by_the_center_of_an_obstacle_that_moved_far_are_those_of_the_final_state():
     torch = pytest.importorskip("torch")
     ball = above("sphere")
     scene = over_a_sheet(ball)

@@ -1,4 +1,4 @@
-"""What contacts, water and solves with them say to bad input."""
+"""Errors of contacts, water and solves with them for bad input."""
 
 import numpy as np
 import pytest

@@ -17,12 +17,12 @@ DIPOLES = ms.Dipoles(POSITIONS, MOMENTS)
 
 
 def samples(field, points, moments, order=2, scale=1.0):
-    """Flux, gradient and curvature as an energy gets them."""
+    """Return flux, gradient and curvature as the energy evaluates them."""
     return _core.sample_fields([field._core], [scale], points, moments, order)
 
 
 def cubic(points):
-    """A flux density that is a cubic polynomial in each coordinate."""
+    """Return a flux density that is a cubic polynomial in each coordinate."""
     x, y, z = points.T / 0.05
     polynomials = [
         (1 + x - x**2 + 2 * x**3) * (y**3 - 2) * (z + 3 * z**3),
@@ -42,7 +42,7 @@ def from_magpylib():
     return ms.MagpylibField(sources, length_scale=0.03)
 
 
-# One row a kind of field: how to make it.
+# Kind of field -> how to make it.
 FIELDS = {
     "dipoles": lambda: DIPOLES,
     "cuboid magnet": lambda: ms.CuboidMagnet(
@@ -85,7 +85,7 @@ def moments(rng):
 
 
 def assert_close(actual, expected, tolerance):
-    """Relative to the largest entry."""
+    """Check that all entries agree within a tolerance relative to the largest one."""
     np.testing.assert_allclose(actual, expected, rtol=0, atol=tolerance * np.abs(expected).max())
 
 
@@ -203,7 +203,7 @@ def test_dipole_field_has_no_sources_and_no_currents(points, moments):
 
 
 @pytest.mark.parametrize("metres", [1e-3, 1.0, 1e3])
-def test_dipole_field_is_free_of_scale(points, moments, metres):
+def test_dipole_field_does_not_depend_on_the_unit_of_length(points, moments, metres):
     scaled = ms.Dipoles(POSITIONS * metres, MOMENTS * metres**3)
     for order, (actual, wanted) in enumerate(
         zip(samples(scaled, points * metres, moments), samples(DIPOLES, points, moments), strict=True)

@@ -1,4 +1,4 @@
-"""What applied fields say to bad input, how they print, and the converter of data-sheet values."""
+"""Errors of applied fields for bad input, how they print, and the converter of data-sheet values."""
 
 import sys
 from types import SimpleNamespace
@@ -185,7 +185,7 @@ def test_fields_print_what_they_are():
     assert repr(ms.MagpylibField([dipole], length_scale=0.01)) == "MagpylibField(Dipole, length_scale=0.01 m)"
 
 
-def test_only_a_uniform_field_has_no_core():
+def test_uniform_field_has_no_core_object_and_others_have():
     assert ms.UniformField()._core is None
     assert ms.Dipoles([[0, 0, 0]], [[0, 0, 1]])._core.name == "dipoles"
     assert not ms.SampledField((0, 0, 0), (1, 1, 1), GRID)._core.needs_gil
@@ -203,7 +203,7 @@ def test_residual_flux_density_converts_to_remanent_magnetization():
 
 
 @pytest.mark.parametrize("value", [np.nan, [0.1, np.inf], 0.1j, "0.1", True])
-def test_what_is_no_residual_flux_density_is_refused(value):
+def test_invalid_residual_flux_density_is_refused(value):
     torch = pytest.importorskip("torch")
     with pytest.raises(ValueError, match="residual_flux_density"):
         ms.residual_to_remanent(value)

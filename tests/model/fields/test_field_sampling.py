@@ -1,4 +1,4 @@
-"""ms.FieldSamplingWarning: where the field of a magnet changes over the faces of a sheet, which sample it once each."""
+"""Warnings of ms.FieldSamplingWarning: a magnet's field varies over faces that sample it once each."""
 
 import warnings
 from functools import cache
@@ -13,7 +13,10 @@ WIDTH, THICKNESS, MAGNETIZATION = 10e-3, 0.2e-3, 1e6
 
 
 def between_plates(cells, gap, *, width=WIDTH, more_field=(), **shell):
-    """Two parallel square plates, magnetized across: a magnet, and a sheet stiff beside the force."""
+    """Return a scene of a magnet and a parallel square sheet, both magnetized across.
+
+    The sheet is so stiff that the force hardly deforms it.
+    """
     mesh = ms.meshes.rectangle(width, width, cells=(cells, cells))
     mesh = mesh.transformed(translation=(-width / 2, -width / 2, gap + THICKNESS))
     magnet = ms.CuboidMagnet((WIDTH, WIDTH, THICKNESS), remanent_magnetization=(0, 0, MAGNETIZATION))
@@ -24,7 +27,7 @@ def between_plates(cells, gap, *, width=WIDTH, more_field=(), **shell):
 
 
 def true_error(cells, gap) -> float:
-    """Of the force at one point of every face, beside that of a mesh of 128 by 128 cells."""
+    """Compute the relative error of the force at one point per face, against a mesh of 128 by 128 cells."""
     return abs(force_at_one_point(cells, gap) / force_at_one_point(128, gap) - 1.0)
 
 
@@ -52,7 +55,7 @@ def test_the_estimated_error_of_a_force_is_its_error_within_a_tenth(cells, gap):
 
 @pytest.mark.parametrize(("cells", "too_coarse"), [(11, True), (14, False)])
 def test_a_warning_comes_where_the_force_is_off_by_more_than_1_percent(cells, too_coarse):
-    """1.25 % and 0.77 % are the errors themselves."""
+    """Check two meshes whose true errors are 1.25 % and 0.77 %."""
     gap = 2e-3
     assert (true_error(cells, gap) > 0.01) == too_coarse
     told = warned(lambda: ms.equilibrium(between_plates(cells, gap)))
@@ -70,7 +73,7 @@ def test_a_uniform_field_is_never_warned_of():
 
 
 def test_couples_of_a_uniform_field_count_beside_the_force_of_a_weak_source():
-    """Far beyond the force of the source, they bend the sheet alone."""
+    """Check a uniform field whose couples bend the sheet far more than the source's force."""
     magnetized = {"remanent_magnetization": (MAGNETIZATION, 0, 0)}
     scene = between_plates(6, 2e-3, more_field=[ms.UniformField()], **magnetized)
     coarse, beside = (
@@ -86,7 +89,7 @@ def test_a_motion_is_warned_of_once_where_it_came_nearest():
     assert len(told) == 1 and "the motion, in recorded state" in told[0]
 
 
-def test_the_faces_of_a_skin_are_looked_at_too():
+def test_faces_of_a_skin_are_warned_of_too():
     mesh = ms.meshes.box((WIDTH, WIDTH, 2e-3), cells=(4, 4, 1))
     skin = ms.Skin(thickness=1e-4, faces=mesh.faces_at(z=0.0), remanent_magnetization=(0, 0, MAGNETIZATION))
     law = ms.NeoHookean(young_modulus=1e10, poisson_ratio=0.3)

@@ -12,7 +12,7 @@ INSIDE = np.random.default_rng(1).uniform((-8e-3, -6e-3, 2e-3), (8e-3, 6e-3, 10e
 
 
 def rows(points, separator=", ", flux=1e3):
-    """points: mm; B in mT by default."""
+    """Return lines of a table of the magnet's field at points in mm, B in mT by default."""
     values = flux * MAGNET.flux_density(1e-3 * points)
     return [separator.join(f"{each:.12g}" for each in row) for row in np.hstack([points, values])]
 
@@ -81,7 +81,7 @@ def _with_norm(lines):
         yield ", ".join([*parts[:3], "7", *parts[3:]])
 
 
-def test_scattered_points(tmp_path):
+def test_scattered_points_are_resampled_on_a_grid(tmp_path):
     points = np.random.default_rng(2).uniform((-10, -8, 0), (10, 8, 12), (3000, 3))
     path = written(tmp_path, NAMED, *rows(points))
     corners = {"lower": (-9e-3, -7e-3, 1e-3), "upper": (9e-3, 7e-3, 11e-3)}
@@ -96,13 +96,13 @@ def test_scattered_points(tmp_path):
         ms.SampledField.from_table(path, counts=(15, 13, 11), lower=(-20e-3, 0, 0))
 
 
-def test_a_plane(tmp_path):
+def test_table_of_a_plane_has_one_sample_across(tmp_path):
     flat = GRID[GRID[:, 1] == 0.0]
     field = ms.SampledField.from_table(written(tmp_path, NAMED, *rows(flat)))
     assert field.counts == (9, 1, 6)
 
 
-def test_a_sheet_bends_in_it(tmp_path):
+def test_sheet_bends_in_a_field_from_a_table(tmp_path):
     field = ms.SampledField.from_table(written(tmp_path, NAMED, *rows(GRID)))
     mesh = ms.meshes.rectangle(8e-3, 4e-3, cells=(8, 4)).transformed(translation=(-4e-3, -2e-3, 4e-3))
     sheet = ms.Shell(mesh, thickness=2e-4, young_modulus=1e6)
@@ -137,7 +137,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("head, options, message", BAD.values(), ids=BAD)
-def test_bad_input(head, options, message, tmp_path):
+def test_tables_with_bad_heads_are_refused(head, options, message, tmp_path):
     with pytest.raises(ValueError, match=message):
         ms.SampledField.from_table(written(tmp_path, *head, *rows(GRID)), **options)
 
@@ -150,12 +150,12 @@ LINES = {
 
 
 @pytest.mark.parametrize("line, message", LINES.values(), ids=LINES)
-def test_bad_rows(line, message, tmp_path):
+def test_tables_with_bad_rows_are_refused(line, message, tmp_path):
     with pytest.raises(ValueError, match=message):
         ms.SampledField.from_table(written(tmp_path, NAMED, *rows(GRID), line))
 
 
-def test_no_table(tmp_path):
+def test_files_without_a_table_are_refused(tmp_path):
     with pytest.raises(ValueError, match="holds no rows of numbers"):
         ms.SampledField.from_table(written(tmp_path, "hello"))
     with pytest.raises(FileNotFoundError):

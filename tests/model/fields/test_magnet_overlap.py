@@ -1,4 +1,4 @@
-"""A sheet that comes into a magnet, which nothing keeps it from: failures say so."""
+"""Errors name the vertices inside a magnet, which nothing keeps a sheet from entering."""
 
 import numpy as np
 import pytest
@@ -11,8 +11,8 @@ CYLINDER = ms.CylinderMagnet(0.01, 0.04, (0, 0, 1e6), center=(0, 0.1, 0), rotati
 
 
 @pytest.mark.parametrize("magnet", [CUBOID, CYLINDER], ids=lambda magnet: type(magnet).__name__)
-def test_what_is_inside_is_magnetized(magnet) -> None:
-    """Against magpylib's polarization."""
+def test_points_inside_are_those_that_magpylib_magnetizes(magnet) -> None:
+    """Compare with the points where magpylib's polarization is not zero."""
     magpylib = pytest.importorskip("magpylib")
     points = magnet.center + np.random.default_rng(0).uniform(-0.03, 0.03, (500, 3))
     turn = magpylib.misc.Dipole().rotate_from_rotvec(np.array(magnet.rotation), degrees=False).orientation

@@ -1,4 +1,4 @@
-"""Fields of permanent magnets: against magpylib, against their own dipoles, on edges and faces, and by every parameter."""
+"""Fields of permanent magnets: against magpylib and dipoles, on edges and faces, and gradients by every parameter."""
 
 import numpy as np
 import pytest
@@ -41,7 +41,7 @@ def in_the_world(own):
 
 
 def errors(found, wanted):
-    """Of each point, relative to the largest entry there."""
+    """Compute the error of each point, relative to the largest entry there."""
     count = len(found)
     difference = np.abs(found - wanted).reshape(count, -1).max(axis=1)
     return difference / np.abs(wanted).reshape(count, -1).max(axis=1)
@@ -74,7 +74,7 @@ def test_flux_inside_and_near_is_magpylibs(magnet, rng):
 
 
 def gauss_dipoles(magnet, count=14):
-    """The magnet as dipoles at Gauss points, which is exact to round-off from three half diagonals on."""
+    """Return the magnet as dipoles at Gauss points, exact to round-off from three half diagonals on."""
     place, weight = np.polynomial.legendre.leggauss(count)
     half = half_sizes(magnet)
     if isinstance(magnet, ms.CuboidMagnet):
@@ -107,7 +107,7 @@ def test_all_orders_from_three_half_diagonals_on_are_those_of_its_dipoles(magnet
 
 @each(MAGNETS)
 def test_derivatives_inside_and_near(magnet, rng):
-    """Against differences of fourth order."""
+    """Compare with differences of fourth order."""
     half, step = half_sizes(magnet), 1e-5
     points = in_the_world(
         half * np.concatenate([rng.uniform(-0.7, 0.7, (20, 3)), rng.uniform(1.5, 3, (20, 3))])
@@ -134,7 +134,7 @@ def test_no_sources_and_no_currents(magnet, rng):
     assert (trace < 1e-12 * np.abs(curvature).max(axis=(1, 2))).all()
 
 
-# In half sizes: on lines and planes that prolong edges and faces, on the axis, in the middle.
+# Points in half sizes: on the continuations of edges and faces, on the axis, in the middle.
 PROLONGED = {
     "an edge": (1, 1, 1.5),
     "a lower edge": (-1, 1, -1.5),
@@ -149,7 +149,7 @@ PROLONGED = {
 
 @each(SHAPES)
 @pytest.mark.parametrize("place", PROLONGED)
-def test_nothing_happens_where_faces_and_edges_are_prolonged(magnet, place):
+def test_field_is_continuous_on_prolonged_faces_and_edges(magnet, place):
     own = half_sizes(magnet) * PROLONGED[place]
     if isinstance(magnet, ms.CylinderMagnet) and place != "an end":
         own[:2] *= np.sqrt(0.5) if own[0] and own[1] else 1.0  # onto the shell prolonged
@@ -182,7 +182,7 @@ def test_a_face_has_the_value_outside_and_an_edge_none(magnet):
 
 @each(SHAPES)
 def test_close_to_an_edge_the_field_is_that_of_the_edge(magnet):
-    """A charged strip along z at the edge: B changes by mu_0 M/(2 pi) log 2 as the distance halves."""
+    """Compare with a charged strip along z at the edge: B changes by mu_0 M/(2 pi) log 2 as the distance halves."""
     axial = magnet.replaced(center=(0, 0, 0), rotation=(0, 0, 0), remanent_magnetization=(0, 0, 1e6))
     edge = half_sizes(magnet) * (1, 0, 1)
     for distance in (1e-7, 1e-9, 1e-11):
@@ -193,7 +193,7 @@ def test_close_to_an_edge_the_field_is_that_of_the_edge(magnet):
 
 @each(SHAPES)
 @pytest.mark.parametrize("metres", [1e-6, 1e3])
-def test_magnets_are_free_of_scale(magnet, metres, rng):
+def test_magnet_field_does_not_depend_on_the_unit_of_length(magnet, metres, rng):
     sizes = {
         n: metres * getattr(magnet, n) for n in magnet._replaceable if n in ("dimensions", "radius", "height")
     }

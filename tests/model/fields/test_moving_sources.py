@@ -1,4 +1,4 @@
-"""Field sources, obstacles and supports that move in time, and along a path: as functions, as arrays, with gradients."""
+"""Field sources, obstacles and supports that move in time and along a path: functions, arrays, gradients."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ CUBE = ms.CuboidMagnet((0.01, 0.012, 0.008), (0, 1e4, 2e5), center=(0.05, 0.01, 
 DISK = ms.CylinderMagnet(0.005, 0.01, (0, 0, 3e5), center=(0.02, 0, -0.04), rotation=(0.1, 0, 0))
 
 
-def placed(field):
+def positioned_field(field):
     return ms.PlacedField(field, center=(0.001, 0.002, 0.0), rotation=(0.1, 0.2, 0.0))
 
 
@@ -39,9 +39,9 @@ SOURCES = {
     "cuboid": lambda: CUBE,
     "cylinder": lambda: DISK,
     "dipoles": lambda: PAIR,
-    "placed dipoles": lambda: placed(PAIR),
-    "placed grid": lambda: placed(GRID),
-    "placed function": lambda: placed(ms.CustomField(swirl, length_scale=0.05)),
+    "placed dipoles": lambda: positioned_field(PAIR),
+    "placed grid": lambda: positioned_field(GRID),
+    "placed function": lambda: positioned_field(ms.CustomField(swirl, length_scale=0.05)),
 }
 
 
@@ -53,16 +53,19 @@ def approach(t):
     return np.array([0.05 - t, 0.01 + 20 * t**2, 0.04 - 0.5 * t])
 
 
-def turn(t):
+def rotation_vector(t):
     return np.array([20 * t, 5 * np.sin(40 * t), 400 * t**2])
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS, ids=repr)
 def test_a_magnet_that_approaches_by_an_array_as_by_a_function(integrator):
-    """Straight lines between the ends of steps: an array of what moves evenly says the same, another to second order."""
+    """Compare an array with a function of the time.
+
+    An array is linear between the ends of steps: exact for a uniform motion, of second order for another.
+    """
     scene, apart = in_field(CUBE), []
     even = {"center": lambda t: (0.05 - t, 0.01, 0.04 - t), "rotation": lambda t: (0, 30 * t, 0)}
-    curved = {"center": approach, "rotation": turn}
+    curved = {"center": approach, "rotation": rotation_vector}
     for path, steps in ((even, 8), (curved, 8), (curved, 16)):
         given = {"steps": steps, "time_step": 0.016 / steps, "integrator": integrator, **MAGNETIZED, **EXACT}
         sampled = {name: ends(f, steps, 0.016 / steps) for name, f in path.items()}
@@ -78,14 +81,14 @@ def test_a_magnet_that_approaches_by_an_array_as_by_a_function(integrator):
         assert 3.0 < apart[1] / apart[2] < 5.0 and apart[2] < 0.01 * moved
 
 
-def test_a_turning_magnet_is_what_its_dipoles_are():
-    """Dipoles with positions and moments over time, and the same ones that turn as a whole."""
+def test_rotating_source_equals_its_rotating_dipoles():
+    """Compare dipoles with prescribed positions and moments with the same dipoles rotated as one field."""
     steps, time_step = 6, 2e-3
     given = {"steps": steps, "time_step": time_step, "integrator": ms.ImplicitEuler(), **MAGNETIZED, **EXACT}
     whole = ms.PlacedField(PAIR)
-    path = {"center": lambda t: (t, 0.0, -t), "rotation": turn}
+    path = {"center": lambda t: (t, 0.0, -t), "rotation": rotation_vector}
     moved = ms.simulate(in_field(whole), **given, values={whole: path})
-    turns = [ms.obstacles.obstacle._motion.matrix(turn(k * time_step)) for k in range(steps + 1)]
+    turns = [ms.obstacles.obstacle._motion.matrix(rotation_vector(k * time_step)) for k in range(steps + 1)]
     shifts = ends(path["center"], steps, time_step)
     rows = {
         "positions": np.array([PAIR.positions @ r.T + c for r, c in zip(turns, shifts, strict=True)]),
@@ -96,7 +99,7 @@ def test_a_turning_magnet_is_what_its_dipoles_are():
     np.testing.assert_allclose(moved.positions, alone.positions, rtol=0, atol=1e-13)
 
 
-def test_one_place_a_step_is_a_jump_of_the_field_at_its_beginning():
+def test_source_positions_per_step_change_at_the_beginning_of_each_step():
     scene, rows = in_field(CUBE), np.array([(0.05, 0.01, z) for z in (0.04, 0.03, 0.035)])
     given = {"time_step": 2e-3, "integrator": ms.TRBDF2(), **MAGNETIZED, **EXACT}
     at_once = ms.simulate(scene, steps=3, **given, values={CUBE: {"center": rows}})
@@ -106,7 +109,7 @@ def test_one_place_a_step_is_a_jump_of_the_field_at_its_beginning():
 
 
 def slope(loss, given, name, direction, step):
-    """Of a loss along a direction of one input, from central differences with two steps."""
+    """Compute the derivative of a loss along a direction of one input, from central differences with two steps."""
     found = []
     for size in (step, 0.5 * step):
         above, below = (float(loss({**given, name: given[name] + s * size * direction})) for s in (1, -1))
@@ -115,7 +118,7 @@ def slope(loss, given, name, direction, step):
 
 
 def check_gradients(loss, given, steps):
-    """By each input against differences along its gradient and along noise."""
+    """Compare the gradient by each input with differences along that gradient and along noise."""
     tensors = {
         name: torch.tensor(value, dtype=torch.float64, requires_grad=True) for name, value in given.items()
     }
@@ -163,7 +166,7 @@ def rocking(t):
 
 
 def on_a_block(**contact):
-    """A sheet that lies on a block, which takes it along by friction."""
+    """Return a block and a scene of a sheet that lies on it and is moved by its friction."""
     block = ob.Box((0.2, 0.2, 0.1), rounding=0.01, center=(0, 0, -0.0505))
     law = {"friction_coefficient": 0.5, "offset": 1e-4, "contact_stiffness": 50.0, **contact}
     touching = ms.Contact(block, **law)
@@ -294,7 +297,10 @@ def test_gradient_by_the_path_of_a_support(integrator):
 
 
 def test_all_that_moves_at_once_from_checkpoints():
-    """However little is kept of a motion, its gradient has the same bits; a solve after it finds the scene as it was."""
+    """Check that the gradient has the same bits however little of a motion is stored.
+
+    A solve afterwards finds the scene unchanged.
+    """
     block, _ = on_a_block()
     clamp = ms.Clamp(MESH.edges_at(x=0.0), displacement=(0, 0, 0))
     scene = ms.Scene(
@@ -330,7 +336,7 @@ def test_all_that_moves_at_once_from_checkpoints():
 
 
 def test_gradients_through_a_step_that_was_taken_in_parts():
-    """What moves is asked for between its knots there."""
+    """Check gradients by prescribed motions that are evaluated within a subdivided step."""
     ball, steps, time_step = ob.Sphere(0.004, center=(0.03, 0.01, -0.03)), 5, 1e-3
     hits = ms.Contact(ball, contact_stiffness=200.0, friction_coefficient=0.3)
     scene = ms.Scene(SHEET, supports=[CLAMP], field=CUBE, contacts=[hits])
@@ -355,14 +361,14 @@ def test_gradients_through_a_step_that_was_taken_in_parts():
 
 def test_a_motion_in_two_parts_goes_on_with_functions_of_the_time():
     scene, given = in_field(CUBE), {"time_step": 2e-3, **MAGNETIZED, **EXACT}
-    values = {CUBE: {"center": approach, "rotation": turn}}
+    values = {CUBE: {"center": approach, "rotation": rotation_vector}}
     whole = ms.simulate(scene, steps=6, values=values, **given)
     first = ms.simulate(scene, steps=2, values=values, **given)
     second = ms.simulate(scene, steps=4, start=first, values=values, **given)
     assert np.array_equal(second.positions, whole.positions[2:])
 
 
-def test_a_trajectory_knows_where_its_obstacles_went():
+def test_trajectory_stores_the_positions_of_its_obstacles():
     ball = ob.Sphere(0.02, center=(0.025, 0.01, -0.021))
     scene = ms.Scene(SHEET, supports=[CLAMP], contacts=[ms.Contact(ball)])
     path = ends(lambda t: (0.025, 0.01, -0.021 + t), 4, 1e-3)

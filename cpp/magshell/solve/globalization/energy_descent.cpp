@@ -37,7 +37,7 @@ constexpr double near = 0.05;
 constexpr double round_off = 1e-6;
 // [-] First rates of a gradient flow step, over the rate given by the forces and over the largest stiffness; see test_both_sides_of_a_saddle_cost_the_same.
 constexpr double first_forced_rate = 1e-3, first_stiffness_rate = 1e-12;
-// [-] Shortest admissible fraction of a gradient flow step; see test_a_solid_that_lands_is_not_turned_inside_out.
+// [-] Shortest admissible fraction of a gradient flow step; see test_landing_solid_is_not_inverted.
 constexpr double min_flow_alpha = 1e-4;
 
 /// The success of one of the two methods, and for how many steps it is not tried (exponential back-off).

@@ -50,7 +50,7 @@ constexpr double diverged_step = 1e3;
 // [-] Change of contact forces, over the residual, that makes a new factorization necessary; see test_an_impact_takes_few_factorizations.
 constexpr double stale_contact = 0.1;
 
-// [-] Shortest admissible step length; see test_a_solid_that_lands_is_not_turned_inside_out.
+// [-] Shortest admissible step length; see test_landing_solid_is_not_inverted.
 constexpr double min_step_length = 1e-4;
 
 // Returns the tolerance of the linear solve with a nonsymmetric matrix (inexact Newton, N&W 7.1): the forcing term that keeps quadratic

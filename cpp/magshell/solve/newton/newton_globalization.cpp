@@ -13,7 +13,7 @@ namespace {
 constexpr double search_contraction = 0.5;
 // [-] Shortest admissible step length of the line search; see test_sheets_pressed_together_by_a_thousand_times_their_weight.
 constexpr double min_search_length = 1e-9;
-// [-] Step length below which the report names the elements or faces that limit it; see test_a_relaxation_that_ends_early_tells_what_touches.
+// [-] Step length below which the report names the elements or faces that limit it; see test_relaxation_that_ends_early_reports_contacts.
 constexpr double blocked_step_length = 0.1;
 // [-] Distance of a trial from the ends of its bracket, over its width; see test_strip_folds_onto_itself.
 constexpr double bracket_margin = 0.1;
