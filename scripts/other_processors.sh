@@ -49,6 +49,7 @@ avx2() {
 # The package with the extension compiled for a family, in build/$1/site, before any other.
 compiled_for() {
     local build=build/$1
+    mkdir -p build
     if [ ! -f "$build/CMakeCache.txt" ]; then
         cmake -G Ninja -S . -B "$build" -DMAGSHELL_NATIVE=OFF -DMAGSHELL_BASELINE="$1" -DPython_EXECUTABLE="$python" \
             -Dpybind11_DIR="$("$python" -m pybind11 --cmakedir)" ${CMAKE_ARGS:-} >"$build.log" ||
