@@ -253,5 +253,5 @@ sys.modules.update({f"{__name__}.{group}": globals()[group] for group in _GROUPS
 
 
 def __dir__() -> list[str]:
-    """What is public: neither the rooms that it is made in nor the bench."""
+    """Return the public names, for tab completion; the inner packages and the benchmarks are left out."""
     return sorted(__all__)

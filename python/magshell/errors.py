@@ -1,4 +1,7 @@
-"""What a solve raises when it cannot finish. Each error hands back what the solve had."""
+"""Errors and warnings of magshell.
+
+An error raised by a solve has an attribute `last_good`: the last usable result before the failure.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +9,11 @@ from typing import Any
 
 
 class DesignRejected(RuntimeError):
-    """Raised inside an objective: this design cannot be evaluated, its equilibrium was not found or jumped. Go
-    less far. `last_good` holds the last state of the same kind that could be, if there is one. `load_case`: the number
-    of the load case that it is about, or None."""
+    """An error for a design that an objective cannot evaluate: its equilibrium was not found, or has jumped.
+
+    An optimizer answers it with a shorter step. `last_good` holds the last state of the same kind that could be computed,
+    or None. `load_case` is the number of the load case that failed, or None.
+    """
 
     def __init__(self, message: str, last_good: Any = None, load_case: int | None = None):
         super().__init__(message)
@@ -17,27 +22,42 @@ class DesignRejected(RuntimeError):
 
 
 class NotConverged(DesignRejected):
-    """A solve failed. `last_good` holds the last converged state, as a result of the same kind."""
+    """An error for a solve that did not converge.
+
+    `last_good` holds the last converged state, as a result of the same kind.
+    """
 
 
 class EquilibriumJumped(DesignRejected):
-    """Between two designs the equilibrium snapped or buckled. `last_good` holds the one before the jump."""
+    """An error for an equilibrium that snapped or buckled between two designs.
+
+    `last_good` holds the equilibrium before the jump.
+    """
 
 
 class MeshQualityWarning(UserWarning):
-    """Faces of the mesh are so flat that a result cannot be trusted, see TriangleMesh.quality; or a solid has too few
-    tetrahedra for their mean volume."""
+    """A warning about a mesh whose results cannot be trusted.
+
+    Either faces are nearly degenerate (see TriangleMesh.quality), or a solid has too few tetrahedra for the mean-volume
+    formulation.
+    """
 
 
 class UnitWarning(UserWarning):
-    """A thickness, modulus, density, magnetization or field is by decades beyond any body, as where mm, kPa or mT were
-    given for m, Pa or T. Said once a scene and kind of value; `warnings.filterwarnings("ignore",
-    category=ms.UnitWarning)` for models without units."""
+    """A warning about a value whose unit is probably wrong, such as mm, kPa or mT given for m, Pa or T.
+
+    It is raised once per scene and kind of value, where a thickness, modulus, density, magnetization or field is orders of
+    magnitude away from that of any real body. For models without units, switch it off by
+    `warnings.filterwarnings("ignore", category=ms.UnitWarning)`.
+    """
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C stopped a solve. `last_good` holds the last converged state, as a result of the same kind; None where
-    there is nothing before all of it is done, as of linear solves, or where the start was not yet known."""
+    """The KeyboardInterrupt of a solve that was stopped by Ctrl-C.
+
+    `last_good` holds the last converged state, as a result of the same kind. It is None for linear solves, which have no
+    intermediate states, and if the solve was stopped before its start was known.
+    """
 
     def __init__(self, message: str, last_good: Any = None):
         super().__init__(message)
@@ -45,7 +65,10 @@ class Interrupted(KeyboardInterrupt):
 
 
 class ObjectiveFailed(RuntimeError):
-    """An optimization met an error, its cause, on the way. `last_good` holds the best design until then."""
+    """An error that stopped an optimization; its cause (`__cause__`) is the error raised by the objective.
+
+    `last_good` holds the best design found until then.
+    """
 
     def __init__(self, message: str, last_good: Any = None):
         super().__init__(message)
@@ -53,8 +76,10 @@ class ObjectiveFailed(RuntimeError):
 
 
 class MultistartFailed(RuntimeError):
-    """The executor of a multistart broke, or none of the starts came to its end. `last_good` holds a Multistart of
-    what finished."""
+    """An error for a multistart whose executor broke, or of which no start finished.
+
+    `last_good` holds a MultistartResult of the starts that finished.
+    """
 
     def __init__(self, message: str, last_good: Any = None):
         super().__init__(message)
@@ -62,8 +87,11 @@ class MultistartFailed(RuntimeError):
 
 
 class LargeStrainWarning(UserWarning):
-    """A result has strains beyond 20 %, for which its material law is not meant. Said once a scene, and again where
-    strains have doubled since. Where warnings are made errors, `last_good` holds the result."""
+    """A warning about a result with strains above 20 %, for which its material law is not valid.
+
+    It is raised once per scene, and again each time the strains have doubled. If warnings are turned into errors,
+    `last_good` holds the result.
+    """
 
     def __init__(self, message: str, last_good: Any = None):
         super().__init__(message)
@@ -71,10 +99,15 @@ class LargeStrainWarning(UserWarning):
 
 
 class FieldSamplingWarning(UserWarning):
-    """The magnetic force on a sheet is off by more than 1 %, as the field of a source near by changes over its faces, which
-    sample it once each. Said once a solve."""
+    """A warning about a magnetic force on a shell that is wrong by more than 1 %, raised once per solve.
+
+    Each face samples the applied field at one point; the field of a nearby source varies too much over the face for that.
+    """
 
 
 class NoGradient(RuntimeError):
-    """A gradient was asked for where there is none: at a state that did not converge or is not stable, by an input that
-    has none, or of a gradient (second derivatives: take differences of gradients)."""
+    """An error for a gradient that does not exist.
+
+    It is raised at a state that did not converge or is not stable, for an input that is not differentiable, and for second
+    derivatives (use finite differences of gradients instead).
+    """

@@ -1,7 +1,7 @@
-"""Faces and edges of a mesh with the shapes of its elements.
+"""Distribution of face and edge loads to the nodes of a mesh, by the shape functions of its elements.
 
-A side of ten-node tetrahedra, and a six-node triangle, is shown as four flat triangles, but what acts on one of them is
-shared out over all six nodes.
+A six-node triangle, or one side of a ten-node tetrahedron, appears in `mesh.faces` as four flat triangles. A load on one of
+these triangles acts on all six nodes of the element.
 """
 
 from __future__ import annotations
@@ -20,8 +20,10 @@ if TYPE_CHECKING:
 
 
 def sides(mesh: TriangleMesh | QuadraticTriangleMesh | TetMesh) -> tuple[np.ndarray, int]:
-    """The nodes of each side, (n, 3) or (n, 6), and how many of the mesh's faces it is: face f is part f % parts of side
-    f // parts."""
+    """Return the nodes of each element side, (n, 3) or (n, 6), and the number of the mesh's faces per side, 1 or 4.
+
+    Face f of the mesh is part f % parts of side f // parts.
+    """
     if isinstance(mesh, QuadraticTriangleMesh):
         return mesh.elements, len(FLAT)
     if isinstance(mesh, TetMesh) and mesh.order == 2:
@@ -30,7 +32,10 @@ def sides(mesh: TriangleMesh | QuadraticTriangleMesh | TetMesh) -> tuple[np.ndar
 
 
 def corner_axes(corners: np.ndarray) -> np.ndarray:
-    """Two unit vectors in the plane of each three corners (n, 3, 3), (n, 2, 3): along the first edge, and to the left."""
+    """Return two orthonormal vectors in the plane of each triangle, (n, 2, 3): along its first edge, and to the left of it.
+
+    corners: (n, 3, 3) m.
+    """
     edges = corners[:, 1:] - corners[:, :1]
     first = edges[:, 0] / np.linalg.norm(edges[:, 0], axis=1, keepdims=True)
     normal = np.cross(edges[:, 0], edges[:, 1])
@@ -38,11 +43,14 @@ def corner_axes(corners: np.ndarray) -> np.ndarray:
     return np.stack([first, np.cross(normal, first)], axis=1)
 
 
-def shares(
+def nodal_areas(
     mesh: TriangleMesh | QuadraticTriangleMesh | TetMesh, faces: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Whose nodes feel what acts on the area at rest of some faces (k,), and how much of it: (k, 3) or (k, 6) vertices,
-    and the integrals of their shape functions over the face, m2, likewise."""
+    """Return the vertices that carry a load on faces (k,), and the area that each of them stands for.
+
+    Returns vertices, (k, 3) or (k, 6), and the integrals of their shape functions over the reference area of the face, m2,
+    of the same shape.
+    """
     nodes, parts = sides(mesh)
     if parts == 1:
         return nodes[faces], np.repeat(mesh.face_areas[faces, None] / 3.0, 3, axis=1)
@@ -54,10 +62,14 @@ def shares(
     return nodes, weights
 
 
-def edge_shares(
+def nodal_lengths(
     mesh: TriangleMesh | QuadraticTriangleMesh | TetMesh, edges: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Likewise along some edges (k,): (k, 2) or (k, 3) vertices, and m."""
+    """Return the vertices that carry a load on edges (k,), and the length that each of them stands for.
+
+    Returns vertices, (k, 2) or (k, 3), and the integrals of their shape functions along the edge in the reference
+    configuration, m, of the same shape.
+    """
     if not isinstance(mesh, QuadraticTriangleMesh):
         return mesh.edges[edges], np.repeat(mesh.edge_lengths[edges, None] / 2.0, 2, axis=1)
     nodes = mesh.nodes_of_edges[edges]

@@ -1,4 +1,4 @@
-"""What meshes of triangles and of tetrahedra have in common."""
+"""The base class of triangle meshes and tetrahedral meshes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .selection import MeshSelection
 
 
 class MeshBase(Drawn, MeshSelection):
-    """Counts and lengths that follow from rest_positions, edges, faces and components."""
+    """Base class of meshes: counts and lengths that follow from rest_positions, edges, faces and components."""
 
     @property
     def n_vertices(self) -> int:
@@ -31,21 +31,25 @@ class MeshBase(Drawn, MeshSelection):
 
     @cached_property
     def size(self) -> float:
-        """The diagonal of the bounding box, m: the length that default tolerances are relative to."""
+        """The diagonal of the bounding box, m; default tolerances are relative to this length."""
         return float(np.linalg.norm(np.ptp(self.rest_positions, axis=0)))
 
     @cached_property
     def edge_lengths(self) -> np.ndarray:
-        """(n_e,), m, straight from end to end."""
+        """The straight distances between the ends of the edges, (n_e,) m."""
         ends = self.rest_positions[self.edges]
         return frozen(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
 
     @cached_property
     def edge_midpoints(self) -> np.ndarray:
-        """(n_e, 3), m, halfway between the ends; of ten-node tetrahedra the nodes on the edges may lie elsewhere."""
+        """The points halfway between the ends of the edges, (n_e, 3) m.
+
+        The midside nodes of ten-node tetrahedra may lie elsewhere.
+        """
         return frozen(self.rest_positions[self.edges].mean(axis=1))
 
 
 def frozen(array: np.ndarray) -> np.ndarray:
+    """Return the same array, made read-only."""
     array.setflags(write=False)
     return array

@@ -1,4 +1,4 @@
-"""Whether a mesh divides the cells of a coarser one, and where its vertices are among the fine ones."""
+"""Check that a fine mesh subdivides the cells of a coarse one, and find the coarse mesh's vertices in the fine mesh."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .triangles.six_node_mesh import QuadraticTriangleMesh
 if TYPE_CHECKING:
     from .triangles.triangle_mesh import TriangleMesh
 
-_SAME_PLACE = 1e-6  # of the shortest edge
+_SAME_PLACE = 1e-6  # [-] largest distance between two equal vertices, relative to the shortest edge
 _REMEDY = (
     "Make the finer one by mesh.refined(), or by the same generator with a multiple of its cells and without "
     "irregular=..."
@@ -21,8 +21,12 @@ _REMEDY = (
 
 
 class Nesting(NamedTuple):
-    """ratio: into how many parts each edge of the coarse mesh is divided; vertices: (n_v,) its vertices' numbers in the
-    fine one."""
+    """The relation of a coarse mesh to a fine mesh that subdivides its cells.
+
+    ratio: the number of fine edges that each edge of the coarse mesh is divided into.
+    vertices: (n_v,), the number in the fine mesh of each vertex of the coarse one; -1 for the midside nodes of six-node
+        elements.
+    """
 
     ratio: int
     vertices: np.ndarray
@@ -33,16 +37,20 @@ def nesting(
     fine: TriangleMesh | QuadraticTriangleMesh | TetMesh,
     names: tuple[str, str],
 ) -> Nesting:
-    """Raises ValueError, which names the meshes, unless each cell of the coarse one is a union of fine ones, each edge
-    divided alike. Vertices on a curved surface may lie beside the coarse one's edges. Of six-node elements the corners are
-    compared alone, and other vertices are at -1."""
+    """Check that each cell of the coarse mesh is a union of cells of the fine one, with all edges divided alike.
+
+    Fine vertices on a curved surface may lie off the straight edges of the coarse mesh. Only the corners of six-node
+    elements are compared; their midside nodes get -1 in `Nesting.vertices`.
+
+    Raises ValueError if the meshes are not nested; `names` are what its message calls the coarse and the fine mesh.
+    """
     if isinstance(coarse, QuadraticTriangleMesh) and isinstance(fine, QuadraticTriangleMesh):
         corners = nesting(coarse.corners, fine.corners, names)
         vertices = np.full(coarse.n_vertices, -1)
         vertices[coarse.corner_vertices] = fine.corner_vertices[corners.vertices]
         return Nesting(corners.ratio, vertices)
     ratio = _ratio(coarse, fine, names)
-    vertices = _places(coarse, fine)
+    vertices = _matching_vertices(coarse, fine)
     missing = np.flatnonzero(vertices < 0)
     if missing.size:
         at = ", ".join(f"{x:.4g}" for x in coarse.rest_positions[missing[0]])
@@ -83,32 +91,38 @@ def _ratio(coarse, fine, names) -> int:
     return ratio
 
 
-def _places(coarse, fine) -> np.ndarray:
-    """(n_v,): -1 where there is none. On the two sides of a slit, the one on the same side."""
+def _matching_vertices(coarse, fine) -> np.ndarray:
+    """Return the fine vertex at the position of each coarse one, (n_v,), or -1.
+
+    Of two fine vertices on opposite sides of a slit, the one on the same side as the coarse vertex is taken.
+    """
     n_v = coarse.n_vertices
     tolerance = _SAME_PLACE * coarse.edge_lengths.min()
     first = fine.rest_positions[:n_v]
     if len(first) == n_v and np.abs(first - coarse.rest_positions).max() <= tolerance:
         return np.arange(n_v)
-    reach = 1e3 * tolerance
-    tree = scipy.spatial.cKDTree(_told_apart(fine, reach))
-    vertices = tree.query(_told_apart(coarse, reach))[1]
+    weight = 1e3 * tolerance
+    tree = scipy.spatial.cKDTree(_positions_and_sides(fine, weight))
+    vertices = tree.query(_positions_and_sides(coarse, weight))[1]
     off = np.linalg.norm(fine.rest_positions[vertices] - coarse.rest_positions, axis=1)
     return np.where(off <= tolerance, vertices, -1)
 
 
-def _told_apart(mesh, reach: float) -> np.ndarray:
-    """(n_v, 6): the positions, and where the faces or edges of each vertex lie, of little weight: it decides between
-    vertices in one place only."""
+def _positions_and_sides(mesh, weight: float) -> np.ndarray:
+    """Compute points (n_v, 6) that distinguish vertices at the same position, m.
+
+    The first three entries are the position, the others the mean direction of the vertex's edges times `weight` [m]. The
+    weight is small, so that the direction only decides between vertices that coincide, such as those of a slit.
+    """
     ends = np.concatenate([mesh.edges, mesh.edges[:, ::-1]])
     arms = mesh.rest_positions[ends[:, 1]] - mesh.rest_positions[ends[:, 0]]
     sums = np.stack([np.bincount(ends[:, 0], arm, mesh.n_vertices) for arm in arms.T], axis=1)
     lengths = np.bincount(ends[:, 0], np.linalg.norm(arms, axis=1), mesh.n_vertices)
-    return np.concatenate([mesh.rest_positions, reach * sums / np.maximum(lengths, 1e-300)[:, None]], axis=1)
+    return np.concatenate([mesh.rest_positions, weight * sums / np.maximum(lengths, 1e-300)[:, None]], axis=1)
 
 
 def _far_apart(coarse, fine, vertices: np.ndarray, ratio: int) -> np.ndarray:
-    """The edges of the coarse mesh whose ends are more than `ratio` edges apart in the fine one."""
+    """Find the edges of the coarse mesh whose ends are more than `ratio` edges apart in the fine one."""
     n = fine.n_vertices
     ends = np.concatenate([fine.edges, fine.edges[:, ::-1]])
     graph = scipy.sparse.coo_array((np.ones(len(ends), dtype=np.int32), tuple(ends.T)), shape=(n, n)).tocsr()

@@ -1,4 +1,4 @@
-"""A warning where nodes between corners did not get onto the curved surface that they are to lie on."""
+"""A warning about midside nodes that could not be moved onto the curved surface that they belong to."""
 
 from __future__ import annotations
 
@@ -17,11 +17,16 @@ if TYPE_CHECKING:
 # [-] Distance of a node over the length of its edge; straight edges of 1/12 rad of a sphere are this far off it. Fixed by
 # test_nodes_that_stay_off_a_thin_sphere_are_warned_of_with_their_count_and_distance.
 _OFF = 1e-2
-_FEW = 0.02  # [-] share of the nodes: so few lie along ridges of the surface, onto which no gradient leads
+# [-] Fraction of the nodes that may stay off without a warning: nodes along ridges of the surface, where the distance has no
+# gradient to follow.
+_FEW = 0.02
 
 
 def warn_of_nodes_off(mesh: MeshBase, edges: np.ndarray, middles: np.ndarray, surface: Distance) -> None:
-    """Warn where more than a few of the middles (k, 3) m of edges (k,), whose ends are on a surface, are far off it."""
+    """Warn if more than a few midside nodes are far off a surface on which the ends of their edges lie.
+
+    edges: (k,). middles: (k, 3) m, the midside node of each edge. surface: a signed distance, m.
+    """
     distances = np.abs(checked_distance("surface", surface)(middles))
     lengths = mesh.edge_lengths[edges]
     off = distances > _OFF * lengths

@@ -1,7 +1,7 @@
-"""Vertices, edges and faces of a mesh by where they are.
+"""Selection of vertices, edges and faces of a mesh by their position.
 
-Every selection returns ascending indices. One that finds nothing raises a ValueError that says what is
-there: an empty support would otherwise surface much later, as a sheet that flies away.
+Every selection returns ascending indices. A selection that finds nothing raises a ValueError that says what lies nearest: an
+empty support would otherwise be noticed much later, as a body that flies away.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from .._input.kinds import Numbers
 
 
-RELATIVE_TOLERANCE = 1e-6  # of the mesh's size: far above round-off, far below any edge
+# [-] Default tolerance of positions, relative to the diagonal of the bounding box: far above round-off, far below any edge.
+RELATIVE_TOLERANCE = 1e-6
 
 _PLURAL = {
     "vertex": "vertices",
@@ -32,7 +33,7 @@ _PLURAL = {
 
 
 class MeshSelection:
-    """The selecting half of TriangleMesh."""
+    """Base class of all meshes with the methods that select vertices, edges and faces."""
 
     def vertices_at(
         self,
@@ -41,7 +42,7 @@ class MeshSelection:
         z: Numbers | None = None,
         tolerance: float | None = None,
     ) -> np.ndarray:
-        """Vertices whose given coordinates [m] match within `tolerance` [m].
+        """Select the vertices whose given coordinates [m] match within `tolerance` [m].
 
         The default tolerance is 1e-6 of the diagonal of the bounding box.
 
@@ -62,7 +63,7 @@ class MeshSelection:
         z: Numbers | None = None,
         tolerance: float | None = None,
     ) -> np.ndarray:
-        """Edges with both ends at the given coordinates [m]; see `vertices_at`."""
+        """Select the edges with both ends at the given coordinates [m]; see `vertices_at`."""
         return self._at("edge", self.edges, x, y, z, tolerance)
 
     def faces_at(
@@ -72,17 +73,19 @@ class MeshSelection:
         z: Numbers | None = None,
         tolerance: float | None = None,
     ) -> np.ndarray:
-        """Faces with all three vertices at the given coordinates [m]; see `vertices_at`."""
+        """Select the faces with all three vertices at the given coordinates [m]; see `vertices_at`."""
         return self._at("face", self.faces, x, y, z, tolerance)
 
     def vertices_where(self, predicate: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """Vertices where predicate((n_v, 3) positions [m]) -> (n_v,) bool holds."""
+        """Select the vertices for which `predicate` is True; it maps positions (n_v, 3) [m] to booleans (n_v,)."""
         return _where("vertex", predicate, self.rest_positions, np.arange(self.n_vertices))
 
     def edges_where(
         self, predicate: Callable[[np.ndarray], np.ndarray], boundary_only: bool = False
     ) -> np.ndarray:
-        """Edges where predicate((n, 3) midpoints [m]) -> (n,) bool holds, of all or those on the boundary.
+        """Select the edges, all or those on the boundary only, for which `predicate` is True.
+
+        predicate: maps the midpoints of the edges, (n, 3) [m], to booleans (n,).
 
         >>> import magshell as ms
         >>> mesh = ms.meshes.rectangle(2.0, 1.0, cells=(2, 1))
@@ -98,16 +101,16 @@ class MeshSelection:
         )
 
     def faces_where(self, predicate: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """Faces where predicate((n_f, 3) barycenters [m]) -> (n_f,) bool holds."""
+        """Select the faces for which `predicate` is True; it maps barycenters (n_f, 3) [m] to booleans (n_f,)."""
         return _where("face", predicate, self.face_barycenters, np.arange(self.n_faces))
 
     def nearest_vertex(self, point: Numbers) -> int:
-        """The vertex nearest to a point (3,) [m]; the lowest index where several are."""
+        """Return the vertex nearest to a point (3,) [m]; of several, the one with the lowest index."""
         point = quantity("point", "m", point, (3,))
         return int(np.argmin(np.linalg.norm(self.rest_positions - point, axis=1)))
 
     def edges_between(self, vertex_indices: Numbers) -> np.ndarray:
-        """Edges with both ends among the given vertices."""
+        """Select the edges with both ends among the given vertices."""
         indices = index_array("vertex_indices", vertex_indices).ravel()
         outside = indices[(indices < 0) | (indices >= self.n_vertices)]
         if len(outside):

@@ -1,4 +1,4 @@
-"""Signed distances that a caller hands in: negative inside, zero on the surface, metres."""
+"""Signed distance functions given by a caller: negative inside, zero on the surface, in metres."""
 
 from __future__ import annotations
 
@@ -12,13 +12,17 @@ if TYPE_CHECKING:
 
 Distance = Callable[[np.ndarray], np.ndarray]
 
-_STEP = 1e-5  # of differences, relative to the length that the caller names
+_STEP = 1e-5  # [-] step of finite differences, relative to the caller's `lengths`
 _ROUNDS = 20
-_ON_SURFACE = 1e-3  # of an edge: both its ends lie this near to the surface that its middle moves onto
+# [-] Largest distance of an edge's ends from the surface, relative to its length, for its midpoint to be moved onto it.
+_ON_SURFACE = 1e-3
 
 
 def checked_distance(name: str, function: Distance) -> Distance:
-    """The function, which then raises ValueError where it does not return a finite number for each point."""
+    """Return the function with a check: it raises ValueError if it does not return one finite number for each point.
+
+    name: what the messages call it.
+    """
     if not callable(function):
         raise ValueError(
             f"{name} must be a signed distance, (n, 3) m -> (n,) m, as those of ms.shapes, got {type(function).__name__}"
@@ -43,10 +47,10 @@ def checked_distance(name: str, function: Distance) -> Distance:
 def zeros_between(
     distance: Distance, inside: np.ndarray, outside: np.ndarray, at_ends: np.ndarray
 ) -> np.ndarray:
-    """(n,): the fraction of the way from `inside` (n, 3) to `outside` where the distance is zero, to round-off nearly.
+    """Find the zero of the distance on each segment from `inside` (n, 3) to `outside`, as a fraction of its length, (n,).
 
-    at_ends: (n, 2), the distances there, of opposite sign. The false position is kept from creeping by halving the value
-    at the end that stays (the Illinois rule).
+    at_ends: (n, 2) m, the distances at the two points, of opposite sign. The method is regula falsi in the Illinois variant:
+    the value at an end point that does not move is halved. The result is accurate nearly to round-off.
     """
     low, high = np.zeros(len(inside)), np.ones(len(inside))
     f_low, f_high = at_ends.T.copy()
@@ -72,8 +76,10 @@ def zeros_between(
 
 
 def onto_surface(distance: Distance, points: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Points (n, 3) moved onto the surface along the gradient; those that do not get there within a quarter of their
-    length (n,) [m] stay."""
+    """Return the points (n, 3) m moved along the gradient of the distance onto the surface.
+
+    A point that does not arrive, or only by moving more than a quarter of its entry of `lengths` (n,) [m], stays.
+    """
     moved = points.copy()
     steps = _STEP * lengths
     for _ in range(8):
@@ -91,7 +97,7 @@ def onto_surface(distance: Distance, points: np.ndarray, lengths: np.ndarray) ->
 
 
 def middles_on_surface(mesh: MeshBase, edges: np.ndarray, surface: Distance) -> tuple[np.ndarray, np.ndarray]:
-    """Those of the edges (k,) whose ends both lie on the surface, and where their middles are once moved onto it."""
+    """Return those of the edges (k,) whose ends lie on the surface, (n,), and their midpoints moved onto it, (n, 3) m."""
     distance = checked_distance("surface", surface)
     lengths = mesh.edge_lengths[edges]
     at_ends = np.abs(distance(mesh.rest_positions))[mesh.edges[edges]]

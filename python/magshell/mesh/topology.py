@@ -1,7 +1,7 @@
-"""What of a mesh of tetrahedra follows from its indices alone: edges, faces, the surface around it.
+"""Edges, faces and the boundary surface of tetrahedral meshes, from their connectivity alone.
 
-Nodes of a tetrahedron are numbered as VTK does: corners 0 to 3, with (x1 - x0) x (x2 - x0) . (x3 - x0) > 0, and then, of
-ten, one on each of EDGES. Face i is opposite corner i, and runs counter-clockwise seen from outside.
+The nodes of a tetrahedron are numbered as in VTK: corners 0 to 3, with (x1 - x0) x (x2 - x0) . (x3 - x0) > 0, then, for ten
+nodes, one on each of EDGES. Face i is opposite corner i, and its corners run counter-clockwise seen from outside.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import scipy
 
 EDGES = np.array([(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)])
 FACES = np.array([(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)])
-# the ten nodes with corners 0 and 2 exchanged, which turns a tetrahedron and keeps how `refined` divides it
+# the ten nodes with corners 0 and 2 exchanged: this inverts the orientation, and `refined` still divides it in the same way
 MIRRORED = np.array([2, 1, 0, 3, 5, 4, 6, 9, 8, 7])
 
 
@@ -29,13 +29,17 @@ FLAT = np.array([(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)])  # the four triang
 
 
 class EdgeTable(NamedTuple):
-    """edges: (n_e, 2), lower vertex first, sorted. tetrahedron_edges: (n_t, 6), the one at each of EDGES."""
+    """The edges of a tetrahedral mesh.
+
+    edges: (n_e, 2), lower vertex first, sorted. tetrahedron_edges: (n_t, 6), the edge at each of EDGES.
+    """
 
     edges: np.ndarray
     tetrahedron_edges: np.ndarray
 
 
 def edge_table(corners: np.ndarray) -> EdgeTable:
+    """Build the table of the edges of tetrahedra with the given corners, (n_t, 4)."""
     ends = np.sort(corners[:, EDGES].astype(np.int64), axis=2)
     count = int(corners.max()) + 1
     keys, which = np.unique(ends[..., 0] * count + ends[..., 1], return_inverse=True)
@@ -44,10 +48,11 @@ def edge_table(corners: np.ndarray) -> EdgeTable:
 
 
 class FaceTable(NamedTuple):
-    """The faces of all tetrahedra, 4 t + i for face i of tetrahedron t, sorted so that equal ones follow each other.
+    """The faces of all tetrahedra, 4 t + i for face i of tetrahedron t, sorted so that equal faces follow each other.
 
-    order: (4 n_t,). first: (k,), where in `order` each distinct face begins. even: (4 n_t,), whether a face runs its
-    vertices as their sorted numbers do, up to a rotation: of two tetrahedra on opposite sides just one does.
+    order: (4 n_t,), the sorted faces. first: (k,), the position in `order` at which each distinct face begins.
+    even: (4 n_t,), True if the vertices of a face are an even permutation of their sorted numbers. A face between two
+        tetrahedra on opposite sides is even in exactly one of them.
     """
 
     order: np.ndarray
@@ -56,10 +61,12 @@ class FaceTable(NamedTuple):
 
     @property
     def counts(self) -> np.ndarray:
+        """The number of tetrahedra at each distinct face, (k,)."""
         return np.diff(np.append(self.first, len(self.order)))
 
 
 def face_table(corners: np.ndarray) -> FaceTable:
+    """Build the table of the faces of tetrahedra with the given corners, (n_t, 4)."""
     faces = corners[:, FACES].reshape(-1, 3).astype(np.int64)
     low, middle, high = np.sort(faces, axis=1).T
     pair = low * (int(corners.max()) + 1) + middle
@@ -72,19 +79,21 @@ def face_table(corners: np.ndarray) -> FaceTable:
 
 
 def neighbours(table: FaceTable) -> np.ndarray:
-    """(k, 2): the pairs of tetrahedra that share a face."""
+    """Return the pairs of tetrahedra that share a face, (k, 2)."""
     first = table.first[table.counts == 2]
     return np.stack([table.order[first], table.order[first + 1]], axis=1) // 4
 
 
 def outer_faces(table: FaceTable) -> np.ndarray:
-    """Faces of one tetrahedron alone, as 4 t + i, ascending."""
+    """Return the faces that belong to one tetrahedron only, as 4 t + i, ascending."""
     return np.sort(table.order[table.first[table.counts == 1]])
 
 
 def triangles_of(tetrahedra: np.ndarray, outer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The flat triangles (n_f, 3) on the given faces, and the tetrahedron of each (n_f,): one a face, or four on six
-    nodes."""
+    """Return the flat triangles (n_f, 3) on the given faces, and the tetrahedron of each, (n_f,).
+
+    There is one triangle per face of three nodes, and four per face of six nodes. outer: (k,), faces as 4 t + i.
+    """
     owner, side = np.divmod(outer, 4)
     if tetrahedra.shape[1] == 4:
         return tetrahedra[owner[:, None], FACES[side]], owner
@@ -93,20 +102,26 @@ def triangles_of(tetrahedra: np.ndarray, outer: np.ndarray) -> tuple[np.ndarray,
 
 
 def groups(count: int, pairs: np.ndarray) -> np.ndarray:
-    """(count,): the number, from 0, of the group that each of `count` things belongs to, joined by pairs (k, 2)."""
+    """Return the number, from 0, of the connected component that each of `count` items belongs to, (count,).
+
+    pairs: (k, 2), the items that are connected.
+    """
     graph = scipy.sparse.coo_array((np.ones(len(pairs), dtype=bool), tuple(pairs.T)), shape=(count, count))
     return scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
 
 
-def touching_edges(faces: np.ndarray) -> np.ndarray:
-    """(k, 2): the edges that more than two of a closed surface's triangles meet at."""
+def nonmanifold_edges(faces: np.ndarray) -> np.ndarray:
+    """Return the edges at which more than two triangles of a closed surface meet, (k, 2)."""
     ends = np.sort(faces[:, [(0, 1), (1, 2), (2, 0)]].reshape(-1, 2), axis=1)
     edges, counts = np.unique(ends, axis=0, return_counts=True)
     return edges[counts > 2]
 
 
-def touching_vertices(faces: np.ndarray) -> np.ndarray:
-    """Vertices that more than one fan of a closed surface's triangles meets at; its edges have two faces each."""
+def nonmanifold_vertices(faces: np.ndarray) -> np.ndarray:
+    """Return the vertices at which more than one fan of triangles of a closed surface meets, (k,).
+
+    Every edge of the surface must have two faces.
+    """
     corner = np.arange(3 * len(faces)).reshape(-1, 3)
     start, end = faces[:, [0, 1, 2]].ravel(), faces[:, [1, 2, 0]].ravel()
     at_start, at_end = corner.ravel(), corner[:, [1, 2, 0]].ravel()

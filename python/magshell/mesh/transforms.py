@@ -1,4 +1,4 @@
-"""Points moved as a whole."""
+"""Affine transformations of points."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ if TYPE_CHECKING:
 def moved(
     positions: np.ndarray, rotation: Rotates | None = None, translation: Numbers | None = None
 ) -> np.ndarray:
-    """rotation x + translation. rotation: an invertible (3, 3) matrix or a scipy Rotation. translation: (3,), m."""
+    """Return rotation x + translation for each position x, (n, 3) m.
+
+    rotation: an invertible (3, 3) matrix or a scipy Rotation. translation: (3,), m.
+    """
     if rotation is not None:
         positions = positions @ matrix_of(rotation).T
     if translation is not None:
@@ -24,7 +27,7 @@ def moved(
 
 
 def matrix_of(rotation: Numbers) -> np.ndarray:
-    """(3, 3), invertible, of a matrix or a scipy Rotation."""
+    """Return a matrix or a scipy Rotation as a matrix (3, 3). Raises ValueError if it is singular."""
     as_matrix = getattr(rotation, "as_matrix", None)
     matrix = quantity("rotation", "1", as_matrix() if as_matrix else rotation, (3, 3))
     if abs(np.linalg.det(matrix)) <= 1e-12 * np.linalg.norm(matrix) ** 3:

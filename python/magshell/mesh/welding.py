@@ -1,4 +1,4 @@
-"""Welds meshes: joins the vertices that lie in one place."""
+"""Welding of meshes: merges the vertices of different meshes that coincide."""
 
 from __future__ import annotations
 
@@ -21,7 +21,10 @@ if TYPE_CHECKING:
 
 
 def weld_tolerance(meshes: Sequence[MeshBase], tolerance: float | None) -> float:
-    """m; by default 1e-6 of the largest mesh's size. Raises ValueError from half the shortest edge on."""
+    """Return the tolerance, m; None stands for 1e-6 of the bounding-box diagonal of the largest mesh.
+
+    Raises ValueError if it is not below half the length of the shortest edge.
+    """
     if tolerance is None:
         tolerance = RELATIVE_TOLERANCE * max(mesh.size for mesh in meshes)
     shortest = min(float(mesh.edge_lengths.min()) for mesh in meshes)
@@ -36,7 +39,10 @@ def weld_tolerance(meshes: Sequence[MeshBase], tolerance: float | None) -> float
 
 @immutable
 class TetWeld(NamedTuple):
-    """The joined mesh, and where each one went: vertex_maps[k][vertex of mesh k], tetrahedra alike."""
+    """A welded tetrahedral mesh, and the maps from the given meshes to it.
+
+    vertex_maps[k][i] is the number in `mesh` of vertex i of mesh k; tetrahedron_maps are built alike.
+    """
 
     mesh: TetMesh
     vertex_maps: tuple[np.ndarray, ...]
@@ -44,7 +50,10 @@ class TetWeld(NamedTuple):
 
 
 def weld_solids(meshes: tuple[TetMesh, ...], tolerance: float | None) -> TetWeld:
-    """What `weld` does with meshes of tetrahedra. Parts keep their numbers; names that stand for two are refused."""
+    """Weld tetrahedral meshes, as `weld` describes.
+
+    Parts keep their numbers. Raises ValueError if two meshes use one part name for different numbers.
+    """
     for k, mesh in enumerate(meshes):
         if not isinstance(mesh, TetMesh):
             raise ValueError(f"mesh {k} must be a TetMesh as the others, got {type(mesh).__name__}")
@@ -98,7 +107,7 @@ def _names(meshes) -> dict[str, int]:
 
 
 def _check_joined(meshes, joined: TetMesh, maps, tolerance: float) -> None:
-    """Each mesh shares faces with another, all hold together, and no crack is left between them."""
+    """Check that the meshes are connected to each other through shared faces, without a crack between them."""
     first = np.concatenate([[0], np.cumsum([mesh.n_components for mesh in meshes])])
     pairs = []
     for k, mesh in enumerate(meshes):
@@ -118,7 +127,7 @@ def _check_joined(meshes, joined: TetMesh, maps, tolerance: float) -> None:
 
 
 def _check_hanging(meshes, joined: TetMesh, maps, tolerance: float) -> None:
-    """A vertex of one mesh within a face of another would leave a crack."""
+    """Raise ValueError if a vertex of one mesh lies within a face of another, which would leave a crack."""
     from_mesh = np.full(joined.n_vertices, -1)
     shared = np.zeros(joined.n_vertices, dtype=bool)
     for k, mapped in enumerate(maps):
@@ -154,7 +163,10 @@ def _check_hanging(meshes, joined: TetMesh, maps, tolerance: float) -> None:
 
 @immutable
 class Weld(NamedTuple):
-    """The joined mesh, and where each part went: vertex_maps[part][vertex of the part], faces alike."""
+    """A welded triangle mesh, and the maps from the given meshes to it.
+
+    vertex_maps[k][i] is the number in `mesh` of vertex i of mesh k; face_maps are built alike.
+    """
 
     mesh: TriangleMesh
     vertex_maps: tuple[np.ndarray, ...]
@@ -162,22 +174,22 @@ class Weld(NamedTuple):
 
 
 def weld(*meshes: TriangleMesh | TetMesh, tolerance: float | None = None) -> Weld | TetWeld:
-    """Joins meshes along boundaries that they share vertex by vertex.
+    """Weld meshes along boundaries whose vertices coincide.
 
-    Boundary vertices of different parts within `tolerance` become one, at the position of the first part.
-    Vertices of one part are never joined, so its slits stay open.
+    Boundary vertices of different meshes within `tolerance` become one vertex, at the position of the first mesh.
+    Vertices of the same mesh are never merged, so its slits stay open.
 
-    Meshes of tetrahedra are joined alike, by the vertices of their surfaces, where they share faces; they keep their
-    `parts`, and `tetrahedron_maps` come instead of `face_maps`.
+    Tetrahedral meshes are welded at the vertices of their surfaces, where they share faces. They keep their `parts`, and the
+    result has `tetrahedron_maps` instead of `face_maps`.
 
     Args:
-        meshes: two or more, their normals on the same side along the seams.
-        tolerance: m; 1e-6 of the largest part's size by default. Below half the shortest edge.
+        meshes: two or more; their normals must point to the same side along the seams.
+        tolerance: m; by default 1e-6 of the bounding-box diagonal of the largest mesh. It must be below half the length of
+            the shortest edge.
 
     Raises:
-        ValueError: when a part shares no edge with the others, when the divisions of a shared boundary
-            differ, when two parts are oriented against each other, or when more than two faces would meet at
-            an edge.
+        ValueError: if a mesh shares no edge with the others, if a shared boundary is divided differently, if two meshes have
+            opposite orientations, or if more than two faces would meet at an edge.
 
     >>> import magshell as ms
     >>> left = ms.meshes.rectangle(1.0, 1.0, cells=(4, 4))
@@ -207,7 +219,7 @@ def weld(*meshes: TriangleMesh | TetMesh, tolerance: float | None = None) -> Wel
 
 
 def _vertex_maps(meshes, tolerance: float) -> list[np.ndarray]:
-    """For each part, the merged vertex of each of its vertices, numbered as they first appear."""
+    """Return for each mesh the merged vertex of each of its vertices, numbered in order of first appearance."""
     part_of = np.concatenate([np.full(mesh.n_vertices, part) for part, mesh in enumerate(meshes)])
     offsets = np.concatenate([[0], np.cumsum([mesh.n_vertices for mesh in meshes])])
     rims = np.concatenate([mesh.boundary_vertices + offsets[part] for part, mesh in enumerate(meshes)])
@@ -241,7 +253,10 @@ def _vertex_maps(meshes, tolerance: float) -> list[np.ndarray]:
 
 
 def _check_seams(meshes, maps: list[np.ndarray], tolerance: float) -> None:
-    """Refuses what TriangleMesh would refuse too, but in terms of the parts; and parts that nothing holds."""
+    """Check the seams: at most two faces at an edge, equal orientations, and no mesh unconnected.
+
+    TriangleMesh refuses the first two cases as well, but its message could not name the meshes.
+    """
     starts, ends, parts = [], [], []
     for number, (mesh, mapped) in enumerate(zip(meshes, maps, strict=True)):
         edges = mapped[mesh.edges[mesh.boundary_edges]]
@@ -280,7 +295,7 @@ def _check_seams(meshes, maps: list[np.ndarray], tolerance: float) -> None:
 
 
 def _check_hanging_vertices(meshes, maps: list[np.ndarray], tolerance: float) -> None:
-    """A vertex in the middle of another part's boundary edge would leave a crack."""
+    """Raise ValueError if a vertex lies in the middle of another mesh's boundary edge, which would leave a crack."""
     for part, mesh in enumerate(meshes):
         foreign = [
             (other, vertex)
@@ -312,7 +327,10 @@ def _check_hanging_vertices(meshes, maps: list[np.ndarray], tolerance: float) ->
 
 
 def _refuse_apart(meshes, group: np.ndarray, tolerance: float) -> None:
-    """group: (n_parts,), which parts hold together. Names those that the first part is not joined to."""
+    """Raise a ValueError that names a mesh that is not connected to the first one.
+
+    group: (n_meshes,), the connected group that each mesh belongs to.
+    """
     apart = np.flatnonzero(group == group[np.argmax(group != group[0])])
     rims = [(part, vertex) for part in apart for vertex in meshes[part].boundary_vertices]
     others = [mesh.rest_positions[mesh.boundary_vertices] for k, mesh in enumerate(meshes) if k not in apart]

@@ -13,7 +13,7 @@ from ..._runtime.solver_entry_point import grouped
 from ..shapes import Shape
 from ..signed_distance import Distance, checked_distance
 from ..tetrahedra.tet_mesh import TetMesh
-from ..topology import FACES, face_table, outer_faces, touching_edges, touching_vertices
+from ..topology import FACES, face_table, nonmanifold_edges, nonmanifold_vertices, outer_faces
 from ._bcc_lattice import lattice_inside
 from ._lost import warn_of_loss
 from ._stuffing import Cuts, stuffed
@@ -164,5 +164,5 @@ def _touching(tetrahedra: np.ndarray) -> np.ndarray:
     """Vertices, and ends of edges, where the surface touches itself."""
     outer = outer_faces(face_table(tetrahedra))
     faces = tetrahedra[outer[:, None] // 4, FACES[outer % 4]]
-    edges = touching_edges(faces)
-    return np.unique(edges) if len(edges) else touching_vertices(faces)
+    edges = nonmanifold_edges(faces)
+    return np.unique(edges) if len(edges) else nonmanifold_vertices(faces)

@@ -1,9 +1,9 @@
-"""Shapes by their signed distance, to be put together and meshed by `ms.meshes.from_distance`.
+"""Shapes described by signed distances, to be combined and then meshed by `ms.meshes.from_distance`.
 
     hand = palm.smooth_union(thumb, fingers, radius=4e-3) - ms.shapes.ball(5e-3)
 
 A shape is a function of points (n, 3) m that returns distances (n,) m, negative inside. `a | b` is the union, `a & b` the
-intersection, `a - b` what b leaves of a.
+intersection, `a - b` the difference.
 """
 
 from .combined import difference, intersection, smooth_union, union
@@ -26,5 +26,5 @@ __all__ = [
 
 
 def __dir__() -> list[str]:
-    """Returns what is public, for tab completion."""
+    """Return the public names, for tab completion."""
     return sorted(__all__)

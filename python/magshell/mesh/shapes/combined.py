@@ -1,4 +1,4 @@
-"""Shapes of several."""
+"""Boolean combinations of shapes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from .shape import Difference, Intersection, Shape, SmoothUnion, Union, several
 
 
 def union(*shapes: Shape) -> Shape:
-    """All that lies in one of them, `a | b`.
+    """Return the union of shapes, `a | b`: the points that lie in at least one of them.
 
     >>> import magshell as ms
     >>> two = ms.shapes.union(ms.shapes.ball(0.01), ms.shapes.ball(0.01, center=(0.03, 0, 0)))
@@ -18,7 +18,7 @@ def union(*shapes: Shape) -> Shape:
 
 
 def intersection(*shapes: Shape) -> Shape:
-    """All that lies in each of them, `a & b`.
+    """Return the intersection of shapes, `a & b`: the points that lie in all of them.
 
     >>> import magshell as ms
     >>> lens = ms.shapes.intersection(ms.shapes.ball(0.01), ms.shapes.ball(0.01, center=(0.01, 0, 0)))
@@ -29,7 +29,7 @@ def intersection(*shapes: Shape) -> Shape:
 
 
 def difference(shape: Shape, *others: Shape) -> Shape:
-    """What others leave of a shape, `a - b`.
+    """Return the difference of shapes, `a - b`: the points of the first shape that lie in none of the others.
 
     >>> import magshell as ms
     >>> bowl = ms.shapes.difference(ms.shapes.ball(0.01), ms.shapes.ball(0.008))
@@ -40,12 +40,13 @@ def difference(shape: Shape, *others: Shape) -> Shape:
 
 
 def smooth_union(*shapes: Shape, radius: float) -> Shape:
-    """The union with its inner edges filled, as flesh fills the space between fingers.
+    """Return the union of shapes with its concave edges rounded by fillets.
 
     Args:
         shapes: two or more, joined one after the other.
-        radius: m, about that of the fillet. Where the distances a and b of two differ by less than it, theirs is
-            min(a, b) - (radius - |a - b|)^2 / (4 radius); a quarter of it is added where they are the same.
+        radius: m, about the radius of the fillets. Where the distances a and b of two shapes differ by less than this, the
+            combined distance is min(a, b) - (radius - |a - b|)^2 / (4 radius); it grows the shape by at most radius / 4,
+            where a = b.
 
     >>> from magshell import shapes
     >>> shapes.smooth_union(shapes.ball(1.0), shapes.ball(1.0), radius=0.4)([2, 0, 0]).item()

@@ -1,4 +1,4 @@
-"""Round and square shapes, each by its exact distance."""
+"""Primitive shapes, each with its exact signed distance."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ _ORIGIN = (0.0, 0.0, 0.0)
 
 
 class Primitive(Shape):
-    """A distance (n, 3) -> (n,), the box around where it is negative, and what to print."""
+    """A shape with a signed distance in closed form, (n, 3) m -> (n,) m.
+
+    low, high: (3,) m, the bounding box of the points where it is negative. text: its repr.
+    """
 
     def __init__(self, distance: Callable[..., Any], low: Numbers, high: Numbers, text: str):
         self._function, self._bounds, self._text = distance, (np.asarray(low), np.asarray(high)), text
@@ -37,7 +40,7 @@ class Primitive(Shape):
 
 
 def ball(radius: float, center: Numbers = _ORIGIN) -> Shape:
-    """A ball; radius and center (3,) in m.
+    """Return a ball; radius and center (3,) in m.
 
     >>> ball(1.0)([3, 0, 0]).item()
     2.0
@@ -51,12 +54,12 @@ def ball(radius: float, center: Numbers = _ORIGIN) -> Shape:
 
 
 def capsule(start: Numbers, end: Numbers, radius: float, end_radius: float | None = None) -> Shape:
-    """All that is within a radius of a segment: a finger.
+    """Return a capsule: the points within a distance `radius` of a segment.
 
     Args:
-        start, end: (3,), m, the ends of the segment; the two half balls reach beyond them.
+        start, end: (3,), m, the ends of the segment; the half balls at the ends reach beyond them.
         radius: m.
-        end_radius: m, at the end, where the capsule is to taper; by default the same.
+        end_radius: m, the radius at `end` of a tapered capsule; by default `radius`.
 
     >>> capsule((0, 0, 0), (0, 0, 5), radius=1.0)([2, 0, 3]).item()
     1.0
@@ -88,10 +91,10 @@ def capsule(start: Numbers, end: Numbers, radius: float, end_radius: float | Non
 
 
 def box(size: Numbers, center: Numbers = _ORIGIN, rounding: float = 0.0) -> Shape:
-    """A box with sides along the axes.
+    """Return a box with sides along the axes.
 
     Args:
-        size: (3,), m, the whole lengths.
+        size: (3,), m, the lengths of its sides.
         center: (3,), m.
         rounding: m, the radius of its edges and corners, at most half the shortest side.
 
@@ -117,7 +120,7 @@ def box(size: Numbers, center: Numbers = _ORIGIN, rounding: float = 0.0) -> Shap
 
 
 def cylinder(start: Numbers, end: Numbers, radius: float) -> Shape:
-    """A round bar with flat ends at start and end (3,) m.
+    """Return a circular cylinder with flat ends at `start` and `end` (3,) m.
 
     >>> cylinder((0, 0, 0), (0, 0, 5), radius=1.0)([0, 0, 6]).item()
     1.0
@@ -142,7 +145,7 @@ def cylinder(start: Numbers, end: Numbers, radius: float) -> Shape:
 
 
 def half_space(normal: Numbers, point: Numbers = _ORIGIN) -> Shape:
-    """All behind the plane through a point (3,) m: where normal . (x - point) < 0. It has no end.
+    """Return the half-space behind the plane through `point` (3,) m: all x with normal . (x - point) < 0.
 
     >>> half_space((0, 0, 2))([0, 0, 3]).item()
     3.0
@@ -159,7 +162,7 @@ def half_space(normal: Numbers, point: Numbers = _ORIGIN) -> Shape:
 
 
 def ellipsoid(radii: Numbers, center: Numbers = _ORIGIN) -> Shape:
-    """An ellipsoid with axes along x, y and z; radii and center (3,) in m.
+    """Return an ellipsoid with axes along x, y and z; radii and center (3,) in m.
 
     >>> round(ellipsoid((3, 2, 1))([0, 0, 4]).item(), 9)
     3.0
@@ -175,23 +178,26 @@ def ellipsoid(radii: Numbers, center: Numbers = _ORIGIN) -> Shape:
 
 
 def _to_ellipsoid(points: np.ndarray, radii: np.ndarray) -> np.ndarray:
-    """Of points in the first octant. The foot of the perpendicular is r^2 p / (r^2 + t), with t the largest root of
-    sum (r p / (r^2 + t))^2 = 1; left of it the sum is convex and falls, so that Newton's steps from there only rise."""
+    """Return the signed distances (n,) of points (n, 3) in the first octant from an ellipsoid at the origin, m.
+
+    The nearest point of the surface to p is r^2 p / (r^2 + t), where t is the largest root of sum (r p / (r^2 + t))^2 = 1.
+    To the left of this root the sum is convex and decreasing, so Newton's iterates from there increase monotonically.
+    """
     largest = radii.max()
     squares = (radii / largest) ** 2
     least = squares.min()
     more = squares - least
-    # on a plane of symmetry inside the foot may lie beside the plane: so near to it, the difference does not matter
+    # The nearest point to an inner point on a plane of symmetry may lie off that plane: the lower bound moves the inner point
+    # off the plane by a negligible distance.
     p = np.maximum(points / largest, 1e-12 * np.sqrt(squares))
     weighted = p * np.sqrt(squares)
-    u = (weighted - more).max(
-        axis=1
-    )  # t + the least square, so that r^2 + t keeps its digits where it is small
+    # u = t + the smallest square: so r^2 + t keeps its digits where it is small
+    u = (weighted - more).max(axis=1)
     for _ in range(60):
         inverse = 1 / (more + u[:, None])
         terms = (weighted * inverse) ** 2
         value = terms.sum(axis=1) - 1
-        # Newton for 1 / sqrt(sum) = 1, which is nearly straight
+        # Newton's method for 1 / sqrt(sum) = 1, which is nearly linear in u
         step = value * (1 + value) / (np.sqrt(1 + value) + 1) / (terms * inverse).sum(axis=1)
         u = u + step
         if (np.abs(step) <= 1e-15 * u).all():

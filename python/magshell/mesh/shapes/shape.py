@@ -1,4 +1,4 @@
-"""What every shape can do: put together, moved, changed."""
+"""The base class of shapes described by signed distances, and their combinations and transformations."""
 
 from __future__ import annotations
 
@@ -21,11 +21,12 @@ Bounds = tuple[np.ndarray, np.ndarray]
 
 
 class Shape(Frozen):
-    """A region of space by its signed distance. Made by the functions of `ms.shapes`; immutable.
+    """A region of space described by its signed distance. Made by the functions of `ms.shapes`; immutable.
 
-    Call it with points (n, 3) [m], or one point (3,), for distances [m], negative inside. `bounds` are the lower and
-    upper corner (3,) m of a box around it, infinite where it is. The distance is exact for primitives, moved or not; of
-    combinations it is exact on the surface, has the right sign everywhere, and is at most the true one.
+    A shape is called with points (n, 3) [m], or one point (3,), and returns distances [m], negative inside. `bounds` are the
+    lower and upper corners (3,) m of a box around it, infinite for an unbounded shape. The distance of primitives is exact,
+    also after a transformation. That of combinations is exact on the surface, has the right sign everywhere, and its
+    magnitude is at most that of the true distance.
     """
 
     name: str | None = None
@@ -36,26 +37,31 @@ class Shape(Frozen):
 
     @property
     def bounds(self) -> Bounds:
-        """(2, 3) m, corners of a box around it."""
+        """The lower and the upper corner of a box around the shape, each (3,) m."""
         raise AttributeError("a Shape without a kind has no bounds: make one by the functions of ms.shapes")
 
     def _distance(self, points: np.ndarray) -> np.ndarray:
         raise AttributeError("a Shape without a kind has no distance: make one by the functions of ms.shapes")
 
     def named(self, name: str) -> Shape:
-        """The same shape as a part of this name: `from_distance` gives it to the tetrahedra that are nearest to it."""
+        """Return the same shape as a part with this name.
+
+        `ms.meshes.from_distance` gives the name to the tetrahedra that are nearest to this shape.
+        """
         if not (isinstance(name, str) and name):
             raise ValueError(f"name must be a word, got {name!r:.60}")
         return Named(self, name)
 
     def nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[str]]:
-        """Distances (n,), and for each point the number (n,) among the names (k,) of the nearest named shape in it, -1
-        for none."""
+        """Return the distances of points (n, 3), and the named part of the shape that is nearest to each point.
+
+        Returns distances (n,) m, the index of the part in the list of names, (n,), -1 for none, and that list (k,).
+        """
         return self._distance(points), np.full(len(points), -1), []
 
-    # Put together
+    # Combinations
 
-    # NotImplemented is how an operator tells Python to ask the other side, and then to raise TypeError.
+    # An operator that returns NotImplemented lets Python try the other operand, and then raise TypeError.
     def __or__(self, other: Shape) -> Shape:
         return Union([self, other]) if isinstance(other, Shape) else NotImplemented
 
@@ -66,37 +72,41 @@ class Shape(Frozen):
         return Difference([self, other]) if isinstance(other, Shape) else NotImplemented
 
     def smooth_union(self, *others: Shape, radius: float) -> Shape:
-        """The union with others, its inner edges filled; see `ms.shapes.smooth_union`."""
+        """Return the union with other shapes, with its concave edges rounded; see `ms.shapes.smooth_union`."""
         return SmoothUnion(several("smooth_union", (self, *others)), positive("radius", "m", radius))
 
-    # Moved and changed
+    # Transformations
 
     def translated(self, translation: Numbers) -> Shape:
-        """Moved by (3,) m."""
-        return Placed(self, np.eye(3), quantity("translation", "m", translation, (3,)), 1.0)
+        """Return the shape moved by a translation (3,) m."""
+        return Transformed(self, np.eye(3), quantity("translation", "m", translation, (3,)), 1.0)
 
     def rotated(self, rotation: Rotates, center: Numbers = (0.0, 0.0, 0.0)) -> Shape:
-        """Turned about a center (3,) m by a rotation matrix (3, 3) or a scipy Rotation."""
+        """Return the shape rotated about a center (3,) m by a rotation matrix (3, 3) or a scipy Rotation."""
         matrix = matrix_of(rotation)
         if np.abs(matrix @ matrix.T - np.eye(3)).max() > 1e-9:
-            raise ValueError("rotation must be orthogonal: a distance does not survive stretching")
+            raise ValueError(
+                "rotation must be orthogonal: a matrix that stretches would falsify the distances"
+            )
         center = quantity("center", "m", center, (3,))
-        return Placed(self, matrix, center - matrix @ center, 1.0)
+        return Transformed(self, matrix, center - matrix @ center, 1.0)
 
     def scaled(self, factor: float) -> Shape:
-        """All lengths multiplied by a positive factor, from the origin."""
-        return Placed(self, np.eye(3), np.zeros(3), positive("factor", "", factor))
+        """Return the shape scaled by a positive factor about the origin."""
+        return Transformed(self, np.eye(3), np.zeros(3), positive("factor", "", factor))
 
     def offset(self, distance: float) -> Shape:
-        """Grown by a distance [m] on all sides, its outer edges rounded; shrunk by a negative one."""
+        """Return the shape grown by a distance [m] on all sides, convex edges rounded; a negative distance shrinks it."""
         return Offset(self, float(quantity("distance", "m", distance, ())))
 
     def hollow(self, thickness: float) -> Shape:
-        """What is left within `thickness` [m] of its surface: the wall around a chamber."""
+        """Return the wall of the shape, hollow inside: its points within `thickness` [m] of its surface."""
         return self - self.offset(-positive("thickness", "m", thickness))
 
 
 class Named(Shape):
+    """A shape that is a named part."""
+
     name: str
 
     def __init__(self, shape: Shape, name: str):
@@ -116,8 +126,8 @@ class Named(Shape):
         return f"{self._shape!r}.named({self.name!r})"
 
 
-class Placed(Shape):
-    """x -> factor rotation x + translation."""
+class Transformed(Shape):
+    """A shape moved by the similarity transformation x -> factor rotation x + translation."""
 
     def __init__(self, shape: Shape, rotation: np.ndarray, translation: np.ndarray, factor: float):
         self._shape, self._rotation, self._translation, self._factor = shape, rotation, translation, factor
@@ -125,7 +135,7 @@ class Placed(Shape):
     @property
     def bounds(self) -> Bounds:
         low, high = self._shape.bounds
-        # a turned infinite box is taken to be infinite all around, unless it is turned onto the axes
+        # a rotated infinite box is taken to be infinite in all directions, unless its axes are rotated onto the axes
         steps = np.where(np.abs(self._rotation) < 1e-12, 0.0, self._rotation)[:, :, None]
         with np.errstate(invalid="ignore"):
             ends = np.where(steps == 0, 0.0, steps * np.stack([low, high], axis=1))
@@ -154,6 +164,8 @@ class Placed(Shape):
 
 
 class Offset(Shape):
+    """A shape grown or shrunk by a distance."""
+
     def __init__(self, shape: Shape, distance: float):
         self._shape, self._by = shape, distance
 
@@ -174,6 +186,7 @@ class Offset(Shape):
 
 
 def several(name: str, shapes: Iterable[Shape]) -> list[Shape]:
+    """Check that two or more shapes are given, and return them as a list. name: the function that its message names."""
     listed = checked_list("shapes", list(shapes), (Shape,), "shapes of ms.shapes", repeats=True)
     if len(listed) < 2:
         raise ValueError(f"{name} needs at least two shapes, got {len(listed)}")
@@ -187,7 +200,7 @@ class _Combined(Shape):
         self._shapes = shapes
 
     def _nearest(self, shapes: list[Shape], points: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[str]]:
-        """All distances (k, n), whose number at each point, and the names."""
+        """Return the distances of all shapes, (k, n) m, the named part nearest to each point, (n,), and the names."""
         distances, numbers, names = [], [], []
         for shape in shapes:
             distance, number, own = shape.nearest(points)
@@ -227,7 +240,7 @@ class SmoothUnion(Union):
     @property
     def bounds(self) -> Bounds:
         low, high = super().bounds
-        # each of the steps may add a quarter of the radius
+        # each union may grow the shape by a quarter of the radius
         most = 0.25 * self._radius * (len(self._shapes) - 1)
         return low - most, high + most
 
@@ -266,7 +279,7 @@ class Intersection(_Combined):
 
 
 class Difference(_Combined):
-    """The first without the others, whose names do not count."""
+    """The first shape without the others; part names of the others are ignored."""
 
     sign = "-"
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..topology import EDGES, FaceTable, edge_table, touching_edges, touching_vertices
+from ..topology import EDGES, FaceTable, edge_table, nonmanifold_edges, nonmanifold_vertices
 from .jacobian import bent, jacobians, not_positive, straight_volumes
 
 # Six volumes over the longest edge cubed is 0.71 for a regular tetrahedron. Below this, round-off decides the sign.
@@ -131,13 +131,13 @@ def check_faces(corners: np.ndarray, table: FaceTable) -> None:
 
 def check_surface(faces: np.ndarray) -> None:
     """faces: (n_f, 3) corners, closed. It must be a manifold: two faces at an edge, one fan at a vertex."""
-    edges = touching_edges(faces)
+    edges = nonmanifold_edges(faces)
     if len(edges):
         raise ValueError(
             f"the surface touches itself at {plural(len(edges), 'edge', 'edges')}: {listed(edges)}. Join what meets "
             "there by tetrahedra that share a face, or give each side vertices of its own"
         )
-    vertices = touching_vertices(faces)
+    vertices = nonmanifold_vertices(faces)
     if len(vertices):
         raise ValueError(
             f"the surface touches itself at {plural(len(vertices), 'vertex', 'vertices')}: {listed(vertices)}. Join "

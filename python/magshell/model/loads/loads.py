@@ -9,7 +9,7 @@ import numpy as np
 from ..._input.owner import Owner
 from ..._input.quantity import quantity, real_numbers
 from ..._input.selections import indices, selection
-from ...mesh.face_shapes import edge_shares, shares
+from ...mesh.face_shapes import nodal_areas, nodal_lengths
 from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ..bodies.bodies import checked_body
@@ -110,7 +110,7 @@ class EdgeLoad(DeadLoad):
         return EdgeLoad(self.edges, force_per_length, self.body)
 
     def _shares(self, mesh: TriangleMesh):
-        return edge_shares(mesh, indices("EdgeLoad edges", self.edges, mesh.n_edges))
+        return nodal_lengths(mesh, indices("EdgeLoad edges", self.edges, mesh.n_edges))
 
 
 class AreaLoad(DeadLoad):
@@ -145,7 +145,7 @@ class AreaLoad(DeadLoad):
             if self.faces is None
             else indices("AreaLoad faces", self.faces, mesh.n_faces)
         )
-        return shares(mesh, faces)
+        return nodal_areas(mesh, faces)
 
 
 class EdgeCouple(Owner):
