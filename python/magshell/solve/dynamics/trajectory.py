@@ -236,7 +236,12 @@ class Trajectory(Filmed, OfOneBody):
         """
         positions, now, bodies = detached(self.positions), self._values.current, self.scene._bodies
         placed = [
-            (now(each), [now(obstacle) for obstacle in each.obstacles], self._values.contact_bodies(each), bodies)
+            (
+                now(each),
+                [now(obstacle) for obstacle in each.obstacles],
+                self._values.contact_bodies(each),
+                bodies,
+            )
             for each in self.scene._obstacle_contacts
         ]
         found = {}
