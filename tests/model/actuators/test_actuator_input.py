@@ -77,7 +77,7 @@ MISTAKES = {
         r"volume_ratio \[1\] must be above 0, got -0.5",
     ),
     "a tendon of one point": (lambda: ms.Tendon(ENDS[:1], BLOCK), "needs two points or more, got 1"),
-    "a tendon nowhere": (lambda: ms.Tendon(ENDS), "runs through a Shell, a Solid or a Rigid part"),
+    "a tendon nowhere": (lambda: ms.Tendon(ENDS), "runs through a Shell, a Solid or a RigidBody"),
     "points that are one": (
         lambda: ms.Tendon([ENDS[0], ENDS[0], ENDS[1]], BLOCK),
         "points 0 and 1 of the Tendon are one",

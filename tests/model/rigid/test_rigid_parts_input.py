@@ -50,7 +50,7 @@ def payload(**changed):
         ({"mass": 1.0, "inertia": 1.0, "center": (1.0, np.nan, 0.0)}, "center"),
         ({"mass": 1.0, "inertia": 1.0, "body": 3}, "body must be a Shell"),
         ({"vertices": END, "velocity": (0, 0, 1.0)}, "those of a free body"),
-        ({"vertices": []}, "Rigid vertices are empty"),
+        ({"vertices": []}, "RigidBody vertices are empty"),
     ],
 )
 def test_parts_that_cannot_be(given, message):
@@ -63,7 +63,7 @@ def test_parts_that_do_not_fit_their_scene():
         scene_with(ms.RigidBody(END[:2]))
     with pytest.raises(ValueError, match="lie on a line"):
         scene_with(ms.RigidBody(MESH.vertices_at(x=0.1)))
-    with pytest.raises(ValueError, match=r"Rigid vertices must be in \[0, 33\), got 99"):
+    with pytest.raises(ValueError, match=r"RigidBody vertices must be in \[0, 33\), got 99"):
         scene_with(ms.RigidBody([30, 31, 99]))
     with pytest.raises(ValueError, match="rigid parts 0 and 1 share vertex 24"):
         scene_with(payload(), ms.RigidBody(END[:4]))

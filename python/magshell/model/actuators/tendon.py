@@ -29,8 +29,8 @@ class Tendon(Actuator):
     """A string through points of bodies: it pulls, and is slack where it is shorter than its rest length.
 
     points: (k, 3) m, k >= 2, where it passes at rest, in `body`: each rides on the element or face that it lies in. Or
-        [(body, (3,)), ...] for one of several bodies, links of a skeleton and Rigid parts among them.
-    body: a Shell, a Solid, or a Rigid part such as a Link.
+        [(body, (3,)), ...] for one of several bodies, links of a skeleton and rigid bodies among them.
+    body: a Shell, a Solid, or a RigidBody such as a Link.
     tension: N, which it pulls with at any length.
     stiffness: N/m, with which it pulls beyond rest_length, as a spring of the whole tendon.
     rest_length: m, by default its length at rest.
@@ -153,7 +153,7 @@ def _points(points, body) -> list[tuple[Shell | Solid | RigidBody, np.ndarray]]:
     else:
         if not isinstance(body, _KINDS):
             raise ValueError(
-                f"a Tendon runs through a Shell, a Solid or a Rigid part: Tendon(points, body), got {body!r:.60}"
+                f"a Tendon runs through a Shell, a Solid or a RigidBody: Tendon(points, body), got {body!r:.60}"
             )
         pairs = [(body, point) for point in quantity("points", "m", points, ("k", 3))]
     if len(pairs) < 2:

@@ -1,4 +1,4 @@
-"""The bodies of a scene, one after another: where each has its vertices, edges and faces among those of all."""
+"""The bodies of a scene and the numbering of their vertices, edges and faces, one body after another."""
 
 from __future__ import annotations
 
@@ -30,20 +30,22 @@ BODIES = (Shell, Solid)
 
 
 class Bodies:
-    """Raises ValueError where one is no Shell, Solid, RigidBody or Skeleton, or is there twice, or where a tie cannot be.
+    """The bodies of a scene, and the numbers of their vertices, edges and faces among those of all.
 
-    shells: all Shells and Solids. rigid: the Rigid parts, links among them, whose points come after all vertices.
-    touching: those of the rigid parts whose shapes touch: vertices of theirs come after the points of all.
+    shells: all Shells and Solids. rigid: the rigid bodies, links among them, whose points come after all vertices.
+    rigid_in_contact: those rigid bodies whose own shape is in a contact; its vertices come after the points of all.
     original: (n_v of all,), the first of the vertices that each is welded to, or itself.
+
+    Raises ValueError if a body is no Shell, Solid, RigidBody or Skeleton, or is given twice, or if a tie is impossible.
     """
 
     def __init__(
         self,
         bodies: Shell | Solid | RigidBody | Skeleton | Iterable[Shell | Solid | RigidBody | Skeleton],
         ties: Iterable[Tie] = (),
-        touching: Iterable[RigidBody] = (),
+        rigid_in_contact: Iterable[RigidBody] = (),
     ):
-        self.touching: tuple[RigidBody, ...] = tuple(touching)
+        self.rigid_in_contact: tuple[RigidBody, ...] = tuple(rigid_in_contact)
         listed = checked_list("bodies", bodies, (*BODIES, RigidBody, Skeleton), repeats=True)
         self.skeletons: tuple[Skeleton, ...] = tuple(body for body in listed if isinstance(body, Skeleton))
         self.listed: tuple[Any, ...] = tuple(listed)
@@ -56,7 +58,7 @@ class Bodies:
         for k, part in enumerate(self.rigid):
             if self.rigid_number(part) < k:
                 raise ValueError(
-                    f"bodies must differ, but rigid parts {self.rigid_number(part)} and {k} are one Rigid"
+                    f"bodies must differ, but rigid parts {self.rigid_number(part)} and {k} are one RigidBody"
                 )
         for k, shell in enumerate(self.shells):
             if (before := self.number(shell)) < k:
@@ -80,15 +82,16 @@ class Bodies:
         self._check_welded_once()
 
     def _first_rotations(self) -> list[int]:
-        """Of each of `sheets`."""
+        """Return the number of the first edge rotation of each of `sheets`."""
         return np.cumsum([0, *(rotations_of(sheet.mesh) for sheet in self.sheets)])[:-1].tolist()
 
     def _pairs(self, tie: Tie) -> np.ndarray:
-        """(k, 2), the scene's vertices."""
+        """Return the vertices of the scene that a tie welds, (k, 2)."""
         first = [self.spans[self.number(body)].first_vertex for body in (tie.a, tie.b)]
         return tie.pairs() + first
 
     def _check_welded_once(self) -> None:
+        """Raise ValueError if ties would weld two vertices of one body to each other."""
         for k, span in enumerate(self.spans):
             values, counts = np.unique(self.original[span.vertices], return_counts=True)
             if counts.max() > 1:
@@ -102,21 +105,21 @@ class Bodies:
 
     @property
     def n_vertices(self) -> int:
-        """Those that are welded count once."""
+        """The number of vertices; welded ones count once."""
         return len(self.original) - int(np.sum(self.copies))
 
     @property
     def copies(self) -> np.ndarray:
-        """(n_v of all,), whether it is welded to an earlier one."""
+        """The vertices that are welded to an earlier one, (n_v of all,) bool."""
         return self.original != np.arange(len(self.original))
 
     @property
     def components(self) -> np.ndarray:
-        """(n_v of all,), the connected part of each vertex."""
+        """The connected component of each vertex, (n_v of all,)."""
         return joined_components(self.mesh.components, self._welded) if self.ties else self.mesh.components
 
     def check_welded(self, name: str, unit: str, rows: np.ndarray) -> None:
-        """Raises ValueError where rows (n_v of all, 3) say two things of one vertex."""
+        """Raise ValueError if rows (n_v of all, 3) differ between vertices that are welded."""
         apart = np.abs(rows - rows[self.original]).max(axis=1)
         if apart.max(initial=0.0) > 1e-9 * max(np.abs(rows).max(initial=0.0), 1e-300):
             vertex = int(np.argmax(apart))
@@ -134,7 +137,7 @@ class Bodies:
 
     @cached_property
     def mesh(self) -> TriangleMesh:
-        """Of all: as edges are sorted by their lower vertex, they too are those of one body after another."""
+        """The mesh of all bodies. Its edges, sorted by their lower vertex, are those of one body after another, too."""
         if len(self) == 1:
             return self.shells[0].mesh
         if not self.shells:
@@ -148,40 +151,40 @@ class Bodies:
 
     @property
     def joints(self) -> tuple[Joint, ...]:
-        """Of all skeletons."""
+        """The joints of all skeletons."""
         return tuple(joint for skeleton in self.skeletons for joint in skeleton.joints)
 
     def skeleton_of(self, part: RigidBody) -> Skeleton | None:
-        """The one that it is a link of; None where it is alone."""
+        """Return the skeleton of which a rigid body is a link; None if there is none."""
         for skeleton in self.skeletons:
             if any(part is link for link in skeleton.links):
                 return skeleton
         return None
 
     def moved_by(self, joint: Joint) -> list[int]:
-        """The numbers of the rigid parts that a joint carries."""
+        """Return the numbers of the rigid bodies that a joint moves."""
         (skeleton,) = (each for each in self.skeletons if any(joint is own for own in each.joints))
         return [self.rigid_number(each) for each in skeleton._moved_by(joint)]
 
     def started_by(self, part: RigidBody) -> list[int]:
-        """The numbers of the rigid parts that start with the velocity of a free one: of a skeleton, its tree."""
+        """Return the numbers of the rigid bodies that get the initial velocity of a free one: all links of its tree."""
         skeleton = self.skeleton_of(part)
         moved = [part] if skeleton is None else skeleton._tree(part)
         return [self.rigid_number(each) for each in moved]
 
-    def drifts(self, part: RigidBody) -> bool:
-        """Whether nothing but itself tells a rigid part where to be."""
+    def is_floating(self, part: RigidBody) -> bool:
+        """Return whether neither joints nor vertices of a body hold a rigid body."""
         skeleton = self.skeleton_of(part)
-        return part.vertices is None if skeleton is None else skeleton._drifts(part)
+        return part.vertices is None if skeleton is None else skeleton._is_floating(part)
 
-    def held_by_joints(self, part: RigidBody) -> bool:
-        """Whether joints lead from it to the world."""
+    def is_grounded(self, part: RigidBody) -> bool:
+        """Return whether joints lead from a rigid body to the world."""
         skeleton = self.skeleton_of(part)
-        return skeleton is not None and skeleton._held(part)
+        return skeleton is not None and skeleton._is_grounded(part)
 
     @property
     def sheets(self) -> tuple[Shell, ...]:
-        """In the core's order: those of six-node elements come last."""
+        """The shells in the core's order: those of six-node elements come last."""
         return (*self.flat_sheets, *self.six_node_sheets)
 
     @property
@@ -194,17 +197,17 @@ class Bodies:
 
     @property
     def flat_sheets_alone(self) -> bool:
-        """Whether there are no solids, and no sheets of six-node elements."""
+        """Return whether all bodies are sheets of three-node faces."""
         return len(self.flat_sheets) == len(self.shells)
 
     @property
     def n_rotations(self) -> int:
-        """Of all sheets, in the core's order."""
+        """The number of edge rotations of all sheets."""
         return sum(rotations_of(mesh) for mesh in self.meshes)
 
     @property
     def n_magnetized(self) -> int:
-        """How many rows a magnetization of all bodies has."""
+        """The number of rows that a magnetization of all bodies has."""
         return sum(map(magnetized_rows, self.meshes))
 
     @property
@@ -213,21 +216,21 @@ class Bodies:
 
     @property
     def skins(self) -> tuple[Skin, ...]:
-        """Of the solids that have one, in their order."""
+        """The skins of those solids that have one, in the order of the solids."""
         return tuple(body.skin for body in self.solids if body.skin is not None)
 
     @property
     def size(self) -> float:
-        """Of the largest body: the diagonal of its bounding box [m]."""
+        """The diagonal of the bounding box of the largest body, m."""
         return max((mesh.size for mesh in self.meshes), default=0.0)
 
     @property
     def extent(self) -> float:
-        """Of the largest body: the longest side of its bounding box [m]."""
+        """The longest side of a bounding box among all bodies, m."""
         return max((float(np.ptp(mesh.rest_positions, axis=0).max()) for mesh in self.meshes), default=0.0)
 
     def number(self, shell: Shell | Solid) -> int:
-        """Which of the bodies it is. Raises ValueError where it is none of them."""
+        """Return the number of a shell or solid. Raises ValueError if it is not in the scene."""
         for k, each in enumerate(self.shells):
             if each is shell:
                 return k
@@ -237,7 +240,7 @@ class Bodies:
         raise ValueError(f"a body of the scene is one of scene.bodies, got {what}")
 
     def rigid_number(self, part: RigidBody) -> int:
-        """Which of the rigid parts it is. Raises ValueError where it is none of them."""
+        """Return the number of a rigid body. Raises ValueError if it is not in the scene."""
         for k, each in enumerate(self.rigid):
             if each is part:
                 return k
@@ -247,30 +250,37 @@ class Bodies:
 
     @property
     def n_points(self) -> int:
-        """Vertices, of which those that are welded count once, and points of rigid parts: what comes first in a state."""
+        """The number of points at the beginning of a state: vertices, welded ones once, and points of rigid bodies."""
         return self.n_vertices + 10 * len(self.rigid) + self.n_on_surfaces
 
     @property
     def n_rows(self) -> int:
-        """Vertices of all bodies, those of shapes that touch, and points of rigid parts, as a caller counts them."""
+        """The number of rows of an array over all points as a caller counts them.
+
+        These are the vertices of all bodies, the points of rigid bodies, and the vertices of rigid bodies' shapes in
+        contact.
+        """
         return len(self.original) + 10 * len(self.rigid) + self.n_on_surfaces
 
     @property
     def n_on_surfaces(self) -> int:
-        """Vertices of shapes that touch."""
-        return sum(part.shape.n_vertices for part in self.touching)
+        """The number of vertices of rigid bodies' shapes in contact."""
+        return sum(part.shape.n_vertices for part in self.rigid_in_contact)
 
     def first_on_surface(self, part: RigidBody) -> int:
-        """Where the vertices of its shape begin, among all points as a caller counts them."""
+        """Return the number of the first vertex of a rigid body's shape, in the order of `n_rows`."""
         before = 0
         for each in self.rigid:
             if each is part:
                 break
-            before += each.shape.n_vertices if any(each is other for other in self.touching) else 0
+            before += each.shape.n_vertices if any(each is other for other in self.rigid_in_contact) else 0
         return len(self.original) + 10 * len(self.rigid) + before
 
     def of(self, item: Any) -> Span:
-        """What a support, a load or a contact is about. Raises ValueError where it does not say so, and has to."""
+        """Return the index ranges of the body that a support, a load or a contact acts on.
+
+        Raises ValueError if that body is not in the scene, or if it must be named and is not.
+        """
         kind = type(item).__name__
         if item.body is None:
             if len(self) == 1:
@@ -286,26 +296,33 @@ class Bodies:
             raise ValueError(f"a {kind} is about a body that is not in the scene: {item.body!r}") from None
 
     def contact_points(self, contact: Contact) -> tuple[np.ndarray, np.ndarray]:
-        """Its points with the scene's vertices: (k, 3), -1 where there are fewer, and their weights (k, 3)."""
+        """Return the vertices (k, 3) of the points of a contact and their weights (k, 3).
+
+        Vertices are numbered as in the scene; points of fewer than three vertices are padded with -1. Points of welded
+        vertices
+        are returned once.
+        """
         span = self.of(contact)
         vertices, weights = contact.points(span.mesh)
         numbers = np.where(vertices < 0, vertices, vertices + np.int32(span.first_vertex))
         if not self.ties:
             return numbers, weights
-        again = (vertices[:, 1] < 0) & np.isin(
+        repeated = (vertices[:, 1] < 0) & np.isin(
             self.original[numbers[:, 0]], numbers[~self.copies[numbers[:, 0]], 0]
         )
-        kept = ~(again & self.copies[numbers[:, 0]])
-        return numbers[kept], weights[kept]
+        chosen = ~(repeated & self.copies[numbers[:, 0]])
+        return numbers[chosen], weights[chosen]
 
     def split(self, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The body of each of the scene's edges, (k,), and its number there, (k,)."""
+        """Return the body of each of the scene's edges, (k,), and the number of the edge in that body, (k,)."""
         first = np.array([span.first_edge for span in self.spans])
         of = np.searchsorted(first, edges, side="right") - 1
         return of, edges - first[of]
 
     def core_number(self, span: Span, n_skins: int = 0) -> int:
-        """Of one body, where flat sheets come first, solids after them, then so many skins, then six-node sheets."""
+        """Return the core's number of a body: flat sheets come first, then solids, then `n_skins` skins, then six-node
+        sheets.
+        """
         body = self.shells[span.bodies.start or 0]
         before = 0
         for kind, others in ((self.flat_sheets, 0), (self.solids, n_skins), (self.six_node_sheets, 0)):
@@ -316,11 +333,11 @@ class Bodies:
         raise ValueError("a body of the scene is one of scene.bodies")
 
     def sheets_before(self, body: Shell | Solid) -> tuple[Shell, ...]:
-        """The sheets that come before one of them where there are rows of sheets alone."""
+        """Return the sheets before a body, in arrays that have rows for sheets only."""
         return tuple(takewhile(lambda each: each is not body, self.sheets))
 
     def sheets_of(self, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """As `split`, with the number of the body among `sheets`."""
+        """Return the same as `split`, with the number of the body among `sheets`; -1 for a solid."""
         of, own = self.split(edges)
         numbers = {id(sheet): k for k, sheet in enumerate(self.sheets)}
         return np.array([numbers.get(id(body), -1) for body in self.shells], dtype=int)[of], own
@@ -331,7 +348,7 @@ def _parts(body) -> tuple[Any, ...]:
 
 
 class CombinedSheets:
-    """What faces of several sheets, or of none, are made of, one sheet after another."""
+    """The face values of several sheets, or of none, one sheet after another."""
 
     def __init__(self, mesh: TriangleMesh, sheets: tuple[Shell, ...]):
         self.mesh = mesh
@@ -344,19 +361,19 @@ class CombinedSheets:
 
 
 def checked_body(body: Any) -> Shell | None:
-    """The body that something is about, as it was given."""
+    """Return a `body` argument as it was given. Raises ValueError if it is no Shell or Solid."""
     if body is not None and not isinstance(body, BODIES):
         raise ValueError(f"body must be a Shell or Solid of the scene, got {body!r:.60}")
     return body
 
 
 def on_body(body: Shell | None) -> str:
-    """For a repr."""
+    """Return the end of a repr that says which body an object acts on; empty if none was given."""
     return "" if body is None else f", on a body of {body.mesh.n_faces} faces"
 
 
 def joined(arrays: list[np.ndarray]) -> np.ndarray:
-    """Rows of all bodies; of one body, its own."""
+    """Return the rows of the arrays of all bodies in one array; the array of a single body is returned itself."""
     if not arrays:
         return np.zeros(0)
     return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)

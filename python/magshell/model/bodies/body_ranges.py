@@ -1,4 +1,4 @@
-"""Where a body has its vertices, edges and faces among those of all bodies of a scene."""
+"""Index ranges of a body's vertices, edges and faces among those of all bodies of a scene."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ if TYPE_CHECKING:
 
 
 class Span(NamedTuple):
-    """One body, or all of them: `mesh`, and the numbers in the scene of its first vertex, edge and face, of its first
-    rotation, and of its first row in a magnetization of all bodies.
+    """The index ranges of one body, or of all bodies together.
 
-    bodies: which of the scene's they are.
+    mesh: of the body, or the joined mesh. bodies: which of the scene's bodies. The other fields are the numbers in the
+    scene
+    of the first vertex, edge, face and edge rotation, and of the first row in a magnetization of all bodies.
     """
 
     mesh: TriangleMesh
@@ -32,7 +33,7 @@ class Span(NamedTuple):
 
     @property
     def edges(self) -> slice:
-        """Those that may turn: a solid has none."""
+        """The range of the edges that have rotations; empty for a solid."""
         return slice(self.first_edge, self.first_edge + turning_edges(self.mesh))
 
     @property
@@ -49,15 +50,17 @@ class Span(NamedTuple):
 
 
 def turning_edges(mesh: MeshBase) -> int:
-    """How many edges the core has for a mesh: of a solid, none."""
+    """Return the number of edges that have rotations; zero for a solid."""
     return mesh.n_edges if isinstance(mesh, TriangleMesh | QuadraticTriangleMesh) else 0
 
 
 def rotations_of(mesh: MeshBase) -> int:
-    """How many rotations it has: one an edge, two where there are six nodes, of a solid none."""
+    """Return the number of edge rotations of a mesh: one per edge, two for six-node elements, none for a solid."""
     return turning_edges(mesh) * getattr(mesh, "order", 1)
 
 
 def magnetized_rows(mesh: MeshBase) -> int:
-    """How many rows it has in a magnetization of all bodies: one an element of a sheet, of a solid one a face."""
+    """Return the number of rows of a mesh in a magnetization of all bodies: the elements of a sheet, the faces of a
+    solid.
+    """
     return mesh.n_elements if isinstance(mesh, TriangleMesh | QuadraticTriangleMesh) else mesh.n_faces

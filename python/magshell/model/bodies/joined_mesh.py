@@ -1,4 +1,4 @@
-"""Joins the meshes of bodies into one; there may be none."""
+"""Joins the meshes of all bodies of a scene into one, and provides an empty mesh for scenes of rigid bodies only."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class NoMesh(TriangleMesh):
-    """Of a scene that has rigid parts only."""
+    """An empty mesh, for a scene that has rigid bodies only."""
 
     size = 0.0
     n_components = 0
@@ -37,18 +37,20 @@ class NoMesh(TriangleMesh):
 
 
 class JoinedMesh:
-    """Vertices, edges and faces (of a solid, those of its surface) of one body after another."""
+    """The vertices, edges and faces of several bodies, one body after another; of a solid, the faces of its surface."""
 
     def __init__(self, meshes: list[Any]):
         self.meshes = meshes
         self._first = np.cumsum([0, *(mesh.n_vertices for mesh in meshes)])
 
     def _numbered(self, name: str) -> np.ndarray:
+        """Return an array of vertex numbers of all meshes, renumbered for the joined mesh."""
         return np.concatenate(
             [getattr(mesh, name) + first for mesh, first in zip(self.meshes, self._first, strict=False)]
         )
 
     def _together(self, name: str) -> np.ndarray:
+        """Return the rows of an array of all meshes."""
         return np.concatenate([getattr(mesh, name) for mesh in self.meshes])
 
     @property
@@ -57,12 +59,12 @@ class JoinedMesh:
 
     @cached_property
     def rest_positions(self) -> np.ndarray:
-        """(n_v, 3), m."""
+        """The positions of the vertices in the rest shape, (n_v, 3) m."""
         return self._together("rest_positions")
 
     @cached_property
     def edges(self) -> np.ndarray:
-        """(n_e, 2), of sheets alone: those that have rotations."""
+        """The edges of sheets, (n_e, 2); solids have none here, as only edges of sheets have rotations."""
         sheets = [
             mesh.edges + first
             for mesh, first in zip(self.meshes, self._first, strict=False)
@@ -76,12 +78,12 @@ class JoinedMesh:
 
     @cached_property
     def edge_lengths(self) -> np.ndarray:
-        """(k,) m, of all bodies, solids' inner ones as well."""
+        """The lengths of the edges of all bodies, inner edges of solids included, (k,) m."""
         return self._together("edge_lengths")
 
     @cached_property
     def faces(self) -> np.ndarray:
-        """(n_f, 3)."""
+        """The vertices of the faces, (n_f, 3)."""
         return self._numbered("faces")
 
     @property
@@ -90,17 +92,17 @@ class JoinedMesh:
 
     @cached_property
     def face_areas(self) -> np.ndarray:
-        """(n_f,), m2."""
+        """The areas of the faces in the rest shape, (n_f,) m2."""
         return self._together("face_areas")
 
     @cached_property
     def surface_vertices(self) -> np.ndarray:
-        """(n_s,): all of sheets, of solids those on the surface, ascending."""
+        """The vertices of faces, ascending, (n_s,): all vertices of sheets, those on the surface of solids."""
         return np.unique(self.faces)
 
     @cached_property
     def surface(self) -> TriangleMesh:
-        """The faces, as a mesh of its own: its vertices are `surface_vertices`."""
+        """The faces as a mesh of its own, whose vertices are `surface_vertices`."""
         vertices = self.surface_vertices
         return TriangleMesh(self.rest_positions[vertices], np.searchsorted(vertices, self.faces))
 
@@ -111,7 +113,7 @@ class JoinedMesh:
 
     @cached_property
     def components(self) -> np.ndarray:
-        """(n_v,): the number of the connected piece each vertex belongs to."""
+        """The number of the connected component of each vertex, (n_v,)."""
         before = np.cumsum([0, *(mesh.n_components for mesh in self.meshes)])
         return np.concatenate(
             [mesh.components + first for mesh, first in zip(self.meshes, before, strict=False)]
@@ -122,5 +124,5 @@ class JoinedMesh:
         return sum(mesh.n_components for mesh in self.meshes)
 
     def self_intersections(self, positions: Numbers) -> np.ndarray:
-        """The faces that pass through each other, (k, 2)."""
+        """Find the faces that pass through each other, (k, 2)."""
         return self.surface.self_intersections(np.asarray(positions)[self.surface_vertices])

@@ -1,4 +1,4 @@
-"""Bodies that are welded: where they share places at rest, they share vertices."""
+"""Ties weld bodies: vertices that have the same position in the rest shape become one vertex of the scene."""
 
 from __future__ import annotations
 
@@ -19,17 +19,22 @@ if TYPE_CHECKING:
 
 
 class Tie(Frozen):
-    """Welds two bodies: vertices of both that lie at one place at rest are one vertex of the scene.
+    """Welds two bodies: vertices of both that have the same position in the rest shape are one vertex of the scene.
 
-    Results have it among those of each body, at the same place. Masses, loads and damping of both add up there; what holds
-    one, holds the other. A seam is a hinge: bodies that share no more than a line turn freely about it, and bodies that
-    share faces (a patch on a sheet) bend together. A seam that carries moments is one mesh: `ms.weld(mesh, mesh)`, with
-    thickness and modulus by face. A sheet on a solid's face moves with it; one that is held by an edge alone turns.
+    Results list such a vertex for each body, with equal positions. Masses, loads and damping of both bodies add up
+    there; a
+    support of one body holds the other. A seam is a hinge: bodies that share no more than a line turn freely about it,
+    and
+    bodies that share faces (a patch on a sheet) bend together. For a seam that carries moments make one mesh,
+    `ms.weld(mesh, mesh)`, with thickness and modulus by face. A sheet on a solid's face moves with it; one that is tied
+    by
+    an edge alone can turn.
 
     a, b: two bodies of the scene.
-    vertices: those of `a` that are welded, each to one of `b`; by default all that have one.
-    tolerance: m, how far from each other they may be at rest, where `a` says where they are; by default 1e-6 of the larger
-        body.
+    vertices: those of `a` that are welded, each to one of `b`; by default all that have one within the tolerance.
+    tolerance: m, largest distance of the two vertices in the rest shape; the position is that in `a`. By default 1e-6
+    of the
+        larger body.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.02, 0.01, cells=(4, 2))
@@ -67,15 +72,18 @@ class Tie(Frozen):
             raise ValueError(f"tolerance [m] must be positive, got {self.tolerance:g}")
 
     def pairs(self) -> np.ndarray:
-        """(k, 2): vertices of a and of b that are one. Raises ValueError where there are none, or it is not clear which."""
+        """Return the pairs of vertices of `a` and of `b` that are welded, (k, 2).
+
+        Raises ValueError if there are none, if a given vertex has no partner, or if one has several.
+        """
         reach = self.tolerance
         if reach is None:
             reach = RELATIVE_TOLERANCE * max(self.a.mesh.size, self.b.mesh.size)
         of_a = np.arange(self.a.mesh.n_vertices)
         if self.vertices is not None:
             of_a = indices("Tie vertices", self.vertices, self.a.mesh.n_vertices)
-        places, others = self.a.mesh.rest_positions[of_a], self.b.mesh.rest_positions
-        apart, of_b = scipy.spatial.cKDTree(others).query(places, distance_upper_bound=np.inf)
+        points, others = self.a.mesh.rest_positions[of_a], self.b.mesh.rest_positions
+        apart, of_b = scipy.spatial.cKDTree(others).query(points, distance_upper_bound=np.inf)
         near = apart <= reach
         if self.vertices is not None and not near.all():
             far = int(np.argmax(apart))
@@ -102,7 +110,10 @@ class Tie(Frozen):
 
 
 def originals(count: int, welded: np.ndarray) -> np.ndarray:
-    """(count,): the first of the vertices that each is welded to, itself where it is not. welded: (k, 2)."""
+    """Return for each vertex the first of the vertices that it is welded to, itself if there is none, (count,).
+
+    welded: (k, 2), pairs of vertices.
+    """
     if not len(welded):
         return np.arange(count)
     groups = _groups(count, welded)
@@ -112,7 +123,7 @@ def originals(count: int, welded: np.ndarray) -> np.ndarray:
 
 
 def joined_components(components: np.ndarray, welded: np.ndarray) -> np.ndarray:
-    """The connected part of each vertex, numbered as their first vertices are, once some are welded."""
+    """Return the connected component of each vertex after welding, numbered in the order of their first vertices."""
     parts = _groups(int(components.max()) + 1, components[welded])
     return np.unique(parts[components], return_inverse=True)[1]
 

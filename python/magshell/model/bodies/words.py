@@ -1,4 +1,4 @@
-"""What messages call the bodies of a scene."""
+"""Names the bodies of a scene in messages."""
 
 from __future__ import annotations
 

@@ -305,7 +305,7 @@ def checked_side(name: str, side: Shell | Solid | RigidBody) -> Shell | Solid | 
         raise ValueError(f"{name} must be a Shell, a Solid or a RigidBody of the scene, got {side!r:.60}")
     if side.vertices is None:
         raise ValueError(
-            f"{name} is a free Rigid without faces to touch with: give it a shape, or make it of the vertices of a body"
+            f"{name} is a free RigidBody without faces to touch with: give it a shape, or make it of the vertices of a body"
         )
     if side.body is None:
         raise ValueError(

@@ -67,7 +67,7 @@ def _check_each_pair_once(contacts) -> None:
 
 
 def shapes_that_touch(contacts: Sequence[Contact | BodyContact]) -> tuple[RigidBody, ...]:
-    """Rigid parts that contacts are about with their shapes, each once."""
+    """rigid bodies that contacts are about with their shapes, each once."""
     sides = [side for contact in contacts for side in contact._sides if touches_with_shape(side)]
     return tuple({id(side): side for side in sides}.values())
 
@@ -86,7 +86,7 @@ def _surface(side, bodies) -> dict[Any, Any]:
         return {"name": f"rigid part {rigid}", "faces": rows, "numbers": chosen.astype(np.int32)}
     span = bodies.spans[number]
     if rigid >= 0:
-        own = indices("Rigid vertices", side.vertices, body.mesh.n_vertices)
+        own = indices("RigidBody vertices", side.vertices, body.mesh.n_vertices)
         chosen = np.flatnonzero(np.isin(faces, own).all(axis=1))
         if not chosen.size:
             raise ValueError(

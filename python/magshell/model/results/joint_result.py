@@ -129,7 +129,7 @@ class JointResult(Frozen):
     def _place_of(self, link: RigidBodyResult | None):
         if link is None:
             return _like(self.joint.origin, self._child.center)
-        middle = link._place.center
+        middle = link._points.center
         return link.center + link.rotation @ _like(self.joint.origin - middle, link.center)
 
     def __repr__(self) -> str:

@@ -1,4 +1,4 @@
-"""Links of skeletons: rigid parts that a joint may hold where they cannot hold themselves."""
+"""Links of skeletons: rigid bodies whose joints may hold them where they could not hold themselves."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ if TYPE_CHECKING:
 
 
 class Link(RigidBody):
-    """A RigidBody of a skeleton. It may be a point mass, or without any mass, as its joints keep it from spinning.
+    """A rigid body of a skeleton. It may be a point mass, or have no mass, as its joints keep it from spinning.
 
-    As Rigid; without vertices it needs its center. `shape`: as of a RigidBody; by default pictures show
-    rods between joints. Link.of makes mass, inertia and center from one.
+    The arguments are those of `RigidBody`; without vertices it needs its center. Pictures show a link without a `shape`
+    as
+    rods between its joints. Link.of computes mass, inertia and center from a shape.
 
     magnetic_moment, velocity, angular_velocity, body: as in `RigidBody`.
 

@@ -1,4 +1,4 @@
-"""Defines rigid bodies, their mass properties, and what results say of them."""
+"""Rigid bodies, their mass properties, and their motion in results."""
 
 from __future__ import annotations
 
@@ -23,9 +23,11 @@ if TYPE_CHECKING:
     from ..scene.values import Gradient, Values
 
 
-def filled(shape: TriangleMesh, mass_density: Numbers) -> dict[Any, Any]:
-    """mass [kg], inertia [kg m2] and center [m] of a RigidBody that fills it. Raises ValueError where it is open, or turned
-    inside out."""
+def mass_properties(shape: TriangleMesh, mass_density: Numbers) -> dict[Any, Any]:
+    """Return the mass [kg], inertia [kg m2] and center [m] of a rigid body that fills a closed surface.
+
+    Raises ValueError if the surface is open, or its faces look inwards.
+    """
     density = positive("mass_density", "kg/m3", mass_density)
     volume, center, second = moments_of(shape)
     inertia = density * (np.trace(second) * np.eye(3) - second)
@@ -33,7 +35,12 @@ def filled(shape: TriangleMesh, mass_density: Numbers) -> dict[Any, Any]:
 
 
 def moments_of(shape: TriangleMesh) -> tuple[float, np.ndarray, np.ndarray]:
-    """Volume, center and second moments about it of what a closed surface holds, by tetrahedra to the origin."""
+    """Return the volume, the center and the second moments about it of the interior of a closed surface.
+
+    They are sums over tetrahedra from each face to the mean of the vertices. Raises ValueError if the surface is open,
+    or its
+    faces look inwards.
+    """
     faces, points = shape.faces, shape.rest_positions
     edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     _, counts = np.unique(edges, axis=0, return_counts=True)
@@ -53,29 +60,31 @@ def moments_of(shape: TriangleMesh) -> tuple[float, np.ndarray, np.ndarray]:
     return volume, middle + center, second - volume * np.outer(center, center)
 
 
-_ROUNDING = 1e-9
+_ROUNDING = 1e-9  # [-] of the largest entry: tolerance of the checks of an inertia
 
 
 class RigidBody(Owner):
-    """Vertices of a body that move as one rigid body: a payload, a stiff frame, a magnet glued on. Or a free body without
-    a mesh. One of the bodies of a scene.
+    """A rigid body: vertices of a body that move together, such as a payload, a stiff frame or a magnet glued on, or a
+    free body without a mesh. It is one of the bodies of a scene.
 
     vertices: (k,), three at least and not all on a line; or None for a free body.
-    mass: kg, its own, beside that of the sheet it is part of; None where it has none: a frame.
-    inertia: kg m2, about `center`, in the world's axes at rest: (3, 3), or (3,) where those are its principal axes, or one
-        number for all three. By default that of a point mass, none.
-    center: (3,) m, of its own mass and of its moment, at rest; by default the mean of the vertices, or the origin.
-    magnetic_moment: (3,) A m2 at rest, in a scene with a field; it turns with the part.
-    velocity, angular_velocity: (3,) m/s of the center, (3,) rad/s in the world's axes: of a free body, where a motion
-        starts at rest positions. Vertices have theirs from the `velocities` of ms.simulate.
+    mass: kg, its own, in addition to that of the sheet it is part of; None for a frame without mass.
+    inertia: kg m2, about `center`, in the world's axes at rest: (3, 3), or (3,) if these are its principal axes, or one
+        number for all three. By default zero, as for a point mass.
+    center: (3,) m, of its own mass and of its magnetic moment, at rest; by default the mean of the vertices, or the
+        origin.
+    magnetic_moment: (3,) A m2 at rest, in a scene with a field; it turns with the body.
+    velocity, angular_velocity: (3,) m/s of the center, (3,) rad/s in the world's axes: initial values of a free body in a
+        motion that starts at rest positions. Vertices take theirs from the `velocities` of ms.simulate.
     body: the Shell or Solid whose vertices they are, in a scene of several.
-    shape: a TriangleMesh where it is at rest, or one of ms.shapes, of which the surface of some 2000 tetrahedra is taken:
-        what an ms.Contact of the part with bodies touches with, and pictures show. `Rigid.of` makes mass, inertia and
-        center from one.
+    shape: the surface for an ms.Contact with other bodies and for pictures: a TriangleMesh in its rest pose, or one of
+        ms.shapes, of which the surface of about 2000 tetrahedra is used. `RigidBody.of` computes mass, inertia and center
+        from a shape.
 
-    Supports hold none of its vertices. `result[part]` has its center and rotation, and how fast it moves. ms.simulate
-    takes it by TRBDF2, the first step in seven parts, or by ImplicitEuler; viscous damping acts on vertices only. Faces
-    between its vertices still bend at its border: where that half of a face matters, give them a larger modulus too.
+    Supports cannot hold its vertices. `result[body]` has its center, rotation and velocities. ms.simulate integrates it
+    by TRBDF2, with the first step in seven parts, or by ImplicitEuler; viscous damping acts on vertices only. Faces with
+    only some corners in the rigid body still bend at its border: if that half of a face matters, give them a larger
+    modulus too.
 
     >>> import numpy as np
     >>> import magshell as ms
@@ -108,7 +117,9 @@ class RigidBody(Owner):
         if vertices is None and body is not None:
             raise ValueError("a RigidBody of a body needs its vertices: RigidBody(vertices=..., body=...)")
         self.shape: TriangleMesh | None = _checked_shape(shape)
-        self.vertices: np.ndarray | None = None if vertices is None else selection("Rigid vertices", vertices)
+        self.vertices: np.ndarray | None = (
+            None if vertices is None else selection("RigidBody vertices", vertices)
+        )
         self.body = body
         self.mass: float | None = None if mass is None else float(quantity("mass", "kg", mass, ()))
         if self.mass is not None and not self.mass > 0:
@@ -130,35 +141,40 @@ class RigidBody(Owner):
     def _check_free(self) -> None:
         if self.mass is None:
             raise ValueError(
-                "a free Rigid needs a mass [kg], and an inertia [kg m2]: RigidBody(mass=..., inertia=...)"
+                "a free RigidBody needs a mass [kg], and an inertia [kg m2]: RigidBody(mass=..., inertia=...)"
             )
         least = 0.0 if self.inertia is None else np.linalg.eigvalsh(self.inertia_tensor)[0]
         if not least > 0:
             raise ValueError(
-                f"a free Rigid needs an inertia [kg m2] about every axis, but the smallest is {least:g}: it could spin "
+                f"a free RigidBody needs an inertia [kg m2] about every axis, but the smallest is {least:g}: it could spin "
                 "without a force"
             )
 
     @property
     def inertia_tensor(self) -> np.ndarray:
-        """(3, 3), kg m2, about the center; zero where there is none."""
+        """The inertia about the center, (3, 3) kg m2; zero if none was given."""
         given = np.zeros(()) if self.inertia is None else self.inertia
         return given if given.ndim == 2 else given * np.eye(3)
 
     def replaced(self, **values: Any) -> RigidBody:
-        """The same part with other values."""
+        """Return the same rigid body with other values.
+
+        Raises ValueError for a value that the body was made without.
+        """
         own = {name: getattr(self, name) for name in self._replaceable}
         for name in values:
             if own[name] is None and not (name in ("velocity", "angular_velocity") and self.vertices is None):
-                raise ValueError(f"the Rigid was made without {name}: give it one in the scene, zero will do")
+                raise ValueError(
+                    f"the RigidBody was made without {name}: give it one in the scene, zero will do"
+                )
         return self._again({**own, **values})
 
     @classmethod
     def of(cls, shape: TriangleMesh | Shape, mass_density: float, **others: Any) -> RigidBody:
-        """The one that fills a closed surface, faces outwards: mass [kg], inertia and center by its density [kg/m3].
-        others: of its arguments.
+        """Make the rigid body that fills a closed surface whose faces look outwards.
 
-        Raises ValueError where the surface is open, or turned inside out.
+        mass_density: kg/m3; mass [kg], inertia and center follow from it. others: further arguments of RigidBody.
+        Raises ValueError if the surface is open, or its faces look inwards.
 
         >>> import magshell as ms
         >>> ms.RigidBody.of(ms.meshes.box((0.02, 0.02, 0.02), cells=(1, 1, 1)).surface, 1e3)
@@ -167,7 +183,7 @@ class RigidBody(Owner):
         surface = _checked_shape(shape)
         if surface is None:
             raise ValueError("shape must be a TriangleMesh or one of ms.shapes, got None")
-        return cls(shape=surface, **filled(surface, mass_density), **others)
+        return cls(shape=surface, **mass_properties(surface, mass_density), **others)
 
     def _again(self, values: dict[Any, Any]) -> RigidBody:
         return type(self)(self.vertices, body=self.body, shape=self.shape, **values)
@@ -178,7 +194,7 @@ class RigidBody(Owner):
             numbers[label, "center"] = values.rigid_points(self).center_of(self)
 
     def _gradients(self, label: str, values: Values, gradient: Gradient) -> dict[str, np.ndarray]:
-        place, found = values.rigid_points(self), {}
+        own_points, found = values.rigid_points(self), {}
         by_center = np.zeros(3)
         if gradient.has(label, "magnetic_moment"):
             found["magnetic_moment"] = gradient.value(label, "magnetic_moment")[0]
@@ -187,13 +203,14 @@ class RigidBody(Owner):
             found["magnetic_moment"] = np.zeros(3)
         by_masses = values.by_masses(gradient)
         if self.mass is not None and by_masses is not None:
-            found["mass"], found["inertia"], by_place = place.masses_vjp(self, by_masses[place.points])
-            by_center += by_place
-        by_mass_points = gradient.others.get("own_velocities")
-        if by_mass_points is not None:
+            by_own_masses = by_masses[own_points.points]
+            found["mass"], found["inertia"], by_mass_center = own_points.masses_vjp(self, by_own_masses)
+            by_center += by_mass_center
+        by_velocities = gradient.others.get("own_velocities")
+        if by_velocities is not None:
             started = values.started_by(self)
-            rows = np.concatenate([by_mass_points[each.points] for each in started])
-            at = np.concatenate([each.rest for each in started]) - place.center_of(self)
+            rows = np.concatenate([by_velocities[each.points] for each in started])
+            at = np.concatenate([each.rest for each in started]) - own_points.center_of(self)
             found["velocity"], found["angular_velocity"] = rows.sum(axis=0), np.cross(at, rows).sum(axis=0)
             if self.vertices is None:  # points start at velocity + angular_velocity x (point - center)
                 by_center -= np.cross(rows.sum(axis=0), or_zero(self.angular_velocity))
@@ -212,7 +229,7 @@ class RigidBody(Owner):
         return f"RigidBody({what}{mass}{magnet})"
 
 
-_SHAPE_TETRAHEDRA = 2000
+_SHAPE_TETRAHEDRA = 2000  # tetrahedra of the mesh whose surface stands for one of ms.shapes
 
 
 def _checked_shape(shape) -> TriangleMesh | None:
@@ -248,14 +265,16 @@ def _vector(name: str, unit: str, given) -> np.ndarray | None:
 
 
 def or_zero(vector: np.ndarray | None) -> np.ndarray:
+    """Return a vector, or zeros for None."""
     return np.zeros(3) if vector is None else vector
 
 
 class RigidBodyResult(Frozen):
-    """A rigid part of a result. Of tensors in their graph, tensors.
+    """The motion of a rigid body in a result. If the result has tensors, these are tensors in the same graph.
 
-    rotation: (..., 3, 3), from how it was turned at rest. center: (..., 3) m, of its own mass as the scene has it: a point
-        that stays the same one where a solve has another center.
+    rotation: (..., 3, 3), from the orientation at rest. center: (..., 3) m, of its own mass as the scene has it: this
+    stays the
+        same material point in a solve with another center.
     """
 
     body: RigidBody
@@ -264,44 +283,47 @@ class RigidBodyResult(Frozen):
         scene = result.scene
         k = scene._bodies.rigid_number(part)
         self._result, self.body = result, part
-        self._place, self._rows = scene._rigid[k], slice(10 * k, 10 * k + 4)
-        self._offsets = self._place.rest[:4] - self._place.center
+        self._points, self._rows = scene._rigid[k], slice(10 * k, 10 * k + 4)
+        self._offsets = self._points.rest[:4] - self._points.center
 
     @property
     def positions(self) -> Computed:
-        """(..., k, 3) m, of its vertices, in their order. Raises ValueError for a free body, which has none."""
-        if not len(self._place.vertices):
-            raise ValueError("a free Rigid has no vertices: ask for its center and rotation")
-        return self._result.positions[..., self._place.vertices, :]
+        """The positions of its vertices in their order, (..., k, 3) m.
+
+        Raises ValueError for a free body, which has none.
+        """
+        if not len(self._points.vertices):
+            raise ValueError("a free RigidBody has no vertices: ask for its center and rotation")
+        return self._result.positions[..., self._points.vertices, :]
 
     @property
     def rotation(self) -> Computed:
-        """Rotation vector, rad: (3,), or (n, 3) of a motion."""
+        """The rotation matrix from the orientation at rest, (3, 3), or (n, 3, 3) of a motion."""
         return self._turned(self._result._own_points[..., self._rows, :])
 
     @property
     def center(self) -> Computed:
-        """m: (3,), or (n, 3) of a motion."""
+        """The position of the center, (3,) m, or (n, 3) of a motion."""
         return self._result._own_points[..., self._rows, :].mean(-2)
 
     @property
     def velocity(self) -> Computed:
-        """(n, 3) m/s, of the center, of a motion."""
+        """The velocity of the center in a motion, (n, 3) m/s."""
         return self._result._own_velocities[..., self._rows, :].mean(-2)
 
     @property
     def angular_velocity(self) -> Computed:
-        """(n, 3) rad/s, in the world's axes, of a motion."""
+        """The angular velocity in a motion, in the world's axes, (n, 3) rad/s."""
         velocities = self._result._own_velocities[..., self._rows, :]
         corners = self._result._own_points[..., self._rows, :]
         around = corners - corners.mean(-2)[..., None, :]
         moments = _cross(around, velocities).sum(-2)
-        return moments / (8.0 * self._place.length**2)
+        return moments / (8.0 * self._points.length**2)
 
     def _turned(self, corners):
-        """Of corners c + R rho, sum of (x - c) rho^T over 4 length^2."""
+        """Return the rotation matrices R of corners c + R rho: the sums of (x - c) rho^T over 4 length^2."""
         around = corners - corners.mean(-2)[..., None, :]
-        offsets = _like(self._offsets / (4.0 * self._place.length**2), corners)
+        offsets = _like(self._offsets / (4.0 * self._points.length**2), corners)
         return (around[..., :, :, None] * offsets[:, None, :]).sum(-3)
 
     def __repr__(self) -> str:

@@ -1,4 +1,4 @@
-"""Defines skeletons, and their description for the core."""
+"""Skeletons: trees of links and joints, and their input for the core."""
 
 from __future__ import annotations
 
@@ -19,25 +19,30 @@ if TYPE_CHECKING:
 
 
 class Skeleton(Frozen):
-    """Links and the joints between them: one tree, or several. One of the bodies of a scene, and so are its links.
+    """Links and the joints between them: one tree, or several. A skeleton is one of the bodies of a scene, with its
+    links.
 
-    links: Link (or RigidBody) objects: vertices of a body that they carry, or numbers alone, or both.
-    joints: Fixed, Revolute, Prismatic and Ball objects, each leading to a link; a link to which none leads is free.
-        Closure objects close loops.
+    links: Link (or RigidBody) objects: vertices of a body that they move, or mass properties alone, or both.
+    joints: Fixed, Revolute, Prismatic and Ball objects, each leading to a link; a link without such a joint is free.
+        LoopClosure objects close loops.
 
-    Soft material around a link rides on it by its vertices, Link(vertices=..., body=solid). Joints hold to round-off, also
-    over many steps. Values of joints go by the joint, values={hinge: {"torque": ...}}, and may change in time;
-    `result[hinge].angle` and `result[link]` tell how it moves. ms.simulate takes it by TRBDF2 or ImplicitEuler.
-    Gradients are by all values of joints, their origins and axes too. In motions of long chains (200 links) round-off of
-    angles, which are read off places far away, is above the tolerance of solvers: ms.MixedNewton(tolerance=1e-8) will do.
+    Soft material is attached to a link by vertices, Link(vertices=..., body=solid). Joints hold to round-off, also over
+    many
+    steps. Values of joints are given by the joint, values={hinge: {"torque": ...}}, and may change in time;
+    `result[hinge].angle` and `result[link]` describe the motion. ms.simulate integrates a skeleton by TRBDF2 or
+    ImplicitEuler. There are gradients by all values of joints, also by their origins and axes. In motions of long
+    chains (200
+    links) the angles come from positions far from the origin, and their round-off exceeds the default tolerance of
+    solvers:
+    use ms.MixedNewton(tolerance=1e-8).
 
     >>> import numpy as np
     >>> import magshell as ms
     >>> upper, lower = (ms.Link(mass=1.0, center=(0, 0, -z), inertia=1e-3) for z in (0.5, 1.5))
     >>> shoulder = ms.Revolute(upper, origin=(0, 0, 0), axis=(0, 1, 0), torque=-2.0, spring_stiffness=10.0)
     >>> elbow = ms.Revolute(lower, upper, origin=(0, 0, -1.0), axis=(0, 1, 0), spring_stiffness=1.0)
-    >>> rest = ms.equilibrium(ms.Scene(ms.Skeleton([upper, lower], [shoulder, elbow]), gravity=(0, 0, -9.81)))
-    >>> bool(0 < abs(float(rest[shoulder].angle)) < 0.2)
+    >>> shape = ms.equilibrium(ms.Scene(ms.Skeleton([upper, lower], [shoulder, elbow]), gravity=(0, 0, -9.81)))
+    >>> bool(0 < abs(float(shape[shoulder].angle)) < 0.2)
     True
     """
 
@@ -46,7 +51,7 @@ class Skeleton(Frozen):
         self.joints: tuple[Joint, ...] = checked_list("joints", joints, (Joint,))
         if not self.links:
             raise ValueError("links must hold at least one Link")
-        self.named: dict[str, RigidBody | Joint] = FixedDict()  # of a file
+        self.named: dict[str, RigidBody | Joint] = FixedDict()  # filled by from_urdf
         self._leading: dict[int, Joint] = {}
         for k, joint in enumerate(self.joints):
             self._check(k, joint)
@@ -54,7 +59,10 @@ class Skeleton(Frozen):
         self._check_velocities()
 
     def __getstate__(self) -> dict[str, Any]:
-        """What a copy, or another process, makes it from again: it knows links by where they are in memory."""
+        """Return the data from which a copy or another process makes the skeleton again.
+
+        Joints refer to links by identity, so the constructor must run again.
+        """
         return {"links": self.links, "joints": self.joints, "named": self.named}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -71,17 +79,22 @@ class Skeleton(Frozen):
         limit_stiffness: Numbers | None = None,
         limit_smoothing: Numbers | None = None,
     ) -> Skeleton:
-        """Reads a URDF file, with the extra `urdf`: links with masses and inertias, at rest where all joints are at zero;
-        revolute, continuous, prismatic and fixed joints with axes, limits and damping; links on a floating joint are free.
-        `skeleton.named["elbow"]` is the link or joint of that name.
+        """Read a skeleton from a URDF file; this needs the extra `urdf`.
 
-        fixed_base: the root is held in the world; else it is free.
+        Links have masses and inertias and are at rest where all joint coordinates are zero. Revolute, continuous,
+        prismatic and
+        fixed joints are read with axes, limits and damping; a link on a floating joint is free.
+        `skeleton.named["elbow"]` is the
+        link or joint of that name.
+
+        fixed_base: the root is fixed to the world; else it is free.
         limit_stiffness, limit_smoothing: of all joints that have limits, in their units (see Revolute, Prismatic);
-            limits=False leaves limits out. Limits of effort and velocity are those of actuators, and not read, nor are
-            shapes: pictures show rods.
+            limits=False leaves limits out. Limits of effort and velocity belong to actuators and are not read, nor are
+            shapes:
+            pictures show rods.
 
-        Raises ValueError on what cannot be: mimic joints, dry friction, planar joints, loops, broken files; ImportError
-        without the extra.
+        Raises ValueError for mimic joints, dry friction, planar joints, loops and broken files; ImportError without the
+        extra.
         """
         from .urdf import read_urdf
 
@@ -125,7 +138,7 @@ class Skeleton(Frozen):
                 )
 
     def _in_order(self) -> list[int]:
-        """The numbers of the links, parents first."""
+        """Return the numbers of the links, parents first. Raises ValueError if joints make a loop."""
         number = {id(link): k for k, link in enumerate(self.links)}
         order: list[int] = []
         waiting = list(range(len(self.links)))
@@ -140,51 +153,54 @@ class Skeleton(Frozen):
         return order
 
     def _parent_of(self, number: int) -> RigidBody | None:
-        """The link that a link, by its number, hangs on; None where that is the world."""
+        """Return the parent of a link, by the link's number; None if the link is free or its parent is the world."""
         joint = self._joint_to(self.links[number])
         return None if joint is None else joint.parent
 
     def _reach(self, link: RigidBody, center: np.ndarray) -> float:
-        """How far from a point of a link its joints are, m."""
-        places = [joint.origin for joint in self.joints if link is joint.child or link is joint.parent]
-        return max((float(np.linalg.norm(place - center)) for place in places), default=0.0)
+        """Return the largest distance from a point of a link to one of its joints, m."""
+        origins = [joint.origin for joint in self.joints if link is joint.child or link is joint.parent]
+        return max((float(np.linalg.norm(origin - center)) for origin in origins), default=0.0)
 
     def _turning_scale(self, link: RigidBody) -> float:
-        """Return a length, m, for a link that does not turn by itself as one of its joints is a slide or fixed; else 0.
+        """Return a length, m, for a link that cannot turn by itself because a joint of it is prismatic or fixed; else
+        0.
 
-        It only sets how rotations of the link are scaled: that of the skeleton, 0.01 m where all of it is at one place.
+        It only scales the rotations of the link: the size of the skeleton, or 0.01 m if that has no extent.
         """
         own = [joint for joint in self.joints if link is joint.child or link is joint.parent]
         if not any(isinstance(joint, Prismatic | Fixed) for joint in own):
             return 0.0
         centers = [each.center for each in self.links if each.center is not None]
-        places = np.array([*centers, *(joint.origin for joint in self.joints)])
-        return float(np.linalg.norm(np.ptp(places, axis=0))) or 0.01
+        points = np.array([*centers, *(joint.origin for joint in self.joints)])
+        return float(np.linalg.norm(np.ptp(points, axis=0))) or 0.01
 
-    def _held(self, link: RigidBody) -> bool:
-        """Whether joints lead from a link to the world."""
+    def _is_grounded(self, link: RigidBody) -> bool:
+        """Return whether joints lead from a link to the world."""
         return id(self._root(link)) in self._leading
 
-    def _drifts(self, link: RigidBody) -> bool:
-        """Whether neither the world nor a vertex of a body is in the tree of a link."""
-        return not self._held(link) and all(each.vertices is None for each in self._tree(link))
+    def _is_floating(self, link: RigidBody) -> bool:
+        """Return whether the tree of a link is connected neither to the world nor to vertices of a body."""
+        return not self._is_grounded(link) and all(each.vertices is None for each in self._tree(link))
 
     def _moved_by(self, joint: Joint) -> list[RigidBody]:
-        """All links that it carries."""
-        return [link for link in self.links if self._on_the_way(joint, link)]
+        """Return all links that a joint moves: its subtree."""
+        return [link for link in self.links if self._is_moved_by(joint, link)]
 
-    def _on_the_way(self, joint: Joint, link: RigidBody) -> bool:
+    def _is_moved_by(self, joint: Joint, link: RigidBody) -> bool:
+        """Return whether a joint is on the path from the root to a link."""
         before = self._leading.get(id(link))
         while before is not None and before is not joint:
             before = None if before.parent is None else self._leading.get(id(before.parent))
         return before is joint
 
     def _tree(self, link: RigidBody) -> list[RigidBody]:
-        """All links that joints lead to from the root of this one."""
+        """Return all links of the tree that a link belongs to."""
         root = self._root(link)
         return [each for each in self.links if self._root(each) is root]
 
     def _root(self, link: RigidBody) -> RigidBody:
+        """Return the root of the tree that a link belongs to."""
         joint = self._leading.get(id(link))
         while joint is not None and joint.parent is not None:
             link, joint = joint.parent, self._leading.get(id(joint.parent))
@@ -196,7 +212,7 @@ class Skeleton(Frozen):
         return tuple(self.links[k] for k in self._order)
 
     def _joint_to(self, link: RigidBody) -> Joint | None:
-        """The joint that leads to a link; None where it is free."""
+        """Return the joint that leads to a link; None if the link is free."""
         return self._leading.get(id(link))
 
     def __repr__(self) -> str:
@@ -207,7 +223,10 @@ class Skeleton(Frozen):
 
 
 def skeleton_inputs(bodies: Bodies, labels: list[tuple[object, str]]) -> dict[str, list[dict[Any, Any]]]:
-    """Of a scene's Bodies. labels: the core's name of every object."""
+    """Return the core's input of the skeletons and loop closures of a scene.
+
+    labels: the core's name of every object.
+    """
     part = {id(link): k for k, link in enumerate(bodies.rigid)}
     label = {id(item): name for item, name in labels if isinstance(item, Joint)}
     closures = [joint for joint in bodies.joints if isinstance(joint, LoopClosure)]
@@ -227,23 +246,23 @@ def skeleton_inputs(bodies: Bodies, labels: list[tuple[object, str]]) -> dict[st
 
 def _skeleton(skeleton: Skeleton, part: dict[int, int], label: dict[int, str]) -> dict[Any, Any]:
     links = skeleton._links_in_order
-    place = {id(link): k for k, link in enumerate(links)}
+    number = {id(link): k for k, link in enumerate(links)}
     joints = [skeleton._joint_to(link) for link in links]
     return {
         "links": [part[id(link)] for link in links],
-        "joints": [_joint(each, place) for each in joints],
+        "joints": [_joint(each, number) for each in joints],
         "owners": [label[id(each)] if each is not None and each._acts else "" for each in joints],
         "labels": ["" if each is None else label[id(each)] for each in joints],
     }
 
 
-def _joint(joint: Joint | None, place: dict[int, int]) -> dict[Any, Any]:
+def _joint(joint: Joint | None, number: dict[int, int]) -> dict[Any, Any]:
     if joint is None:
         still = dict.fromkeys(("driven", "damped", "twisted", "served", "coned"), False)
         return {"kind": "free", "parent": -1, "origin": np.zeros(3), "axis": np.zeros(3), **still}
     return {
         "kind": joint._kind,
-        "parent": -1 if joint.parent is None else place[id(joint.parent)],
+        "parent": -1 if joint.parent is None else number[id(joint.parent)],
         "origin": joint.origin,
         "axis": joint.axis,
         "driven": joint._driven,
@@ -255,7 +274,9 @@ def _joint(joint: Joint | None, place: dict[int, int]) -> dict[Any, Any]:
 
 
 def motor_rows(skeletons: Sequence[Skeleton], joint: Joint) -> int | slice:
-    """Where the numbers of a joint's motor stand among those of all, in the core's order: one, or of a Ball three."""
+    """Return the row of a joint's motor among those of all motors in the core's order; for a Ball a slice of three
+    rows.
+    """
     leading = [skeleton._joint_to(link) for skeleton in skeletons for link in skeleton._links_in_order]
     first = 0
     for each in leading:

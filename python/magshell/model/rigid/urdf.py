@@ -1,4 +1,4 @@
-"""Skeletons from URDF files (unified robot description format), read by yourdfpy."""
+"""Reads skeletons from URDF files (unified robot description format) with yourdfpy."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 def read_urdf(
     path: FilePath, *, fixed_base: bool, limits: bool, limit_stiffness: Numbers, limit_smoothing: Numbers
 ) -> tuple[list[Link], list[Joint], dict[str, Link | Joint]]:
-    """Links, joints, and both by their names in the file. See Skeleton.from_urdf."""
+    """Read a URDF file: its links, its joints, and both by their names in the file. See Skeleton.from_urdf."""
     robot = _parsed(Path(path))
-    placed = _placed(robot)
-    links = {each.name: _link(each, placed[each.name]) for each in robot.links}
+    frames = _link_frames(robot)
+    links = {each.name: _link(each, frames[each.name]) for each in robot.links}
     (root,) = {each.name for each in robot.links} - {each.child for each in robot.joints}
     base = None
     if fixed_base and not links[root].mass:  # it is the world
@@ -37,7 +37,7 @@ def read_urdf(
     joints = {}
     for each in robot.joints:
         try:
-            joint = _joint(each, links, placed[each.child], law if limits else None)
+            joint = _joint(each, links, frames[each.child], law if limits else None)
         except ValueError as error:
             raise ValueError(f"joint {each.name!r} of {path}: {error}") from error
         if joint is not None:
@@ -59,17 +59,17 @@ def _parsed(path: Path):
     if not path.is_file():
         raise FileNotFoundError(f"there is no file {path}")
     try:
-        etree.parse(str(path))  # yourdfpy takes what is left of a broken file
+        etree.parse(str(path))  # yourdfpy alone would read the intact part of a broken file without an error
         robot = yourdfpy.URDF.load(str(path), build_scene_graph=False, load_meshes=False).robot
-    except Exception as error:  # of its own, of lxml, of numpy, ...
+    except Exception as error:  # errors of yourdfpy itself, of lxml, of numpy, ...
         raise ValueError(f"{path} is not a URDF file that yourdfpy reads: {error}") from error
     if not robot.links:
         raise ValueError(f"{path} has no links")
     return robot
 
 
-def _placed(robot) -> dict[str, np.ndarray]:
-    """Where the frame of every link is with all joints at zero, (4, 4)."""
+def _link_frames(robot) -> dict[str, np.ndarray]:
+    """Return the frame (4, 4) of every link with all joint coordinates at zero. Raises ValueError if they make no tree."""
     known = {each.name for each in robot.links}
     parent_of: dict[str, object] = {}
     for joint in robot.joints:
@@ -88,15 +88,15 @@ def _placed(robot) -> dict[str, np.ndarray]:
         raise ValueError(
             f"a URDF file has one root, but this one has {sorted(roots) or 'none: its links make a loop'}"
         )
-    placed = dict.fromkeys(roots, np.eye(4))
-    while len(placed) < len(known):
-        ready = [name for name, joint in parent_of.items() if name not in placed and joint.parent in placed]
+    frames = dict.fromkeys(roots, np.eye(4))
+    while len(frames) < len(known):
+        ready = [name for name, joint in parent_of.items() if name not in frames and joint.parent in frames]
         if not ready:
-            raise ValueError(f"links {sorted(known - placed.keys())} hang on each other in a loop")
+            raise ValueError(f"links {sorted(known - frames.keys())} hang on each other in a loop")
         for name in ready:
             joint = parent_of[name]
-            placed[name] = placed[joint.parent] @ (np.eye(4) if joint.origin is None else joint.origin)
-    return placed
+            frames[name] = frames[joint.parent] @ (np.eye(4) if joint.origin is None else joint.origin)
+    return frames
 
 
 def _link(given, frame: np.ndarray) -> Link:
@@ -104,9 +104,9 @@ def _link(given, frame: np.ndarray) -> Link:
     if inertial is None or not inertial.mass:
         return Link(center=frame[:3, 3])
     own = frame @ (np.eye(4) if inertial.origin is None else inertial.origin)
-    turn = own[:3, :3]
+    rotation = own[:3, :3]
     inertia = np.zeros((3, 3)) if inertial.inertia is None else inertial.inertia
-    inertia = turn @ inertia @ turn.T
+    inertia = rotation @ inertia @ rotation.T
     try:
         return Link(mass=inertial.mass, inertia=0.5 * (inertia + inertia.T), center=own[:3, 3])
     except ValueError as error:
@@ -128,19 +128,19 @@ def _joint(given, links: dict[str, Link], frame: np.ndarray, limits: dict[Any, A
         )
     law = {}
     if given.dynamics is not None:
-        # yourdfpy leaves them as text.
+        # yourdfpy does not convert these values from text.
         if float(given.dynamics.friction or 0.0):
             raise ValueError("it has dry friction, which joints here do not have: set friction to 0")
         if damping := float(given.dynamics.damping or 0.0):
             law["damping"] = damping
     if limits is not None and kind != "continuous" and given.limit is not None:
-        ends_of_way = {"lower_limit": given.limit.lower, "upper_limit": given.limit.upper}
-        if any(value is not None for value in ends_of_way.values()):
+        bounds = {"lower_limit": given.limit.lower, "upper_limit": given.limit.upper}
+        if any(value is not None for value in bounds.values()):
             if None in limits.values():
                 raise ValueError(
                     "it has limits: say by limit_stiffness and limit_smoothing how stiff it is beyond, or limits=False"
                 )
-            law |= {**ends_of_way, **limits}
+            law |= {**bounds, **limits}
     axis = np.array([1.0, 0.0, 0.0]) if given.axis is None else given.axis
     make = Prismatic if kind == "prismatic" else Revolute
     return make(**ends, origin=frame[:3, 3], axis=frame[:3, :3] @ axis, **law)

@@ -36,7 +36,7 @@ from ..loads.face_energies import FaceEnergy
 from ..loads.loads import AreaLoad, DeadLoad, EdgeCouple, EdgeLoad, PointLoad
 from ..loads.pressure import Pressure
 from ..loads.water import Water
-from ..rigid.equimomental_points import places
+from ..rigid.equimomental_points import rigid_body_points
 from ..rigid.joints import Joint
 from ..rigid.rigid import RigidBody
 from ..rigid.skeleton import Skeleton, skeleton_inputs
@@ -173,7 +173,7 @@ class Scene(Drawn):
         edges = moment_edges(bodies, self.loads)
         self._moment_directions = moment_directions(bodies, edges)
         constraints = gather(bodies, self.supports, self._moment_directions)
-        self._rigid = places(bodies)
+        self._rigid = rigid_body_points(bodies)
         check_shapes(self._obstacle_contacts, self.rigid_parts, self._rigid)
         for k, part in enumerate(self.rigid_parts):
             if part.magnetic_moment is not None and not self.fields:
@@ -184,12 +184,14 @@ class Scene(Drawn):
         held = np.intersect1d(edges, constraints.directed_edges[:, 0])
         if held.size:
             raise ValueError(f"an EdgeCouple acts on edge {held[0]}, whose direction a support holds")
-        free = [] if allow_rigid_motions else free_rigid_motions(bodies, constraints, self._held_by_joints())
+        free = (
+            [] if allow_rigid_motions else free_rigid_motions(bodies, constraints, self._grounded_vertices())
+        )
         if not allow_rigid_motions:
             free += [
                 f"rigid part {k}, which is free"
                 for k, each in enumerate(self.rigid_parts)
-                if bodies.drifts(each)
+                if bodies.is_floating(each)
             ]
         if free:
             it = "it" if len(bodies.listed) == 1 else "them"
@@ -235,12 +237,12 @@ class Scene(Drawn):
         self._model.set_values(self._values.numbers)
         check_new_scene(self)
 
-    def _held_by_joints(self) -> np.ndarray:
+    def _grounded_vertices(self) -> np.ndarray:
         """Return the vertices of links that joints hold to the world."""
         held = [
             place.vertices
             for part, place in zip(self.rigid_parts, self._rigid, strict=True)
-            if self._bodies.held_by_joints(part)
+            if self._bodies.is_grounded(part)
         ]
         return np.concatenate([np.zeros(0, dtype=np.int64), *held])
 
@@ -335,12 +337,12 @@ class Scene(Drawn):
 
     @property
     def has_uniform_field(self) -> bool:
-        """The field has a uniform part, so solves need an applied_flux_density."""
+        """Return whether the field has a uniform part, so that solves need an applied_flux_density."""
         return any(isinstance(f, UniformField) for f in self.fields)
 
     @property
     def has_forces_of_motion(self) -> bool:
-        """The scene has forces without an energy, which act on moving bodies only: friction, water."""
+        """Return whether there are forces without an energy, which act on moving bodies only: friction, water."""
         rubs = any(contact.friction_coefficient is not None for contact in self.contacts)
         return self.water is not None or rubs
 
@@ -385,7 +387,7 @@ def _refuse_support(parts, held: np.ndarray) -> None:
         if both.size:
             raise ValueError(
                 f"a support holds vertex {both[0]}, which rigid part {k} carries: leave it out of the part's vertices; what "
-                "is to stand still altogether needs no Rigid"
+                "is to stand still altogether needs no RigidBody"
             )
 
 

@@ -61,7 +61,7 @@ def bones_of(result: SolveResult) -> list[list[tuple[np.ndarray, np.ndarray]]]:
     return _where(
         result,
         [
-            (link, *surface_of(skeleton, link, result[link]._place.center))
+            (link, *surface_of(skeleton, link, result[link]._points.center))
             for skeleton in result.scene._bodies.skeletons
             for link in skeleton.links
         ],
@@ -91,7 +91,7 @@ def _where(result, surfaces) -> list[list[tuple[np.ndarray, np.ndarray]]]:
     for part, points, faces in surfaces:
         of = result[part]
         turns, centers = np.asarray(detached(of.rotation)), np.asarray(detached(of.center))
-        around = points - of._place.center
+        around = points - of._points.center
         moved = np.einsum("kij,nj->kni", turns.reshape(-1, 3, 3), around) + centers.reshape(-1, 1, 3)
         found = found or [[] for _ in moved]
         for state, positions in zip(found, moved, strict=True):
