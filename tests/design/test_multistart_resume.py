@@ -13,7 +13,7 @@ import torch
 from multistart_runs import STARTS, bits, quiet
 
 import magshell as ms
-from magshell.design.digest import digest
+from magshell.design.content_hash import content_hash
 from magshell.design.minimum import Record
 
 
@@ -96,7 +96,7 @@ def test_results_come_back_as_they_were(kind, here, tmp_path):
     run = partial(returned, RESULTS[kind])
     quiet(run, [0], here, checkpoint=tmp_path)
     found = quiet(run, [0], here, checkpoint=tmp_path, resume=True)
-    assert found.resumed == (0,) and digest(found.best.result) == digest(RESULTS[kind])
+    assert found.resumed == (0,) and content_hash(found.best.result) == content_hash(RESULTS[kind])
     gradients = [t.requires_grad for t in found.best.result if isinstance(t, torch.Tensor)]
     assert gradients == [t.requires_grad for t in RESULTS[kind] if isinstance(t, torch.Tensor)]
 
@@ -239,15 +239,20 @@ def test_what_cannot_be_told_apart_is_refused_before_any_work(here, tmp_path):
 def test_a_digest_is_of_what_a_value_is():
     one, other = strip(1e-3), strip(1e-3)
     ms.equilibrium(one, remanent_magnetization=(1e4, 0, 0), applied_flux_density=(0, 0, 1e-3))
-    assert digest(one) == digest(other) != digest(strip(2e-3))
+    assert content_hash(one) == content_hash(other) != content_hash(strip(2e-3))
     looped = [1]
     looped.append(looped)
-    assert digest(looped) == digest(looped) and digest({"a": 1, "b": 2}) == digest({"b": 2, "a": 1})
+    assert content_hash(looped) == content_hash(looped) and content_hash({"a": 1, "b": 2}) == content_hash(
+        {"b": 2, "a": 1}
+    )
     shared = np.zeros(2)
-    assert digest([shared, shared]) == digest([np.zeros(2), np.zeros(2)])
-    assert digest({1, "a", None}) == digest({None, "a", 1}) != digest({1, "a"})
+    assert content_hash([shared, shared]) == content_hash([np.zeros(2), np.zeros(2)])
+    assert content_hash({1, "a", None}) == content_hash({None, "a", 1}) != content_hash({1, "a"})
     assert (
-        len({digest(value) for value in (1, 1.0, True, "1", b"1", np.float64(1), torch.tensor(1), None)}) == 8
+        len(
+            {content_hash(value) for value in (1, 1.0, True, "1", b"1", np.float64(1), torch.tensor(1), None)}
+        )
+        == 8
     )
 
 

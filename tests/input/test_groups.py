@@ -25,7 +25,7 @@ def limits(picture) -> np.ndarray:
     [
         (
             lambda: ms.plot(MESH, mesh_lines=True),
-            r"plot\(\) has no keyword 'mesh_lines': .* style=ms.Style\(mesh_lines=...\)",
+            r"plot\(\) has no keyword 'mesh_lines'; use style=ms.Style\(mesh_lines=...\)",
         ),
         (lambda: ms.plot(MESH, color_label="u"), r"color=ms.Color\(label=...\)"),
         (lambda: ms.plot(MESH, frame=None), r"view=ms.View\(frame=...\)"),

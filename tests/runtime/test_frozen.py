@@ -10,7 +10,7 @@ from public_objects import STATEFUL, Arrays, found_results, frozen_classes, made
 
 import magshell as ms
 from magshell._runtime.frozen import Frozen
-from magshell.design.digest import digest
+from magshell.design.content_hash import content_hash
 
 MADE = made_objects(Arrays())
 OBJECTS = {**MADE, **found_results(Arrays(), MADE)}
@@ -160,10 +160,10 @@ def test_a_changed_array_of_the_caller_changes_nothing() -> None:
     given = Arrays()
     made = made_objects(given)
     things = {**made, **found_results(given, made)}
-    before = {name: digest(each) for name, each in things.items() if not isinstance(each, NO_COPIES)}
+    before = {name: content_hash(each) for name, each in things.items() if not isinstance(each, NO_COPIES)}
     moved = things["moved"]([[0.1, 0, 0]])
     given.change()
-    assert {name for name in before if digest(things[name]) != before[name]} == set()
+    assert {name for name in before if content_hash(things[name]) != before[name]} == set()
     np.testing.assert_array_equal(things["moved"]([[0.1, 0, 0]]), moved)
 
 
@@ -229,10 +229,12 @@ def test_a_result_of_one_body_has_its_stresses_and_strains() -> None:
     )
     for result in (rest, move, path, OBJECTS["equilibria"]):
         body = result.scene.bodies[0]
-        assert digest(result.stresses()) == digest(result[body].stresses())
-        assert digest(result.strains()) == digest(result[body].strains())
+        assert content_hash(result.stresses()) == content_hash(result[body].stresses())
+        assert content_hash(result.strains()) == content_hash(result[body].strains())
     whole = of_solid._result
-    assert digest(whole.stresses()) == digest(of_solid.stresses()) == digest(whole.strains())
+    assert (
+        content_hash(whole.stresses()) == content_hash(of_solid.stresses()) == content_hash(whole.strains())
+    )
 
 
 def test_stresses_of_several_bodies_are_asked_of_one_of_them() -> None:

@@ -1,4 +1,4 @@
-"""Lists of objects, where one object will do as well."""
+"""Checks arguments that may be one object or a list of objects."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ from typing import Any
 
 
 def listed(name: str, given: Any, is_one: Callable[[Any], bool]) -> list[Any]:
-    """Of one object or several, by whether a thing is one; None is none. Raises ValueError where it is neither."""
+    """Return a list from one object or several; None gives an empty list.
+
+    is_one: tells whether `given` is a single object. Raises ValueError if it is neither that nor iterable.
+    """
     if given is None:
         return []
     if is_one(given):
@@ -21,7 +24,11 @@ def listed(name: str, given: Any, is_one: Callable[[Any], bool]) -> list[Any]:
 def checked_list(
     name: str, items, kinds: tuple[type[Any], ...], wanted: str | None = None, repeats: bool = False
 ) -> tuple[Any, ...]:
-    """Of one object or several; raises ValueError where one is of none of the kinds, or is there twice, unless repeats."""
+    """Return a tuple from one object or several, after a check of their classes.
+
+    wanted: what a message calls them, by default the names of `kinds`. Raises ValueError if an object is of none
+    of the kinds, or, unless `repeats`, if it appears twice.
+    """
     wanted = wanted or ", ".join(kind.__name__ for kind in kinds) + " objects"
     several = (
         isinstance(items, Iterable) and getattr(items, "ndim", 1) > 0
@@ -37,7 +44,7 @@ def checked_list(
 
 
 def _refuse_repeats(name: str, items: list[Any]) -> None:
-    """What is there twice would act twice, while values and gradients know it once."""
+    """Raise ValueError if an object appears twice: it would act twice, while parameters and gradients count it once."""
     first: dict[int, int] = {}
     for k, item in enumerate(items):
         if (before := first.setdefault(id(item), k)) < k:

@@ -1,4 +1,4 @@
-"""What may come as an argument or go back, for type checkers: nothing of it is needed to run."""
+"""Type aliases of arguments and results, for type checkers only: nothing here is needed at run time."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ if TYPE_CHECKING:
     # The same, or a function of time [s].
     InTime: TypeAlias = Numbers | Callable[[float], Numbers]
 
-    # An array, or a tensor in its graph where an input was one with a gradient. Which of both, only the values tell: a union
-    # would have every program ask before it uses either.
+    # An array, or a tensor in its graph if an input was a tensor with a gradient. The type is Any, not a union: with a
+    # union, type checkers would ask every program to test which of the two it got.
     Computed: TypeAlias = Any
 
     FilePath: TypeAlias = str | os.PathLike[str]
 
     class HasMatrix(Protocol):
-        """A Rotation of scipy's, which has no types of its own."""
+        """A rotation of scipy's (scipy.spatial.transform.Rotation), which has no type annotations of its own."""
 
         def as_matrix(self) -> Any: ...
 
@@ -54,14 +54,14 @@ if TYPE_CHECKING:
     Starting: TypeAlias = Equilibrium | Numbers
 
     class HasPositions(Protocol):
-        """A result of whatever solve."""
+        """A result of any solve: it has a scene and positions."""
 
         @property
         def scene(self) -> Scene: ...
         @property
         def positions(self) -> Any: ...
 
-    # What there are pictures of.
+    # Anything that ms.plot can draw.
     Shown: TypeAlias = (
         TriangleMesh
         | QuadraticTriangleMesh
@@ -80,5 +80,5 @@ if TYPE_CHECKING:
     Load: TypeAlias = DeadLoad | EdgeCouple | FaceEnergy | Pressure
     EnvActuator: TypeAlias = Action
 
-    # A method of optimization, or what makes one for the parameters.
+    # An optimizer, or a function that makes one for a list of parameters.
     Optimizing: TypeAlias = torch.optim.Optimizer | Callable[[list[Any]], Any]

@@ -1,4 +1,4 @@
-"""Physical quantities that a caller hands in: checked once, naming the unit and the offending entry."""
+"""Checks physical quantities that a caller passes in; messages name the unit and the offending entry."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .tensor_kinds import is_tensor, numbers_of, why_not
 
 
 def quantity(name: str, unit: str, values: Any, shape: tuple[int | str, ...]) -> np.ndarray:
-    """A read-only float64 copy of finite numbers.
+    """Return a read-only float64 copy of finite numbers.
 
     Letters in the shape stand for any size, "..." in front for any leading axes.
 
@@ -32,7 +32,8 @@ def quantity(name: str, unit: str, values: Any, shape: tuple[int | str, ...]) ->
 
 
 def one_or_more(name: str, unit: str, values: Any, shape: tuple[int | str, ...]) -> np.ndarray:
-    """A quantity of which there may be several, along the first axis of the shape; one alone needs no such axis.
+    """Return one or several quantities as an array with a leading axis, which the caller may leave out for a single
+    one.
 
     >>> one_or_more("directions", "1", [0, 0, 1], ("k", 3)).shape
     (1, 3)
@@ -46,16 +47,17 @@ def one_or_more(name: str, unit: str, values: Any, shape: tuple[int | str, ...])
 
 
 def _shown(shape: tuple[int | str, ...]) -> str:
+    """Format a shape as Python prints a tuple, with letters for the sizes that are free."""
     return f"({', '.join(map(str, shape))}{',' if len(shape) == 1 else ''})"
 
 
 def label(name: str, unit: str) -> str:
-    """What messages call a quantity; unit "" for a number without one."""
+    """Return the name of a quantity as messages show it, "name [unit]"; unit "" stands for a dimensionless number."""
     return f"{name} [{unit}]" if unit else name
 
 
 def real_numbers(label: str, values: Any) -> np.ndarray:
-    """A float64 copy of any shape. Truth values, masked entries and strings are no numbers."""
+    """Return a float64 copy of any shape. Raises ValueError on booleans, strings and masked entries."""
     array = array_of(label, values, "be an array of real numbers")
     if array.dtype == bool or not np.can_cast(array.dtype, np.float64, casting="same_kind"):
         what = f"{values!r:.60}" if array.ndim == 0 else f"dtype {array.dtype}"
@@ -64,7 +66,7 @@ def real_numbers(label: str, values: Any) -> np.ndarray:
 
 
 def shape_of(label: str, values: Any) -> tuple[int, ...]:
-    """The shape of what a caller handed in, which may be a list. Raises ValueError where it has none."""
+    """Return the shape of an array or a nested list. Raises ValueError if it has none, such as a ragged list."""
     if why := why_not(values):
         raise ValueError(f"{label} {why}")
     try:
@@ -74,8 +76,11 @@ def shape_of(label: str, values: Any) -> tuple[int, ...]:
 
 
 def array_of(label: str, values: Any, wanted: str) -> np.ndarray:
-    """Whatever a caller handed in as an array, perhaps the caller's own. Raises ValueError where it is none, which is
-    then told that it must be what is `wanted`."""
+    """Convert what a caller passed in to an array, without a copy where numpy needs none.
+
+    wanted: what the message says the argument must be. Raises ValueError if it cannot be converted, has masked
+    entries, or is a tensor that requires a gradient.
+    """
     if why := why_not(values):
         raise ValueError(f"{label} {why}")
     if getattr(values, "requires_grad", False):
@@ -89,7 +94,7 @@ def array_of(label: str, values: Any, wanted: str) -> np.ndarray:
 
 
 def fits(actual: tuple[int, ...], wanted: tuple[int | str, ...]) -> bool:
-    """Whether a shape is the wanted one: letters stand for any size, "..." in front for any leading axes."""
+    """Return whether a shape matches the wanted one. Letters match any size, "..." in front matches any leading axes."""
     if wanted[:1] == ("...",):
         wanted = wanted[1:]
         actual = actual[max(len(actual) - len(wanted), 0) :]

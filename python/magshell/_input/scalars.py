@@ -1,4 +1,4 @@
-"""Single numbers and switches that a caller hands in."""
+"""Checks single numbers and switches that a caller passes in."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .quantity import label, quantity
 
 
 def positive(name: str, unit: str, value: Any) -> float:
-    """A positive finite number, or a ValueError that names it and its unit ("" for a number without one)."""
+    """Return a positive finite number. Raises ValueError with the name and the unit ("" for a dimensionless number)."""
     number = float(quantity(name, unit, value, ()))
     if number <= 0:
         raise ValueError(f"{label(name, unit)} must be positive, got {number:g}")
@@ -18,7 +18,7 @@ def positive(name: str, unit: str, value: Any) -> float:
 
 
 def not_negative(name: str, unit: str, value: Any) -> float:
-    """As `positive`; zero will do."""
+    """Return a finite number of at least zero. Raises ValueError with the name and the unit."""
     number = float(quantity(name, unit, value, ()))
     if number < 0:
         raise ValueError(f"{label(name, unit)} must not be negative, got {number:g}")
@@ -26,7 +26,7 @@ def not_negative(name: str, unit: str, value: Any) -> float:
 
 
 def all_positive(name: str, unit: str, values: Any, shape: tuple[int | str, ...]) -> np.ndarray:
-    """An array of positive finite numbers, or a ValueError that names the first other entry."""
+    """Return an array of positive finite numbers. Raises ValueError that names the first other entry."""
     array = quantity(name, unit, values, shape)
     if (wrong := np.argwhere(array <= 0)).size:
         index = tuple(wrong[0].tolist())
@@ -36,7 +36,7 @@ def all_positive(name: str, unit: str, values: Any, shape: tuple[int | str, ...]
 
 
 def flag(name: str, value: Any) -> bool:
-    """True or False, or a ValueError that names it."""
+    """Return a boolean as it is. Raises ValueError with the name on anything else than True or False."""
     if not isinstance(value, bool):
         raise ValueError(f"{name} must be True or False, got {value!r:.60}")
     return value

@@ -1,4 +1,4 @@
-"""Indices that a caller hands in."""
+"""Checks vertex, edge, face and element indices that a caller passes in."""
 
 from __future__ import annotations
 
@@ -16,10 +16,9 @@ _OTHERWISE = {
 
 
 class Indices(np.ndarray):
-    """Indices that know what they count: vertices taken for edges would be other places without an error. Parts of them
-    know it too; what is computed from them is a plain array.
+    """An integer array that knows which entities it counts, so that vertex indices passed as edges raise an error.
 
-    kind: one of KINDS.
+    Slices keep the kind; results of arithmetic are plain arrays. kind: one of KINDS.
     """
 
     kind: str | None
@@ -45,7 +44,7 @@ class Indices(np.ndarray):
 
 
 def _check_kind(name: str, values: Any, wanted: str) -> None:
-    """Raises ValueError where indices count other things than those wanted."""
+    """Raise ValueError if the indices count other entities than those wanted."""
     given = getattr(values, "kind", None)
     numbers = isinstance(values, Indices) and values.dtype != bool
     if numbers and given in KINDS and wanted in KINDS and given != wanted:
@@ -56,7 +55,8 @@ def _check_kind(name: str, values: Any, wanted: str) -> None:
 
 
 def selection(name: str, values: Any, of: str | None = None) -> np.ndarray:
-    """Indices, or a mask, as they were given: (k,), k > 0. `indices` checks them once their mesh is known.
+    """Return indices or a mask as a read-only copy in the form they were given, (k,) with k > 0. `indices` checks
+    them once the mesh is known.
 
     of: what they count, by default what the last word of their name says.
     """
@@ -73,7 +73,8 @@ def selection(name: str, values: Any, of: str | None = None) -> np.ndarray:
 
 
 def indices(name: str, array: np.ndarray, count: int) -> np.ndarray:
-    """A selection as distinct indices into `count` things, (k,), k > 0."""
+    """Return a selection as distinct int64 indices into `count` entities, (k,) with k > 0. Raises ValueError on a bad
+    index."""
     if array.dtype == bool:
         if array.shape != (count,):
             raise ValueError(f"{name}: a mask must have shape ({count},), got {array.shape}")

@@ -1,4 +1,4 @@
-"""Which of torch's tensors hold numbers that can be had, and what to do about the others. Needs no torch."""
+"""Checks whether the numbers of a torch tensor can be read, without importing torch."""
 
 from __future__ import annotations
 
@@ -14,19 +14,22 @@ _DEEPEST = 5  # axes of any input, and one more
 
 
 def is_tensor(value) -> bool:
+    """Return whether a value is a torch tensor; False if torch has not been imported."""
     torch = sys.modules.get("torch")
     return torch is not None and isinstance(value, torch.Tensor)
 
 
 def numbers_of(tensor) -> np.ndarray:
-    """Those of a tensor that has them, without their history. numpy has no bfloat16, whose numbers float32 holds."""
+    """Return the numbers of a readable tensor, without its graph. bfloat16, which numpy lacks, becomes float32."""
     plain = tensor.detach().cpu().resolve_conj().resolve_neg()
     return (plain.float() if plain.dtype == sys.modules["torch"].bfloat16 else plain).numpy()
 
 
 def why_not(values) -> str:
-    """Why the numbers of a tensor, or of a list of them, cannot be had, and the way out. Empty where they can, and of
-    anything else."""
+    """Say why the numbers of a tensor, or of a list with tensors, cannot be read, and what to do instead.
+
+    Returns "" if they can be read, and for anything that is no tensor.
+    """
     if is_tensor(values):
         return _why_not(sys.modules["torch"], values)
     return _why_not_all(values, _DEEPEST) if "torch" in sys.modules else ""

@@ -1,4 +1,4 @@
-"""torch tensors in, torch tensors out; magshell itself needs no torch."""
+"""Converts between torch tensors and arrays; magshell itself works without torch."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .tensor_kinds import is_tensor, numbers_of, why_not
 
 
 def require_torch(what: str):
-    """The torch module, or an ImportError that says how to get it."""
+    """Return the torch module. Raises ImportError with the command that installs it; what: the feature that needs it."""
     try:
         import torch
     except ImportError as error:
@@ -22,12 +22,12 @@ def require_torch(what: str):
 
 
 def tensor_of(values: Any):
-    """A tensor as it is; of arrays and lists a copy, because the mesh's own arrays cannot be written to."""
+    """Return a tensor as it is, and arrays and lists as a copied tensor, because a mesh's own arrays are read-only."""
     return values if is_tensor(values) else require_torch("an objective").from_numpy(np.array(values))
 
 
 def real_tensor(name: str, values: Any, shape: tuple[int | str, ...]):
-    """Real numbers of this shape as a floating tensor, in its graph; letters and "..." as in `quantity`."""
+    """Return real numbers of this shape as a floating-point tensor in its graph; letters and "..." as in `quantity`."""
     torch = require_torch(f"a function of {name}")
     if is_tensor(values):
         if why := why_not(values):
@@ -44,49 +44,52 @@ def real_tensor(name: str, values: Any, shape: tuple[int | str, ...]):
 
 
 def positive_number(name: str, unit: str, value: Any):
-    """A positive float, or the tensor that holds one."""
+    """Return a positive float, or the tensor that was given, after a check of its number."""
     number = positive(name, unit, detached(value))
     return value if is_tensor(value) else number
 
 
-def wants_gradient(value: Any) -> bool:
-    """Whether torch is recording what happens to this tensor."""
+def requires_gradient(value: Any) -> bool:
+    """Return whether torch records the operations on this value: a tensor with a gradient, while gradients are
+    enabled."""
     return is_tensor(value) and value.requires_grad and sys.modules["torch"].is_grad_enabled()
 
 
 def detached(value: Any):
-    """A tensor's numbers without their history; anything else as it came. So does a tensor whose numbers cannot be had,
-    for `quantity` to refuse by its name."""
+    """Return a tensor's numbers without their graph, and anything else as it is.
+
+    A tensor whose numbers cannot be read is returned too: `quantity` refuses it with its name.
+    """
     return numbers_of(value) if is_tensor(value) and not why_not(value) else value
 
 
 def plain_arrays(named: dict[Any, Any]) -> dict[Any, Any]:
-    """The same with arrays in the place of tensors."""
+    """Return the dictionary with tensors replaced by arrays."""
     return {name: detached(value) for name, value in named.items()}
 
 
 def to_array(name: str, value: Any):
-    """A tensor's numbers; anything else as it came. Tensors that ask for a gradient are refused."""
+    """Return a tensor's numbers, and anything else as it is. Raises ValueError if the tensor requires a gradient."""
     if is_tensor(value) and value.requires_grad and not why_not(value):
         raise ValueError(f"{name} requires a gradient, and nothing passes one back to it: detach it first")
     return detached(value)
 
 
 def like(values: np.ndarray, *inputs):
-    """The array, or a tensor if there is one among the inputs."""
+    """Return the array, as a tensor if one of the inputs is a tensor."""
     if not any(is_tensor(given) for given in inputs):
         return values
     return sys.modules["torch"].from_numpy(np.ascontiguousarray(values)).to(dtype=dtype_like(*inputs))
 
 
 def dtype_like(*inputs):
-    """Of results: that of the first tensor among the inputs that has one for real numbers, or float64."""
+    """Return the dtype of results: that of the first floating-point tensor among the inputs, or float64."""
     real = (given.dtype for given in inputs if is_tensor(given) and given.is_floating_point())
     return next(real, sys.modules["torch"].float64)
 
 
 def stacked(parts: list[Any], axis: int = 0):
-    """Arrays as one along a new axis, or tensors in their graphs; of none, no numbers."""
+    """Stack arrays along a new axis, or tensors in their graphs. An empty list gives an empty array."""
     if parts and is_tensor(parts[0]):
         import torch
 

@@ -1,4 +1,7 @@
-"""Objects that stay as they were made: what a scene, a solve or a result was built from cannot change under it."""
+"""Base class and decorator of immutable objects.
+
+A scene, a solve or a result relies on the objects that it was built from: these must not change afterwards.
+"""
 
 from __future__ import annotations
 
@@ -12,24 +15,25 @@ import numpy as np
 C = TypeVar("C", bound=type)
 T = TypeVar("T")
 
-# The ids of the objects whose __init__ is running; each is there for that long only, so that it is that of one object.
+# The ids of the objects whose __init__ is running. An id is removed when __init__ ends, so it cannot be that of another
+# object.
 _being_made: set[int] = set()
 _HOLDERS = (np.ndarray, tuple, dict)
 
 
 class Frozen:
-    """A base of objects whose attributes are set while `__init__` runs, and never after.
+    """A base class of objects whose attributes can be set only while `__init__` runs.
 
-    Setting or deleting one later raises FrozenInstanceError, an AttributeError, which says how to get another value. The
-    arrays that an object holds are read-only as soon as it has them, in copies and in other processes too. Cached
-    properties still work: Python keeps them without setting an attribute. Code of the package makes a changed copy by
-    `variant`, and keeps what it found by `remember`.
+    Setting or deleting one later raises FrozenInstanceError, an AttributeError, which says how to get another
+    value. Arrays that an object holds become read-only when they are assigned, also in copies and in other
+    processes. Cached properties still work: Python stores them without setting an attribute. Code of the package
+    makes a changed copy with `variant`, and stores cached values with `remember`.
     """
 
-    _way = ""  # how to get another value, where the class knows better than `_way_to_another`
+    _how_to_change = ""  # how to get another value, if the class knows better than `_describe_change`
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Wraps the `__init__` that a class has of its own."""
+        """Wrap the `__init__` that a class defines itself."""
         super().__init_subclass__(**options)
         if "__init__" in vars(cls):
             setattr(cls, "__init__", _closing(vars(cls)["__init__"]))  # noqa: B010 - type checkers see the class's own
@@ -47,14 +51,17 @@ class Frozen:
         object.__delattr__(self, name)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Takes what a copy, another process or a file hands over: arrays arrive writable, dicts plain."""
+        """Restore the attributes from a copy, another process or a file, where arrays arrive writable and dicts
+        plain."""
         vars(self).update(_of_fixed_parts(self, state))
 
 
 def immutable(cls: C) -> C:
-    """Decorate a frozen dataclass or a named tuple: it refuses changes with the words that `Frozen` has. Its arrays
-    are read-only, lists become tuples, dicts a FixedDict; but for the fields named in `_as_given`, which hold what a
-    function of the caller's returned."""
+    """Wrap a frozen dataclass or a named tuple: it refuses changes with the messages of `Frozen`.
+
+    Its arrays become read-only, lists become tuples, dicts a FixedDict. Fields named in `_as_given`, which hold
+    what a function of the caller's returned, stay as they are.
+    """
     cls.__setattr__, cls.__delattr__ = Frozen.__setattr__, Frozen.__delattr__
     if is_dataclass(cls):
         if "__init__" in vars(cls):
@@ -67,7 +74,7 @@ def immutable(cls: C) -> C:
 
 
 def variant(thing: T, **attributes: Any) -> T:
-    """Return a copy of an object with other attributes, without its `__init__`."""
+    """Return a copy of an object with other attributes, without calling its `__init__`."""
     other = object.__new__(type(thing))
     vars(other).update({**vars(thing), **attributes})
     read_only(attributes)
@@ -75,12 +82,12 @@ def variant(thing: T, **attributes: Any) -> T:
 
 
 def remember(thing: Any, **attributes: Any) -> None:
-    """Sets what an object keeps for itself once it is made: caches, locks, what it has warned of."""
+    """Set attributes of a finished object: caches, locks, the warnings that it has already given."""
     vars(thing).update(attributes)
 
 
 def read_only(values: Any) -> None:
-    """Makes an array read-only, or every array in a tuple or a dict."""
+    """Make an array read-only, or every array in a tuple or a dict."""
     if isinstance(values, np.ndarray):
         values.setflags(write=False)
     elif isinstance(values, tuple):
@@ -92,15 +99,15 @@ def read_only(values: Any) -> None:
 
 
 def refuse(thing: Any, name: str) -> NoReturn:
-    """Raises FrozenInstanceError: an attribute cannot be set or deleted."""
+    """Raise FrozenInstanceError: an attribute cannot be set or deleted."""
     kind = type(thing).__name__
     article = "an" if kind[0] in "AEIOU" else "a"
-    way = getattr(type(thing), "_way", "") or _way_to_another(thing, name)
-    raise FrozenInstanceError(f"{article} {kind} stays as it was made: {name} cannot be changed. {way}")
+    advice = getattr(type(thing), "_how_to_change", "") or _describe_change(thing, name)
+    raise FrozenInstanceError(f"{article} {kind} stays as it was made: {name} cannot be changed. {advice}")
 
 
 class FixedDict(dict[Any, Any]):
-    """A dict of a result, which cannot be edited: dict(...) of it is a copy that can."""
+    """A read-only dict of a result; dict(...) makes a copy that can be edited."""
 
     def _refuse(self, *_: Any, **__: Any) -> NoReturn:
         raise TypeError("a result stays as it was found: edit a copy, dict(...)")
@@ -112,14 +119,15 @@ class FixedDict(dict[Any, Any]):
 
 
 def _closing(init: Any) -> Any:
-    """The `__init__` of a class, in which attributes can be set.
+    """Wrap an `__init__` so that attributes can be set while it runs.
 
-    It leaves `__dict__` alone: once that is asked for, every look at an attribute takes twice as long.
+    The ids of objects are kept in a set, not in the objects: asking for `__dict__` would double the time of every
+    later attribute access.
     """
 
     @functools.wraps(init)
     def made(self, *arguments, **named):
-        if id(self) in _being_made:  # a part of a subclass's
+        if id(self) in _being_made:  # called from the `__init__` of a subclass
             init(self, *arguments, **named)
             return
         _being_made.add(id(self))
@@ -132,7 +140,7 @@ def _closing(init: Any) -> Any:
 
 
 def _with_fixed_parts(init: Any) -> Any:
-    """The `__init__` of a dataclass, whose arrays, lists and dicts cannot be edited at its end."""
+    """Wrap the `__init__` of a dataclass so that its arrays, lists and dicts cannot be edited afterwards."""
 
     @functools.wraps(init)
     def made(self, *arguments, **named):
@@ -146,7 +154,8 @@ def _with_fixed_parts(init: Any) -> Any:
 
 
 def _of_fixed_parts(thing: Any, state: dict[str, Any]) -> dict[str, Any]:
-    """The attributes of an object so that they cannot be edited. What is private stays what it is, with read-only arrays."""
+    """Return the attributes of an object in forms that cannot be edited. Private ones stay as they are, with
+    read-only arrays."""
     as_given = getattr(thing, "_as_given", ())
     read_only({name: value for name, value in state.items() if name not in as_given})
     return {
@@ -156,7 +165,7 @@ def _of_fixed_parts(thing: Any, state: dict[str, Any]) -> dict[str, Any]:
 
 
 def _new_of_fixed_parts(new: Any) -> Any:
-    """The `__new__` of a named tuple, likewise."""
+    """Wrap the `__new__` of a named tuple so that its arrays, lists and dicts cannot be edited."""
 
     @functools.wraps(new)
     def made(cls, *arguments, **named):
@@ -166,6 +175,7 @@ def _new_of_fixed_parts(new: Any) -> Any:
 
 
 def _fixed(value: Any) -> Any:
+    """Return a list as a tuple, a dict as a FixedDict, and an array read-only; also inside lists, tuples and dicts."""
     if type(value) in (list, tuple):
         return tuple(map(_fixed, value))
     if type(value) is dict:
@@ -175,7 +185,8 @@ def _fixed(value: Any) -> Any:
     return value
 
 
-def _way_to_another(thing, name: str) -> str:
+def _describe_change(thing, name: str) -> str:
+    """Return the part of an error message that says how to get an object with another value of `name`."""
     kind = type(thing).__name__
     variable = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", kind).lower()
     replaceable = tuple(getattr(thing, "_replaceable", ()))

@@ -1,16 +1,20 @@
-"""Whether this processor can run this build: asked before the extension is loaded, as it would end the interpreter."""
+"""Checks that this processor has the instructions that the build uses.
+
+It runs before the extension is loaded: an unknown instruction would end the interpreter without a message.
+"""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
 
-# What a build for a family of processors takes for granted, in Linux's words; others are built where they run.
+# Instruction sets that a build for a processor family needs, by their names in Linux. Other builds run where they were made.
 _NEEDED = {"x86-64-v3": ("avx2", "fma", "bmi2", "f16c", "movbe")}
 
 
 def check(built_for: str, cpuinfo: str) -> None:
-    """Raises ImportError where a processor lacks what the build needs. cpuinfo: of /proc/cpuinfo, empty without one."""
+    """Raise ImportError if the processor lacks an instruction set of the build. cpuinfo: the text of /proc/cpuinfo,
+    or ""."""
     flags = re.search(r"^flags\s*:(.*)$", cpuinfo, re.MULTILINE)
     missing = set(_NEEDED.get(built_for, ())) - set(flags[1].split()) if flags else set()
     if missing:
@@ -20,8 +24,12 @@ def check(built_for: str, cpuinfo: str) -> None:
         )
 
 
-def _told(path: Path) -> str:
+def _read_if_exists(path: Path) -> str:
+    """Return the text of a file, "" if there is none."""
     return path.read_text() if path.exists() else ""
 
 
-check(_told(Path(__file__).parents[1] / "built_for.txt").strip(), _told(Path("/proc/cpuinfo")))
+check(
+    _read_if_exists(Path(__file__).parents[1] / "built_for.txt").strip(),
+    _read_if_exists(Path("/proc/cpuinfo")),
+)

@@ -1,4 +1,5 @@
-"""What `values` may say of a solve itself, and the keywords that are short forms of it: controls, damping."""
+"""Keywords of a solve that may be given in `values` as well: load parameters and damping. Messages on unknown
+keywords."""
 
 from __future__ import annotations
 
@@ -13,20 +14,24 @@ OF_MOTION = (
     "stiffness_damping",
     "maxwell_modulus",
     "maxwell_time",
-)  # which ms.simulate has beside them
+)  # keywords of ms.simulate only
 
 
 def controls_of(owner, scene) -> tuple[str, ...]:
-    """What an object has that is no value in the core: all belongs to the scene, its uniform field's to that as well."""
+    """Return the keywords of a solve that `values` may hold for an object, though they are no parameters in the core.
+
+    These are all keywords for the scene, the flux density for its uniform field, and none for other objects.
+    """
     if owner is scene:
         return (*CONTROLS, *OF_MOTION)
     return (FLUX_DENSITY,) if getattr(owner, "_is_uniform", False) else ()
 
 
 def as_keywords(scene, named: dict[Any, Any], known) -> dict[Any, Any]:
-    """The keywords of a solve with what `values` say of it among them, as far as it has such a keyword (`known`).
+    """Return the keywords of a solve, with those among `values` moved to the keywords that the function has
+    (`known`).
 
-    Raises ValueError where one is given twice. What else is wrong with `values` is told where they are checked.
+    Raises ValueError if one is given twice. Other errors in `values` are reported where they are checked.
     """
     values = named.get("values")
     if not isinstance(values, dict):
@@ -52,8 +57,8 @@ def as_keywords(scene, named: dict[Any, Any], known) -> dict[Any, Any]:
 
 
 def check_known(function: str, named, known, groups: dict[str, type[Any]]) -> None:
-    """Raises TypeError on a keyword that a function does not have: with the group that has it, {parameter: dataclass},
-    or the keywords that are most like it."""
+    """Raise TypeError on an unknown keyword, naming the group {parameter: dataclass} that has it, or the most similar
+    keywords."""
     for name in named:
         if name in known:
             continue
@@ -61,13 +66,13 @@ def check_known(function: str, named, known, groups: dict[str, type[Any]]) -> No
             for field in group.__dataclass_fields__:
                 if name in (field, f"{parameter}_{field}"):
                     there = f"{parameter}=ms.{group.__name__}({field}=...)"
-                    raise TypeError(f"{function}() has no keyword {name!r}: it is said by {there}")
+                    raise TypeError(f"{function}() has no keyword {name!r}; use {there}")
         there = [each for each in known if each != "self"]
         use = f"{use}; it has" if (use := meant(name, there)) else "it has, most like it first"
         raise TypeError(f"{function}() has no keyword {name!r}; {use}: {nearest_first(name, there)}")
 
 
-# What other programs and textbooks call things, and their names here, of which a function may have one.
+# Names of quantities in other programs and textbooks, by the keyword that magshell uses.
 _ELSEWHERE = {
     "young_modulus": ("E", "Y", "youngs_modulus", "elastic_modulus", "modulus", "stiffness"),
     "poisson_ratio": ("nu", "poisson", "poissons_ratio"),
@@ -94,7 +99,7 @@ _ELSEWHERE = {
 
 
 def meant(name: str, there: Iterable[str]) -> str:
-    """Return "use ..." with the names, of those that are there, that one from elsewhere stands for; empty without one."""
+    """Return "use KEYWORD" if `name` is what other programs call one of the keywords `there`, else ""."""
     for own, others in _ELSEWHERE.items():
         if name in others and set(own.split(" and ")) <= set(there):
             return f"use {own}"
@@ -102,7 +107,7 @@ def meant(name: str, there: Iterable[str]) -> str:
 
 
 def nearest_first(name, names) -> str:
-    """The names that there are, the one most like `name` in front."""
+    """Return the names as text, the most similar to `name` first."""
     from difflib import SequenceMatcher  # for errors alone
 
     return ", ".join(sorted(sorted(names), key=lambda each: -SequenceMatcher(None, str(name), each).ratio()))

@@ -1,7 +1,7 @@
-"""What runs say of themselves through `logging`, to the logger "magshell", which a user's program may listen to.
+"""Progress messages for Python's `logging`, to the logger "magshell".
 
-INFO: what searches come to, a line an iteration, a start or an equilibrium found. DEBUG: every solve within them, and
-every design that is rejected. What must be known is warned of and raised, never only logged.
+INFO: progress of searches, one line for each iteration, start or equilibrium found. DEBUG: every solve within
+them, and every rejected design. Anything that a user must know is a warning or an error, never only a log message.
 """
 
 from __future__ import annotations

@@ -1,15 +1,18 @@
-"""Whether what is asked for fits into this computer, before anything is allocated."""
+"""Checks before a motion is computed that it fits into the computer's memory."""
 
 from __future__ import annotations
 
 import os
 
-_A_KNOT = 200  # bytes of the controls at one time, in Python and in the core
+_BYTES_PER_TIME_POINT = 200  # of the load parameters at one time, in Python and in the core
 
 
-def check_memory(steps: int, record_every: int, knots: int, unknowns: int) -> None:
-    """Raises MemoryError where a motion needs more than all there is: its controls, and its recorded states."""
-    controls = _A_KNOT * knots * steps
+def check_memory(steps: int, record_every: int, times_per_step: int, unknowns: int) -> None:
+    """Raise MemoryError if the load parameters and the recorded states of a motion exceed the physical memory.
+
+    times_per_step: time points of a step at which load parameters are needed; unknowns: degrees of freedom.
+    """
+    controls = _BYTES_PER_TIME_POINT * times_per_step * steps
     states = 32 * unknowns * (steps // record_every)  # positions and velocities, in the core and handed out
     if (there := physical_memory()) is not None and controls + states > there:
         raise MemoryError(
@@ -20,7 +23,7 @@ def check_memory(steps: int, record_every: int, knots: int, unknowns: int) -> No
 
 
 def physical_memory() -> int | None:
-    """Bytes, or None where the system does not tell."""
+    """Return the physical memory in bytes, or None if the system does not say."""
     try:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):

@@ -1,5 +1,8 @@
-"""Methods by which results, scenes and meshes draw and save themselves: short forms of functions of rooms above theirs,
-which offer them as they are imported."""
+"""Mixins that give results, scenes and meshes the methods plot(), save() and animate().
+
+The functions behind them belong to packages that import this one; they register themselves here when they are
+imported.
+"""
 
 from __future__ import annotations
 
@@ -13,36 +16,36 @@ F = TypeVar("F", bound=Callable)
 _FUNCTIONS: dict[str, Callable] = {}
 
 
-def offered(function: F) -> F:
-    """A function that is a method of what it is about, too."""
+def register_method(function: F) -> F:
+    """Register the function that the mixins' method of the same name calls. A decorator."""
     _FUNCTIONS[function.__name__] = function
     return function
 
 
-class Drawn(Frozen):
-    """What ms.plot draws."""
+class PlotMixin(Frozen):
+    """A mixin for objects that ms.plot can draw."""
 
     def plot(self, **options: Any) -> Any:
-        """A picture: ms.plot(self, ...), with its keywords."""
+        """Draw a picture: ms.plot(self, ...), with the keywords of ms.plot."""
         return _FUNCTIONS["plot"](self, **options)
 
 
-class Kept(Drawn):
-    """A result that ms.save writes."""
+class SaveMixin(PlotMixin):
+    """A mixin for results that ms.save can write."""
 
-    _way = (
+    _how_to_change = (
         "It is what a solve found; to go on from other positions, start the next solve from a changed copy: "
         "ms.equilibrium(scene, start=positions)"
     )
 
     def save(self, path: Any) -> None:
-        """Writes it into one .npz file: ms.save(path, self). ms.load(path, scene) makes it again."""
+        """Write the result into one .npz file: ms.save(path, self). ms.load(path, scene) reads it."""
         _FUNCTIONS["save"](path, self)
 
 
-class Filmed(Kept):
-    """A result of several states, one after another."""
+class AnimateMixin(SaveMixin):
+    """A mixin for results with a sequence of states."""
 
     def animate(self, path: Any, **options: Any) -> Any:
-        """Writes a movie, a .gif or an .mp4: ms.animate(self, path, ...), with its keywords."""
+        """Write a movie, a .gif or an .mp4: ms.animate(self, path, ...), with its keywords."""
         return _FUNCTIONS["animate"](self, path, **options)

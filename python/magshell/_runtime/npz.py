@@ -1,4 +1,4 @@
-"""Reads .npz files that anybody may have written: data only, and no more memory than the file accounts for."""
+"""Reads .npz files from unknown sources: arrays of numbers only, using no more memory than the file's size justifies."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How many threads this process begins with: what its environment says, or the processors it may use."""
+"""Number of threads at the start of a process: from its environment variables, or the processors that it may use."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 MOST_THREADS = 1024
-MOST_BY_DEFAULT = 8  # loops are too short for more to be worth it on most sheets
+MOST_BY_DEFAULT = 8  # on most meshes the loops are too short to gain from more threads
 
 
 def first_threads(environment: Mapping[str, str], root: Path = Path("/")) -> int:
-    """MAGSHELL_NUM_THREADS, or the processors, at most OMP_NUM_THREADS or else 8.
+    """Return MAGSHELL_NUM_THREADS, or else the number of processors, at most OMP_NUM_THREADS or else 8.
 
-    root is the folder that holds proc and sys. Raises ValueError where MAGSHELL_NUM_THREADS is no number of threads;
-    OMP_NUM_THREADS is not ours, and ignored then.
+    root: the folder that holds proc and sys. Raises ValueError if MAGSHELL_NUM_THREADS is no number of threads. A
+    bad OMP_NUM_THREADS is ignored, because it belongs to other programs.
     """
     ours = environment.get("MAGSHELL_NUM_THREADS", "").strip()
     if ours:
@@ -32,9 +32,11 @@ def first_threads(environment: Mapping[str, str], root: Path = Path("/")) -> int
 
 
 def processors(root: Path = Path("/")) -> int:
-    """Those the system lets this process run on, by its affinity and its control groups' quotas. At least 1.
+    """Return the number of processors that the process may use, by its affinity and its control groups' quotas; at
+    least 1.
 
-    A quota of 1.5 is one: when a group has used up its share of a tenth of a second, all its threads are stopped.
+    A quota of 1.5 counts as one: when a group has used up its share of a tenth of a second, all its threads are
+    stopped.
     """
     try:
         count = len(os.sched_getaffinity(0))
@@ -45,7 +47,8 @@ def processors(root: Path = Path("/")) -> int:
 
 
 def quotas_of(root: Path = Path("/")) -> list[float]:
-    """The quotas of this process's control groups and of those around them, in processors: versions 1 and 2."""
+    """Return the quotas, in processors, of the process's control groups (versions 1 and 2) and of the groups around
+    them."""
     try:
         groups = (root / "proc/self/cgroup").read_text().splitlines()
         mounts = (root / "proc/self/mountinfo").read_text().splitlines()
@@ -67,8 +70,10 @@ def quotas_of(root: Path = Path("/")) -> list[float]:
 
 
 def _folders(mounts: list[str], group: str, unified: bool) -> Iterator[tuple[str, str]]:
-    """Where groups of the kind are mounted, and this one's folder below, of which containers may see no more than the
-    mounted top."""
+    """Yield where control groups of this kind are mounted, and this group's folder below.
+
+    A container may see no more than the mounted top folder.
+    """
     for line in mounts:
         before, _, after = line.partition(" - ")
         _, _, _, mounted, top, *_ = before.split()
@@ -98,7 +103,8 @@ def _words(path: Path) -> list[str]:
 
 
 def _ratio(words: list[str]) -> float | None:
-    """Of two numbers; None without a quota, which is "max" in version 2 and negative in version 1."""
+    """Return the quotient of two numbers; None if there is no quota, which is "max" in version 2 and negative in
+    version 1."""
     try:
         quota, period = map(int, words)
     except ValueError:

@@ -1,4 +1,4 @@
-"""One progress bar for all loops and solves, so that the many inside a multistart can be kept silent."""
+"""Progress bars of all loops and solves, in one place so that the bars inside a multistart can be switched off."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ T = TypeVar("T")
 
 _silent = ContextVar("silent", default=False)
 
-_DELAY = 2.0  # s, that a solve goes on before its bar is shown
-_SHARES = "{desc} {percentage:3.0f}%|{bar}| {elapsed}<{remaining}{postfix}"
+_DELAY = 2.0  # [s] solves shorter than this show no bar
+_BAR_FORMAT = "{desc} {percentage:3.0f}%|{bar}| {elapsed}<{remaining}{postfix}"
 
 
 def progress_bar(title: str, total: float, *, shown: bool = True, **options: Any) -> tqdm:
-    """A bar with tqdm's options; one that is not shown takes the same calls. Raises ValueError on another `shown`.
+    """Return a progress bar with tqdm's options; a bar that is not shown takes the same calls.
 
-    Inside another bar it is gone once it is full.
+    A bar inside another one disappears when it is full. Raises ValueError if `shown` is neither True nor False.
     """
     from tqdm import tqdm  # late, as loading it takes long; tqdm.auto would complain without ipywidgets
 
@@ -31,9 +31,9 @@ def progress_bar(title: str, total: float, *, shown: bool = True, **options: Any
 
 
 class SolveBar:
-    """The bar of a solve that tells how far it has come, there once that has taken two seconds.
+    """A progress bar of one solve, which appears once the solve has taken two seconds.
 
-    Raises ValueError where `shown` is neither True nor False.
+    Raises ValueError if `shown` is neither True nor False.
     """
 
     def __init__(self, title: str, shown: bool = True):
@@ -43,21 +43,21 @@ class SolveBar:
         self._bar: tqdm | None = None
 
     def note(self, text: str) -> None:
-        """What stands behind the bar from now on."""
+        """Set the text that stands behind the bar from now on."""
         self._note = text
 
-    def to(self, share: float) -> None:
-        """The solve has come to this share of its way."""
+    def to(self, fraction: float) -> None:
+        """Set the fraction of the solve that is done."""
         taken = time.perf_counter() - self._began
         if self._bar is None and self._shown and taken >= _DELAY:
-            self._bar = progress_bar(self._title, 1.0, bar_format=_SHARES)
+            self._bar = progress_bar(self._title, 1.0, bar_format=_BAR_FORMAT)
             self._bar.start_t -= taken
         if self._bar is not None:
             self._bar.set_postfix_str(self._note, refresh=False)
-            self._bar.update(min(max(share, 0.0), 1.0) - self._bar.n)
+            self._bar.update(min(max(fraction, 0.0), 1.0) - self._bar.n)
 
     def through(self, items: Sequence[T]) -> Iterator[T]:
-        """The items, with the share of those done."""
+        """Yield the items, and set the fraction of those done."""
         for k, each in enumerate(items):
             self.to(k / len(items))
             yield each
@@ -72,9 +72,15 @@ class SolveBar:
 
 
 @contextmanager
-def told(title: str, progress) -> Iterator[tuple[Callable[[float, float], None], Callable[[str], None]]]:
-    """For a `progress` that is True, False or a caller's function of (progress, residual): what a solve is to call as it
-    goes on, and what takes notes for the bar. Raises ValueError on anything else."""
+def solve_progress(
+    title: str, progress
+) -> Iterator[tuple[Callable[[float, float], None], Callable[[str], None]]]:
+    """Yield two functions for a solve: one to call with (fraction done, residual) as it goes on, and one that sets
+    the bar's note.
+
+    progress: True for a bar, False for none, or the caller's function of (fraction done, residual). Raises
+    ValueError on anything else.
+    """
     if callable(progress):
         yield progress, lambda text: None
         return
@@ -83,13 +89,13 @@ def told(title: str, progress) -> Iterator[tuple[Callable[[float, float], None],
             f"progress must be True, False or a function of (progress, residual), got {progress!r:.60}"
         )
     with SolveBar(title, progress) as bar:
-        yield lambda share, residual: bar.to(share), bar.note
+        yield lambda fraction, residual: bar.to(fraction), bar.note
         bar.to(1.0)
 
 
 @contextmanager
 def no_bars() -> Iterator[None]:
-    """Inside, bars are not shown, whatever is asked for: those of several processes would overwrite each other."""
+    """Switch off all bars inside the block: those of several processes would overwrite each other."""
     token = _silent.set(True)
     try:
         yield

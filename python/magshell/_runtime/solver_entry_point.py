@@ -1,4 +1,4 @@
-"""What every solve does as it is called, whatever it solves."""
+"""Decorators of the functions that users call: checks of keywords, Ctrl-C, torch.compile."""
 
 from __future__ import annotations
 
@@ -15,13 +15,16 @@ F = TypeVar("F", bound=Callable)
 
 
 def grouped(**groups: type[Any]) -> Callable[[F], F]:
-    """A function as users call it, some of whose parameters take groups: dataclasses made once and handed to many calls.
-    A keyword that it does not have is told with the group that has it, or with those that are most like it."""
+    """Wrap a function so that an unknown keyword raises a TypeError with the group that has it, or the most
+    similar keywords.
+
+    groups: the dataclasses that some of its parameters take, which group options that are used in many calls.
+    """
 
     def decorated(function: F) -> F:
         parameters = inspect.signature(function).parameters
         if any(each.kind is each.VAR_KEYWORD for each in parameters.values()):
-            return function  # it tells of wrong ones itself
+            return function  # it checks its keywords itself
         known = tuple(parameters)
         name = function.__qualname__.removesuffix(".__init__")
 
@@ -36,11 +39,11 @@ def grouped(**groups: type[Any]) -> Callable[[F], F]:
 
 
 def solve_entry(function: F) -> F:
-    """A solve as users call it.
+    """Wrap a solve that users call.
 
-    Ctrl-C before there is anything to hand back, in a function of the caller's too, is an Interrupted as anywhere else,
-    with no `last_good`. Within torch.compile, the solve runs as it is, between the graphs. Controls among `values` become
-    the keywords that are their short forms.
+    Ctrl-C before there is a result, also in a function of the caller's, raises Interrupted without a `last_good`.
+    Within torch.compile the solve runs uncompiled, between the graphs. Load parameters among `values` become the
+    keywords of the same names.
     """
     known = set(inspect.signature(function).parameters)
 
@@ -62,7 +65,7 @@ _disabled: dict[Callable[..., Any], Callable[..., Any]] = {}
 
 
 def _untraced(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The function, hidden from torch.compile where that has been loaded; to load it takes seconds."""
+    """Hide the function from torch.compile, if that has been loaded; loading it takes seconds."""
     if "torch._dynamo" not in sys.modules:
         return function
     if function not in _disabled:

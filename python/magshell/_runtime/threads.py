@@ -1,4 +1,4 @@
-"""What this build of magshell is made of, and how many threads it uses."""
+"""Number of threads that magshell uses, and the configuration of this build."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _core.set_num_threads(first_threads(os.environ))
 
 
 def num_threads() -> int:
-    """How many threads magshell's parallel loops use, the caller's included.
+    """Return the number of threads that magshell's parallel loops use, the calling one included.
 
     >>> import magshell as ms
     >>> ms.num_threads() >= 1

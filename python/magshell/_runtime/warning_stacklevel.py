@@ -1,4 +1,4 @@
-"""Which line of a caller a warning is about."""
+"""Finds the line of the user's code that a warning is about."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import sys
 
 
 def callers_level() -> int:
-    """The `stacklevel` of the line that called the package. torch may stand in between: its compiler calls solves."""
+    """Return the `stacklevel` of the line that called the package. torch may stand in between: its compiler calls
+    solves."""
     frame, level = sys._getframe(1), 1
     while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] in (
         "magshell",

@@ -1,4 +1,4 @@
-"""Describes a minimization, so that it can be stopped and go on from a file."""
+"""Describes a minimization, so that it can be stopped and continued from a file."""
 
 from __future__ import annotations
 
@@ -10,18 +10,20 @@ import numpy as np
 
 from .._input.tensors import detached, is_tensor, require_torch
 from .._runtime.files import replace_file
-from .digest import digest
+from .content_hash import content_hash
 
-_ARRAY = "numpy array"  # the only key of a dict that stands for one
+_ARRAY = "numpy array"  # the only key of a dict that stands for a numpy array
 
 
 def save(path: str | Path, contents: dict[Any, Any]) -> None:
+    """Write a checkpoint with torch.save, replacing the file only once it is complete."""
     torch = require_torch("a checkpoint")
     replace_file(path, lambda file: torch.save(contents, file))
 
 
 def load(path: str | Path, parts: Iterable[str]) -> dict[Any, Any]:
-    """What `save` wrote; a file of anything but tensors and plain values, or without these parts, is refused."""
+    """Read what `save` wrote. Raises ValueError if it holds more than tensors and plain values, or lacks one of
+    `parts`."""
     torch = require_torch("a checkpoint")
     try:
         contents = torch.load(path, weights_only=True)
@@ -33,7 +35,10 @@ def load(path: str | Path, parts: Iterable[str]) -> dict[Any, Any]:
 
 
 def encoded(value: Any, label: str) -> Any:
-    """A state of tensors, arrays and plain values as what a safe file may hold; anything else is refused."""
+    """Return a state of tensors, arrays and plain values in a form that torch.load reads without pickle.
+
+    label: its name in messages. Raises TypeError on anything else.
+    """
     if isinstance(value, dict):
         return {key: encoded(entry, f"{label}[{key!r}]") for key, entry in value.items()}
     if isinstance(value, list | tuple):
@@ -53,7 +58,7 @@ def encoded(value: Any, label: str) -> Any:
 
 
 def decoded(value: Any) -> Any:
-    """What was given to `encoded`."""
+    """Return what was given to `encoded`."""
     if isinstance(value, dict):
         if value.keys() == {_ARRAY}:
             return value[_ARRAY].numpy()
@@ -63,8 +68,9 @@ def decoded(value: Any) -> Any:
     return value
 
 
-def kept(configuration: dict[Any, Any]) -> dict[Any, Any]:
-    """As a checkpoint holds it: arrays and plain values; of anything else the type."""
+def as_stored(configuration: dict[Any, Any]) -> dict[Any, Any]:
+    """Return a configuration as a checkpoint stores it: arrays and plain values, and the type's name of anything
+    else."""
     held = {}
     for name, value in configuration.items():
         try:
@@ -75,12 +81,12 @@ def kept(configuration: dict[Any, Any]) -> dict[Any, Any]:
 
 
 def changes(known: dict[Any, Any], now: dict[Any, Any]) -> list[str]:
-    """What two of them differ in, in words."""
+    """Describe the differences between two configurations, one sentence each."""
     return [_change(name, known, now) for name in {**known, **now} if _differs(name, known, now)]
 
 
 def _differs(name: str, known: dict[Any, Any], now: dict[Any, Any]) -> bool:
-    return not (name in known and name in now) or digest(known[name]) != digest(now[name])
+    return not (name in known and name in now) or content_hash(known[name]) != content_hash(now[name])
 
 
 def _change(name: str, known: dict[Any, Any], now: dict[Any, Any]) -> str:
@@ -102,7 +108,7 @@ def _change(name: str, known: dict[Any, Any], now: dict[Any, Any]) -> str:
 
 
 def _array(value) -> np.ndarray | None:
-    """Of numbers."""
+    """Return a value as an array of float64, None if it is not numeric."""
     value = next(iter(value.values())) if isinstance(value, dict) and len(value) == 1 else value
     array = np.asarray(detached(value))
     return array.astype(np.float64) if array.dtype.kind in "iuf" else None

@@ -1,4 +1,4 @@
-"""What a printer or a magnetizer can make: ms.PrintableSet."""
+"""Set of magnetizations that a printer or a magnetizer can make: ms.PrintableSet."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ if TYPE_CHECKING:
 
     from .._input.kinds import Computed, Numbers
 
-_UNIT = 1e-6  # how far frames may be from orthonormal
+_UNIT = 1e-6  # [-] largest deviation of frames from orthonormal
 
 
 class PrintableSet(Frozen):
-    """The magnetizations that can be printed: a few directions, one strength, and any share of it or a few.
+    """The set of magnetizations that can be printed: a few directions, one strength, and any share of it or a few
+    levels.
 
     strength: A/m, of a face that is magnetized fully.
     directions: (k, 3), or (3,) for one, of any length but zero; in world axes at rest, or in those of `frames`.
@@ -58,26 +59,29 @@ class PrintableSet(Frozen):
 
     @property
     def rays(self) -> np.ndarray:
-        """Unit vectors in world axes at rest: (k, 3), or with frames (n_f, k, 3)."""
+        """The printable directions as unit vectors in world axes at rest: (k, 3), or with frames (n_f, k, 3)."""
         return self.directions if self.frames is None else self.directions @ self.frames
 
     def choices(self, remanent_magnetization: Numbers) -> tuple[np.ndarray, np.ndarray]:
-        """What comes nearest to the magnetization of each face: (n_f,) which direction, and (n_f,) which share of the
-        strength.
+        """Return the direction and the share of the strength that come nearest to each face's magnetization, both
+        (n_f,).
 
-        remanent_magnetization: as in `nearest`. Where none of the directions leads there, the one that is least opposed.
+        remanent_magnetization: as in `nearest`. If a face's magnetization has no positive component along any
+        direction, the direction with the smallest opposition is returned.
         """
-        share = self._shares(remanent_magnetization)
-        amounts, rays, squares = self._choices(share, self.rays)
+        relative = self._relative(remanent_magnetization)
+        amounts, rays, squares = self._choices(relative, self.rays)
         along = (
-            (share[:, None, :] * rays).sum(-1).repeat(1 if self.levels is None else len(self.levels), axis=1)
+            (relative[:, None, :] * rays)
+            .sum(-1)
+            .repeat(1 if self.levels is None else len(self.levels), axis=1)
         )
         nearest = squares <= squares.min(axis=1, keepdims=True)
         choice = np.where(nearest, along, -np.inf).argmax(axis=1)
-        return self._ray_of(choice), amounts[np.arange(len(share)), choice]
+        return self._ray_of(choice), amounts[np.arange(len(relative)), choice]
 
     def nearest(self, remanent_magnetization: Numbers) -> Computed:
-        """(n_f, 3) A/m: what of this ink comes nearest to the magnetization of each face.
+        """Return the printable magnetization that is nearest to that of each face, (n_f, 3) A/m.
 
         remanent_magnetization: (n_f, 3) A/m, an array or a tensor; the result is the same, without a gradient.
         """
@@ -86,23 +90,27 @@ class PrintableSet(Frozen):
         return like(self.strength * amount[:, None] * rays, remanent_magnetization)
 
     def rays_of(self, faces: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """(n, 3) unit vectors in world axes: of each of these faces the direction with this number. faces, directions:
-        (n,) indices."""
+        """Return unit vectors in world axes, (n, 3): for each of these faces the direction with this number.
+
+        faces, directions: (n,) indices.
+        """
         return self.rays[directions] if self.frames is None else self.rays[faces, directions]
 
     def distances(self, remanent_magnetization: Numbers) -> Computed:
-        """(n_f,) shares of the strength: how far the magnetization of each face is from what can be printed there.
+        """Return how far each face's magnetization is from the nearest printable one, as a share of the strength,
+        (n_f,).
 
         remanent_magnetization: as in `nearest`.
         """
-        _, _, squares = self._choices(self._shares(remanent_magnetization), self.rays)
+        _, _, squares = self._choices(self._relative(remanent_magnetization), self.rays)
         return like(np.sqrt(squares.min(axis=1)), remanent_magnetization)
 
     def squares(self, remanent_magnetization: Numbers) -> torch.Tensor:
-        """(n_f, choices) tensor, differentiable: the squared distances from all that might be printed on each face, in
-        squares of the strength. A choice is a direction with a level, or a direction with its best share.
+        """Return the squared distances of each face's magnetization from all printable ones, in squares of the
+        strength.
 
-        remanent_magnetization: (n_f, 3) A/m.
+        remanent_magnetization: (n_f, 3) A/m. The result is a differentiable tensor (n_f, choices). A choice is a
+        direction with a level, or, without levels, a direction with its best share.
         """
         torch = require_torch("Ink.squares")
         magnetization = real_tensor("remanent_magnetization", remanent_magnetization, ("n_f", 3))
@@ -111,11 +119,13 @@ class PrintableSet(Frozen):
             magnetization / self.strength, torch.from_numpy(self.rays.copy()).to(magnetization)
         )[2]
 
-    def _choices(self, share, rays):
-        """Amounts (n_f, c), rays (n_f or 1, k, 3), squared distances (n_f, c) of all that might be printed; of arrays or
-        tensors."""
+    def _choices(self, relative, rays):
+        """Return amounts (n_f, c), rays (n_f or 1, k, 3) and squared distances (n_f, c) of all printable choices.
+
+        relative: magnetization over strength, (n_f, 3). All are arrays, or all tensors.
+        """
         rays = rays if rays.ndim == 3 else rays[None]
-        along = (share[:, None, :] * rays).sum(-1)[:, :, None]  # (n_f, k, 1)
+        along = (relative[:, None, :] * rays).sum(-1)[:, :, None]  # (n_f, k, 1)
         if self.levels is None:
             amounts = along.clip(0.0, 1.0)
         else:
@@ -123,20 +133,21 @@ class PrintableSet(Frozen):
             amounts = 0.0 * along + (
                 require_torch("an ink").from_numpy(levels).to(along) if is_tensor(along) else levels
             )
-        squares = ((share[:, None, None, :] - amounts[..., None] * rays[:, :, None, :]) ** 2).sum(-1)
-        return amounts.reshape(len(share), -1), rays, squares.reshape(len(share), -1)
+        squares = ((relative[:, None, None, :] - amounts[..., None] * rays[:, :, None, :]) ** 2).sum(-1)
+        return amounts.reshape(len(relative), -1), rays, squares.reshape(len(relative), -1)
 
     def _ray_of(self, choice):
-        """The direction of a choice."""
+        """Return the index of a choice's direction."""
         return choice // (1 if self.levels is None else len(self.levels))
 
-    def _shares(self, remanent_magnetization) -> np.ndarray:
+    def _relative(self, remanent_magnetization) -> np.ndarray:
+        """Return the magnetization over the strength, (n_f, 3)."""
         values = quantity("remanent_magnetization", "A/m", detached(remanent_magnetization), ("n_f", 3))
         self.check_faces(len(values))
         return values / self.strength
 
     def check_faces(self, count: int) -> None:
-        """Raises ValueError where there are none, or the frames are not those of so many faces."""
+        """Raise ValueError if there are no faces, or the frames are those of another number of faces."""
         if count == 0:
             raise ValueError("remanent_magnetization has no faces")
         if self.frames is not None and len(self.frames) != count:

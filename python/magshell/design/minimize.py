@@ -1,4 +1,4 @@
-"""The loop that improves a design: when it ends, what it saves, and the best design whatever happens."""
+"""Minimizes an objective: the loop over iterations, its end, checkpoints, and the best design in any case."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .run import PARTS, Run
 if TYPE_CHECKING:
     from .._input.kinds import Optimizing
 
-_TIME_TO_READ = 0.2  # s, between two texts of the progress bar
+_TIME_TO_READ = 0.2  # [s] shortest time between two texts of the progress bar
 
 
 def minimize(
@@ -41,7 +41,7 @@ def minimize(
     checkpoint_every: int = 1,
     resume: bool = False,
 ) -> MinimizeResult:
-    """Minimizes objective(*parameters) and leaves the parameters at the best design.
+    """Minimize objective(*parameters) and leave the parameters at the best design.
 
     objective: returns a scalar tensor, or a dict of named terms whose sum it is, or a tuple of one of these with a
     dict of terms to record, with a tensor of constraints (m,) <= 0, or with both.
@@ -106,7 +106,7 @@ def minimize(
 
 
 def _loop(run: Run, ends: _Ends, bar, checkpoints: _Checkpoints) -> str:
-    """Iterates; returns the reason of the end."""
+    """Run iterations until one of the ends is met, and return the reason."""
     if not run.history:
         run.begin()
         reason = ends.reason(run.history)
@@ -122,7 +122,7 @@ def _loop(run: Run, ends: _Ends, bar, checkpoints: _Checkpoints) -> str:
             bar.update()
             bar.set_postfix_str(run.summary())
             log.info("minimize: iteration %d: %s", run.iteration, run.summary())
-            reason = ends.reason(run.history, None if moved else run.standstill)
+            reason = ends.reason(run.history, None if moved else run.stagnation)
     checkpoints.save(run, last=True)
     log.info("minimize: ended: %s", reason)
     return reason
@@ -130,7 +130,7 @@ def _loop(run: Run, ends: _Ends, bar, checkpoints: _Checkpoints) -> str:
 
 @dataclass(frozen=True)
 class _Ends:
-    """What ends a minimization; arguments as in `minimize`."""
+    """The conditions that end a minimization; arguments as in `minimize`."""
 
     max_iterations: int
     tolerance: float
@@ -145,20 +145,23 @@ class _Ends:
         if self.patience < 1:
             raise ValueError(f"patience must be positive, got {self.patience}")
 
-    def reason(self, history: list[Record], standstill: str | None = None) -> str | None:
-        """Why to end after the last iteration, if there is a reason; one may be that its step moved nothing."""
+    def reason(self, history: list[Record], stagnation: str | None = None) -> str | None:
+        """Return why to end after the last iteration, None to continue. stagnation: why its step changed nothing, if
+        it did not."""
         if self.callback is not None and self.callback(history[-1]) is True:
             return "stopped by the callback"
-        if standstill is not None:
-            return standstill
-        if self._settled(history):
+        if stagnation is not None:
+            return stagnation
+        if self._changes_little(history):
             return "the objective has settled"
         return self.spent(history)
 
     def spent(self, history: list[Record]) -> str | None:
+        """Return the reason of the end if max_iterations is reached, else None."""
         return "max_iterations reached" if history[-1].iteration >= self.max_iterations else None
 
-    def _settled(self, history: list[Record]) -> bool:
+    def _changes_little(self, history: list[Record]) -> bool:
+        """Return whether the last `patience` changes of the objective were within the tolerance."""
         values = [record.objective for record in history[-self.patience - 1 :]]
         changes = [abs(b - a) <= self.tolerance * abs(b) for a, b in pairwise(values)]
         return self.tolerance > 0 and len(changes) == self.patience and all(changes)
@@ -166,7 +169,7 @@ class _Ends:
 
 @dataclass
 class _Watch:
-    """Shows after an evaluation what a run is at, since an iteration may need many; not more often than one can read."""
+    """A display of the run's state after each evaluation, updated no more often than one can read."""
 
     bar: Any
     run: Run
@@ -180,7 +183,7 @@ class _Watch:
 
 @dataclass
 class _Checkpoints:
-    """Saves a run every few iterations, to a path or, without one, not at all."""
+    """A writer of checkpoints every few iterations; without a path it does nothing."""
 
     path: str | Path | None
     every: int

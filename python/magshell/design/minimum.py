@@ -1,4 +1,4 @@
-"""Holds what a minimization found, and which designs it could not evaluate."""
+"""Results of a minimization, and descriptions of the designs that it could not evaluate."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from .._runtime.frozen import immutable
 from ..errors import DesignRejected, EquilibriumJumped, NotConverged
 
 _JUMP = "jump"
-_IN_A_ROW = 3  # iterations that meet the same jump before anything is made of it
-_SLOW = 0.01  # of the objective, an iteration: a fall by less
+_IN_A_ROW = 3  # iterations in a row that must meet the same jump before it is reported
+_SLOW = 0.01  # [-] relative decrease of the objective per iteration below which progress counts as slow
 
 
 def reason_of(error: DesignRejected) -> str:
-    """Short, and the same for all designs that are rejected for the same reason."""
+    """Return a short reason, the same for all designs that are rejected for the same cause."""
     if not isinstance(error, EquilibriumJumped | NotConverged):
         return f"{str(error).strip().splitlines()[0]:.60}" if str(error).strip() else type(error).__name__
     case = "" if error.load_case is None else f" in load case {error.load_case}"
@@ -24,7 +24,7 @@ def reason_of(error: DesignRejected) -> str:
 
 
 def total(rejections: Iterable[Mapping[str, int]]) -> Counter[str]:
-    """Of several iterations: {reason: how often}."""
+    """Count the rejections of several iterations: {reason: how often}."""
     counted: Counter[str] = Counter()
     for each in rejections:
         counted.update(each)
@@ -32,30 +32,35 @@ def total(rejections: Iterable[Mapping[str, int]]) -> Counter[str]:
 
 
 def in_words(rejections: Mapping[str, int]) -> str:
-    """Such as "7 rejected (5 jump in load case 1, 2 no equilibrium found)"; empty for none."""
+    """Format rejections, such as "7 rejected (5 jump in load case 1, 2 no equilibrium found)"; "" if there are none."""
     if not rejections:
         return ""
     listed = Counter(rejections).most_common()
-    told = listed[0][0] if len(listed) == 1 else ", ".join(f"{count} {reason}" for reason, count in listed)
-    return f"{sum(rejections.values())} rejected ({told})"
+    reasons = listed[0][0] if len(listed) == 1 else ", ".join(f"{count} {reason}" for reason, count in listed)
+    return f"{sum(rejections.values())} rejected ({reasons})"
 
 
 def effort_in_words(evaluations: int, rejections: Mapping[str, int]) -> list[str]:
-    """What a search has taken so far, for its bar and the log: ["31 evaluations", "2 rejected (jump)"]."""
+    """Format the effort of a search so far, for its bar and the log: ["31 evaluations", "2 rejected (jump)"]."""
     return [f"{evaluations} evaluations", *filter(None, [in_words(rejections)])]
 
 
 def conflict(history: Sequence[Any], lost: Mapping[str, int], stuck: bool) -> str:
-    """What is to be said where a run met the same jump in every one of its last iterations and gained little, or ended
-    at one; else nothing. That lower designs lie beyond it is likely, and no more than that.
+    """Describe a jump of the equilibrium that seems to keep the objective from falling; "" if there is none.
 
-    history: Records. lost: rejections of an iteration that did not end; stuck: because every length was rejected.
+    That is the case if every one of the last iterations met the same jump and gained little, or if the run ended
+    at one. Lower designs then probably lie beyond the jump, but this is not certain.
+
+    history: Records. lost: rejections of an iteration that did not end; stuck: whether it was rejected at every
+    step length.
     """
     iterations = [record.rejections for record in history] + ([lost] if lost else [])
     jumps = [reason for reason in (iterations[-1] if iterations else ()) if reason.startswith(_JUMP)]
     for reason in jumps:
         met = next((k for k, each in enumerate(reversed(iterations)) if reason not in each), len(iterations))
-        ended = met - bool(lost)  # of those, the ones in the history; the objective before them
+        ended = met - bool(
+            lost
+        )  # how many of those are in the history; `before` is the objective ahead of them
         before, after = history[max(-ended - 1, -len(history))].objective, history[-1].objective
         fall = (before - after) / abs(before) if before else 0.0
         if stuck:
@@ -76,12 +81,12 @@ def conflict(history: Sequence[Any], lost: Mapping[str, int], stuck: bool) -> st
 @immutable
 @dataclass(frozen=True)
 class Record:
-    """One iteration.
+    """One iteration of a minimization.
 
-    objective, its named terms, violation: the largest positive constraint. gradient_norm: |gradient| of the objective.
-    seconds: since the start. evaluations: how often the objective was asked for, since the start. rejected: trial
-    designs of this iteration that could not be evaluated; rejections: why, {reason: how many}. jumped: whether the
-    equilibrium jumped in its step.
+    objective: its value; terms: its named parts; violation: the largest positive constraint. gradient_norm:
+    |gradient| of the objective. seconds: since the start. evaluations: calls of the objective since the start.
+    rejected: trial designs of this iteration that could not be evaluated; rejections: why, {reason: how many}.
+    jumped: whether the equilibrium jumped in its step.
     """
 
     iteration: int
@@ -99,10 +104,13 @@ class Record:
 @immutable
 @dataclass(frozen=True)
 class MinimizeResult:
-    """What `minimize` found. parameters: the best design, as tensors in the order given; history: a Record an
-    iteration, from the start; reason: why it ended. rejections: why trial designs could not be evaluated, {reason: how
-    many}, in all. conflict: what seems to keep the objective from falling, where it is one and the same jump of the
-    equilibrium in every one of the last iterations; else empty."""
+    """The result of `minimize`.
+
+    parameters: the best design, as tensors in the order given; history: one Record for each iteration, from the
+    start; reason: why it ended. rejections: why trial designs could not be evaluated, {reason: how many}, in all.
+    conflict: the jump that seems to keep the objective from falling, if every one of the last iterations met the
+    same jump of the equilibrium; else "".
+    """
 
     parameters: Sequence[Any]
     objective: float
@@ -114,7 +122,7 @@ class MinimizeResult:
 
     @property
     def iterations(self) -> int:
-        """How many were taken."""
+        """The number of iterations taken."""
         return self.history[-1].iteration if self.history else 0
 
     def __repr__(self) -> str:
@@ -127,7 +135,7 @@ class MinimizeResult:
 
 
 def effort(minima: Iterable[MinimizeResult]) -> str:
-    """What several searches took together; empty where there was none."""
+    """Format the evaluations and rejections of several searches together; "" if there was none."""
     found = list(minima)
     if not found:
         return ""

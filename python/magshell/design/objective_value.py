@@ -1,4 +1,4 @@
-"""What an objective may return: its value, named terms, constraints."""
+"""Return value of an objective: its number, named terms, constraints."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ from .._input.tensors import detached, is_tensor
 
 @dataclass(frozen=True)
 class Answer:
-    """objective: as it was returned, or the sum of its terms. terms: numbers to record. constraints: (m,) or None."""
+    """The parts of an objective's return value.
+
+    objective: as it was returned, or the sum of its terms. terms: numbers to record. constraints: (m,) or None.
+    """
 
     objective: Any
     terms: dict[str, float]
@@ -19,6 +22,8 @@ class Answer:
 
     @staticmethod
     def of(result: Any) -> Answer:
+        """Split a returned scalar, dict of terms, or tuple with constraints. Raises TypeError or ValueError on
+        anything else."""
         head, *rest = result if isinstance(result, tuple) else (result,)
         terms, constraints = {}, None
         if isinstance(head, dict):

@@ -1,7 +1,8 @@
-"""Objectives, penalties and constraints of designs: small functions of torch tensors, differentiable in each.
+"""Objectives, penalties and constraints of designs: functions of torch tensors, differentiable in each.
 
-Each returns a scalar that a sum of others can hold; `cap` returns constraints g <= 0. Lengths in m, magnetizations in
-A/m. Positions may be those of one equilibrium, (n_v, 3), or of several load cases, (k, n_v, 3): then the cases' sum.
+Each returns a scalar that can be added to others; only `limit` returns constraints g <= 0. Lengths are in m,
+magnetizations in A/m. Positions may be those of one equilibrium, (n_v, 3), or of several load cases, (k, n_v, 3):
+then the result is the sum over the cases.
 """
 
 from __future__ import annotations
@@ -31,14 +32,14 @@ __all__ = [
 
 
 def __dir__() -> list[str]:
-    """Returns what is public, for tab completion."""
+    """Return the public names, for tab completion."""
     return sorted(__all__)
 
 
 def shape_matching(
     positions: Numbers, target: Numbers, vertices: Numbers | None = None, weights: Numbers | None = None
 ) -> torch.Tensor:
-    """Sum of squared distances between vertices and their targets [m2].
+    """Return the sum of squared distances between vertices and their targets [m2].
 
     positions: (n_v, 3) or (k, n_v, 3). target: as the positions, or (n_v, 3) for all cases; with only the chosen
     vertices, in their order. vertices: (n_chosen,) indices, by default all.
@@ -62,7 +63,7 @@ def height_map(
     extent: Numbers,
     weights: Numbers | None = None,
 ) -> torch.Tensor:
-    """Sum of squared differences between the vertices' heights z and an image [m2].
+    """Return the sum of squared differences between the vertices' heights z and an image [m2].
 
     The image is sampled bilinearly where the vertices rest. positions: (n_v, 3) or (k, n_v, 3). rest_positions:
     (n_v, 3). image: (rows, columns) heights [m], row 0 at the largest y as pictures are drawn; one for all cases.
@@ -81,7 +82,8 @@ def height_map(
 
 
 def bilinear(image: Numbers, points: Numbers, extent: Numbers) -> torch.Tensor:
-    """(n,) values of the image at points (n, 2 or 3), by their x and y; image and extent as in `height_map`.
+    """Interpolate an image at points (n, 2 or 3), by their x and y, to (n,) values; image and extent as in
+    `height_map`.
 
     >>> import magshell as ms
     >>> ms.objectives.bilinear([[0.0, 1.0], [0.0, 1.0]], [(0.25, 0.5)], (0, 1, 0, 1))
@@ -110,7 +112,8 @@ def bilinear(image: Numbers, points: Numbers, extent: Numbers) -> torch.Tensor:
 
 
 def extension(positions: Numbers, vertices: Numbers, direction: Numbers) -> torch.Tensor:
-    """Minus the mean reach of the chosen vertices along a direction [m]: minimize it to pull them as far as they go.
+    """Return minus the mean coordinate of the chosen vertices along a direction [m]: minimize it to pull them as far
+    as they go.
 
     positions: (n_v, 3) or (k, n_v, 3). vertices: an index, or (n_chosen,). direction: (3,), of any length but zero, or
     one a case, (k, 3).
@@ -130,7 +133,7 @@ def extension(positions: Numbers, vertices: Numbers, direction: Numbers) -> torc
 
 
 def magnitude(values: Numbers, areas: Numbers | None = None) -> torch.Tensor:
-    """Sum of squares, weighted by areas [m2] where given: of magnetizations (n_f, 3), or of any (n, ...).
+    """Return the sum of squares of magnetizations (n_f, 3), or of any (n, ...), weighted by areas [m2] if given.
 
     values: (n, ...); areas: (n,) m2.
 
@@ -148,8 +151,9 @@ def magnitude(values: Numbers, areas: Numbers | None = None) -> torch.Tensor:
 def total_variation(
     values: Numbers, edge_faces: Numbers, edge_lengths: Numbers | None = None, smoothing: float = 1e-3
 ) -> torch.Tensor:
-    """Sum over interior edges of edge length times the jump of the values across, smooth at zero:
-    sqrt(jump^2 + eps^2) - eps.
+    """Return the sum over interior edges of edge length times the jump of the values across the edge.
+
+    The jump is smoothed at zero: sqrt(jump^2 + eps^2) - eps.
 
     values: (n_f,) or (n_f, k). edge_faces: (n_e, 2), with -1 where an edge has no second face, as in
     `TriangleMesh`. edge_lengths: (n_e,) [m], by default 1.
@@ -180,7 +184,7 @@ def total_variation(
 
 
 def limit(remanent_magnetization: Numbers, limit: Numbers, sharpness: float | None = None) -> torch.Tensor:
-    """Constraints g <= 0 that keep |M_r| at or below a limit: (|M_r| / limit)^2 - 1.
+    """Return constraints g <= 0 that keep |M_r| at or below a limit: (|M_r| / limit)^2 - 1.
 
     remanent_magnetization: (n_f, 3) A/m. limit: A/m. One constraint a face, (n_f,); with a sharpness p > 1, a single
     one, (1,), from the p-norm over all faces: for optimizers it costs one gradient instead of n_f, and it is never
@@ -200,8 +204,10 @@ def limit(remanent_magnetization: Numbers, limit: Numbers, sharpness: float | No
     sharpness = positive_number("sharpness", "1", sharpness)
     if not sharpness > 1:
         raise ValueError(f"sharpness must exceed 1, got {sharpness}")
-    largest = squares.detach().max().clamp(min=1e-30)  # taken out: the powers neither overflow nor vanish
-    powers = ((squares / largest) ** sharpness).sum() + 1e-30  # a root's derivative at zero is not finite
+    largest = (
+        squares.detach().max().clamp(min=1e-30)
+    )  # factored out, so that the powers neither overflow nor vanish
+    powers = ((squares / largest) ** sharpness).sum() + 1e-30  # the root has no finite derivative at zero
     return (largest * powers ** (1 / sharpness) - 1)[None]
 
 
@@ -211,14 +217,14 @@ def printable(
     areas: Numbers | None = None,
     sharpness: float | None = None,
 ) -> torch.Tensor:
-    """Mean squared distance of magnetizations from what an ink can print, over the square of its strength: 0 where all
-    can be printed, 1 where none is magnetized and all must be fully.
+    """Return the mean squared distance of magnetizations from the printable ones, over the square of the strength.
 
-    Without a unit, and the same for any mesh and any strength: multiply it by what the objective may lose.
-    remanent_magnetization: (n_f, 3) A/m. ink: an `ms.PrintableSet`. areas: (n_f,) m2, of which the mean takes
-        account; by default
-    all faces count alike.
-    sharpness: replaces the minimum over what can be printed by a smooth one, which is lower; 100 is close to it.
+    It is 0 if all can be printed, and 1 if none is magnetized and all must be fully magnetized. It has no unit and does
+    not depend on mesh and strength: multiply it by the increase of the objective that rounding may cost.
+
+    remanent_magnetization: (n_f, 3) A/m. ink: an `ms.PrintableSet`.
+    areas: (n_f,) m2, the weights of the mean; by default all faces count alike.
+    sharpness: replaces the minimum over the printable magnetizations by a smooth one, which is lower; 100 is close to it.
 
     >>> import magshell as ms
     >>> ink = ms.PrintableSet(5.0, directions=[(1, 0, 0), (-1, 0, 0)])
@@ -249,7 +255,7 @@ def _weighted_sum(squares, weights, name="weights"):
 
 
 def _at(positions, vertices):
-    """(..., n_chosen, 3): the positions of these vertices, an index or a row of them."""
+    """Return the positions of these vertices, (..., n_chosen, 3); vertices: an index or a row of them."""
     indices = _indices(vertices).reshape(-1)
     size = positions.shape[-2]
     if len(indices) == 0 or not -size <= int(indices.min()) <= int(indices.max()) < size:
@@ -269,7 +275,8 @@ def _indices(values):
 
 
 def _like(values, reference, name: str, shape, axes: int):
-    """A tensor of the reference's dtype and shape; of its last axes only, it stands for every load case."""
+    """Return a tensor of the reference's dtype and of this shape; one that has only the last axes holds for every
+    load case."""
     tensor = real_tensor(name, values, ("...",)).to(reference)
     if tuple(tensor.shape) not in (tuple(shape), tuple(shape[-axes:])):
         raise ValueError(f"{name} must have shape {tuple(shape)}, got {tuple(tensor.shape)}")

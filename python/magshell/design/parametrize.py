@@ -1,5 +1,5 @@
-"""From the few numbers that are optimized to the values of every face: small functions of torch tensors; and the axes of
-the faces."""
+"""Maps from a few optimized numbers to the values of every face, as functions of torch tensors; and axes of the
+faces."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ __all__ = [
 
 
 def __dir__() -> list[str]:
-    """Returns what is public, for tab completion."""
+    """Return the public names, for tab completion."""
     return sorted(__all__)
 
 
 def from_regions(values: Numbers, regions: Numbers) -> torch.Tensor:
-    """Values a face, (n_f, ...), equal within a region.
+    """Return values for each face, (n_f, ...), that are equal within a region.
 
     values: (n_regions, ...). regions: (n_f,) the region of each face, from 0.
 
@@ -55,7 +55,7 @@ def from_regions(values: Numbers, regions: Numbers) -> torch.Tensor:
         raise ValueError(
             f"regions must be integers of shape (n_f,), got {regions.dtype} {tuple(regions.shape)}"
         )
-    regions = regions.long()  # torch has no smallest of unsigned numbers
+    regions = regions.long()  # torch has no min() of unsigned integers
     if len(regions) and not 0 <= int(regions.min()) <= int(regions.max()) < len(values):
         raise ValueError(
             f"regions must lie in 0 ... {len(values) - 1}, got {int(regions.min())} ... {int(regions.max())}"
@@ -64,7 +64,7 @@ def from_regions(values: Numbers, regions: Numbers) -> torch.Tensor:
 
 
 def along(amplitude: Numbers, directions: Numbers) -> torch.Tensor:
-    """Magnetizations (n_f, 3) of free amplitude in fixed directions.
+    """Return magnetizations (n_f, 3) of given amplitude in fixed directions.
 
     amplitude: (n_f,) A/m. directions: (3,) or (n_f, 3), of any length but zero.
 
@@ -86,8 +86,9 @@ def along(amplitude: Numbers, directions: Numbers) -> torch.Tensor:
     return amplitude[:, None] * (directions / lengths)
 
 
+# plain-words: ok (public name)
 def log_scaled(shares: Numbers, lower: Numbers, upper: Numbers) -> torch.Tensor:
-    """Values between lower and upper, evenly spread in their logarithm: lower (upper / lower)^share, for shares in
+    """Return values between lower and upper, uniform in their logarithm: lower (upper / lower)^share, for shares in
     [0, 1].
 
     Moduli over decades: young_modulus = log_scaled(s, 1e4, 1e8), with the bounds 0 and 1 of s left to the optimizer.
@@ -100,8 +101,9 @@ def log_scaled(shares: Numbers, lower: Numbers, upper: Numbers) -> torch.Tensor:
     return lower * (real_tensor("shares", shares, ("...",)) * math.log(ratio)).exp()
 
 
+# plain-words: ok (public name)
 def log_shares(values: Numbers, lower: Numbers, upper: Numbers) -> torch.Tensor:
-    """The shares of `log_scaled` that give these values.
+    """Return the shares for which `log_scaled` gives these values.
 
     values, lower, upper: in one unit.
 
@@ -114,7 +116,8 @@ def log_shares(values: Numbers, lower: Numbers, upper: Numbers) -> torch.Tensor:
 
 
 def softly_limited(vectors: Numbers, limit: Numbers) -> torch.Tensor:
-    """Magnetizations (n_f, 3) below a limit [A/m], smoothly from any (n_f, 3): v / sqrt(1 + |v|^2 / limit^2).
+    """Return magnetizations (n_f, 3) below a limit [A/m] that depend smoothly on any (n_f, 3): v / sqrt(1 + |v|^2 /
+    limit^2).
 
     vectors: (n_f, 3), A/m. limit: A/m.
 
@@ -128,7 +131,7 @@ def softly_limited(vectors: Numbers, limit: Numbers) -> torch.Tensor:
 
 
 def clip_to_limit(vectors: Numbers, limit: Numbers) -> torch.Tensor:
-    """The nearest magnetizations (n_f, 3) that do not exceed a limit [A/m]: longer ones are cut to it.
+    """Return the nearest magnetizations (n_f, 3) that do not exceed a limit [A/m]: longer ones are shortened to it.
 
     vectors: (n_f, 3), A/m. limit: A/m.
 
@@ -141,7 +144,7 @@ def clip_to_limit(vectors: Numbers, limit: Numbers) -> torch.Tensor:
     vectors = real_tensor("vectors", vectors, ("...", 3))
     limit = positive_number("limit", "A/m", limit)
     squares = (vectors**2).sum(-1, keepdim=True)
-    # The root only where it is needed: its derivative at zero would make NaN of a zero vector's gradient.
+    # The root is taken only of vectors beyond the limit: at zero its infinite derivative would turn the gradient into NaN.
     longer = squares > limit * limit
     return vectors * torch.where(
         longer, limit / torch.where(longer, squares, torch.ones_like(squares)) ** 0.5, 1.0
@@ -149,12 +152,13 @@ def clip_to_limit(vectors: Numbers, limit: Numbers) -> torch.Tensor:
 
 
 def frames_along(mesh: TriangleMesh | QuadraticTriangleMesh, direction: Numbers) -> np.ndarray:
-    """Axes of each face for directions that follow it, (n_f, 3, 3) as the `frames` of `ms.PrintableSet`: rows
-    are the direction as
-    far as it lies in the face, the one across within the face, and the face's normal.
+    """Return axes of each face that follow a direction, (n_f, 3, 3) as the `frames` of `ms.PrintableSet`.
+
+    The rows are the direction projected onto the face, the direction across it within the face, and the face's
+    normal.
 
     mesh: a TriangleMesh. direction: (3,), or one a face, (n_f, 3); of any length.
-    Raises ValueError where it has no part in a face.
+    Raises ValueError if it is normal to a face.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(1, 1, cells=(1, 1))
@@ -178,13 +182,13 @@ def frames_along(mesh: TriangleMesh | QuadraticTriangleMesh, direction: Numbers)
 def radial_frames(
     mesh: TriangleMesh | QuadraticTriangleMesh, center: Numbers | None = None, axis: Numbers | None = None
 ) -> np.ndarray:
-    """Axes of each face for "radially in or out", (n_f, 3, 3) as the `frames` of `ms.PrintableSet`: rows are
-    outwards within the
-    face, around, and the face's normal.
+    """Return axes of each face for "radially in or out", (n_f, 3, 3) as the `frames` of `ms.PrintableSet`.
+
+    The rows are the outward direction within the face, the circumferential direction, and the face's normal.
 
     mesh: a TriangleMesh. center: (3,) m, by default the mean of the faces' barycenters. axis: (3,), where outwards is
     away from the line through the center along it; None: away from the center.
-    Raises ValueError where outwards has no part in a face, as in the one at the center.
+    Raises ValueError if the outward direction is zero or normal to a face, as for a face at the center.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.disk(1.0, cells=2)
@@ -204,14 +208,14 @@ def radial_frames(
 
 
 def _of_faces(mesh, name: str) -> np.ndarray:
-    """(n_f, 3)"""
+    """Return a property of the mesh's faces, (n_f, 3). Raises ValueError if the mesh is no TriangleMesh."""
     if not hasattr(mesh, "face_normals"):
         raise ValueError(f"mesh must be a TriangleMesh, got {type(mesh).__name__}")
     return np.array(getattr(mesh, name))
 
 
 def _bounds(lower, upper) -> tuple[float, float]:
-    """The lower bound, and the upper over it."""
+    """Return the lower bound, and the ratio of the upper to the lower. Raises ValueError unless 0 < lower < upper."""
     low, high = (
         float(quantity(name, "as values", detached(each), ()))
         for name, each in (("lower", lower), ("upper", upper))

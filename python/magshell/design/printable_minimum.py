@@ -1,4 +1,4 @@
-"""What `ms.minimize_printable` reports: a stage each, and the printable design."""
+"""Results of `ms.minimize_printable`: its stages, and the printable design."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from .ink import PrintableSet
 @immutable
 @dataclass(frozen=True)
 class PrintableStage:
-    """One stage of a search.
+    """One stage of a search for a printable magnetization.
 
-    name: "free", "weight", "hold" or "exchange". weight: of the pull, as given. held: faces whose direction, and level
-    where the ink has levels, is decided. objective: at its end, without the pull. distance: mean squared distance from
-    what can be printed, over the square of the strength, as `ms.objectives.printable`. evaluations, seconds: since the
-    start.
+    name: "free", "weight", "hold" or "exchange". weight: that of the penalty, as given. held: number of faces
+    whose direction, and level if the ink has levels, is fixed. objective: at the stage's end, without the penalty.
+    distance: mean squared distance from the printable magnetizations, over the square of the strength, as
+    `ms.objectives.printable`. evaluations, seconds: since the start.
     """
 
     name: str
@@ -35,11 +35,11 @@ class PrintableStage:
 @immutable
 @dataclass(frozen=True)
 class PrintableMinimum:
-    """What `minimize_printable` found.
+    """The result of `minimize_printable`.
 
-    remanent_magnetization: (n_f, 3) A/m, a tensor of what can be printed. objective: of it.
-    free_objective: before anything was rounded, with any magnetization between the ink's. rounded_at_once: of that design
-    with each face at the nearest that can be printed; None where that could not be evaluated.
+    remanent_magnetization: (n_f, 3) A/m, a tensor of printable magnetizations. objective: its value there.
+    free_objective: before anything was rounded, with any magnetization between the ink's. rounded_at_once: the objective of
+    that free design with each face rounded to the nearest printable one; None if it could not be evaluated.
     history: a PrintableStage each. reason: why it ended.
     """
 
@@ -53,23 +53,25 @@ class PrintableMinimum:
 
     @property
     def distances(self) -> np.ndarray:
-        """(n_f,) shares of the strength: how far each face is from what can be printed. Round-off, but for a search that was
-        cut short."""
+        """The distance of each face from the nearest printable magnetization, as a share of the strength, (n_f,).
+
+        Only round-off, unless the search was cut short.
+        """
         return self.ink.distances(self.remanent_magnetization.numpy())
 
     @property
     def not_printable(self) -> int:
-        """Faces that are farther than 1e-6 of the strength from what can be printed."""
+        """The number of faces that are farther than 1e-6 of the strength from the nearest printable magnetization."""
         return int((self.distances > 1e-6).sum())
 
     @property
     def directions(self) -> np.ndarray:
-        """(n_f,) which of the ink's directions each face is printed with."""
+        """The index of the ink's direction that each face is printed with, (n_f,)."""
         return self.ink.choices(self.remanent_magnetization.numpy())[0]
 
     @property
-    def shares(self) -> np.ndarray:
-        """(n_f,) which share of the ink's strength each face is printed with."""
+    def shares(self) -> np.ndarray:  # plain-words: ok (public name)
+        """The share of the ink's strength that each face is printed with, (n_f,)."""
         return self.ink.choices(self.remanent_magnetization.numpy())[1]
 
     def __repr__(self) -> str:

@@ -1,4 +1,4 @@
-"""One search for a magnetization that can be printed: its stages, and how it goes on after a stop."""
+"""One search for a printable magnetization: its stages, and how it continues after a stop."""
 
 from __future__ import annotations
 
@@ -22,18 +22,26 @@ from .printable_minimum import PrintableMinimum, PrintableStage
 from .printed_faces import PrintedFaces
 from .tabu_search import Exchanges
 
-_LINE_SEARCH = 8  # evaluations: a stage is to go on, not to end at a kink
-_SAME_OBJECTIVE = 1e-6  # of the objective: another thread count or release may round otherwise
-_ROUNDING = 1e-12  # of the largest objective so far: one that has all but vanished is round-off
-_KEPT = ("evaluations", "at_once", "rounded", "scale", "_compared")  # beside the design and the stages
+_LINE_SEARCH = 8  # evaluations per line search: few, so that a stage does not end at a kink of the objective
+_SAME_OBJECTIVE = (
+    1e-6  # [-] relative difference that counts as equal: thread count or release may change rounding
+)
+_ROUNDING = 1e-12  # [-] difference relative to the largest objective so far that counts as round-off
+_STORED = (
+    "evaluations",
+    "at_once",
+    "rounded",
+    "scale",
+    "_compared",
+)  # attributes in a checkpoint, with design and stages
 
 
 class Stopped(Exception):
-    """The callback said so."""
+    """An exception that ends the search because the callback returned True."""
 
 
 class PrintableSearch:
-    """Its faces, and the stages so far. What it does next follows from these, so that it can go on from a file."""
+    """A search: its faces, and the stages so far, which determine the next one, so that it can continue from a file."""
 
     def __init__(
         self,
@@ -61,15 +69,15 @@ class PrintableSearch:
         self.history: list[PrintableStage] = []
         self.evaluations: int = 0
         self.began: float = time.perf_counter()
-        self.at_once: float | None = None  # of the free design, rounded
+        self.at_once: float | None = None  # objective of the free design with all faces rounded at once
         self.rounded: tuple[Any, ...] = ()
-        self.scale: float = 0.0  # of the pull, in units of the objective
-        self._compared = False  # with the design that was rounded at once
+        self.scale: float = 0.0  # factor of the penalty, in units of the objective
+        self._compared = False  # whether the design was compared with the one rounded at once
         self._exchanges: Exchanges | None = None  # while they go on
-        self._told = 0  # stages of which the callback knows
+        self._reported = 0  # number of stages that the callback has been called with
 
     def run(self, exchanges: int) -> str:
-        """All that is left to do; returns the reason of the end."""
+        """Run the stages that are left, and return the reason of the end."""
         if not self._done("free"):
             self.free()
             self._save()
@@ -81,15 +89,18 @@ class PrintableSearch:
         return "all faces are rounded"
 
     def _done(self, name: str) -> int:
+        """Return how many stages of this name are finished."""
         return sum(stage.name == name for stage in self.history)
 
     def free(self) -> None:
+        """Run the first stage, with any magnetization, and set the scale of the penalty by the loss of rounding all
+        at once."""
         self.relax("free", 0.0, self._max_iterations)
-        free, value, distance = self.kept(), self.history[-1].objective, self.history[-1].distance
-        self.faces.hold(np.arange(len(self.faces.held)))
+        free, value, distance = self.snapshot(), self.history[-1].objective, self.history[-1].distance
+        self.faces.freeze_nearest(np.arange(len(self.faces.held)))
         try:
             self.at_once = self.value()
-            self.rounded = self.kept()
+            self.rounded = self.snapshot()
         except DesignRejected as error:
             log.info("minimize_printable: rounded at once, the design cannot be evaluated: %s", error)
         finally:
@@ -98,18 +109,24 @@ class PrintableSearch:
         self.scale = loss / distance if distance > 0.0 else 0.0
 
     def round(self) -> None:
-        """Holds all faces, in blocks of a share of those that are left; the last one is about a face."""
+        """Freeze all faces in blocks, each a fixed fraction of those that are left, so that the last has about one
+        face.
+
+        Then take the design that was rounded at once, if it is lower.
+        """
         held = self.faces.held
-        share = 1.0 if self._blocks == 1 else 1.0 - len(held) ** (-1.0 / (self._blocks - 1))
+        fraction = 1.0 if self._blocks == 1 else 1.0 - len(held) ** (-1.0 / (self._blocks - 1))
         while not self.faces.held.all():
             left = int((~self.faces.held).sum())
-            size = left if self._done("hold") + 1 >= self._blocks else min(left, int(np.ceil(share * left)))
-            before = self.faces.kept(), len(self.history)
+            size = (
+                left if self._done("hold") + 1 >= self._blocks else min(left, int(np.ceil(fraction * left)))
+            )
+            before = self.faces.snapshot(), len(self.history)
             try:
-                self.hold(self.faces.surest(size))
+                self.freeze(self.faces.nearest_to_printable(size))
                 self.relax("hold", 0.0)
             except BaseException:
-                if len(self.history) == before[1]:  # what is handed back is what the last stage ended with
+                if len(self.history) == before[1]:  # return the design that the last stage ended with
                     self.faces.restore(before[0])
                 raise
             self._save()
@@ -120,12 +137,13 @@ class PrintableSearch:
                 self.end("hold", self.at_once)
             self._save()
 
-    def hold(self, faces: np.ndarray) -> None:
-        """As many of these as can be held without a jump; of a single one, the jump is taken."""
+    def freeze(self, faces: np.ndarray) -> None:
+        """Freeze as many of these faces as the equilibrium allows without a jump; for a single face a jump is
+        accepted."""
         while True:
-            before = self.faces.kept()
+            before = self.faces.snapshot()
             try:
-                self.faces.hold(faces)
+                self.faces.freeze_nearest(faces)
                 with jumps_accepted(self.offering if len(faces) == 1 else []):
                     self.value()
                 return
@@ -140,6 +158,7 @@ class PrintableSearch:
                 raise
 
     def exchange(self, trials: int) -> None:
+        """Exchange single faces in up to `trials` trials, and return to the lowest design found."""
         if trials == 0 or self._done("exchange"):
             return
         reached = self.history[-1].objective
@@ -155,21 +174,21 @@ class PrintableSearch:
             self.back_to(going.best)
             self.note("exchange", 0.0, going.lowest)
             raise
-        self.back_to(going.best)  # from before them, where none was lower
+        self.back_to(going.best)  # the design before the exchanges, if none was lower
         self.end("exchange", min(going.lowest, reached))
         self._exchanges = None
         self._save()
 
     def end(self, name: str, value: float) -> None:
-        """A design with this objective that is reached, and what is left free of it optimized once more."""
+        """End a stage at a design with this objective, and optimize its free variables once more."""
         self.note(name, 0.0, value)
         if self.faces.free:
             self.relax(name, 0.0)
 
     def resume(self) -> None:
-        """Goes on from the file. Raises ValueError where it is of something else."""
+        """Continue from the file. Raises ValueError if it is of another search."""
         known = self._checkpoint.load()
-        fresh = self.kept()
+        fresh = self.snapshot()
         self.back_to((known["faces"], known["stateful"]))
         exchanges = None if known["exchanges"] is None else Exchanges(self, known["exchanges"])
         history = [PrintableStage(**stage) for stage in known["history"]]
@@ -180,14 +199,15 @@ class PrintableSearch:
         self.history, self._exchanges = history, exchanges
         vars(self).update(known["search"])
         self.began -= history[-1].seconds if history else 0.0
-        self._told = len(history)
+        self._reported = len(history)
         self.bar.update(len(history) + (0 if exchanges is None else exchanges.trial))
 
     def _check(self, was: float, largest: float, fresh: tuple[Any, ...]) -> None:
-        """Raises ValueError where the objective says something else of the design now; it is as before then."""
+        """Raise ValueError if the objective of the checkpoint's design has changed, after a return to the design
+        `fresh`."""
         try:
             now = self.value()
-        except DesignRejected as error:  # the way to it from where its objects are is not the way there
+        except DesignRejected as error:  # its equilibrium was reached along another path, which is not stored
             log.info("minimize_printable: the checkpoint's design cannot be checked: %s", error)
             return
         except Exception:
@@ -201,20 +221,20 @@ class PrintableSearch:
             )
 
     def begin(self) -> None:
-        """What is left of another search in the place of the file is none of this one's."""
+        """Start a new search: remove files that another search has left, and write the first checkpoint."""
         self._checkpoint.clear()
         self._save()
 
     def _save(self) -> None:
-        """Into the file, and then what is new to the callback."""
+        """Write the checkpoint, then call the callback with the stages that are new to it."""
         self._checkpoint.save(
-            faces=self.faces.kept(),
+            faces=self.faces.snapshot(),
             stateful=[each.state_dict() for each in self.stateful],
             history=[asdict(stage) for stage in self.history],
-            search={name: getattr(self, name) for name in _KEPT},
+            search={name: getattr(self, name) for name in _STORED},
             exchanges=None if self._exchanges is None else self._exchanges.state(),
         )
-        new, self._told = self.history[self._told :], len(self.history)
+        new, self._reported = self.history[self._reported :], len(self.history)
         for stage in new:
             if self._callback is not None and self._callback(stage):
                 raise Stopped
@@ -223,25 +243,27 @@ class PrintableSearch:
     def _seconds(self) -> float:
         return time.perf_counter() - self.began
 
-    def kept(self) -> tuple[Any, ...]:
-        """A design and the states that objects have at it: the way back to it need not be the way there."""
-        return self.faces.kept(), [copy.deepcopy(each.state_dict()) for each in self.stateful]
+    def snapshot(self) -> tuple[Any, ...]:
+        """Return the design with the states of the stateful objects: an equilibrium may not be reached again without
+        them."""
+        return self.faces.snapshot(), [copy.deepcopy(each.state_dict()) for each in self.stateful]
 
-    def back_to(self, kept: tuple[Any, ...]) -> None:
-        self.faces.restore(kept[0])
-        for each, state in zip(self.stateful, kept[1], strict=True):
+    def back_to(self, snapshot: tuple[Any, ...]) -> None:
+        """Restore what `snapshot` returned."""
+        self.faces.restore(snapshot[0])
+        for each, state in zip(self.stateful, snapshot[1], strict=True):
             each.load_state_dict(copy.deepcopy(state))
 
     def relax(self, name: str, weight: float, iterations: int | None = None) -> None:
-        """Optimizes what is free, with a pull of this weight."""
+        """Run the optimizer on the free variables, with a penalty of this weight on the distance from printability."""
         torch = require_torch("minimize_printable")
-        shares = torch.from_numpy(self.faces.shares.copy()).requires_grad_()
-        pull = weight * self.scale
+        components = torch.from_numpy(self.faces.components.copy()).requires_grad_()
+        penalty = weight * self.scale
 
-        def total(shares):
-            magnetization = self.faces.magnetization_of(shares)
+        def total(components):
+            magnetization = self.faces.magnetization_of(components)
             value = self.evaluate(magnetization)
-            return value + pull * printable(magnetization, self.faces.ink) if pull else value
+            return value + penalty * printable(magnetization, self.faces.ink) if penalty else value
 
         if not self.faces.free:
             self.note(name, weight, self.value())
@@ -251,8 +273,8 @@ class PrintableSearch:
         try:
             found = minimize(
                 total,
-                [shares],
-                _optimizer(shares, lower, upper),
+                [components],
+                _optimizer(components, lower, upper),
                 max_iterations=self._stage_iterations if iterations is None else iterations,
                 tolerance=self._tolerance,
                 stateful=self.stateful,
@@ -265,15 +287,15 @@ class PrintableSearch:
             raise
         finally:
             if found is not None:
-                self.faces.shares = shares.detach().numpy().copy()
-                left = float(printable(self.faces.magnetization, self.faces.ink)) if pull else 0.0
+                self.faces.components = components.detach().numpy().copy()
+                left = float(printable(self.faces.magnetization, self.faces.ink)) if penalty else 0.0
                 self.evaluations = max(
                     self.evaluations, before + found.history[-1].evaluations
-                )  # gone on with
-                self.note(name, weight, found.objective - pull * left)
+                )  # a resumed stage counts those before the stop
+                self.note(name, weight, found.objective - penalty * left)
 
     def note(self, name: str, weight: float, value: float) -> None:
-        """A stage that is over, or was cut short."""
+        """Append a stage that is over, or was cut short, to the history, and show it."""
         stage = PrintableStage(
             name,
             weight,
@@ -292,7 +314,7 @@ class PrintableSearch:
         )
 
     def evaluate(self, magnetization: Any) -> Any:
-        """The objective as a tensor."""
+        """Return the objective as a tensor. Raises ValueError if it comes with constraints."""
         self.evaluations += 1
         answer = Answer.of(self.objective(magnetization))
         if answer.constraints is not None:
@@ -302,13 +324,14 @@ class PrintableSearch:
         return answer.objective
 
     def value(self) -> float:
+        """Return the objective of the current design."""
         from .optim.sample import Trial  # late, as torch is
 
         torch = require_torch("minimize_printable")
         return Trial(lambda: self.evaluate(torch.from_numpy(self.faces.magnetization)), []).objective
 
     def sample(self) -> tuple[float, np.ndarray]:
-        """The objective, and its gradient by shares of the strength in world axes, (n_f, 3)."""
+        """Return the objective and its gradient by the magnetization over the strength in world axes, (n_f, 3)."""
         from .optim.sample import Trial
 
         torch = require_torch("minimize_printable")
@@ -317,7 +340,7 @@ class PrintableSearch:
         return found.objective, self.faces.ink.strength * found.gradient.reshape(-1, 3)
 
     def result(self, reason: str) -> PrintableMinimum | None:
-        """What there is; None before there is a design."""
+        """Return the result so far, None before there is a design."""
         if not self.history:
             return None
         torch = require_torch("minimize_printable")
@@ -332,7 +355,7 @@ class PrintableSearch:
         )
 
 
-def _optimizer(shares, lower, upper):
+def _optimizer(components, lower, upper):
     from .optim import LBFGS  # late, as torch is
 
-    return LBFGS([shares], lower=lower, upper=upper, max_evaluations=_LINE_SEARCH)
+    return LBFGS([components], lower=lower, upper=upper, max_evaluations=_LINE_SEARCH)

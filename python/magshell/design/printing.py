@@ -1,4 +1,4 @@
-"""The search for a magnetization that can be printed: found freely, pulled, rounded in blocks, exchanged."""
+"""Search for a printable magnetization: a free one first, then a penalty, rounding in blocks, and exchanges of faces."""
 
 from __future__ import annotations
 
@@ -40,35 +40,40 @@ def minimize_printable(
     checkpoint: str | Path | None = None,
     resume: bool = False,
 ) -> PrintableMinimum:
-    """Minimizes objective(remanent_magnetization) over what an ink can print.
+    """Minimize objective(remanent_magnetization) over the magnetizations that an ink can print.
 
-    First any magnetization between those of the ink is free, for `max_iterations`. Then, for each of `weights`, the
-    magnetization is pulled to what can be printed. Then faces are rounded in blocks, the surest first: those of a block are
-    held at the nearest that can be printed (where the ink prints any share of its strength, only their direction is held),
-    and the others are optimized again and make up for it. The blocks become smaller, as what is rounded last nobody makes
-    up for. At last single faces are exchanged: the one of which the gradient promises most is changed, `exchanges` times,
-    and the lowest design is kept. Never higher than the free design rounded at once, where that can be evaluated.
+    The search has four kinds of stages:
+
+    - free: any magnetization between those of the ink is allowed, for `max_iterations`;
+    - weight: for each of `weights`, a penalty pulls the magnetization towards printable ones;
+    - hold: faces are rounded in blocks, those nearest to a printable magnetization first. The faces of a block are held
+      there (if the ink prints any share of its strength, only their direction is held), and the others are optimized
+      again to compensate. The blocks become smaller, because less and less is left to compensate with;
+    - exchange: the face whose change the gradient predicts to gain most is changed, `exchanges` times (a tabu search).
+
+    The lowest design is returned. It is never higher than the free design rounded at once, if that can be evaluated.
 
     objective: of a tensor (n_f, 3) A/m; returns a scalar tensor, or a dict of named terms whose sum it is. As in
         `ms.minimize` it may raise `ms.DesignRejected`; constraints are refused.
-    remanent_magnetization: (n_f, 3) A/m, where to begin; brought into the box around what can be printed.
+    remanent_magnetization: (n_f, 3) A/m, the start; clipped to the box around all printable magnetizations.
     ink: an `ms.PrintableSet`.
-    weights: of the pull, without a unit and rising: 1 adds, at the free design, what it costs to round that at once.
-        That is much; small ones leave the objective its say. () leaves the pull out.
-    blocks: how many; 1 rounds all at once. stage_iterations: of the optimizer after each block and each weight.
+    weights: weights of the penalty, dimensionless and rising: 1 adds, at the free design, the cost of rounding it at
+        once. That is much; with small weights the objective still matters. () omits the penalty.
+    blocks: number of blocks; 1 rounds all faces at once. stage_iterations: largest number of iterations of the
+        optimizer after each block and each weight.
     tolerance: a stage ends once the objective changed by no more than this share of itself, three times in a row.
     stateful: as in `ms.minimize`. A block whose equilibrium jumps is halved; a single face's jump is crossed if the
         objective or one of these, such as an `ms.WarmStart`, has accept_jumps().
     callback: called with the PrintableStage that each stage ends with; returning True ends the search there, with faces left
         that cannot be printed.
     progress: show a bar.
-    checkpoint: a file that is replaced, whole or not at all, after each stage and each exchange; within a stage there is
-        another one beside it, as of `ms.minimize`. resume: continue from it if it exists, with the same bits as without the
-        stop, whatever remanent_magnetization is given then. A checkpoint of another ink, of other options or of another
+    checkpoint: a file that is replaced atomically after each stage and each exchange; within a stage there is a second
+        one in the same folder, that of `ms.minimize`. resume: continue from it if it exists, with the same bits as without
+        the stop; remanent_magnetization is then ignored. A checkpoint of another ink, of other options or of another
         objective is refused (ValueError says what differs): its design is evaluated once and compared.
 
-    Raises ValueError on bad input. Ctrl-C raises `ms.Interrupted`, an error on the way `ms.ObjectiveFailed`, once a design
-    is known: both hold a PrintableMinimum in `last_good`, not all of which can be printed.
+    Raises ValueError on bad input. Ctrl-C raises `ms.Interrupted`, any other error `ms.ObjectiveFailed`, once a design
+    is known: both hold a PrintableMinimum in `last_good`, with faces that cannot be printed.
 
     >>> import magshell as ms
     >>> ink = ms.PrintableSet(1.0, [(1, 0, 0), (-1, 0, 0)], levels=(1,))
@@ -110,10 +115,10 @@ def minimize_printable(
         "stage_iterations": stage_iterations,
         "tolerance": tolerance,
     }
-    kept = PrintableCheckpoint(checkpoint, ink, len(start), {**options, "exchanges": exchanges})
+    file = PrintableCheckpoint(checkpoint, ink, len(start), {**options, "exchanges": exchanges})
     bar = progress_bar("minimize_printable", 1 + len(weights) + blocks + exchanges, shown=progress)
-    search = PrintableSearch(objective, faces, stateful, kept, callback, bar, **options)
-    if resume and kept.there:
+    search = PrintableSearch(objective, faces, stateful, file, callback, bar, **options)
+    if resume and file.there:
         search.resume()
     else:
         search.begin()

@@ -1,4 +1,4 @@
-"""Whether a minimization goes on with the problem that its checkpoint is of."""
+"""Checks that a minimization continues with the problem that its checkpoint is of."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ from .objective_value import Answer
 if TYPE_CHECKING:
     from .run import Run
 
-_SAME_OBJECTIVE = 1e-6  # of the objective: another thread count or release may round otherwise
-_ROUNDING = 1e-12  # of the largest objective so far: one that has all but vanished is round-off
+_SAME_OBJECTIVE = (
+    1e-6  # [-] relative difference that counts as equal: thread count or release may change rounding
+)
+_ROUNDING = 1e-12  # [-] difference relative to the largest objective so far that counts as round-off
 
 
 def check_same(run: Run, snapshot: dict[Any, Any]) -> None:
-    """Raises ValueError where parameters, method or options are others than the snapshot's."""
+    """Raise ValueError if parameters, method or options differ from the snapshot's."""
     shapes, now = ([tuple(each.shape) for each in of] for of in (snapshot["parameters"], run.parameters))
     if shapes != now:
         raise ValueError(f"the checkpoint holds parameters of shapes {shapes}, not those of this problem")
@@ -39,8 +41,10 @@ def check_same(run: Run, snapshot: dict[Any, Any]) -> None:
 
 
 def check_objective(run: Run, snapshot: dict[Any, Any]) -> None:
-    """Evaluates the best design as it was evaluated then, from the same states. Raises ValueError where the objective
-    says something else of it now, with parameters and states as they were before."""
+    """Evaluate the snapshot's best design again, from the same states, and compare.
+
+    Raises ValueError if its objective or violation has changed; parameters and states are then as before.
+    """
     best = snapshot["best"]
     values, states = run.values(), run.states()
     try:
@@ -63,7 +67,7 @@ def check_objective(run: Run, snapshot: dict[Any, Any]) -> None:
 
 
 def _evaluated(run, best: dict[Any, Any]) -> tuple[float, float]:
-    """Objective and violation of the best design."""
+    """Return objective and violation of the best design. Raises ValueError if it cannot be evaluated."""
     from .optim.sample import Trial
 
     def closure():

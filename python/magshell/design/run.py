@@ -1,4 +1,4 @@
-"""The state of one minimization: where its optimizer stands, the history, the best design."""
+"""State of one minimization: its optimizer, the history, the best design."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from .._input.arrays import number
 from .._input.tensors import is_tensor, require_torch
 from .._runtime.log import log
 from ..errors import DesignRejected, EquilibriumJumped
-from .configuration import decoded, encoded, kept
+from .configuration import as_stored, decoded, encoded
 from .jump_policies import checked_stateful, jumps_accepted, offering
 from .minimum import MinimizeResult, Record, conflict, effort_in_words, reason_of, total
 from .objective_value import Answer
-from .optim.stagnation import STANDSTILL
+from .optim.stagnation import STAGNATION
 from .resume import check_objective, check_same
 
 if TYPE_CHECKING:
@@ -35,12 +35,15 @@ PARTS = (
     "terms",
     "stateful",
     "configuration",
-)  # of a snapshot
+)  # keys of a snapshot
 
 
 @dataclass(frozen=True)
 class _Seen:
-    """A design that was evaluated, its terms, and the states from which: None where no checkpoint needs them."""
+    """A design that was evaluated, its terms, and the states from which it was evaluated.
+
+    states is None if no checkpoint needs them.
+    """
 
     design: list[Any]
     terms: dict[str, float]
@@ -48,8 +51,10 @@ class _Seen:
 
 
 class Run:
-    """One minimization, an iteration at a time. Arguments as in `ms.minimize`; cross: whether jumps are crossed;
-    checkpointed: whether snapshots will be asked for."""
+    """One minimization, an iteration at a time.
+
+    Arguments as in `ms.minimize`. cross: whether jumps are crossed; checkpointed: whether snapshots will be taken.
+    """
 
     feasibility: float
     objective: Callable[..., Any]
@@ -67,7 +72,7 @@ class Run:
         if not callable(objective):
             raise ValueError(f"objective must be a function of the parameters, got {objective!r:.60}")
         self.parameters: list[Any] = _checked_parameters(parameters)
-        self.optimizer: BoxOptimizer | AnyTorch = _driven(
+        self.optimizer: BoxOptimizer | AnyTorch = _adapted(
             optimizer(self.parameters) if callable(optimizer) else optimizer
         )
         if {id(p) for p in self.parameters} != {id(p) for p in self.optimizer.parameters}:
@@ -83,32 +88,35 @@ class Run:
             cross,
             checkpointed,
         )
-        self.configuration: dict[str, Any] = kept(
+        self.configuration: dict[str, Any] = as_stored(
             {"feasibility": feasibility, **self.optimizer.configuration()}
         )
         self._evaluations = 0
-        self.rejections: Counter[str] = Counter()  # of the iteration under way
+        self.rejections: Counter[str] = Counter()  # of the current iteration
         self.watch: Callable[[], None] = lambda: None  # called after every evaluation
-        self._answers: list[_Seen] = []  # of one step
+        self._answers: list[_Seen] = []  # evaluated in the current step
         self._at = _Seen([], {})  # the design of the last record
-        self._recorded = False  # whether the iteration under way is in the history
-        self._stuck = False  # at a jump that no step avoids
+        self._recorded = False  # whether the current iteration is in the history
+        self._stuck = False  # whether every step, however short, met a jump
         self._started = time.perf_counter()
 
     @property
     def method(self) -> str:
-        return _name(getattr(self.optimizer, "optimizer", self.optimizer))  # what AnyTorch drives
+        """The class name of the optimizer."""
+        return _name(getattr(self.optimizer, "optimizer", self.optimizer))  # AnyTorch wraps an optimizer
 
     @property
     def rejected(self) -> int:
-        """Trial designs of the iteration under way."""
+        """The number of trial designs that were rejected in the current iteration."""
         return sum(self.rejections.values())
 
     @property
     def iteration(self) -> int:
+        """The number of the last recorded iteration."""
         return self.history[-1].iteration if self.history else 0
 
     def closure(self) -> Any:
+        """Evaluate the objective at the current parameters for the optimizer: returns it, and the constraints."""
         self._evaluations += 1
         before = self.states() if self._checkpointed else None
         try:
@@ -123,10 +131,12 @@ class Run:
         return answer.objective, answer.constraints
 
     def begin(self) -> None:
+        """Evaluate the start and record it as iteration 0."""
         self._record(0, self.optimizer.evaluate(self.closure), jumped=False)
 
     def advance(self) -> bool:
-        """One step; whether it moved anything. Raises the last rejection if no step was short enough."""
+        """Take one step and return whether a parameter changed. Raises the last rejection if no step was short
+        enough."""
         before = self.values()
         self._answers, self.rejections, self._recorded = [], Counter(), False
         try:
@@ -137,29 +147,30 @@ class Run:
                 self._stuck = True
                 raise
             with self.accepting_jumps():
-                self.optimizer.leap(self.closure)
+                self.optimizer.full_step(self.closure)
             jumped = True
         moved = any(not a.equal(b) for a, b in zip(before, self.values(), strict=True))
         self._record(self.iteration + 1, self.optimizer.evaluate(self.closure), jumped)
         return moved
 
     @property
-    def standstill(self) -> str:
-        """What it means that a step moved nothing."""
-        return getattr(self.optimizer, "standstill", STANDSTILL)
+    def stagnation(self) -> str:
+        """The reason to give if a step changed nothing."""
+        return getattr(self.optimizer, "stagnation", STAGNATION)
 
     def minimum(self, reason: str) -> MinimizeResult | None:
-        """The best design, which the parameters are set to. None before there is any."""
+        """Set the parameters to the best design and return the result; None before a design was evaluated."""
         if self.best is None:
             return None
         self.set(self.best["parameters"])
         best = [value.clone() for value in self.best["parameters"]]
-        told = self._all_rejections, conflict(self.history, self._lost, self._stuck)
+        obstacles = self._all_rejections, conflict(self.history, self._lost, self._stuck)
         return MinimizeResult(
-            best, self.best["objective"], self.best["violation"], self.history, reason, *told
+            best, self.best["objective"], self.best["violation"], self.history, reason, *obstacles
         )
 
     def snapshot(self) -> dict[Any, Any]:
+        """Return the state as a dict for a checkpoint."""
         return {
             "method": self.method,
             "parameters": self.values(),
@@ -172,7 +183,7 @@ class Run:
         }
 
     def restore(self, snapshot: dict[Any, Any]) -> None:
-        """Goes on from a snapshot. Raises ValueError where it is of something else, and changes nothing then."""
+        """Continue from a snapshot. Raises ValueError if it is of another problem, and then changes nothing."""
         check_same(self, snapshot)
         check_objective(self, snapshot)
         self.set(snapshot["parameters"])
@@ -184,13 +195,13 @@ class Run:
         self._started -= self.history[-1].seconds
 
     def summary(self) -> str:
-        """The objective, and how many designs were evaluated and rejected so far."""
+        """Format the objective, and how many designs were evaluated and rejected so far."""
         parts = [f"objective {self.history[-1].objective:.6g}"] if self.history else []
         return ", ".join([*parts, *effort_in_words(self._evaluations, self._all_rejections)])
 
     @property
     def _lost(self) -> dict[str, int]:
-        """Rejections of an iteration that is under way, or did not come to its end."""
+        """The rejections of an iteration that is not, or never will be, in the history."""
         return {} if self._recorded else dict(self.rejections)
 
     @property
@@ -198,6 +209,7 @@ class Run:
         return dict(total([*(record.rejections for record in self.history), self._lost]))
 
     def _record(self, iteration: int, sample, jumped: bool) -> None:
+        """Append the current design to the history, and keep it if it is the best."""
         values = self.values()
         for seen in self._answers:
             if all(a.equal(b) for a, b in zip(seen.design, values, strict=True)):
@@ -228,34 +240,37 @@ class Run:
             }
 
     def _order(self, objective: float, violation: float) -> tuple[float, float]:
-        """Feasible designs by their objective, before all others by how far they are from it."""
+        """Return a sort key: feasible designs first, by their objective; then the others, by their violation."""
         return (0.0, objective) if violation <= self.feasibility else (violation, objective)
 
     def values(self) -> list[Any]:
+        """Return copies of the parameters."""
         return [parameter.detach().clone() for parameter in self.parameters]
 
     def states(self) -> list[Any]:
-        """Of the stateful objects, as a checkpoint holds them."""
+        """Return the states of the stateful objects, as a checkpoint stores them."""
         return [encoded(each.state_dict(), f"state of {_name(each)}") for each in self.stateful]
 
     def load_states(self, states: list[Any]) -> None:
+        """Set the states of the stateful objects."""
         for each, state in zip(self.stateful, states, strict=True):
             each.load_state_dict(decoded(state))
 
     @contextmanager
     def accepting_jumps(self, accepted: bool = True) -> Iterator[None]:
-        """Inside, the equilibrium may jump, where something offers that."""
+        """Let the equilibrium jump inside the block, if an object has accept_jumps()."""
         with jumps_accepted(self._offering if accepted else []):
             yield
 
     def set(self, values: list[Any]) -> None:
+        """Set the parameters to these values."""
         with require_torch("minimize").no_grad():
             for parameter, value in zip(self.parameters, values, strict=True):
                 parameter.copy_(value)
 
 
-def _driven(optimizer):
-    """The optimizer as one that can be asked what is known where it stands."""
+def _adapted(optimizer):
+    """Return the optimizer with the interface of BoxOptimizer; one of torch.optim is wrapped."""
     from .optim.base import BoxOptimizer
     from .optim.torch_adapter import AnyTorch
 
@@ -270,6 +285,7 @@ def _driven(optimizer):
 
 
 def _checked_parameters(parameters) -> list[Any]:
+    """Return the parameters as a list. Raises ValueError unless each is a leaf tensor that requires a gradient."""
     parameters = [parameters] if is_tensor(parameters) else list(parameters)
     if not parameters:
         raise ValueError("there are no parameters to optimize")
@@ -289,5 +305,5 @@ def _name(each) -> str:
 
 
 def _plain(record: Record) -> dict[str, Any]:
-    """What a checkpoint keeps of a record: torch.load takes dicts of Python's own alone."""
+    """Convert a record to plain dicts, since torch.load accepts no others."""
     return {**asdict(record), "terms": dict(record.terms), "rejections": dict(record.rejections)}

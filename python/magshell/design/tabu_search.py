@@ -1,4 +1,4 @@
-"""Single faces of a printable design changed, one after another, where the gradient says that it is worth a trial."""
+"""Tabu search over a printable design: changes single faces, one at a time, as the gradient suggests."""
 
 from __future__ import annotations
 
@@ -9,18 +9,20 @@ import numpy as np
 from ..errors import DesignRejected
 from .printed_faces import PrintedFaces
 
-_RESTS = 8  # trials for which a face that was changed is left alone
-_MEMORY = 0.8  # of the mean curvature, at each trial
-_SAME = 1e-12  # in squares of the strength
+_RESTS = 8  # number of trials for which a changed face is tabu
+_MEMORY = 0.8  # [-] weight of the earlier trials in the mean curvature
+_SAME = 1e-12  # [-] squared change, over the square of the strength, below which a face is unchanged
 
 
 class Exchanges:
-    """Changes the face that promises most, one at a time, also where the objective rises for a while (a tabu search).
+    """A tabu search that changes the face with the largest predicted decrease, also when the objective rises for a
+    while.
 
-    search: has the faces, sample(): (objective, gradient (n_f, 3) by shares of the strength in world axes) of them, kept()
-    and back_to() for all that belongs to a design, and a bar. known: `state()` of an earlier one, to go on from.
+    search: has the faces, a bar, sample(): (objective, gradient (n_f, 3) by magnetization over strength in world axes), and
+    snapshot() and back_to() for a whole design. known: `state()` of an earlier search, to continue from.
 
-    The objective is taken to be quadratic in each face, with one curvature for all: the mean of what the trials showed.
+    The objective is modelled as quadratic in each face, with one curvature for all: the mean of those that the
+    trials showed.
     """
 
     def __init__(self, search: Any, known: dict[str, Any] | None = None):
@@ -34,15 +36,18 @@ class Exchanges:
         self.gradient: np.ndarray
         self.value, self.gradient = search.sample()
         self.lowest: float = self.value
-        self.best: tuple[Any, ...] = search.kept()
-        self.resting: np.ndarray = np.zeros(len(search.faces.held), dtype=int)  # until which trial
+        self.best: tuple[Any, ...] = search.snapshot()
+        self.resting: np.ndarray = np.zeros(
+            len(search.faces.held), dtype=int
+        )  # the trial until which each face is tabu
         self.curvature: float | None = None
 
     def state(self) -> dict[str, Any]:
+        """Return the state as a dict for a checkpoint."""
         return {name: value for name, value in vars(self).items() if not name.startswith("_")}
 
     def try_one(self) -> None:
-        """The next trial; `over` once there is nothing left to change."""
+        """Make the next trial; set `over` if no face is left to change."""
         search, faces, curvature = self._search, self._search.faces, self.curvature
         predicted, amounts, squares = _moves(faces, self.gradient, curvature or 0.0)
         predicted[self.resting > self.trial] = np.inf
@@ -51,8 +56,8 @@ class Exchanges:
             self.over = True
             return
         slope = predicted[face, choice] - 0.5 * (curvature or 0.0) * squares[face, choice]
-        before, amount = faces.kept(), amounts[face, choice]
-        faces.put(np.array([face]), np.array([choice // _levels(faces)]), amount)
+        before, amount = faces.snapshot(), amounts[face, choice]
+        faces.freeze(np.array([face]), np.array([choice // _levels(faces)]), amount)
         try:
             found, gradient = search.sample()
         except DesignRejected:
@@ -67,17 +72,21 @@ class Exchanges:
             self.resting[face] = self.trial + 1 + min(_RESTS, len(self.resting) // 4)
             self.value, self.gradient = found, gradient
             if found < self.lowest:
-                self.lowest, self.best = found, search.kept()
+                self.lowest, self.best = found, search.snapshot()
         self.trial += 1
 
 
 def _levels(faces: PrintedFaces) -> int:
+    """Return the number of levels of the ink, 1 without levels."""
     return 1 if faces.ink.levels is None else len(faces.ink.levels)
 
 
 def _moves(faces: PrintedFaces, gradient: np.ndarray, curvature: float):
-    """Of every face and what it might be printed with, (n_f, c): the change of the objective that is expected, the share of
-    the strength, the square of the change. Infinite where it would change nothing."""
+    """Return, for each face and each printable choice, (n_f, c): the predicted change, the fraction of the strength,
+    the squared change.
+
+    The predicted change of the objective is infinite for a choice that changes nothing.
+    """
     ink, now = faces.ink, faces.magnetization / faces.ink.strength
     rays = ink.rays if ink.rays.ndim == 3 else ink.rays[None]
     falls, along = ((each[:, None, :] * rays).sum(-1)[:, :, None] for each in (gradient, now))  # (n_f, k, 1)

@@ -6,11 +6,11 @@ from functools import cached_property
 
 import numpy as np
 
-from .._runtime.mixins import Drawn
+from .._runtime.mixins import PlotMixin
 from .selection import MeshSelection
 
 
-class MeshBase(Drawn, MeshSelection):
+class MeshBase(PlotMixin, MeshSelection):
     """Base class of meshes: counts and lengths that follow from rest_positions, edges, faces and components."""
 
     @property

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..._input.tensors import is_tensor
-from ..digest import closure, digest, is_own_function, used_globals
+from ..content_hash import closure, content_hash, is_own_function, used_globals
 
 _LONGEST_TOLD = 60  # characters of a value that is told in full
 
@@ -71,7 +71,7 @@ def told_apart(name: str, value: Any) -> str:
 def _in_words(value) -> str:
     if value is None or (type(value) in (bool, int, float, str) and len(repr(value)) <= _LONGEST_TOLD):
         return repr(value)
-    found = digest(value)[:16]
+    found = content_hash(value)[:16]
     if is_tensor(value) or isinstance(value, np.ndarray):
         return f"a {type(value).__name__} of shape {tuple(value.shape)} with digest {found}"
     return f"a {type(value).__name__} with digest {found}"

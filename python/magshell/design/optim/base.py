@@ -15,7 +15,7 @@ from . import box as boxes
 from .box import Box
 from .iterate import Iterate, Restoring, as_array, as_tensor
 from .sample import Sample
-from .stagnation import STANDSTILL
+from .stagnation import STAGNATION
 
 
 class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
@@ -36,7 +36,7 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
         "max_backtracks",
     )  # what a copy takes along, beyond torch's own
 
-    standstill = STANDSTILL  # what it means when a step moves nothing
+    stagnation = STAGNATION  # what it means when a step moves nothing
 
     def __init__(self, params: Iterable[Any], defaults: dict[Any, Any], max_backtracks: int):
         if not (isinstance(max_backtracks, int) and max_backtracks >= 0):
@@ -59,7 +59,7 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
             self._advance(sample, self._box(), self._sample_x)
         return self._sample.objective
 
-    def leap(self, closure: Callable[..., Any]) -> float:
+    def full_step(self, closure: Callable[..., Any]) -> float:
         """Takes the step that `step` would try first, whatever the objective is there; returns it.
 
         For a design beyond a jump of the equilibrium, which no shorter step reaches.
@@ -67,7 +67,7 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
         sample = self.evaluate(closure)
         self._check_sample(sample)
         with Restoring(self):
-            self._leap(sample, self._box(), self._sample_x)
+            self._full_step(sample, self._box(), self._sample_x)
         return self._sample.objective
 
     def add_param_group(self, param_group: dict[Any, Any]) -> None:
@@ -132,7 +132,7 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
         """One step from the design x."""
 
     @abstractmethod
-    def _leap(self, sample: Sample, box: Box, x: np.ndarray) -> None:
+    def _full_step(self, sample: Sample, box: Box, x: np.ndarray) -> None:
         """The first step that `_advance` would try, and no other."""
 
     def _check_group(self, group: dict[Any, Any], box: Box) -> None:

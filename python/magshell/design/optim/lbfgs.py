@@ -16,7 +16,7 @@ from .box import Box
 from .cauchy import Curvature, cauchy_step, shows_curvature, subspace_step, updated_diagonal
 from .line_search import Probe, strong_wolfe
 from .sample import Sample
-from .stagnation import STANDSTILL
+from .stagnation import STAGNATION
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
@@ -82,7 +82,7 @@ class LBFGS(BoxOptimizer):
             raise ValueError("LBFGS has bounds but no other constraints: use MMA or GCMMA, or add a penalty")
 
     def _advance(self, sample: Sample, box: Box, x: np.ndarray) -> None:
-        self.standstill = STANDSTILL
+        self.stagnation = STAGNATION
         # A model may be stale: once more along the gradient then.
         for run in (self._run, {}) if self._run else ({},):
             line = self._line(sample, box, x, run)
@@ -97,7 +97,7 @@ class LBFGS(BoxOptimizer):
         self._write(x)
         self._leave_gradients(sample.gradient)
 
-    def _leap(self, sample: Sample, box: Box, x: np.ndarray) -> None:
+    def _full_step(self, sample: Sample, box: Box, x: np.ndarray) -> None:
         line = self._line(sample, box, x, self._run)
         if line is not None:
             # The gradient's change across a jump is no curvature: nothing is learned from it.
@@ -150,7 +150,7 @@ class LBFGS(BoxOptimizer):
         if len(rejections) > self.max_backtracks:
             raise rejections[-1]
         if probes == self.max_evaluations:
-            self.standstill: str = (
+            self.stagnation: str = (
                 f"no lower design in as many evaluations of a line search as max_evaluations allows, {probes}"
             )
         return None

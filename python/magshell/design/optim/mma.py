@@ -95,7 +95,7 @@ class MMA(BoxOptimizer):
                 self._commit(x, reached, trial.differentiate(), distance, around.size)
                 return
 
-    def _leap(self, sample: Sample, box: Box, x: np.ndarray) -> None:
+    def _full_step(self, sample: Sample, box: Box, x: np.ndarray) -> None:
         around, distance = self._surroundings(sample, box, x)
         _, t = around.step(self._first_convexity(around), self.penalty)
         reached, trial = self._trial(box.moved(x, t * around.scale))

@@ -1,3 +1,3 @@
 """What optimizers say where a step moves nothing. Needs no torch."""
 
-STANDSTILL = "the optimizer finds no lower design, to rounding"
+STAGNATION = "the optimizer finds no lower design, to rounding"

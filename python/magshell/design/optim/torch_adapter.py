@@ -48,7 +48,7 @@ class AnyTorch(Iterate):
                 if shortening == self.max_backtracks:
                     raise
 
-    def leap(self, closure: Callable[..., Any]) -> float:
+    def full_step(self, closure: Callable[..., Any]) -> float:
         """The step at the full learning rate and no other."""
         return self._step(closure, share=1.0)
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..._input.arrays import whole_numbers
+from ..._input.arrays import integer_array
 from ..._runtime.files import replace_file
 
 _TYPES = {
@@ -63,7 +63,7 @@ def read_ply(path: Path) -> tuple[np.ndarray, np.ndarray, dict[Any, Any], dict[A
     if not lists or not {"x", "y", "z"} <= vertex.keys():
         raise ValueError("it lacks x, y, z of its vertices or vertex_indices of its faces")
     points = np.stack([vertex.pop(axis) for axis in "xyz"], axis=1).astype(np.float64)
-    faces = whole_numbers(lists[0], face.pop(lists[0]))
+    faces = integer_array(lists[0], face.pop(lists[0]))
     if faces.size and faces.shape[1] != 3:
         raise ValueError(f"face 0 has {faces.shape[1]} vertices; only triangles are supported")
     return points, faces, _grouped(vertex, groups.get("vertex", {})), _grouped(face, groups.get("face", {}))
@@ -203,7 +203,7 @@ def _of_type(prop: _Property, words: list[Any]) -> np.ndarray:
     numbers = np.array(words, dtype=np.float64)
     if prop.type.startswith("f"):
         return numbers.astype(prop.type)
-    return whole_numbers(prop.name, numbers, prop.type)
+    return integer_array(prop.name, numbers, prop.type)
 
 
 def _same_lengths(element: _Element, counts: dict[str, np.ndarray]) -> None:

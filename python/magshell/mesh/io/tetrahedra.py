@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..._input.arrays import whole_numbers
+from ..._input.arrays import integer_array
 from ..tetrahedra.tet_mesh import TetMesh
 
 LOWER_CELLS = ("vertex", "line", "line3", "triangle", "triangle6")  # gmsh writes them beside the solid
@@ -37,7 +37,7 @@ class TetContent:
         """The mesh, its parts from the field `part` or gmsh's physical groups of volumes, and all other fields."""
         fields = dict(self.tetrahedron_fields)
         chosen = next((name for name in _PART_FIELDS if name in fields), None)
-        parts = None if chosen is None else whole_numbers(f"the cell field {chosen!r}", fields.pop(chosen))
+        parts = None if chosen is None else integer_array(f"the cell field {chosen!r}", fields.pop(chosen))
         mesh = TetMesh(self.points, self.tetrahedra, parts, self.part_names)
         return mesh, TetFields(self.vertex_fields, fields)
 

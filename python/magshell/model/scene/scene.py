@@ -14,7 +14,7 @@ from ... import _core
 from ..._input.checked_list import checked_list
 from ..._input.quantity import quantity
 from ..._runtime.frozen import remember
-from ..._runtime.mixins import Drawn
+from ..._runtime.mixins import PlotMixin
 from ..._runtime.solver_entry_point import grouped
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ..actuators.actuator import Actuator
@@ -66,7 +66,7 @@ _SUPPORTS = (Pin, Clamp, SymmetryPlane)
 _ACTUATORS = "Muscle, Cavity, Cells and Tendon objects"
 
 
-class Scene(Drawn):
+class Scene(PlotMixin):
     """A model: bodies, their supports, and the loads, actuators, fields and contacts that act on them.
 
     A scene can be solved many times. For that it stores the structure of its matrix and, up to 256 MB, the memory of its

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..._input.quantity import quantity
-from ..._input.tensors import detached, is_tensor, to_array, wants_gradient
+from ..._input.tensors import detached, is_tensor, requires_gradient, to_array
 from ..shells.shell import magnetization_of
 from .magnetization import check_given_once, check_on_skins, of_all_bodies
 from .plausible import warn_of_field, warn_of_units
@@ -111,7 +111,7 @@ class Inputs:
         """Record that a tensor has no gradient by this input, and why: NoGradient says so when the gradient is asked
         for.
         """
-        if wants_gradient(tensor):
+        if requires_gradient(tensor):
             self.leaves = [leaf for leaf in self.leaves if leaf.tensor is not tensor or leaf.name != name]
             self.leaves.append(Leaf(tensor, None, name, why))
 
@@ -121,7 +121,7 @@ class Inputs:
             self.given.append(value)
         if not self._differentiable:
             return to_array(name, value)
-        if wants_gradient(value):
+        if requires_gradient(value):
             self.leaves.append(Leaf(value, owner, name))
         return detached(value)
 

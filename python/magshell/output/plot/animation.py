@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._input.quantity import quantity
-from ..._runtime.mixins import offered
+from ..._runtime.mixins import register_method
 from ..._runtime.progress import SolveBar
 from ..._runtime.solver_entry_point import grouped
 from ..results.state import State, states_of, with_times
@@ -34,7 +34,7 @@ SLOWEST, FASTEST = 0.01, 1000.0  # frames a second that the formats can hold
 PALETTE_FRAMES = 12  # that a GIF's colours are chosen from
 
 
-@offered
+@register_method
 @grouped(color=Color, view=View, style=Style)
 def animate(
     what: Shown,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._input.arrays import index_array
-from ..._runtime.mixins import offered
+from ..._runtime.mixins import register_method
 from ..._runtime.solver_entry_point import grouped
 from ...mesh.triangles.self_intersections import AFFORDABLE_FACES
 from ..results.state import State, states_of
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 MOST_STATES = 9  # of a path, unless asked for more
 
 
-@offered
+@register_method
 @grouped(color=Color, view=View, style=Style)
 def plot(
     what: Shown,

@@ -12,9 +12,9 @@ import numpy as np
 from ..._core import __version__
 from ..._input.quantity import quantity
 from ..._runtime.files import replace_file
-from ..._runtime.mixins import offered
+from ..._runtime.mixins import register_method
 from ..._runtime.npz import open_npz
-from ...design.digest import digest
+from ...design.content_hash import content_hash
 from ...design.multistart.json_data import from_plain, to_plain
 from ...model.scene.scene import Scene
 from ...solve.dynamics.trajectory import MotionState, Trajectory
@@ -72,7 +72,7 @@ def digests(scene: Scene) -> dict[str, str]:
     found = {}
     for name, part in _parts(scene).items():
         try:
-            found[name] = digest(part)
+            found[name] = content_hash(part)
         except TypeError as error:
             raise ValueError(
                 f"a file must tell of which scene it is, and cannot for {name}, {part!r}: {error}"
@@ -100,7 +100,7 @@ _KINDS = {each.__name__: each for each in (Equilibrium, EquilibriumSet, Trajecto
 _CONTENTS = "contents"
 
 
-@offered
+@register_method
 def save(path: str | Path, result: Equilibrium | EquilibriumSet | Trajectory) -> None:
     """Writes a result into one file, an .npz of arrays and of JSON text, from which `load` makes it again.
 

@@ -11,7 +11,7 @@ from ... import _core
 from ..._input.arrays import count
 from ..._input.quantity import quantity, shape_of
 from ..._input.scalars import not_negative, positive
-from ..._input.tensors import detached, is_tensor, wants_gradient
+from ..._input.tensors import detached, is_tensor, requires_gradient
 from ..._runtime.memory import check_memory
 from ...model.contact.contacts_to_core import check_outside, poses
 from ...model.rigid.equimomental_points import check_joints, check_rigid, own_velocities
@@ -163,7 +163,7 @@ class MotionInputs:
         """A value in time, as in `scheduled`, at all knots: a tensor in its graph if it is one."""
         time_step = self.given_time_step
         knots = scheduled(name, unit, value, row, self.steps, self.integrator._times, self.clock, time_step)
-        if callable(value) and wants_gradient(time_step) and not _differentiable_in_time(knots, time_step):
+        if callable(value) and requires_gradient(time_step) and not _differentiable_in_time(knots, time_step):
             why = f"{name} is a function of the time that torch cannot follow; make its values from the time by torch"
             self.inputs.refuse("time_step", time_step, why)
         return knots
@@ -256,7 +256,7 @@ class MotionInputs:
                 why = "it goes on from another motion, whose history has no gradient: start=first.end takes its numbers"
                 inputs.refuse("start", start.positions, why)
                 return start.end
-            if wants_gradient(start.positions):
+            if requires_gradient(start.positions):
                 inputs.take("positions", start.positions)
                 inputs.take("edge_rotations", start.edge_rotations)
             return MotionState(0.0, start._state, still, start._turns)

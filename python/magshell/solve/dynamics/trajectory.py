@@ -14,7 +14,7 @@ from ..._input.quantity import quantity
 from ..._input.tensors import detached, plain_arrays
 from ..._runtime.files import replace_file
 from ..._runtime.frozen import immutable
-from ..._runtime.mixins import Filmed
+from ..._runtime.mixins import AnimateMixin
 from ..._runtime.npz import open_npz
 from ...mesh.triangles.self_intersections import told
 from ...model.actuators.actuator import Actuator
@@ -115,7 +115,7 @@ _ARRAYS = ("state", "velocity", "acceleration", "strain_rates", "maxwell_strains
 
 @immutable
 @dataclass(frozen=True, repr=False)
-class Trajectory(Filmed, OfOneBody):
+class Trajectory(AnimateMixin, OfOneBody):
     """A motion. With several bodies, rows are those of one after another; `trajectory[body]` has those of one.
 
     times: (n,) s, of the recorded states, the start among them. positions: (n, n_v, 3) m; velocities: (n, n_v, 3) m/s;
@@ -184,7 +184,7 @@ class Trajectory(Filmed, OfOneBody):
         values = Values.from_state(kept["scene"], kept["_values"])
         for obstacle, path in kept["_values"]["paths"].items():
             values.move(obstacle, path)
-        Filmed.__setstate__(self, {**kept, "_values": values})
+        AnimateMixin.__setstate__(self, {**kept, "_values": values})
 
     def __getitem__(self, body: Any) -> Any:
         """What it says of one body of the scene."""

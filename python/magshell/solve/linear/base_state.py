@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..._input.tensors import wants_gradient
+from ..._input.tensors import requires_gradient
 from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs, plain_inputs
 from ..statics.equilibrium import Equilibrium
@@ -106,7 +106,7 @@ class StiffnessAbout(Stiffness):
 def refuse_what_cannot_be(function: str, equilibrium: Equilibrium, inputs: Inputs) -> None:
     """Raises ValueError where nothing changes, where the equilibrium is not stable, or asks for a gradient."""
     for name in ("positions", "edge_rotations"):
-        if wants_gradient(getattr(equilibrium, name)):
+        if requires_gradient(getattr(equilibrium, name)):
             raise ValueError(
                 f"the equilibrium requires a gradient, and ms.{function} passes none back: find it under "
                 "torch.no_grad(), or of detached tensors"

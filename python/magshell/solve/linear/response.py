@@ -10,7 +10,7 @@ import numpy as np
 
 from ..._input.tensors import detached, like
 from ..._runtime.frozen import immutable
-from ..._runtime.mixins import Drawn
+from ..._runtime.mixins import PlotMixin
 from ..._runtime.solver_entry_point import solve_entry
 from ...model.scene.scene import Scene
 from ..statics.equilibrium import Equilibrium
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @immutable
 @dataclass(frozen=True, repr=False)
-class LinearResponse(Drawn):
+class LinearResponse(PlotMixin):
     """What linear theory says of a scene: the deflection in proportion to the controls. Not an equilibrium.
 
     displacements: (n_v, 3) m, from the rest shape, or from the equilibrium that was given; edge_rotations: (n_e,) rad, zero

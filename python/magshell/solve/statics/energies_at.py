@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._input.quantity import quantity
-from ..._input.tensors import to_array, wants_gradient
+from ..._input.tensors import requires_gradient, to_array
 from ..._runtime.solver_entry_point import solve_entry
 from ...model.bodies.bodies import checked_body
 from ...model.shells.shell import Shell
@@ -84,7 +84,7 @@ def energies(
         },
         ignore_velocity_forces=True,
     )
-    if inputs.leaves or any(map(wants_gradient, given.values())):
+    if inputs.leaves or any(map(requires_gradient, given.values())):
         raise ValueError("energies have no gradients: give tensors detached")
     mesh, model = scene.mesh, scene._model
     number = None if checked_body(body) is None else scene._bodies.number(body)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..._input.tensors import detached, plain_arrays
 from ..._runtime.frozen import immutable
-from ..._runtime.mixins import Kept
+from ..._runtime.mixins import SaveMixin
 from ...mesh.triangles.self_intersections import told
 from ...model.contact.body_contact import BodyContact
 from ...model.contact.contact import Contact
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @immutable
 @dataclass(frozen=True, repr=False)
-class Equilibrium(Kept, OfOneBody):
+class Equilibrium(SaveMixin, OfOneBody):
     """A scene at rest. With several bodies, rows are those of one after another; `equilibrium[body]` has those of one.
 
     positions: (n_v, 3) m; edge_rotations: (n_e,) rad, zero where an edge has none.
@@ -81,7 +81,7 @@ class Equilibrium(Kept, OfOneBody):
 
     def __setstate__(self, kept: dict[Any, Any]) -> None:
         values = Values.from_state(kept["scene"], kept["_values"])
-        Kept.__setstate__(self, {**kept, "_values": values})
+        SaveMixin.__setstate__(self, {**kept, "_values": values})
 
     def __getitem__(self, body: Any) -> Any:
         """What it says of one body of the scene."""

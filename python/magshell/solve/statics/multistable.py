@@ -12,7 +12,7 @@ from ... import _core
 from ..._input.arrays import count
 from ..._input.scalars import flag, positive
 from ..._runtime.log import log
-from ..._runtime.progress import told
+from ..._runtime.progress import solve_progress
 from ..._runtime.solver_entry_point import grouped, solve_entry
 from ...errors import Interrupted, NotConverged
 from ...model.scene.scene import Scene
@@ -119,7 +119,7 @@ def find_equilibria(
         "vertex_loads": vertex_loads,
         "values": values,
     }
-    with told("equilibria", progress) as (advance, note):
+    with solve_progress("equilibria", progress) as (advance, note):
         search = Search(
             MixedNewton() if solver is None else solver, True, advance, ignore_velocity_forces, note
         )

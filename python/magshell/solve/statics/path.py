@@ -14,7 +14,7 @@ from ..._input.arrays import count, number
 from ..._input.scalars import positive
 from ..._runtime.frozen import immutable
 from ..._runtime.log import log
-from ..._runtime.mixins import Filmed
+from ..._runtime.mixins import AnimateMixin
 from ..._runtime.progress import SolveBar
 from ..._runtime.solver_entry_point import grouped, solve_entry
 from ...errors import Interrupted, NotConverged
@@ -55,7 +55,7 @@ class CriticalPoint:
 
 @immutable
 @dataclass(frozen=True, repr=False)
-class EquilibriumPath(Filmed, OfOneBody):
+class EquilibriumPath(AnimateMixin, OfOneBody):
     """A path of equilibria, stable and unstable. `path[body]` has those of one body.
 
     parameters: (n,), 0 at the controls of the start, 1 at the new ones. positions: (n, n_v, 3) m.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..._runtime.progress import told
+from ..._runtime.progress import solve_progress
 from ..._runtime.solver_entry_point import grouped, solve_entry
 from ...model.scene.scene import Scene
 from ..options import MixedNewton, Newton
@@ -100,7 +100,7 @@ def equilibrium(
         "vertex_loads": vertex_loads,
         "values": values,
     }
-    with told("equilibrium", progress) as (advance, note):
+    with solve_progress("equilibrium", progress) as (advance, note):
         search = Search(
             MixedNewton() if solver is None else solver, require_stable, advance, ignore_velocity_forces, note
         )

@@ -1,7 +1,7 @@
-"""Digests of values, the same in every process: equal where two values are the same to the bit.
+"""Hashes of values, the same in every process: equal if two values are the same to the bit.
 
-A function is its code, what it holds and what it uses of its own module and of other modules that are the user's; what
-is installed (the standard library, packages, magshell) is taken to be what its name says.
+The hash of a function covers its code, its closure, and what it uses of its own module and of other modules of the
+user's. Installed code (the standard library, packages, magshell) is identified by its name only.
 """
 
 from __future__ import annotations
@@ -27,21 +27,21 @@ _INSTALLED = tuple(
     }
 )
 _PLAIN = (bool, int, float, complex, str, bytes)
-_NAMED = (type, types.FunctionType, types.ModuleType, np.ufunc, np.dtype)  # those that are not the user's
-_HEAP_TYPE = 1 << 9  # of a class that was made in Python
+_NAMED = (type, types.FunctionType, types.ModuleType, np.ufunc, np.dtype)  # installed ones: hashed by name
+_HEAP_TYPE = 1 << 9  # flag of a class that was made in Python
 _NOT_CONTENT = {
     *("__dict__", "__weakref__", "__doc__", "__module__", "__annotations__", "_abc_impl"),
     *("__firstlineno__", "__static_attributes__"),
 }
 
 
-def digest(value: Any) -> str:
-    """Raises TypeError where the value, or a part of it, neither is plain nor can be pickled."""
-    return _Digester().of(value).hex()
+def content_hash(value: Any) -> str:
+    """Return the hash of a value as text. Raises TypeError if a part of it is neither plain nor can be pickled."""
+    return _Hasher().of(value).hex()
 
 
 def used_globals(function: types.FunctionType) -> Iterator[tuple[str, object]]:
-    """(name, value) of what the function looks up outside itself, also in modules of the user's."""
+    """Yield (name, value) of the globals that the function uses, also those in other modules of the user's."""
     for name in sorted(_names(function.__code__)):
         if name not in function.__globals__:
             continue
@@ -54,17 +54,19 @@ def used_globals(function: types.FunctionType) -> Iterator[tuple[str, object]]:
 
 
 def is_own_function(value: Any) -> bool:
-    """Whether it is a function of the user's, in Python."""
+    """Return whether the value is a Python function of the user's, not an installed one."""
     return isinstance(value, types.FunctionType) and _is_own(value.__code__.co_filename)
 
 
 def _is_own(file: str) -> bool:
+    """Return whether a source file is the user's: not of the standard library, an installed package or magshell."""
     if file.startswith(("<frozen", "<built-in")):
         return False
     return file.startswith("<") or not str(Path(file).resolve()).startswith(_INSTALLED)
 
 
 def _joined(*parts: bytes | str) -> bytes:
+    """Return the hash of several parts, each preceded by its length."""
     joined = hashlib.blake2b(digest_size=16)
     for part in parts:
         content = part.encode("utf-8", "surrogatepass") if isinstance(part, str) else part
@@ -72,13 +74,13 @@ def _joined(*parts: bytes | str) -> bytes:
     return joined.digest()
 
 
-class _Digester:
-    """Digests of values within each other, each object looked at once."""
+class _Hasher:
+    """Computes hashes of nested values; each object is visited once."""
 
     def __init__(self):
         self._known: dict[int, bytes] = {}
-        self._above: dict[int, int] = {}  # the objects that hold the one at hand, by how deep they are
-        self._seen: list[Any] = []  # alive, else another object might be taken for one of them
+        self._above: dict[int, int] = {}  # the objects that contain the current one, with their depths
+        self._seen: list[Any] = []  # kept alive: a new object could get the id of a deleted one
 
     def of(self, value: Any) -> bytes:
         if value is None or type(value) in _PLAIN:
@@ -97,7 +99,7 @@ class _Digester:
         return found
 
     def _parts(self, value) -> list[bytes | str]:
-        """What kind of thing it is, and what makes it."""
+        """Return what determines the hash of a value: a name of its kind and its content."""
         if is_tensor(value):
             flat = value.detach().cpu().reshape(-1)
             content = flat.view(sys.modules["torch"].uint8).numpy().tobytes() if flat.numel() else b""
@@ -148,14 +150,14 @@ class _Digester:
         return parts
 
     def _loosely(self, value) -> bytes | str:
-        """A module or a class may hold anything, such as a lock: what has no digest is its type's name."""
+        """Return the hash of a value in a module or a class, or its type's name if it has none, such as a lock."""
         try:
             return self.of(value)
         except TypeError:
             return type(value).__qualname__
 
     def _reduced_parts(self, value) -> list[bytes | str]:
-        """By what pickle would make of it."""
+        """Return the content as pickle would store it. Raises TypeError if the value cannot be pickled."""
         try:
             reduced = value.__reduce_ex__(4)
         except Exception as error:
@@ -169,7 +171,7 @@ class _Digester:
 
 
 def closure(function: types.FunctionType) -> dict[str, object]:
-    """{name: value} of what the function holds of the functions around it."""
+    """Return {name: value} of the variables that a function holds from the functions around it."""
     held = {}
     for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
         try:
@@ -180,13 +182,14 @@ def closure(function: types.FunctionType) -> dict[str, object]:
 
 
 def _is_own_class(value: type[Any]) -> bool:
+    """Return whether a class is the user's: made in Python, in a file that is not installed."""
     if value.__module__ in sys.builtin_module_names or not value.__flags__ & _HEAP_TYPE:
         return False
     return _is_own(getattr(sys.modules.get(value.__module__), "__file__", None) or "<prompt>")
 
 
 def _is_builtin_function(value) -> bool:
-    """Of a module, and not one bound to an object."""
+    """Return whether the value is a built-in function of a module, not a method bound to an object."""
     if not isinstance(value, types.BuiltinFunctionType):
         return False
     owner = value.__self__
@@ -199,6 +202,6 @@ def _name(value) -> str:
 
 
 def _names(code: types.CodeType) -> set[str]:
-    """All that the code, and the functions within it, look up by name."""
+    """Return all names that the code, and the functions within it, look up."""
     inner = (_names(each) for each in code.co_consts if isinstance(each, types.CodeType))
     return set(code.co_names).union(*inner)
