@@ -1,13 +1,14 @@
-"""Whether faces with an angle near 180 degrees stiffen a bent sheet, and a warning where they do.
+"""Warns if faces with an angle near 180 degrees make a bent sheet too stiff (membrane locking).
 
-A cap of height H stands on an edge of length b. Where the sheet bends with a curvature k along that edge, its tip leaves
-the edge by k b^2 / 8: the face tilts by p = k b^2 / (8 H) and, flat as it is, stretches by p^2 / 2 across the edge. The
-sheet itself does not. Once that costs more than bending does around the cap,
+Such a face, a cap, of height H stands on an edge of length b. If the sheet bends with curvature k along that edge, the
+cap's tip leaves the edge by k b^2 / 8: the face tilts by p = k b^2 / (8 H) and, as it is flat, stretches by p^2 / 2
+across
+the edge. The sheet itself does not stretch. If that takes more energy than bending does around the cap,
 
     L = (A_cap Y h p^4 / 8) / (A Y h^3 k^2 / 24) = 3 (A_cap / A) p^4 / (h k)^2   beyond 1,
 
-A the area of the cap and the faces beside it, the sheet cannot bend there as it would. The core measures the stretch of
-most caps on other triangles (assembly/membrane_faces.h); this is about those that it leaves.
+with A the area of the cap and of the adjacent faces, the sheet cannot bend there as it should. The core measures the
+strain of most caps on other triangles (assembly/membrane_faces.h); this module is about the remaining ones.
 """
 
 from __future__ import annotations
@@ -26,18 +27,21 @@ if TYPE_CHECKING:
     from ..scene.scene import Scene
     from .shell import Shell
 
-LEAST_ANGLE = np.radians(120.0)  # of faces that are looked at
-# Share of the bending energy that is in the way of caps. Measured on strips of crossed cells, of 1/25 to 1/400 of their
-# length thick and bent by 0.1 to 1 rad: the end is off by 0.1 to 0.6 of it, so here by 0.3 to 2 %.
-TRUSTED_SHARE = 0.03
+LEAST_ANGLE = np.radians(120.0)  # smallest angle that makes a face a cap
+# [-] Fraction of the bending energy that caps may obstruct without a warning. Measured on strips of crossed cells, 1/25 to
+# 1/400 of their length thick and bent by 0.1 to 1 rad: the deflection is wrong by 0.1 to 0.6 times this fraction, so at
+# this limit by 0.3 to 2 %.
+TRUSTED_FRACTION = 0.03
 _MOST_NAMED = 4  # faces in a warning
 
 
 class ObtuseFaces:
-    """Those of a sheet that stretch as they tilt. Costs nothing where there are none."""
+    """The caps of a sheet that stretch as they tilt.
+
+    recut: caps to leave out, because the core measures their strain on other triangles.
+    """
 
     def __init__(self, shell: Shell, recut: Numbers = ()):
-        """recut: faces whose stretch is measured on other triangles."""
         mesh, quality = shell.mesh, shell.quality
         is_cap = quality.largest_angles > LEAST_ANGLE
         is_cap[np.asarray(recut, dtype=int)] = False
@@ -46,13 +50,18 @@ class ObtuseFaces:
         edges = mesh.face_edges[self.faces]  # (k, 3)
         self._bases = np.take_along_axis(edges, np.argmax(mesh.edge_lengths[edges], axis=1)[:, None], 1)[:, 0]
         self._heights = quality.heights[self.faces]
-        around = np.sort(mesh.edge_faces[edges].reshape(-1, 6), axis=1)  # the cap thrice
+        around = np.sort(
+            mesh.edge_faces[edges].reshape(-1, 6), axis=1
+        )  # adjacent faces, and the cap three times
         new = (around >= 0) & (np.diff(around, axis=1, prepend=-1) > 0)
         self._areas = np.where(new, mesh.face_areas[around], 0.0).sum(axis=1)
         self._rest_curvatures = self._curvatures(mesh.rest_positions)
 
-    def held_back(self, positions: np.ndarray, shell: Shell, bending_energy: float) -> np.ndarray:
-        """(k,): the bending energy in the way of each cap, as a share of all of it. shell: with its values now."""
+    def obstructed_fractions(self, positions: np.ndarray, shell: Shell, bending_energy: float) -> np.ndarray:
+        """Return the bending energy that each cap obstructs, as a fraction of the whole bending energy, (k,).
+
+        shell: with the values of the solve.
+        """
         if not (self.faces.size and bending_energy > 0.0 and np.isfinite(positions).all()):
             return np.zeros(len(self.faces))
         thickness, young_modulus = shell.thickness[self.faces], shell.young_modulus[self.faces]
@@ -67,7 +76,7 @@ class ObtuseFaces:
         )
 
     def _curvatures(self, positions: np.ndarray) -> np.ndarray:
-        """(k,), 1/m: by how much the sheet's normal turns along each base."""
+        """Return the curvature along the base of each cap, by the rotation of the sheet's normal, (k,) 1/m."""
         mesh = self._mesh
         if not self.faces.size:
             return np.zeros(0)
@@ -80,16 +89,16 @@ class ObtuseFaces:
 def warn_of_obtuse_faces(
     scene: Scene, positions: np.ndarray, shell: Shell, bending_energy: float, where: str
 ) -> None:
-    """Says once a scene that caps stiffen the sheet where it is bent like this. where: the result, in words."""
+    """Warn, once per scene, if caps make the sheet too stiff in this state. where: the result, in words."""
     if scene._warned_of_obtuse_faces or not scene.bodies or not scene._bodies.flat_sheets_alone:
         return
     caps = scene._obtuse_faces
-    shares = caps.held_back(positions, shell, bending_energy)
-    if shares.sum() <= TRUSTED_SHARE:
+    fractions = caps.obstructed_fractions(positions, shell, bending_energy)
+    if fractions.sum() <= TRUSTED_FRACTION:
         return
     remember(scene, _warned_of_obtuse_faces=True)
-    worst = np.argsort(-shares, kind="stable")
-    worst = worst[shares[worst] > 0.01 * shares.max()]
+    worst = np.argsort(-fractions, kind="stable")
+    worst = worst[fractions[worst] > 0.01 * fractions.max()]
     warnings.warn(
         f"{where} cannot be trusted. {describe_faces(shell, caps.faces[worst])} almost flat, and the sheet bends along "
         "the long edge, which such a face cannot follow: it makes the sheet too stiff. Move the vertex at the blunt "
@@ -100,7 +109,7 @@ def warn_of_obtuse_faces(
 
 
 def describe_faces(shell: Shell, faces: np.ndarray) -> str:
-    """The first few of them and the shape of the first, as the beginning of a sentence."""
+    """Return the beginning of a sentence that names the first few faces and the shape of the first one."""
     quality, first = shell.quality, faces[0]
     shape = (
         f"{first} (largest angle {np.degrees(quality.largest_angles[first]):.6g} deg, height "

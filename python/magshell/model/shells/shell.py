@@ -1,4 +1,4 @@
-"""Defines shells and the growth of their faces."""
+"""Shells and the growth of their faces."""
 
 from __future__ import annotations
 
@@ -21,21 +21,24 @@ if TYPE_CHECKING:
     from ..scene.values import Gradient, Values
 
 
-_SYMMETRIC = 1e-9  # of the largest entry
+_SYMMETRIC = 1e-9  # [-] of the largest entry: tolerance of the check for symmetry
 UNITS = {"growth": "1", "rest_curvature": "1/m"}
 
 
 class Growth:
-    """What a shell's growth and rest curvature may be, for `n` faces or elements.
+    """Checks of a shell's growth and rest curvature, for `n` faces or elements.
 
-    rows: what messages call n. axes: (n, 2, 3), two unit vectors in each face at rest.
+    rows: the name of n in messages. axes: (n, 2, 3), two unit vectors in each face at rest.
     """
 
     def __init__(self, rows: str, axes: np.ndarray):
         self._rows, self._axes = rows, axes
 
     def checked(self, name: str, given: Any, before: np.ndarray | None = None) -> np.ndarray:
-        """A number, (n,), (3, 3) or (n, 3, 3), as it was given; of the shape of what was `before`. Raises ValueError."""
+        """Return a growth or rest curvature as it was given: a number, (n,), (3, 3) or (n, 3, 3). Raises ValueError.
+
+        before: the value that it replaces, whose shape it must have or gets.
+        """
         label, n = f"{name} [{UNITS[name]}]", len(self._axes)
         array = real_numbers(label, given)
         if array.shape not in ((), (n,), (3, 3), (n, 3, 3)):
@@ -55,7 +58,9 @@ class Growth:
         return np.broadcast_to(array, before.shape)
 
     def check(self, name: str, rows: np.ndarray) -> None:
-        """Raises ValueError where a face cannot have one of the values (k, *shape), finite and of an allowed shape."""
+        """Raise ValueError if values (k, *shape), finite and of an allowed shape, are not symmetric, or a growth not
+        positive.
+        """
         label, is_tensor = f"{name} [{UNITS[name]}]", _is_tensor(rows.shape[1:])
         of_faces = rows.ndim in (2, 4)
         if is_tensor:
@@ -75,11 +80,11 @@ class Growth:
             )
 
     def in_faces(self, array: np.ndarray) -> np.ndarray:
-        """Return what lies in the faces, in their axes, (n, 2, 2): of a value of one of the allowed shapes."""
+        """Return the in-plane part of a value of an allowed shape, in the axes of the faces, (n, 2, 2)."""
         return self._in_faces(array[None])[0]
 
     def _in_faces(self, rows: np.ndarray) -> np.ndarray:
-        """Return the same, (k, n, 2, 2), of k values (k, *shape)."""
+        """Return the in-plane parts of k values (k, *shape), (k, n, 2, 2)."""
         if _is_tensor(rows.shape[1:]):
             rows = rows[:, None] if rows.ndim == 3 else rows
             every = np.broadcast_to(rows, (len(rows), len(self._axes), 3, 3))
@@ -89,12 +94,12 @@ class Growth:
 
 
 def _is_tensor(shape: tuple[int, ...]) -> bool:
-    """Whether a value of an allowed shape, (), (n,), (3, 3) or (n, 3, 3), holds tensors."""
+    """Return whether a value of an allowed shape, (), (n,), (3, 3) or (n, 3, 3), holds tensors."""
     return len(shape) > 1
 
 
 def core_form(array: np.ndarray | None) -> tuple[int, int]:
-    """How many rows of how many numbers the core keeps of a value; none of one that is not there."""
+    """Return how many rows the core stores of a value, and of how many numbers; no rows for None."""
     if array is None:
         return 0, 1
     width = 9 if _is_tensor(array.shape) else 1
@@ -102,59 +107,55 @@ def core_form(array: np.ndarray | None) -> tuple[int, int]:
 
 
 def _which(sizes: np.ndarray) -> str:
-    """Name the face, the last axis, of the largest entry."""
+    """Return words that name the face, along the last axis, with the largest entry."""
     return f" that of face {int(np.argmax(sizes)) % sizes.shape[-1]}"
 
 
 BENDING = ("midedge", "midedge2", "hinge")
-# Of an element's mass at its nodes, in proportion to the diagonal of its mass matrix where it is flat (Hinton, Rock,
-# Zienkiewicz 1976): positive, as those of the shape functions are not.
+# Fractions of an element's mass at its nodes, in proportion to the diagonal of the mass matrix of a flat element (Hinton,
+# Rock, Zienkiewicz 1976). All are positive, while the integrals of the shape functions are not.
 _LUMPED = {3: np.full(3, 1 / 3), 6: np.array([1 / 19] * 3 + [16 / 57] * 3)}
 
 
 class Shell(Owner):
     """A thin sheet of St. Venant-Kirchhoff material under the Kirchhoff-Love assumption.
 
-    Every property is a number, or an array with one entry a face (of a QuadraticTriangleMesh an element);
-    `curvature_scale` one an
-    edge.
+    Every property is a number, or an array with one entry per face (per element of a QuadraticTriangleMesh);
+    `curvature_scale` has one per edge.
 
-    mesh: TriangleMesh or QuadraticTriangleMesh, its positions are the rest shape.
+    mesh: TriangleMesh or QuadraticTriangleMesh; its positions are the rest shape.
     thickness: m, positive.
     young_modulus: Pa, positive.
     poisson_ratio: in (-1, 1/2].
-    mass_density: kg/m3, positive; only gravity asks for it.
+    mass_density: kg/m3, positive; needed for gravity and motions only.
     curvature_scale: positive factor on every bending strain, [Chen22] k_cur; not for "midedge2".
-    bending: "midedge", the default (second order on irregular meshes too, see `quality`; one rotation an edge: the
+    bending: "midedge", the default (second order, on irregular meshes too, see `quality`; one rotation per edge: the
         lowest-order Hellan-Herrmann-Johnson element); "midedge2", the default and the only one for a
-        QuadraticTriangleMesh (fourth
-        order in smooth problems; curved elements, two rotations an edge, linear moments, and membrane strains of Regge
-        elements: Neunteufel and Schoeberl 2019, 2021); or "hinge" ([Chen22] (19): no rotations, cheaper, and off by several
-        percent on irregular meshes).
-    remanent_magnetization: (3,) or (n_f, 3) A/m, in a scene with a field, where a solve says nothing else.
-    growth: by what factor lengths have grown in the faces: what they would be without stress. A positive number, or a
-        symmetric tensor in world axes at rest, (3, 3) or one a face (n_f, 3, 3), of which counts what lies in the face:
+        QuadraticTriangleMesh (fourth order in smooth problems; curved elements, two rotations per edge, linear moments, and
+        membrane strains of Regge elements: Neunteufel and Schoeberl 2019, 2021); or "hinge" ([Chen22] (19): no rotations,
+        cheaper, and off by several percent on irregular meshes).
+    remanent_magnetization: (3,) or (n_f, 3) A/m, in a scene with a field, unless a solve gives another.
+    growth: the factor by which lengths in the faces have grown, so that they are free of stress: a positive number, or a
+        symmetric tensor in world axes at rest, (3, 3) or one per face (n_f, 3, 3), of which the part in the face acts:
         np.eye(3) + 0.1 np.outer(d, d) grows by a tenth along d. A sheet that is stretched by s before it is fixed to others
         has growth 1/s. None: 1, and no solve can change it.
-    rest_curvature: 1/m, added to the curvature of the rest shape: a number (alike in all directions), or a symmetric
-        tensor as above, np.outer(d, d) / R bends along d; in lengths as they have grown. Positive where normals lean
-        together. None: nothing is added, and no solve can.
+    rest_curvature: 1/m, added to the curvature of the rest shape: a number (equal in all directions), or a symmetric
+        tensor as above, np.outer(d, d) / R bends along d; per grown length. Positive where normals lean together. None:
+        zero, and no solve can change it.
 
-    Growth changes what stretching and bending are measured from, and the area whose energy they are; an even one leaves
-    the angles of a curved rest shape as they are, so that it scales the shape (in general its second fundamental form is
-    multiplied by the root of det G). Everything else stays: thickness is that of the grown sheet; mass, weight,
+    Growth changes the stress-free state that stretching and bending are measured from, and the area of the energy. A
+    uniform growth keeps the angles of a curved rest shape, so that it scales the shape (in general its second fundamental
+    form is multiplied by the root of det G). Everything else stays: thickness is that of the grown sheet; mass, weight,
     magnetization and area loads are those of the mesh, and the magnetization stretches with the sheet, grown or not. Both
-    may change along ms.follow_path and in ms.simulate. With "hinge" both faces of an edge share one angle,
-    their mean, and free
-    edges have none.
+    growth and rest_curvature may change along ms.follow_path and in ms.simulate. With "hinge" both faces of an edge share
+    one angle, their mean, and free edges have none.
 
-    Which one: an element of "midedge2" costs about eight times a face of "midedge", and needs far fewer of them. Where
-    deflections and loads are wanted to a percent or better, and where sheets are curved at rest or twist, take "midedge2"
-    with a QuadraticTriangleMesh; the coarsest mesh that shows the shape will often do. Where the mesh has to
-    be fine anyway, for
-    contacts, many small faces of their own magnetization, creases and folds, or where a few percent are enough, take
-    "midedge". Smoothness is what order four lives on: at clamps' corners, point forces and jumps inside an element the two
-    are alike.
+    Choice of the element: one of "midedge2" costs about eight times a face of "midedge", but far fewer are needed. For
+    deflections and loads to a percent or better, and for sheets that twist or are curved at rest, use "midedge2" with a
+    QuadraticTriangleMesh; often the coarsest mesh that represents the shape is enough. If the mesh has to be fine anyway,
+    for contacts, many small faces with their own magnetization, creases or folds, or if a few percent are enough, use
+    "midedge". The fourth order needs smooth solutions: at corners of clamps, point forces and jumps inside an element both
+    converge alike.
 
     >>> import magshell as ms
     >>> ms.Shell(ms.meshes.rectangle(0.1, 0.02, cells=(10, 2)), thickness=1e-3, young_modulus=1e5)
@@ -236,7 +237,7 @@ class Shell(Owner):
         self._in_time = tuple(name for name in type(self)._in_time if name not in absent)
 
     def replaced(self, **values: Any) -> Shell:
-        """The same sheet with other properties."""
+        """Return the same sheet with other properties."""
         properties = {name: getattr(self, name) for name in self._replaceable}
         grown = {
             name: self._growth.checked(name, values[name], getattr(self, name))
@@ -248,11 +249,13 @@ class Shell(Owner):
     def _add_numbers(self, label: str, values: Values, numbers: dict[Any, Any]) -> None:
         for name in self._stiffnesses:
             numbers[label, name] = getattr(self, name)
-        if self.remanent_magnetization is not None:  # else a solve brings it
+        if self.remanent_magnetization is not None:  # else a solve gives it
             numbers[label, "remanent_magnetization"] = self.remanent_magnetization
 
     def _gradients(self, label: str, values: Values, gradient: Gradient) -> dict[str, np.ndarray]:
-        """With what its values do to the masses of the vertices, and to what contacts make of the thickness."""
+        """Return the gradients by its values, including those through the vertex masses and through the thickness in
+        contacts.
+        """
         found = {name: gradient.value(label, name) for name in self._stiffnesses}
         if gradient.has(label, "remanent_magnetization"):
             found["remanent_magnetization"] = gradient.value(label, "remanent_magnetization")
@@ -261,8 +264,8 @@ class Shell(Owner):
                 found["thickness"] = found["thickness"] + contact._by_thickness(of_contact, sheets, gradient)
         at = values.part_of(self).vertices
         by_volume_mass = [
-            (by[at][self.mesh.elements] * shares).sum(axis=1)
-            for by, shares in zip(values.by_inertia_and_weight(gradient), self._shares, strict=True)
+            (by[at][self.mesh.elements] * areas).sum(axis=1)
+            for by, areas in zip(values.by_inertia_and_weight(gradient), self._nodal_areas, strict=True)
             if by is not None
         ]
         if by_volume_mass:
@@ -273,19 +276,19 @@ class Shell(Owner):
 
     @property
     def _stiffnesses(self) -> tuple[str, ...]:
-        """What of it the core's elastic terms read."""
+        """The names of the values that the core's elastic terms use."""
         names = ("thickness", "young_modulus", "poisson_ratio", "curvature_scale")
         return (*(names if self.mesh.order == 1 else names[:3]), *self._in_time)
 
     @property
     def _growth(self) -> Growth:
-        """What its growth may be."""
+        """The checks of its growth and rest curvature."""
         corners = self.mesh.rest_positions[self.mesh.elements[:, :3]]
         return Growth("n_f" if self.mesh.order == 1 else "n", corner_axes(corners))
 
     @property
     def _has_grown(self) -> bool:
-        """Whether its rest shape is under stress by itself."""
+        """Return whether growth or rest curvature change its stress-free shape."""
         without = {"growth": np.eye(2), "rest_curvature": np.zeros((2, 2))}
         return any(
             (self._growth.in_faces(getattr(self, name)) != without[name]).any() for name in self._in_time
@@ -293,7 +296,9 @@ class Shell(Owner):
 
     @property
     def _grown_by(self) -> np.ndarray:
-        """(n_f, 2, 2) in `corner_axes` of the faces; of a QuadraticTriangleMesh, each flat face like its element."""
+        """The growth of the faces in their `corner_axes`, (n_f, 2, 2); flat faces of a QuadraticTriangleMesh have their
+        element's.
+        """
         n = len(self.mesh.faces)
         if self.growth is None:
             return np.broadcast_to(np.eye(2), (n, 2, 2))
@@ -301,26 +306,28 @@ class Shell(Owner):
         return Growth("n_f", corner_axes(self.mesh.rest_positions[self.mesh.faces])).in_faces(growth)
 
     def _check_in_time(self, name: str, rows: np.ndarray) -> None:
-        """Of a value over time. Raises ValueError."""
+        """Raise ValueError if a value over time, (k, *shape), is not allowed."""
         self._growth.check(name, rows)
 
     def __getstate__(self) -> dict[Any, Any]:
-        """What a copy is made from: not what was looked up meanwhile."""
+        """Return the data for a copy, without the cached `quality`."""
         return {name: value for name, value in vars(self).items() if name != "quality"}
 
     @cached_property
     def quality(self) -> MeshQuality:
-        """The shapes of its faces, their heights also beside the thickness."""
+        """The shapes of its faces, with their heights also relative to the thickness."""
         return MeshQuality(self.mesh if self.mesh.order == 1 else self.mesh.surface, self._face_thickness)
 
     @property
     def _face_thickness(self) -> np.ndarray:
-        """(n_f,), m: of a QuadraticTriangleMesh, of its flat faces."""
+        """The thickness of the faces, (n_f,) m; of a QuadraticTriangleMesh, of its flat faces."""
         return self._on_faces(self.thickness)
 
     @property
     def _face_magnetization(self) -> np.ndarray | None:
-        """(n_f, 3) A/m, of its own; of a QuadraticTriangleMesh, on its flat faces."""
+        """The magnetization of its faces, (n_f, 3) A/m, None without one; of a QuadraticTriangleMesh, that of its flat
+        faces.
+        """
         own = self.remanent_magnetization
         return None if own is None else self._on_faces(own)
 
@@ -329,45 +336,53 @@ class Shell(Owner):
 
     @property
     def face_volumes(self) -> np.ndarray:
-        """Rest volumes, (n_f,), m3: of a QuadraticTriangleMesh, of its elements."""
+        """The rest volumes of the faces, (n_f,) m3; of a QuadraticTriangleMesh, of its elements."""
         return self.mesh.element_areas * self.thickness
 
     @property
-    def _shares(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of each element's area, at its nodes, (n, 3) or (n, 6) m2: for inertia, for weights, which of six nodes are shared
-        out by their shape functions: a third between corners and none at them where it is straight."""
-        even = self.mesh.element_areas[:, None] * _LUMPED[self.mesh.elements.shape[1]]
-        if self.mesh.order == 1:
-            return even, even
-        return even, shape_integrals(self.mesh.rest_positions[self.mesh.elements])
+    def _nodal_areas(self) -> tuple[np.ndarray, np.ndarray]:
+        """The areas of each element's nodes, (n, 3) or (n, 6) m2, first for inertia, then for weights.
 
-    def _gathered(self, shares: np.ndarray) -> np.ndarray:
+        Those for inertia are lumped. Those for weights are integrals of the shape functions: for a straight six-node element
+        zero at corners and a third of the area at midpoints of edges.
+        """
+        lumped = self.mesh.element_areas[:, None] * _LUMPED[self.mesh.elements.shape[1]]
+        if self.mesh.order == 1:
+            return lumped, lumped
+        return lumped, shape_integrals(self.mesh.rest_positions[self.mesh.elements])
+
+    def _assembled_masses(self, nodal_areas: np.ndarray) -> np.ndarray:
         masses = np.zeros(self.mesh.n_vertices)
-        np.add.at(masses, self.mesh.elements, self._areal_masses[:, None] * shares)
+        np.add.at(masses, self.mesh.elements, self._areal_masses[:, None] * nodal_areas)
         return masses
 
     @property
     def _areal_masses(self) -> np.ndarray:
-        """(n,), kg/m2. Raises ValueError without mass density."""
+        """The mass per area of each element, (n,) kg/m2. Raises ValueError without mass density."""
         if self.mass_density is None:
             raise ValueError("the shell has no mass_density [kg/m3]")
         return self.thickness * self.mass_density
 
     @property
     def vertex_masses(self) -> np.ndarray:
-        """Lumped masses for inertia, (n_v,), kg: a third of each face's at its corners; 1/19 of each six-node element's at
-        its corners and 16/57 between them. A sheet without mass density has none."""
-        return self._gathered(self._shares[0])
+        """The lumped masses for inertia, (n_v,) kg. Raises ValueError without mass density.
+
+        A face has a third of its mass at each corner; a six-node element has 1/19 at each corner and 16/57 at each
+        midpoint.
+        """
+        return self._assembled_masses(self._nodal_areas[0])
 
     @property
     def _weighed_masses(self) -> np.ndarray:
-        """What gravity pulls at each vertex by, (n_v,), kg."""
-        return self._gathered(self._shares[1])
+        """The masses on which gravity acts, (n_v,) kg."""
+        return self._assembled_masses(self._nodal_areas[1])
 
     @property
     def element_masses(self) -> tuple[np.ndarray, np.ndarray]:
-        """Consistent masses: the nodes of each element (n, 3) or (n, 6), and the integrals of its mass per area times the
-        products of their shape functions (n, 3, 3) or (n, 6, 6), kg."""
+        """The consistent masses: nodes of each element (n, 3) or (n, 6), and mass matrices (n, 3, 3) or (n, 6, 6), kg.
+
+        A mass matrix has the integrals of the mass per area times products of shape functions.
+        """
         masses, nodes = self._areal_masses[:, None, None], self.mesh.elements
         if self.mesh.order == 2:
             return nodes, masses * shape_products(self.mesh.rest_positions[nodes])
@@ -408,7 +423,7 @@ def _checked_bending(bending, mesh) -> str:
 
 
 def magnetization_of(given: Numbers, count: int, rows: str = "(n_f, 3)") -> np.ndarray:
-    """One row for each of `count`, of one vector for all or one each."""
+    """Return a magnetization (3,) or (count, 3) A/m as one row for each of `count` faces. Raises ValueError."""
     given = real_numbers("remanent_magnetization [A/m]", given)
     if given.shape not in ((3,), (count, 3)):
         raise ValueError(
@@ -418,7 +433,7 @@ def magnetization_of(given: Numbers, count: int, rows: str = "(n_f, 3)") -> np.n
 
 
 def _property(name: str, unit: str, value, rows: tuple[str, int]) -> np.ndarray:
-    """One finite number a row, from an array of that length or from a single number."""
+    """Return one finite number per row, from an array of that length or from a single number."""
     array = real_numbers(f"{name} [{unit}]", value)
     if array.shape not in ((), (rows[1],)):
         raise ValueError(

@@ -1,4 +1,4 @@
-"""How far a sheet is stretched and bent, and when that leaves the model."""
+"""Strains of a sheet's faces by stretching and bending, and a warning where they leave the model."""
 
 from __future__ import annotations
 
@@ -17,20 +17,22 @@ if TYPE_CHECKING:
     from ..scene.scene import Scene
 
 
-SMALL = 0.2  # the largest strain for which St. Venant-Kirchhoff material is of use
+SMALL = 0.2  # [-] largest strain for which St. Venant-Kirchhoff material is a useful model
 _MOST_NAMED = 5  # faces in a warning
 
 
 @immutable
 class Strains(NamedTuple):
-    """Principal strains of every face, (n_f, 2) each, dimensionless, the larger value first; of one shell after another,
-    solids between them have no rows.
+    """Principal strains of every face, (n_f, 2) each, dimensionless, the larger value first; one shell after another.
+    Solids
+    between them have no rows.
 
     membrane: of Green's strain of the middle surface, (F^T F - 1)/2: a stretch s gives (s^2 - 1)/2.
-    bending: half the thickness times the change of curvature since rest: the strain that bending makes at the
-        outer fibres, positive where the normals lean together. curvature_scale is not in it.
+    bending: half the thickness times the change of curvature from the rest shape: the strain by bending at the outer
+    fibres,
+        positive where the normals lean together. It does not include curvature_scale.
 
-    The outer fibres have membrane + bending and membrane - bending, where the two have the same axes.
+    The outer fibres have the strains membrane + bending and membrane - bending if both have the same axes.
     """
 
     membrane: np.ndarray
@@ -38,7 +40,7 @@ class Strains(NamedTuple):
 
     @property
     def largest(self) -> np.ndarray:
-        """(n_f,), the largest magnitude among the four of each face."""
+        """The largest magnitude among the four strains of each face, (n_f,)."""
         return np.abs(np.concatenate(self, axis=1)).max(axis=1)
 
 
@@ -65,19 +67,19 @@ class StrainHistory(NamedTuple):
 
     @staticmethod
     def of(rows: Sequence[Any]) -> StrainHistory:
-        """From what the core says of each state."""
+        """Return the history from the rows that the core computes for each state."""
         numbers = np.array([(membrane, bending) for membrane, _, bending, _ in rows]).reshape(-1, 2)
         return StrainHistory(numbers[:, 0], numbers[:, 1])
 
     @staticmethod
     def of_each(strains: Numbers) -> StrainHistory:
-        """From the Strains of each state."""
+        """Return the history from the Strains of each state."""
         pairs = [[np.abs(each).max(initial=0.0) for each in of_state] for of_state in strains]
         return StrainHistory(*np.reshape(pairs, (-1, 2)).T)
 
     @property
     def worst(self) -> int:
-        """The state with the largest of all."""
+        """The number of the state with the largest strain of all."""
         return int(np.argmax(np.maximum(*self)))
 
     def at(self, state: int) -> Largest:
@@ -90,12 +92,12 @@ class StrainHistory(NamedTuple):
 
 
 def is_small(strain: float) -> bool:
-    """False where it is no number."""
+    """Return whether a strain is within the model; False for NaN."""
     return strain <= SMALL
 
 
 def strains_of(scene: Scene, state: np.ndarray, thickness: np.ndarray) -> Strains:
-    """Of a state of the core. Raises ValueError where the scene has solids only."""
+    """Return the strains in a state of the core. Raises ValueError if the scene has solids only."""
     if scene._bodies.solids and not scene._bodies.sheets:
         raise ValueError("strains() has those of shells, and the scene has none: ask result[solid].strains()")
     rows = scene._model.principal_strains(state, thickness)
@@ -103,12 +105,15 @@ def strains_of(scene: Scene, state: np.ndarray, thickness: np.ndarray) -> Strain
 
 
 def largest_of(scene: Scene, state: np.ndarray, thickness: np.ndarray) -> Largest:
+    """Return the largest strains in a state of the core."""
     return StrainHistory.of([scene._model.largest_strains(state, thickness)]).at(0)
 
 
 def warn_if_large(result: SolveResult, largest: Largest, where: str, index: tuple[Any, ...] = ()) -> None:
-    """Says once a scene that a result leaves the model, and again where strains have doubled since: a design that is
-    solved a thousand times says it a few times, wherever it goes. index: what result.strains takes."""
+    """Warn once per scene that a result leaves the model, and again whenever strains have doubled since.
+
+    So a design loop of a thousand solves warns a few times. index: the argument of result.strains.
+    """
     scene, worst = result.scene, max(largest)
     if is_small(worst) or worst < 2.0 * scene._warned_of_strain:
         return

@@ -1,4 +1,4 @@
-"""Where fibres run in a solid: along a line, as a function of the place, or as arrays have them."""
+"""Fibre directions in a solid: along a line, as a function of the position, or from arrays."""
 
 from __future__ import annotations
 
@@ -18,18 +18,19 @@ from .solid import Solid
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
 
-_BACK = -0.98  # the cosine between two pieces beyond which what is between them has no direction
-_LEAST = 1e-3  # weights below are left out: the reach times 6.9
+_BACK = -0.98  # [-] smallest cosine between successive pieces of a line; below, it turns back on itself
+_LEAST = 1e-3  # [-] smallest weight of a tetrahedron that gets fibres: at a distance of 6.9 times the reach
 
 
 @immutable
 @dataclass(frozen=True)
 class Fibres:
-    """Fibres of some of a solid's tetrahedra, as ms.fibres_along finds them, or made by hand.
+    """Fibres of some of a solid's tetrahedra, found by ms.fibres_along or made by hand.
 
-    elements: (k,), the tetrahedra, each once. directions: (k, 3), at rest, of any length but zero. weights: (k,), how much
-    of a muscle is there, 1 by default. coordinates: (k,) m, of each along its fibre, or None; length: m, of the fibres, by
-    default as far as the coordinates reach.
+    elements: (k,), the tetrahedra, each once. directions: (k, 3), at rest, of any length except zero. weights: (k,),
+    the
+    density of a muscle's fibres there, 1 by default. coordinates: (k,) m, of each tetrahedron along its fibre, or None.
+    length: m, of the fibres, by default the range of the coordinates.
 
     >>> import magshell as ms
     >>> ms.Fibres(elements=[0, 1], directions=[(1, 0, 0), (1, 0, 0)]).elements
@@ -65,7 +66,7 @@ class Fibres:
 
 
 def checked_directions(name: str, values: Any, shape: tuple[Any, ...]) -> np.ndarray:
-    """Vectors of any length but zero."""
+    """Return vectors of any length except zero. Raises ValueError."""
     array = quantity(name, "", values, shape)
     short = ~(np.linalg.norm(np.atleast_2d(array), axis=1) > 0)
     if short.any():
@@ -74,7 +75,10 @@ def checked_directions(name: str, values: Any, shape: tuple[Any, ...]) -> np.nda
 
 
 def checked_weights(values: Any, count: int) -> np.ndarray:
-    """(count,), or one for all; none below zero, some above."""
+    """Return weights (count,), from an array or one number; none may be negative, and not all zero.
+
+    Raises ValueError.
+    """
     shape = shape_of("weights", values)
     array = np.broadcast_to(quantity("weights", "1", values, () if shape == () else (count,)), (count,))
     if (array < 0).any():
@@ -88,15 +92,20 @@ def checked_weights(values: Any, count: int) -> np.ndarray:
 def fibres_along(
     line: Numbers, body: Solid | TetMesh, *, reach: Numbers, elements: Numbers | None = None
 ) -> Fibres:
-    """Fibres along a line through a solid: each tetrahedron near it has their direction at the nearest point of the line,
-    the weight exp(-distance/reach), and its coordinate along the line, from the distance of its middle.
+    """Find fibres along a line through a solid.
 
-    line: (n, 3) m, the corners of a polyline, n > 1. Its direction turns evenly from the middle of one piece to the middle
-        of the next, so that fibres have no kinks.
-    body: Solid or TetMesh. reach: m. elements: which tetrahedra may have some, by default all; of these, those with a
-        weight of 0.001 and more have.
+    Each tetrahedron near the line gets the line's direction at the nearest point, the weight exp(-distance/reach), and
+    its
+    coordinate along the line; the distance is that of its center.
 
-    Raises ValueError where no tetrahedron does: the line misses the solid.
+    line: (n, 3) m, the corners of a polyline, n > 1. Its direction is interpolated between the midpoints of its pieces,
+    so
+        that fibres have no kinks.
+    body: Solid or TetMesh. reach: m. elements: the tetrahedra that may get fibres, by default all; those with a weight
+    of
+        0.001 and more do.
+
+    Raises ValueError if no tetrahedron does: the line misses the solid.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.box((0.1, 0.02, 0.02), cells=(10, 2, 2))
@@ -140,21 +149,23 @@ def fibres_along(
 
 
 def _nearest(points, line, pieces, lengths) -> tuple[np.ndarray, np.ndarray]:
-    """Of each point (n, 3): its distance from the line, and where along it the nearest point is, m."""
+    """Return for each point (n, 3) its distance from the line, and the coordinate of the nearest point along the line,
+    m.
+    """
     best = np.full(len(points), np.inf)
     where = np.zeros(len(points))
     starts = np.concatenate([[0.0], np.cumsum(lengths)])
     for k, (piece, length) in enumerate(zip(pieces, lengths, strict=True)):
-        share = np.clip((points - line[k]) @ piece / length**2, 0.0, 1.0)
-        distance = np.linalg.norm(points - line[k] - share[:, None] * piece, axis=1)
+        fraction = np.clip((points - line[k]) @ piece / length**2, 0.0, 1.0)
+        distance = np.linalg.norm(points - line[k] - fraction[:, None] * piece, axis=1)
         nearer = distance < best
         best[nearer] = distance[nearer]
-        where[nearer] = starts[k] + share[nearer] * length
+        where[nearer] = starts[k] + fraction[nearer] * length
     return best, where
 
 
 def _tangents(coordinates, pieces, lengths) -> np.ndarray:
-    """Unit vectors, from those in the middles of the pieces."""
+    """Return unit vectors at coordinates along the line, interpolated between the midpoints of its pieces."""
     middles = np.cumsum(lengths) - 0.5 * lengths
     units = pieces / lengths[:, None]
     if (turned := np.sum(units[1:] * units[:-1], axis=1) < _BACK).any():
@@ -165,7 +176,7 @@ def _tangents(coordinates, pieces, lengths) -> np.ndarray:
 
 
 def _sizes(mesh: TetMesh) -> np.ndarray:
-    """(n_t,) m: how far the farthest corner of each tetrahedron is from its middle."""
+    """Return the distance of the farthest corner of each tetrahedron from its center, (n_t,) m."""
     corners = mesh.rest_positions[mesh.tetrahedra[:, :4]]
     return np.linalg.norm(corners - mesh.tetrahedron_barycenters[:, None], axis=2).max(axis=1)
 
@@ -173,7 +184,10 @@ def _sizes(mesh: TetMesh) -> np.ndarray:
 def fibres_of(
     fibres: Fibres | Numbers | Callable[[np.ndarray], Numbers], mesh: TetMesh, elements: Numbers
 ) -> Fibres:
-    """What a Muscle was given as a Fibres: one, a vector, one a tetrahedron, or a function of the place."""
+    """Return the `fibres` argument of a Muscle as Fibres. Raises ValueError.
+
+    It may be Fibres, one vector, one per tetrahedron, or a function of the position.
+    """
     n = mesh.n_tetrahedra
     if isinstance(fibres, Fibres):
         if elements is not None:

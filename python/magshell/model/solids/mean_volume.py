@@ -1,17 +1,25 @@
-"""Where the mean volume of each element leaves a solid too soft, and a warning there.
+"""Warns where taking the mean volume change of each element makes a solid too soft.
 
-The energy then does not see volume that goes from one end of an element to the other. Two kinds of meshes let it go far.
+The volumetric energy then does not depend on volume that moves from one end of an element to the other. Two kinds of
+meshes let much volume move.
 
 Slender regions with one cell through the thickness, and no vertex inside: bars and plates bend 14 to 18 % too far at a
-Poisson's ratio of 0.45, with two cells, or a vertex in the middle of each, 2 to 5 %, with four below 1 %. Found as
-tetrahedra with all corners on the surface that hang together, are joined to the rest by little, and are long or wide for
-how thick they are. A few such tetrahedra lie along the edges of thick bodies too, but are joined to the rest by much.
+Poisson's ratio of 0.45, with two cells, or a vertex in the middle of each, 2 to 5 %, with four below 1 %. Such regions
+are
+connected sets of tetrahedra with all corners on the surface, which have little area in common with the other tetrahedra
+and
+are long or wide relative to their thickness. There are such tetrahedra along the edges of thick bodies too, but these
+have
+much area in common with the others.
 
-Bodies of isochoric material whose elements' centers lie in one plane, on a line or at one point: of six tetrahedra around a
-diagonal, or of one to three. Shape is conserved, as the isochoric energy measures it, by all conformal maps; beside
-motions and growth these are u = 2 (b.x) x - |x|^2 b to first order, a quadratic that elements with ten nodes have exactly.
-Its change of volume 6 b.x has no mean in any of the elements if b stands across all centers from the origin: so many
-directions as these leave free cost nothing, however the integrals are taken.
+Bodies of isochoric material whose elements' centers lie in one plane, on a line or at one point: of six tetrahedra
+around a
+diagonal, or of one to three. The isochoric energy does not change under conformal maps. To first order these are,
+besides
+rigid motions and growth, u = 2 (b.x) x - |x|^2 b, a quadratic that ten-node elements represent exactly. Its change of
+volume 6 b.x has mean zero in each element if b is perpendicular to all centers, seen from the origin. As many
+directions
+as are perpendicular to all centers cost no energy, whatever the quadrature.
 """
 
 from __future__ import annotations
@@ -28,22 +36,25 @@ from ...mesh.topology import FACES, face_table, groups, neighbours
 if TYPE_CHECKING:
     from ...mesh.tetrahedra.tet_mesh import TetMesh
 
-# Of what a region joins the rest by to its outside: measured 0 where a plate or bar is one cell thick, 0.04 of a fin
-# ten cells long, 0.6 and more along the edges of thick bodies.
+# [-] Largest ratio of the area that a thin region has in common with other tetrahedra to its area on the surface: measured 0
+# where a plate or bar is one cell thick, 0.04 at a fin ten cells long, 0.6 and more along the edges of thick bodies.
 MOST_JOINED = 0.1
-# outside^3 / volume^2, without a unit: a ball has 113, a cube 216, a bar of 3 widths 305, of 5 426, a plate of 4
-# thicknesses 432.
+# [-] Smallest (surface area)^3 / volume^2 of a slender region: a ball has 113, a cube 216, a bar of length 3 widths 305, of
+# 5 widths 426, a plate of width 4 thicknesses 432.
 LEAST_SLENDER = 400.0
-FEWEST = 12  # tetrahedra of a region: of fewer none is slender
-_HELD = 1e-6  # [-] below one: the share of a direction that supports hold at all corners of a slice
-_SIDE = 0.9  # [-] cosine between the direction in which a slice is held and normals of its sides
-_FLAT = 1e-6  # of the size of a body: centers this near to a plane lie in it
+FEWEST = 12  # smallest number of tetrahedra of a slender region
+_HELD = 1e-6  # [-] tolerance for a direction in which supports hold all corners of a slice
+_SIDE = 0.9  # [-] largest cosine between the held direction of a slice and the normals of its sides
+_FLAT = 1e-6  # [-] of the size of a body: centers this near to a plane count as lying in it
 
 
 def warn_of_thin_regions(mesh: TetMesh, held: np.ndarray) -> None:
-    """Warn of slender regions one cell thick, but for slices in plane strain, which are held across their thickness.
+    """Warn of slender regions one cell thick, except slices in plane strain, which supports hold across their
+    thickness.
 
-    mesh: of a solid whose elements have the mean volume. held: (n_v, 3, 3), onto the directions that supports hold.
+    mesh: of a solid whose elements take the mean volume. held: (n_v, 3, 3), projections onto the directions that
+    supports
+    hold.
     """
     thin = [each for each in thin_regions(mesh) if not _is_slice(mesh, each, held)]
     if thin:
@@ -59,7 +70,10 @@ def warn_of_thin_regions(mesh: TetMesh, held: np.ndarray) -> None:
 
 
 def warn_of_free_modes(mesh: TetMesh, isochoric: bool) -> None:
-    """Warn of shapes that cost isochoric material nothing. mesh: of a solid whose elements have the mean volume."""
+    """Warn of deformations that cost isochoric material no energy.
+
+    mesh: of a solid whose elements take the mean volume.
+    """
     free = free_modes(mesh) if isochoric else 0
     if free:
         _warn(
@@ -74,7 +88,7 @@ def _warn(text: str) -> None:
 
 
 def thin_regions(mesh: TetMesh) -> list[np.ndarray]:
-    """Tetrahedra of each slender region that is one cell thick, the largest first."""
+    """Return the tetrahedra of each slender region that is one cell thick, the largest region first."""
     on_surface = np.zeros(mesh.n_vertices, dtype=bool)
     on_surface[mesh.boundary_vertices] = True
     chosen = np.flatnonzero(on_surface[mesh.corners].all(axis=1))
@@ -96,7 +110,9 @@ def thin_regions(mesh: TetMesh) -> list[np.ndarray]:
 
 
 def _is_slice(mesh: TetMesh, region: np.ndarray, held: np.ndarray) -> bool:
-    """Whether supports hold all corners of a region (k,) along one direction, and it is more than one cell thick across."""
+    """Return whether supports hold all corners of a region (k,) along one direction, and it is wider than one cell
+    across.
+    """
     corners = mesh.corners[region]
     values, axes = np.linalg.eigh(held[np.unique(corners)].mean(axis=0))
     count = int((values > 1.0 - _HELD).sum())
@@ -110,7 +126,7 @@ def _is_slice(mesh: TetMesh, region: np.ndarray, held: np.ndarray) -> bool:
 
 
 def free_modes(mesh: TetMesh) -> int:
-    """How many shapes cost isochoric material nothing, of all separate pieces."""
+    """Return the number of deformations that cost isochoric material no energy, summed over separate pieces."""
     count = 0
     piece = mesh.components[mesh.corners[:, 0]]
     centers = mesh.tetrahedron_barycenters

@@ -1,4 +1,4 @@
-"""A thin magnetized layer on the surface of a solid."""
+"""Thin magnetized layers on the surface of a solid."""
 
 from __future__ import annotations
 
@@ -19,19 +19,20 @@ if TYPE_CHECKING:
 
 
 class Skin(Owner):
-    """A magnetized layer on the surface of a Solid, without stiffness, and without mass unless one is given, as in [Chen22]
-    6.4.
+    """A magnetized layer on the surface of a Solid, as in [Chen22] 6.4. It has no stiffness, and no mass unless one is
+    given.
 
-    Without a field it may stand where it has a mass density and no magnetization.
+    In a scene without a field a Skin is allowed if it has a mass density and no magnetization.
 
-    A layer with a modulus of its own is a Shell: `ms.Shell(solid.mesh.surface, ...)` with `ms.Tie(solid, shell)`.
+    For a layer with stiffness use a Shell: `ms.Shell(solid.mesh.surface, ...)` with `ms.Tie(solid, shell)`.
 
-    thickness: m, positive, a number or (k,), one a face.
-    faces: (k,), those of the mesh that the solid is made of; by default all. `solid.skin` has them in the numbers of
-        `solid.mesh`, whose quadratic tetrahedra show four flat triangles a face, and rows for each of these.
-    mass_density: kg/m3, positive, a number or (k,), times the thickness on each face, beside the solid's own, which needs
-        one too; by default the layer has no mass.
-    remanent_magnetization: (3,) or (k, 3) A/m, at rest, in world axes; where it is None a solve says it:
+    thickness: m, positive, a number or (k,), one per face.
+    faces: (k,), of the mesh that the solid is made of; by default all. `solid.skin` has them in the numbers of
+        `solid.mesh`, whose quadratic tetrahedra have four flat triangles per face, and rows for each of these.
+    mass_density: kg/m3, positive, a number or (k,); times the thickness on each face it adds to the mass of the solid,
+    which
+        needs a density too. By default the layer has no mass.
+    remanent_magnetization: (3,) or (k, 3) A/m, at rest, in world axes; if it is None, a solve gives it:
         `values={solid.skin: {"remanent_magnetization": ...}}`.
 
     >>> import magshell as ms
@@ -48,7 +49,7 @@ class Skin(Owner):
     """
 
     _replaceable = ("thickness", "mass_density", "remanent_magnetization")
-    _corners, _areas = np.zeros((0, 3), dtype=np.int32), np.zeros(0)  # of its triangles, on a solid's mesh
+    _corners, _areas = np.zeros((0, 3), dtype=np.int32), np.zeros(0)  # its triangles, once it is on a solid
 
     def __init__(
         self,
@@ -82,7 +83,10 @@ class Skin(Owner):
             magnetization_of(self.remanent_magnetization, count)
 
     def _on(self, given: TetMesh, mesh: TetMesh) -> Skin:
-        """Of a solid of `mesh`: a row for each triangle there. The faces are those of `given`, which it is made of."""
+        """Return the skin of a solid of `mesh`, with a row for each triangle of the skin there.
+
+        given: the mesh that the solid is made of, which the faces refer to. Raises ValueError if they do not fit.
+        """
         faces = np.arange(given.n_faces) if self.faces is None else self.faces
         if faces.dtype != bool and (faces.min() < 0 or faces.max() >= given.n_faces):
             bad = faces[(faces < 0) | (faces >= given.n_faces)][0]
@@ -112,12 +116,12 @@ class Skin(Owner):
         return variant(self, faces=on, _corners=mesh.faces[on], _areas=mesh.face_areas[on], **now)
 
     def replaced(self, **values: Any) -> Skin:
-        """The same skin with other values."""
+        """Return the same skin with other values."""
         now = {name: getattr(self, name) for name in self._replaceable}
         return variant(Skin(faces=self.faces, **(now | values)), _corners=self._corners, _areas=self._areas)
 
     def _gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
-        """With what its values do to the masses of the vertices."""
+        """Return the gradients by its values, including those through the vertex masses."""
         found = {
             "thickness": np.zeros(len(self.faces)),
             "remanent_magnetization": np.zeros((len(self.faces), 3)),
@@ -132,7 +136,11 @@ class Skin(Owner):
         return found
 
     def masses(self, n_vertices: int) -> np.ndarray:
-        """Of its solid's vertices, (n_v,), kg: a third of each triangle's; zeros without a mass density."""
+        """Return what the skin adds to the masses of its solid's vertices, (n_v,) kg: a third of each triangle's mass
+        per corner.
+
+        It is zero without a mass density.
+        """
         masses = np.zeros(n_vertices)
         if self.mass_density is not None:
             of_faces = self._areas * self.thickness * self.mass_density
@@ -141,8 +149,11 @@ class Skin(Owner):
 
     @property
     def element_masses(self) -> tuple[np.ndarray, np.ndarray]:
-        """Consistent masses: the corners of each triangle (n, 3), and the integrals of its mass per area times the products
-        of their shape functions (n, 3, 3), kg; zeros without a mass density."""
+        """The consistent masses: corners of each triangle (n, 3), and mass matrices (n, 3, 3), kg; zero without a mass
+        density.
+
+        A mass matrix has the integrals of the mass per area times products of shape functions.
+        """
         density = 0.0 if self.mass_density is None else self.mass_density
         products = (np.ones((3, 3)) + np.eye(3)) / 12.0
         return self._corners, (self._areas * self.thickness * density)[:, None, None] * products
@@ -156,7 +167,10 @@ class Skin(Owner):
         )
 
     def _core_input(self, owner: str, mesh: TetMesh, vertices: np.ndarray) -> dict[Any, Any]:
-        """As the core takes it. mesh: the solid's; vertices: the scene's of each of that, (n_v,)."""
+        """Return the input of the core.
+
+        mesh: of the solid. vertices: (n_v,), the scene's number of each of its vertices.
+        """
         faces = mesh.faces[self.faces]
         used = np.unique(faces)
         surface = TriangleMesh(mesh.rest_positions[used], np.searchsorted(used, faces))

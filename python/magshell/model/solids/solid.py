@@ -1,4 +1,4 @@
-"""A solid: a mesh of tetrahedra with a material."""
+"""Solids: meshes of tetrahedra with a material."""
 
 from __future__ import annotations
 
@@ -25,25 +25,25 @@ ELEMENTS = ("quadratic", "linear")
 
 
 class Solid(Owner):
-    """A soft body of tetrahedra.
+    """A soft body, meshed by tetrahedra.
 
-    mesh: TetMesh, its positions are the rest shape. Of four nodes it is made one of ten where the element asks for it, so
-        `solid.mesh` is another mesh than the one given: select the vertices for supports and loads on `solid.mesh`, as in
-        `ms.Pin(solid.mesh.vertices_at(x=0.0))`, which has the nodes between the corners too.
+    mesh: TetMesh; its positions are the rest shape. For quadratic elements a mesh of four-node tetrahedra is raised to
+        ten nodes, so `solid.mesh` may be another mesh than the one given: select the vertices for supports and loads on
+        `solid.mesh`, which has the nodes between the corners too, as in `ms.Pin(solid.mesh.vertices_at(x=0.0))`.
     material: NeoHookean, StableNeoHookean, StVenantKirchhoff, Corotated or Guccione.
-    mass_density: kg/m3, positive, a number or (n_t,); only gravity and motions ask for it.
-    element: "quadratic", ten nodes each; or "linear", four, as in [Chen22]: cheap, and far too stiff in bending: with one
-        or two cells through a finger they show 11 to 31 % of the true deflection at a Poisson's ratio of 0.45, 20 % at
-        0.499. By default quadratic.
+    mass_density: kg/m3, positive, a number or (n_t,); needed for gravity and motions only.
+    element: "quadratic", the default, ten nodes each; or "linear", four, as in [Chen22]: cheap, but far too stiff in
+        bending: with one or two cells through the thickness a finger has 11 to 31 % of the true deflection at a Poisson's
+        ratio of 0.45, 20 % at 0.499.
     mean_volume: whether the volumetric part of the energy acts on the mean change of volume of each element, which keeps
-        nearly incompressible material from locking; for quadratic elements. By default where Poisson's ratio is above 0.4.
+        nearly incompressible material from locking; for quadratic elements. By default if Poisson's ratio is above 0.4.
         Use two cells or more through every thickness: with one, a slender bar's two lowest frequencies are 2 and 12 % too
-        low at a Poisson's ratio of 0.45, with two within 1 %. An ms.MeshQualityWarning says where a slender region has one
-        (as its scene is made, and not of slices in plane strain), and where tetrahedra are so few that shapes of isochoric
-        material cost no energy.
+        low at a Poisson's ratio of 0.45, with two within 1 %. An ms.MeshQualityWarning, when the scene is made, names
+        slender regions with one cell (except slices in plane strain), and bodies of so few tetrahedra that some
+        deformations of isochoric material cost no energy.
     skin: Skin, a thin magnetized layer on its surface; as `solid.skin` it has values of its own.
     remanent_magnetization: (3,) or (n_t, 3) A/m, at rest, in world axes, of a solid that is magnetized throughout; zero
-        where a solve is to say it.
+        if a solve is to give it.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.box((0.1, 0.02, 0.02), cells=(10, 2, 2))
@@ -105,7 +105,9 @@ class Solid(Owner):
 
     @property
     def _face_magnetization(self) -> np.ndarray | None:
-        """(n_f, 3) A/m, of its skin: zero on faces without. None where the skin has none of its own."""
+        """The magnetization of its skin on all faces, (n_f, 3) A/m, zero on faces without skin; None if the skin has
+        none of its own.
+        """
         rows = np.zeros((self.mesh.n_faces, 3))
         if self.skin is not None:
             if self.skin.remanent_magnetization is None:
@@ -114,7 +116,7 @@ class Solid(Owner):
         return rows
 
     def __getattr__(self, name: str) -> np.ndarray:
-        """The values of its material, one a tetrahedron, under their own names."""
+        """Return a value of its material, one entry per tetrahedron."""
         material = self.__dict__.get("material")
         if material is None or name not in material.names:
             raise AttributeError(f"{type(self).__name__} has no {name}")
@@ -137,7 +139,7 @@ class Solid(Owner):
         return array
 
     def replaced(self, **values: Any) -> Solid:
-        """The same solid with other values: those of its material, and the mass density."""
+        """Return the same solid with another mass density, magnetization or values of the material."""
         now: dict[str, Any] = {}
         if "mass_density" in values:
             density = values.pop("mass_density")
@@ -147,10 +149,10 @@ class Solid(Owner):
         material = self.material.replaced(**values)
         for name in values:
             material.rows(name, self.mesh.n_tetrahedra)
-        return variant(self, material=material, **now)  # not made anew, which would warn anew
+        return variant(self, material=material, **now)  # without the constructor, which would warn again
 
     def _core_input(self, owner: str, vertices: np.ndarray) -> dict[Any, Any]:
-        """As the core takes it. vertices: the scene's, (n_v,)."""
+        """Return the input of the core. vertices: (n_v,), the scene's number of each vertex."""
         return {
             "owner": owner,
             "rest_positions": self.mesh.rest_positions,
@@ -171,7 +173,7 @@ class Solid(Owner):
             numbers[label, "remanent_magnetization"] = self.remanent_magnetization
 
     def _gradients(self, label: str, values: Values, gradient: Gradient) -> dict[str, np.ndarray]:
-        """With what its values do to the masses and the weights of the vertices."""
+        """Return the gradients by its values, including those through the masses and the weights of the vertices."""
         names = [*self.material.names, "remanent_magnetization"]
         found = {name: gradient.value(label, name) for name in names if gradient.has(label, name)}
         if "fibres" in found:
@@ -181,8 +183,8 @@ class Solid(Owner):
             found["fibres"] = across / np.linalg.norm(given, axis=1, keepdims=True)
         at = values.part_of(self).vertices
         by_density = [
-            (by[at][self.mesh.tetrahedra] * shares).sum(axis=1)
-            for by, shares in zip(values.by_inertia_and_weight(gradient), self._shares, strict=True)
+            (by[at][self.mesh.tetrahedra] * volumes).sum(axis=1)
+            for by, volumes in zip(values.by_inertia_and_weight(gradient), self._nodal_volumes, strict=True)
             if by is not None
         ]
         if by_density:
@@ -190,13 +192,13 @@ class Solid(Owner):
         return found
 
     @property
-    def _shares(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of each tetrahedron's volume, at its nodes, (n_t, 4) or (n_t, 10) m3: for inertia, for weights.
+    def _nodal_volumes(self) -> tuple[np.ndarray, np.ndarray]:
+        """The volumes of each tetrahedron's nodes, (n_t, 4) or (n_t, 10) m3, first for inertia, then for weights.
 
-        A quadratic element's weight is shared out by its shape functions, curved ones exactly: -1/20 at corners and 1/5
-        between them where it is straight; for inertia its
-        mass is lumped in proportion to the diagonal of its mass matrix (Hinton, Rock, Zienkiewicz 1976), 1/36 and 4/27,
-        which are positive and add up to one.
+        For weights of a quadratic element they are the integrals of the shape functions, exact for curved elements too: of a
+        straight one -1/20 of its volume at corners and 1/5 at midpoints of edges. For inertia they are lumped in proportion
+        to the diagonal of the mass matrix (Hinton, Rock, Zienkiewicz 1976): 1/36 and 4/27, which are positive and add up to
+        one.
         """
         volumes = self.mesh.volumes[:, None]
         if self.element == "linear":
@@ -205,27 +207,29 @@ class Solid(Owner):
         lumped = np.array([1 / 36] * 4 + [4 / 27] * 6)
         return volumes * lumped, shape_integrals(self.mesh.rest_positions[self.mesh.tetrahedra])
 
-    def _gathered(self, shares: np.ndarray) -> np.ndarray:
+    def _assembled_masses(self, nodal_volumes: np.ndarray) -> np.ndarray:
         if self.mass_density is None:
             raise ValueError("the solid has no mass_density [kg/m3]")
         masses = np.zeros(self.mesh.n_vertices)
-        np.add.at(masses, self.mesh.tetrahedra, self.mass_density[:, None] * shares)
+        np.add.at(masses, self.mesh.tetrahedra, self.mass_density[:, None] * nodal_volumes)
         return masses if self.skin is None else masses + self.skin.masses(self.mesh.n_vertices)
 
     @property
     def vertex_masses(self) -> np.ndarray:
-        """Lumped masses for inertia, its skin's with them, (n_v,), kg."""
-        return self._gathered(self._shares[0])
+        """The lumped masses for inertia, with those of its skin, (n_v,) kg."""
+        return self._assembled_masses(self._nodal_volumes[0])
 
     @property
     def _weighed_masses(self) -> np.ndarray:
-        """What gravity pulls at each vertex by, (n_v,), kg; negative at corners of quadratic elements."""
-        return self._gathered(self._shares[1])
+        """The masses on which gravity acts, (n_v,) kg; negative at corners of quadratic elements."""
+        return self._assembled_masses(self._nodal_volumes[1])
 
     @property
     def element_masses(self) -> tuple[np.ndarray, np.ndarray]:
-        """Consistent masses: the nodes of each element (n_t, k), and the integrals of its density times the products of
-        their shape functions (n_t, k, k), kg."""
+        """The consistent masses: nodes of each element (n_t, k), and mass matrices (n_t, k, k), kg.
+
+        A mass matrix has the integrals of the density times products of shape functions.
+        """
         if self.mass_density is None:
             raise ValueError("the solid has no mass_density [kg/m3]")
         nodes = self.mesh.tetrahedra

@@ -1,4 +1,4 @@
-"""Strain and stress of a solid's elements at a state."""
+"""Strains and stresses of a solid's elements in a state."""
 
 from __future__ import annotations
 
@@ -17,11 +17,12 @@ if TYPE_CHECKING:
 
 @immutable
 class SolidStates(NamedTuple):
-    """At the points of integration of each tetrahedron: one of linear ones, p = 4 of quadratic ones.
+    """Strains and stresses at the integration points of each tetrahedron: p = 1 for linear ones, p = 4 for quadratic
+    ones.
 
     deformation_gradients: F, (n_t, p, 3, 3). cauchy_stresses: P F^T / J, (n_t, p, 3, 3), Pa, elastic.
     volumes: at rest, (n_t, p), m3. muscles: {"activation", "fibre_stretch", "fibre_tension" [Pa]}: (n_t,) each, of all
-    muscles in it, NaN where there are none; None in a solid without.
+    muscles in it, NaN where there are none; None in a solid without muscles.
     """
 
     deformation_gradients: np.ndarray
@@ -31,32 +32,34 @@ class SolidStates(NamedTuple):
 
     @property
     def volume_ratios(self) -> np.ndarray:
-        """J = det F, (n_t, p)."""
+        """The volume ratios J = det F, (n_t, p)."""
         return np.linalg.det(self.deformation_gradients)
 
     @property
     def green_strains(self) -> np.ndarray:
-        """(F^T F - I)/2, (n_t, p, 3, 3)."""
+        """The Green strains (F^T F - I)/2, (n_t, p, 3, 3)."""
         f = self.deformation_gradients
         return 0.5 * (np.swapaxes(f, -1, -2) @ f - np.eye(3))
 
     @property
     def largest_green_strain(self) -> float:
-        """The largest magnitude of a principal Green strain, of all points."""
+        """The largest magnitude of a principal Green strain among all points."""
         return float(np.abs(np.linalg.eigvalsh(self.green_strains)).max())
 
     @property
     def von_mises_stresses(self) -> np.ndarray:
-        """(n_t, p), Pa, of the Cauchy stress."""
+        """The von Mises stresses of the Cauchy stress, (n_t, p) Pa."""
         return von_mises(self.cauchy_stresses)
 
     def mean(self, of_points: np.ndarray) -> np.ndarray:
-        """Of each tetrahedron, (n_t, ...), weighed by the volumes: of (n_t, p, ...)."""
+        """Return the mean over the points of each tetrahedron, (n_t, ...), of values (n_t, p, ...) weighted by the
+        volumes.
+        """
         return mean(self.volumes, of_points)
 
 
 def states_at(values: Any, body: Solid, positions: np.ndarray) -> SolidStates:
-    """At positions (n_v of the scene, 3) m, with these values of the scene in its core."""
+    """Return the strains and stresses at positions (n_v of the scene, 3) m, with these values of the scene."""
     scene = values.scene
     with values.in_core():
         rotations = np.zeros(scene._bodies.n_rotations)
@@ -64,8 +67,10 @@ def states_at(values: Any, body: Solid, positions: np.ndarray) -> SolidStates:
 
 
 def states_of(scene: Scene, body: Solid, state: np.ndarray) -> SolidStates:
-    """Of a state of the scene's core, with the values that are in it. Raises ValueError where the body is no solid of the
-    scene."""
+    """Return the strains and stresses in a state of the scene's core, with the values that the core has at the moment.
+
+    Raises ValueError if the body is no solid of the scene.
+    """
     for k, each in enumerate(scene._bodies.solids):
         if each is body:
             return SolidStates(*_core.solid_point_states(scene._model, k, state))
