@@ -10,9 +10,9 @@ namespace {
 // [rad] Smallest angle opposite the long edge of a cap; see test_caps_inside_a_sheet_do_not_stiffen_it.
 constexpr double cap_angle = 150.0 / 180.0 * std::numbers::pi;
 constexpr double flat =
-    0.1;  // [rad] rest angle above which an edge is a fold that stays; see test_folds_and_hinges_stay_what_they_are
+    0.1;  // [rad] rest angle above which an edge is a fold that stays; see test_faces_at_folds_and_hinges_keep_their_own_triangles
 constexpr double softer =
-    0.5;  // [-] curvature scale, over that of the neighbours, below which an edge is a hinge; see test_folds_and_hinges_stay_what_they_are
+    0.5;  // [-] curvature scale, over that of the neighbours, below which an edge is a hinge; see test_faces_at_folds_and_hinges_keep_their_own_triangles
 
 double angle_at(const Vec3& corner, const Vec3& a, const Vec3& b) {
     const Vec3 u = a - corner, v = b - corner;

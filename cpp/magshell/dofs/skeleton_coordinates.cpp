@@ -16,7 +16,7 @@ using Eigen::MatrixXd;
 
 // Iterations that fit the coordinates to a start, and the relative size of the last one [-]; see test_joints_hold_to_round_off_over_ten_thousand_steps.
 constexpr int max_fit_iterations = 30;  // see test_joints_hold_to_round_off_over_ten_thousand_steps
-// [-] over the lengths involved; see test_a_motor_holds_an_arm_at_its_angle_and_says_its_torque
+// [-] over the lengths involved; see test_motor_holds_an_arm_at_its_angle_and_reports_its_torque
 constexpr double motor_round_off = 1e-14;
 constexpr double fit_tolerance = 1e-14;  // [-] see test_joints_hold_to_round_off_over_ten_thousand_steps
 // [-] part of epsilon |x|/l that four corners leave; see test_long_chains_of_links_move_at_the_usual_tolerance

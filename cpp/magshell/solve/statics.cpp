@@ -26,7 +26,7 @@ constexpr int max_halvings = 6;
 // Moves links to where their joints lead them, for example after the origin of a motor has changed. No force would do that, since
 // motors hold in any position.
 void project_onto_joints(const Model& model, VectorXd& q) {
-    // [-] over the extent; see test_a_start_goes_along_with_the_place_of_a_motor
+    // [-] over the extent; see test_start_follows_the_changed_origin_of_a_motor
     constexpr double round_off = 1e-13;
     VectorXd projected = q;
     model.dof_map().project_state(projected, nullptr);

@@ -1,5 +1,8 @@
-"""Pressure that follows the faces: forces, stiffness, potential, closed answers, refusals. Its gradients in all kinds of
-scene: test_every_gradient.py; the tube and the beam of the validation set: test_solid_validation.py."""
+"""Pressure that follows the faces: forces, stiffness, potential, closed-form answers, refused input.
+
+Its gradients in all kinds of scenes: test_every_gradient.py. The tube and the beam of the validation set:
+test_solid_validation.py.
+"""
 
 import numpy as np
 import pytest
@@ -36,7 +39,7 @@ def moved_state(scene, seed: int = 0) -> np.ndarray:
 
 
 def forces(scene, state) -> np.ndarray:
-    """(n_v, 3), N, of the loads alone."""
+    """Compute the forces of the loads alone, (n_v, 3) in N."""
     model = scene._model
     by_load = model.gradient(state, controls(scene, 0.0)) - model.gradient(state, controls(scene, 1.0))
     return model.positions(by_load)
@@ -55,7 +58,10 @@ def test_forces_are_those_of_the_elements_own_shapes(element):
 
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
 def test_pressures_of_faces_add_up(element):
-    """On some faces, one each: the same as a load for every face alone; for quadratic elements a quarter of a side."""
+    """Compare one load with a pressure per face with a load for every face alone.
+
+    A face of a quadratic element is a quarter of its side.
+    """
     body = curved_block(element)
     chosen = np.arange(1, body.mesh.n_faces, 3)
     pressures = np.linspace(-200.0, 500.0, len(chosen))
@@ -84,7 +90,7 @@ def test_four_quarters_are_a_side():
 
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
 def test_a_closed_surface_has_a_potential(element):
-    """p times the change of volume; its first and second derivatives by differences."""
+    """Compare the potential with p times the change of volume, and its two derivatives with differences."""
     body = curved_block(element)
     scene = loose(body, ms.Pressure(2e4))
     model, state, on = scene._model, moved_state(scene), controls(scene, 1.0)
@@ -94,7 +100,7 @@ def test_a_closed_surface_has_a_potential(element):
     off = controls(scene, 0.0)
     rng = np.random.default_rng(1)
     along, step = rng.standard_normal(model.size), 1e-4
-    rise = [model.energies(state + way * along, on)["pressure"] for way in (step, -step)]
+    rise = [model.energies(state + amount * along, on)["pressure"] for amount in (step, -step)]
     slope = (model.gradient(state, on) - model.gradient(state, off)) @ along
     assert (rise[0] - rise[1]) / (2 * step) == pytest.approx(slope, rel=1e-6)
 
@@ -130,7 +136,10 @@ def test_a_free_border_has_none_and_a_held_one_has():
 
 
 def test_oblique_symmetry_planes_close_a_surface():
-    """A quarter of a tube, turned: its border slides in the planes; the same answer as upright, and a potential."""
+    """Check a rotated quarter of a tube, whose border slides in symmetry planes.
+
+    It has the same equilibrium and frequencies as the upright one, and a potential.
+    """
     turn = Rotation.from_rotvec([0.4, -0.3, 0.7]).as_matrix()
     found = []
     for rotation in (np.eye(3), turn):
@@ -162,7 +171,7 @@ def test_a_warm_start_goes_on_without_a_potential():
 
 
 def flap_of(element: str, **options) -> ms.Scene:
-    """A bar held at one end, under a pressure on its lower side: no potential."""
+    """Return a scene of a bar held at one end, under a pressure on its lower side, which has no potential."""
     solid = ms.Solid(
         ms.meshes.box((10, 1, 1), cells=(6, 1, 1)),
         material=ms.NeoHookean("isochoric", young_modulus=1e5, poisson_ratio=0.4),
@@ -176,7 +185,7 @@ def flap_of(element: str, **options) -> ms.Scene:
 
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
 def test_equilibrium_and_gradient_without_a_potential(element):
-    """Few steps, as Newton's with the whole stiffness are; the forces balance; the adjoint by differences."""
+    """Check few Newton iterations with the full stiffness, the balance of forces, and the adjoint."""
     scene = flap_of(element, displacement=(0.0, 0.0, 0.1), rotation=(0.0, 0.05, 0.0))
     rest = ms.equilibrium(scene)
     assert rest.displacements[:, 2].max() > (2.0 if element == "quadratic" else 0.1)
@@ -206,14 +215,14 @@ def test_equilibrium_and_gradient_without_a_potential(element):
         assert float(found) == pytest.approx(exact[k], rel=2e-6), k
 
 
-def test_linear_response_is_the_first_of_it():
+def test_linear_response_is_the_first_order_of_the_equilibrium():
     scene = flap_of("quadratic")
     response = ms.linear_response(scene, load_factor=1e-3).displacements
     rest = ms.equilibrium(scene, load_factor=1e-3).displacements
     assert np.allclose(response, rest, rtol=0, atol=5e-3 * np.abs(rest).max())
 
 
-def test_in_time_as_numbers_as_a_function_and_by_the_factor():
+def test_pressure_in_time_as_array_as_function_and_by_load_factor_agree():
     scene = flap_of("linear")
     load, n = scene.loads[0], 5
     course = 20.0 * np.linspace(0.0, 1.0, n + 1)
@@ -230,22 +239,25 @@ def test_in_time_as_numbers_as_a_function_and_by_the_factor():
     slope = torch.autograd.grad(loss, given)[0].numpy()
     along, step = np.random.default_rng(2).standard_normal(n + 1), 1e-2
 
-    def at(way):
-        found = ms.simulate(scene, values={load: {"pressure": course + way * along}}, **options)
+    def at(amount):
+        found = ms.simulate(scene, values={load: {"pressure": course + amount * along}}, **options)
         return float((np.asarray(found.positions[-1])[:, 2] ** 2).sum())
 
     assert (at(step) - at(-step)) / (2 * step) == pytest.approx(slope @ along, rel=1e-6)
 
 
-def test_a_ring_buckles_at_3_where_it_follows():
-    """p = 3 E I / R^3 for a live pressure, 4 E I / R^3 for one that keeps its direction (Levy 1884; Boresi 1955)."""
+def test_ring_buckles_at_levys_pressure_where_the_load_follows():
+    """Compare the critical pressure of a ring with Levy (1884) and Boresi (1955).
+
+    p = 3 E I / R^3 for a pressure that follows the ring, 4 E I / R^3 for one that keeps its direction.
+    """
     mesh = ms.meshes.cylinder(1.0, 0.1, cells=(72, 2))
     x = mesh.rest_positions
     along = int(np.argmin(np.ptp(x, axis=0)))
     one, other = (k for k in range(3) if k != along)
     sheet = ms.Shell(mesh, thickness=0.02, young_modulus=1e6, poisson_ratio=0.0)
     unit = 1e6 * 0.02**3 / 12
-    # One half wave of the two to each side of a symmetry plane, and everything plane.
+    # The symmetry planes leave a quarter of the two waves; everything stays in the ring's plane.
     flat = {axis: np.abs(x[:, axis]) < 1e-9 for axis in (one, other)}
     supports = [
         ms.Pin(np.flatnonzero(flat[axis]), components="xyz"[along] + "xyz"[axis]) for axis in (one, other)
@@ -261,7 +273,7 @@ def test_a_ring_buckles_at_3_where_it_follows():
     assert found == pytest.approx([3.0, 4.0], rel=0.02)
 
 
-def test_bad_input():
+def test_bad_pressures_are_refused():
     body = curved_block("linear")
     with pytest.raises(ValueError, match=r"pressure \[Pa\] must be a number or one a face"):
         ms.Pressure(np.zeros((2, 3)))

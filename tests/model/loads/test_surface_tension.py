@@ -1,4 +1,4 @@
-"""Surface tension: what it does to sheets, against theory, and what it refuses. Its gradients: test_every_gradient.py."""
+"""Surface tension of shells against theory, and refused input. Its gradients: test_every_gradient.py."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ import magshell as ms
 
 
 def pulled_strip(tension, **options):
-    """Bent by a load, so that nothing of it lies in a plane."""
+    """Return a scene of a strip bent by a load, so that no part of it lies in a plane."""
     mesh = ms.meshes.rectangle(0.02, 0.01, cells=(6, 3))
     sheet = ms.Shell(mesh, thickness=2e-4, young_modulus=1e6, poisson_ratio=0.3)
     loads = [
@@ -23,7 +23,7 @@ def areas(scene, positions):
     return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
 
 
-def test_its_energy_is_tension_times_area():
+def test_energy_is_tension_times_area():
     faces = np.arange(4, 20)
     tension = np.linspace(0.01, 0.03, len(faces))
     scene = pulled_strip(tension, faces=faces)
@@ -32,7 +32,7 @@ def test_its_energy_is_tension_times_area():
     assert rest.energies["surface tension"] == pytest.approx(expected, rel=1e-14)
 
 
-def test_one_number_is_the_same_for_each_face():
+def test_number_and_equal_values_per_face_agree():
     one = ms.equilibrium(pulled_strip(0.02))
     each = ms.equilibrium(pulled_strip(np.full(36, 0.02)))
     assert np.array_equal(one.positions, each.positions)
@@ -42,7 +42,7 @@ def test_one_number_is_the_same_for_each_face():
 
 @pytest.mark.parametrize("load_factor", [1.0, 0.5])
 def test_a_free_sheet_shrinks(load_factor):
-    """Quadratic energies of Green's strain e, the same each way: Y h / (1 - nu) e + gamma = 0 where the area is 1 + 2 e."""
+    """Compare with the Green strain e given by Y h / (1 - nu) e + gamma = 0, where the area is 1 + 2 e."""
     mesh = ms.meshes.rectangle(0.02, 0.01, cells=(6, 3))
     sheet = ms.Shell(mesh, thickness=1e-5, young_modulus=1e6, poisson_ratio=0.3)
     sides = [ms.SymmetryPlane((1, 0, 0)), ms.SymmetryPlane((0, 1, 0)), ms.Pin(mesh.nearest_vertex((0, 0, 0)))]
@@ -53,7 +53,7 @@ def test_a_free_sheet_shrinks(load_factor):
 
 
 def test_a_film_between_two_rings_is_a_catenoid():
-    """The neck of radius c has c cosh(half the distance / c) = radius of the rings. The sheet has next to no stiffness."""
+    """Compare the neck c of a film of negligible stiffness with c cosh(distance / 2 c) = radius of the rings."""
     ring, half = 0.01, 0.005
     neck = brentq(lambda c: c * np.cosh(half / c) - ring, 0.6 * ring, ring)
     mesh = ms.meshes.cylinder(ring, 2 * half, cells=(48, 12))
@@ -76,7 +76,7 @@ def test_a_film_between_two_rings_is_a_catenoid():
         ({"surface_tension": 0.01, "body": "sheet"}, "body must be a Shell"),
     ],
 )
-def test_what_it_refuses(given, message):
+def test_bad_surface_tension_is_refused(given, message):
     tension = given.pop("surface_tension")
     with pytest.raises(ValueError, match=message):
         pulled_strip(tension, **given)

@@ -1,4 +1,4 @@
-"""What must not change a motion in contact, with friction and in water: rotated frames, numbering, mirrors, threads."""
+"""Transformations that must not change a motion with contact, friction and water: frames, numbering, mirrors, threads."""
 
 import numpy as np
 import pytest
@@ -17,34 +17,43 @@ TIME_STEP = 2.0**-10  # s, so that times add up without rounding
 INTEGRATORS = [ms.ImplicitEuler(), ms.TRBDF2()]
 
 
-def axial(turn, vector):
-    """A rotation vector in the turned or mirrored frame: mirrors reverse what they leave of it."""
-    return np.linalg.det(turn) * (turn @ vector)
+def axial(transformation, vector):
+    """Return a rotation vector in the rotated or mirrored frame; as an axial vector, it changes its sign in a mirror."""
+    return np.linalg.det(transformation) * (transformation @ vector)
 
 
-def swaying(turn):
+def swaying(transformation):
     return lambda t: (
-        turn @ [0.01 * t, 0.02 * t, 3e-4 * np.sin(50 * t)],
-        axial(turn, [0.3 * t, 0.2 * t, 0.5 * t]),
+        transformation @ [0.01 * t, 0.02 * t, 3e-4 * np.sin(50 * t)],
+        axial(transformation, [0.3 * t, 0.2 * t, 0.5 * t]),
     )
 
 
-def obstacles(turn, shift):
-    """An oblique plane and a ball, both moving: bodies that a mirror turns into others of their kind."""
+def obstacles(transformation, shift):
+    """Return a moving oblique plane and a moving ball, which a mirror maps to obstacles of their kind."""
     return [
         ms.obstacles.Plane(
-            turn @ [0.1, 0.05, 1.0], center=shift + turn @ [0, 0, -3e-4], motion=swaying(turn)
+            transformation @ [0.1, 0.05, 1.0],
+            center=shift + transformation @ [0, 0, -3e-4],
+            motion=swaying(transformation),
         ),
-        ms.obstacles.Sphere(5e-3, center=shift + turn @ [0.01, 0.005, -5.1e-3], motion=swaying(turn)),
+        ms.obstacles.Sphere(
+            5e-3, center=shift + transformation @ [0.01, 0.005, -5.1e-3], motion=swaying(transformation)
+        ),
     ]
 
 
-def scene_of(turn=None, shift=None, mesh=MESH, lagged=False):
-    """A sheet above them in water, all of it turned and shifted."""
-    turn, shift = np.eye(3) if turn is None else turn, np.zeros(3) if shift is None else shift
-    sheet = ms.Shell(mesh.transformed(turn, shift), thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+def scene_of(transformation=None, shift=None, mesh=MESH, lagged=False):
+    """Return a scene of a sheet above the obstacles in water, all of it rotated or mirrored and shifted."""
+    transformation, shift = (
+        np.eye(3) if transformation is None else transformation,
+        np.zeros(3) if shift is None else shift,
+    )
+    sheet = ms.Shell(
+        mesh.transformed(transformation, shift), thickness=1e-3, young_modulus=1e6, mass_density=1e3
+    )
     contact = ms.Contact(
-        obstacles(turn, shift),
+        obstacles(transformation, shift),
         friction_coefficient=0.4,
         sticking_speed=1e-3,
         smoothing=1e-4,
@@ -55,33 +64,41 @@ def scene_of(turn=None, shift=None, mesh=MESH, lagged=False):
     return ms.Scene(
         sheet,
         contacts=[contact],
-        water=ms.Water(100.0, velocity=turn @ FLOW, added_mass=0.2),
-        gravity=turn @ GRAVITY,
+        water=ms.Water(100.0, velocity=transformation @ FLOW, added_mass=0.2),
+        gravity=transformation @ GRAVITY,
         field=ms.UniformField(),
         allow_rigid_motions=True,
     )
 
 
-def fall(scene, turn, integrator, steps=30, **options) -> ms.Trajectory:
-    """M . B is what counts in a mirror: both are turned like any vector."""
+def fall(scene, transformation, integrator, steps=30, **options) -> ms.Trajectory:
+    """Simulate the falling sheet; M and B are both transformed as vectors, since only M . B enters the energy."""
     return ms.simulate(
         scene,
         steps=steps,
         time_step=TIME_STEP,
-        remanent_magnetization=turn @ MAGNETIZATION,
-        applied_flux_density=turn @ FLUX_DENSITY,
+        remanent_magnetization=transformation @ MAGNETIZATION,
+        applied_flux_density=transformation @ FLUX_DENSITY,
         integrator=integrator,
         progress=False,
         **options,
     )
 
 
-def moved(turn=None, shift=None, mesh=MESH, integrator=INTEGRATORS[0], lagged=False):
-    """Positions and velocities as the sheet falls, turned and shifted back."""
-    turn, shift = np.eye(3) if turn is None else turn, np.zeros(3) if shift is None else shift
-    motion = fall(scene_of(turn, shift, mesh, lagged), turn, integrator, velocities=turn @ VELOCITY)
+def moved(transformation=None, shift=None, mesh=MESH, integrator=INTEGRATORS[0], lagged=False):
+    """Return positions and velocities of the falling sheet, transformed back."""
+    transformation, shift = (
+        np.eye(3) if transformation is None else transformation,
+        np.zeros(3) if shift is None else shift,
+    )
+    motion = fall(
+        scene_of(transformation, shift, mesh, lagged),
+        transformation,
+        integrator,
+        velocities=transformation @ VELOCITY,
+    )
     assert motion.energies["contact"].max() > 0
-    return (motion.positions - shift) @ turn, motion.velocities @ turn
+    return (motion.positions - shift) @ transformation, motion.velocities @ transformation
 
 
 @pytest.fixture(
@@ -114,7 +131,7 @@ def test_a_mirrored_scene(here):
     agree(moved(TURN @ MIRROR, **options), expected)
 
 
-def test_numbering(here, rng):
+def test_numbering_does_not_change_the_motion(here, rng):
     options, expected = here
     vertices, faces = rng.permutation(MESH.n_vertices), rng.permutation(MESH.n_faces)
     shuffled = ms.TriangleMesh(MESH.rest_positions[vertices], np.argsort(vertices)[MESH.faces[faces]])
@@ -129,7 +146,7 @@ def test_the_side_of_the_normals(here):
 @pytest.mark.parametrize("lagged", [False, True], ids=["exact", "lagged"])
 @pytest.mark.parametrize("integrator", INTEGRATORS, ids=repr)
 def test_a_motion_goes_on_where_it_stopped(integrator, lagged):
-    """To the bit; obstacles go on where they were at that time."""
+    """Check that a motion in two halves has the same bits; obstacles continue from their time."""
     scene = scene_of(lagged=lagged)
     whole = fall(scene, np.eye(3), integrator, velocities=VELOCITY)
     half = fall(scene, np.eye(3), integrator, steps=15, velocities=VELOCITY)
@@ -147,7 +164,7 @@ def thread_counts():
 
 
 def test_any_number_of_threads_gives_the_same_bits(thread_counts):
-    """Enough points on faces for several tasks."""
+    """Check a mesh with enough points on its faces for several tasks."""
     fine = ms.meshes.rectangle(0.02, 0.01, cells=(24, 12), irregular=0.2, seed=3)
     scene = scene_of(mesh=fine)
     seen = set()

@@ -1,4 +1,4 @@
-"""`ms.Water`: its tables, what it refuses, copies. Its forces are in test_water_kernel."""
+"""Tables, refused input and copies of `ms.Water`. Its forces: test_water_kernel."""
 
 import copy
 import pickle
@@ -33,7 +33,7 @@ def make(tables):
         (False, {"thrust_table": ([0, np.pi / 2], [0, 2], (0, 1))}),
     ],
 )
-def test_it_says_whether_it_is_smooth(smooth, tables):
+def test_is_smooth_follows_from_the_tables(smooth, tables):
     assert ms.Water(**tables).is_smooth is smooth
 
 
@@ -79,7 +79,7 @@ def test_tables_go_through_their_values_twice_differentiably(rng):
         ),
     ],
 )
-def test_bad_input(changes, message):
+def test_bad_arguments_are_refused(changes, message):
     with pytest.raises(ValueError, match=message):
         ms.Water(**changes)
 
@@ -98,7 +98,7 @@ def test_bad_input_of_the_methods():
 
 @pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, lambda w: pickle.loads(pickle.dumps(w))])
 @pytest.mark.parametrize("tables", [{}, SMOOTH, KINKED])
-def test_copies(tables, duplicate, rng):
+def test_copies_have_equal_forces(tables, duplicate, rng):
     faces, water = rng.standard_normal((3, 10, 3, 3)), make(tables)
     twin = duplicate(water)
     np.testing.assert_array_equal(twin.force(*faces), water.force(*faces))

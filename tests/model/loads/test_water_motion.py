@@ -1,4 +1,4 @@
-"""G1 in motion: plates that fall, drift and glide in water as the closed forms say."""
+"""Motions in water (G1): plates that fall, drift and glide as the closed forms predict."""
 
 import numpy as np
 import pytest
@@ -11,20 +11,20 @@ GRAVITY = 9.81  # m/s2
 INTEGRATORS = [ms.ImplicitEuler(), ms.TRBDF2(), ms.SDIRK2(), ms.SDIRK3()]
 SECOND_ORDER = INTEGRATORS[1:]
 TILT = rotation_matrix(np.array([0.4, -0.7, 0.2]))
-# Of drag and thrust. C = 2 sin^2 is 2 head on; reference.json: "drag rho A v^2 + thrust rho A v^2 = 2 rho A v^2".
+# Factors of drag and thrust. C = 2 sin^2 is 2 head on; reference.json: "drag rho A v^2 + thrust rho A v^2 = 2 rho A v^2".
 COEFFICIENTS = [(1.0, 1.0), (0.6, 0.0), (0.3, 1.7)]
 
 
-def plate(water, gravity=(0, 0, 0), turn=None, cells=(3, 2)) -> ms.Scene:
+def plate(water, gravity=(0, 0, 0), rotation=None, cells=(3, 2)) -> ms.Scene:
     sheet = block_sheet(cells, young_modulus=1e6)
-    if turn is not None:
-        mesh = ms.TriangleMesh(sheet.mesh.rest_positions @ turn.T, sheet.mesh.faces)
+    if rotation is not None:
+        mesh = ms.TriangleMesh(sheet.mesh.rest_positions @ rotation.T, sheet.mesh.faces)
         sheet = ms.Shell(mesh, thickness=2e-3, young_modulus=1e6, mass_density=1e3)
     return ms.Scene(sheet, water=water, gravity=gravity, allow_rigid_motions=True)
 
 
 def closed_form(scene, fall=GRAVITY) -> tuple[float, float]:
-    """v_T and T of a plate that falls face-on, as the docstring of ms.Water has them."""
+    """Return v_T and T of a plate that falls face-on, as in the docstring of ms.Water."""
     water, areal = scene.water, float(scene.shell.mass_density[0] * scene.shell.thickness[0])
     head_on = 2 * (water.drag_coefficient + water.thrust_coefficient)
     terminal = np.sqrt(2 * areal * fall / (water.fluid_density * head_on))
@@ -33,7 +33,7 @@ def closed_form(scene, fall=GRAVITY) -> tuple[float, float]:
 
 @pytest.mark.parametrize("integrator", INTEGRATORS, ids=repr)
 @pytest.mark.parametrize("drag, thrust", COEFFICIENTS)
-def test_terminal_speed(integrator, drag, thrust):
+def test_falling_plate_reaches_the_terminal_speed(integrator, drag, thrust):
     scene = plate(ms.Water(drag_coefficient=drag, thrust_coefficient=thrust), (0, 0, -GRAVITY))
     terminal, time = closed_form(scene)
     motion = simulated(scene, 80, time / 4, integrator=integrator)
@@ -43,11 +43,14 @@ def test_terminal_speed(integrator, drag, thrust):
 
 @pytest.mark.parametrize("integrator", SECOND_ORDER, ids=repr)
 @pytest.mark.parametrize("added_mass", [0.0, 5.0])
-@pytest.mark.parametrize("turn", [None, TILT], ids=["level", "askew"])
-def test_falls_by_a_hyperbolic_tangent(integrator, added_mass, turn):
-    """Added mass makes it slower to start, not slower in the end. Askew: gravity along the plate's normal all the same."""
-    down = np.array([0.0, 0.0, -1.0]) if turn is None else -TILT[:, 2]
-    scene = plate(ms.Water(added_mass=added_mass), GRAVITY * down, turn)
+@pytest.mark.parametrize("rotation", [None, TILT], ids=["level", "askew"])
+def test_plate_falls_by_a_hyperbolic_tangent(integrator, added_mass, rotation):
+    """Compare the fall with v_T tanh(t / T), with and without added mass.
+
+    Added mass slows the start and not the end. In the oblique case gravity is along the plate's normal, too.
+    """
+    down = np.array([0.0, 0.0, -1.0]) if rotation is None else -TILT[:, 2]
+    scene = plate(ms.Water(added_mass=added_mass), GRAVITY * down, rotation)
     terminal, time = closed_form(scene)
     motion = simulated(scene, 150, time / 50, integrator=integrator)
     expected = terminal * np.tanh(motion.times / time)
@@ -62,7 +65,7 @@ def test_falls_by_a_hyperbolic_tangent(integrator, added_mass, turn):
 
 
 def test_added_mass_slows_the_start():
-    """At first there is no drag: the plate falls with g s / (s + m), s its own mass in an area."""
+    """Check the start without drag: acceleration g s / (s + m), with the plate's own mass per area s."""
     scene = plate(ms.Water(added_mass=5.0), (0, 0, -GRAVITY))
     motion = simulated(scene, 1, 1e-6)
     np.testing.assert_allclose(-motion.velocities[-1, :, 2], 1e-6 * GRAVITY * 2.0 / 7.0, rtol=1e-6)
@@ -74,7 +77,7 @@ def test_added_mass_slows_the_start():
 
 
 def test_in_a_flow_the_relative_motion_counts():
-    """Falling through water that rises and drifts along the plate: the speed relative to it is the terminal one."""
+    """Check a plate that falls through rising water: its speed relative to the water is the terminal one."""
     flow = np.array([0.0, 0.0, 0.3])
     scene = plate(ms.Water(velocity=flow), (0, 0, -GRAVITY))
     terminal, time = closed_form(scene)
@@ -84,9 +87,9 @@ def test_in_a_flow_the_relative_motion_counts():
 
 @pytest.mark.parametrize("integrator", INTEGRATORS, ids=repr)
 @pytest.mark.parametrize("added_mass", [0.0, 5.0])
-def test_what_moves_with_the_water_feels_nothing(integrator, added_mass):
+def test_plate_moving_with_the_water_has_no_force(integrator, added_mass):
     flow = np.array([0.31, -0.22, 0.17])
-    scene = plate(ms.Water(velocity=flow, added_mass=added_mass), turn=TILT)
+    scene = plate(ms.Water(velocity=flow, added_mass=added_mass), rotation=TILT)
     motion = simulated(scene, 40, 0.01, velocities=flow, integrator=integrator)
     expected = motion.positions[0] + motion.times[:, None, None] * flow
     np.testing.assert_allclose(motion.positions, expected, rtol=0, atol=1e-13)
@@ -95,7 +98,7 @@ def test_what_moves_with_the_water_feels_nothing(integrator, added_mass):
 
 @pytest.mark.parametrize("integrator", INTEGRATORS, ids=repr)
 def test_edge_on_nothing_slows_a_plate(integrator):
-    """C(0) = 0: there is no friction along the faces."""
+    """Check that an edge-on plate keeps its speed, as C(0) = 0 and faces have no friction along them."""
     scene = plate(ms.Water(added_mass=5.0))
     speed = np.array([0.4, -0.3, 0.0])
     motion = simulated(scene, 40, 0.01, velocities=speed, integrator=integrator)
@@ -103,7 +106,7 @@ def test_edge_on_nothing_slows_a_plate(integrator):
 
 
 def test_face_on_a_plate_coasts_to_a_halt():
-    """dv/dt = -v^2 / l with l = 2 (s + m) / (rho (C_d + C_t)): v = v0 / (1 + v0 t / l)."""
+    """Compare with v = v0 / (1 + v0 t / l), from dv/dt = -v^2 / l with l = 2 (s + m) / (rho (C_d + C_t))."""
     scene = plate(ms.Water(added_mass=1.0))
     start, length = 0.5, 2 * (2.0 + 1.0) / (1000.0 * 4.0)
     motion = simulated(scene, 200, 2e-5, velocities=(0, 0, start), integrator=ms.SDIRK2())
@@ -113,9 +116,9 @@ def test_face_on_a_plate_coasts_to_a_halt():
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS, ids=repr)
-def test_still_water_takes_energy_only(integrator):
-    """A soft sheet thrown askew and spinning."""
-    scene = plate(ms.Water(thrust_coefficient=0.5), turn=TILT, cells=(4, 4))
+def test_still_water_only_dissipates_energy(integrator):
+    """Check that a soft sheet thrown obliquely with a spin never gains energy."""
+    scene = plate(ms.Water(thrust_coefficient=0.5), rotation=TILT, cells=(4, 4))
     x = scene.mesh.rest_positions
     thrown = np.array([0.3, 0.1, -0.2]) + np.cross([5.0, -3.0, 8.0], x - x.mean(axis=0))
     motion = simulated(scene, 60, 2e-3, velocities=thrown, integrator=integrator)

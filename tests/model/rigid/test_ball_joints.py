@@ -1,4 +1,4 @@
-"""Ball joints: how far their axis may lean, servos and motors for their rotation."""
+"""Ball joints: limits of their axis, servos and motors for their rotation."""
 
 from __future__ import annotations
 
@@ -14,15 +14,17 @@ EXACT = {"solver": ms.MixedNewton(tolerance=1e-12)}
 
 
 def _bob(**law):
-    """One kilogram on an arm of half a meter, level at rest."""
+    """Return (scene, joint, link) of one kilogram on an arm of half a meter that is level at rest."""
     bob = ms.Link(mass=1.0, inertia=0.02, center=(0.5, 0, 0))
     ball = ms.Ball(bob, origin=(0, 0, 0), **law)
     return ms.Scene(ms.Skeleton([bob], [ball]), gravity=(0, 0, -G)), ball, bob
 
 
 def test_an_arm_leans_on_its_cone():
-    """Its weight's moment m g l cos(s) is what the limit takes: a parabola up to its smoothing, then linear. The arm may
-    twist as it likes: a moment about it is held by the spring alone."""
+    """Compare the limit's moment with the weight's moment m g l cos(s).
+
+    The limit is a parabola up to its smoothing, then linear. It does not resist twist, which only the spring holds.
+    """
     stiffness, smoothing, cone = 200.0, 1e-3, 0.4
     law = {"axis": (1, 0, 0), "cone_limit": cone, "limit_stiffness": stiffness, "limit_smoothing": smoothing}
     scene, ball, bob = _bob(spring_stiffness=1e-3, **law)
@@ -37,11 +39,11 @@ def test_an_arm_leans_on_its_cone():
     found = ms.equilibrium(scene, gravity_factor=0.0)
     assert float(found[twisted].angle) == pytest.approx(
         1.0, rel=1e-9
-    )  # 57 degrees, of which the cone feels none
+    )  # 57 degrees of twist, which the cone does not resist
     np.testing.assert_allclose(found[bone].rotation[:, 0], (1, 0, 0), atol=1e-9)
 
 
-def test_a_cone_is_not_felt_inside():
+def test_cone_limit_exerts_no_moment_inside():
     inside, *_, bob = _bob(
         spring_stiffness=30.0, axis=(1, 0, 0), cone_limit=0.4, limit_stiffness=1e3, limit_smoothing=1e-2
     )
@@ -56,7 +58,7 @@ def test_a_whirling_arm_stays_in_its_cone():
     )  # fmt: skip
     move = ms.simulate(scene, steps=200, time_step=2e-3, progress=False)
     lean = np.arccos(np.clip(move[bob].rotation[:, 0, 0], -1, 1))
-    # Turning and falling have 5.8 J to press it in with.
+    # Rotation and fall have 5.8 J to press it into the limit.
     assert 0.5 < lean.max() < 0.5 + 0.005 + np.sqrt(2 * 5.8 / 500.0)
     assert abs(move.energy[-1] - move.energy[0]) < 2e-3 * move.kinetic_energy.max()
 
@@ -66,7 +68,7 @@ def test_a_servo_turns_to_its_target_with_a_torque_below_its_limit():
     scene, ball, bob = _bob(target_rotation=target, servo_stiffness=1e4)
     rest = ms.equilibrium(scene)
     np.testing.assert_allclose(rest[bob].rotation, rotation_matrix(target), atol=1e-3)
-    # Without weight it is there; a weak one is short of it by what the weight asks for.
+    # Without weight it reaches the target; a weak servo misses it by what the weight requires.
     level, ball, bob = _bob(target_rotation=(0, 0, 0), servo_stiffness=50.0, torque_limit=6.0)
     rest = ms.equilibrium(level, **EXACT)
     angle = float(rest[ball].angle)
@@ -75,7 +77,10 @@ def test_a_servo_turns_to_its_target_with_a_torque_below_its_limit():
 
 
 def test_a_servo_on_a_turned_parent_and_its_gradient():
-    """The target's axes ride on the parent; by it, by gain and limit, against differences, also where it is reached."""
+    """Check a servo whose target's axes move with the parent, reached and not reached.
+
+    Gradients by target, gain and limit are compared with differences.
+    """
     base, hand = (
         ms.Link(mass=1.0, inertia=0.02, center=(0.5, 0, 0)),
         ms.Link(mass=0.4, inertia=0.01, center=(1.2, 0.1, 0)),
@@ -112,7 +117,7 @@ def test_a_servo_on_a_turned_parent_and_its_gradient():
             )
 
 
-def test_a_motor_holds_a_rotation_and_says_its_moment():
+def test_motor_holds_a_rotation_and_reports_its_moment():
     turn = np.array([0.3, 0.9, -0.4])
     scene, ball, bob = _bob(motor_rotation=turn)
     rest = ms.equilibrium(scene)
@@ -128,8 +133,10 @@ def test_a_motor_beyond_half_a_turn_goes_the_shorter_way():
 
 
 def test_a_motor_in_time_and_what_it_takes():
-    """About an axis of inertia without gravity: the moment is inertia times angular acceleration; Euler's equations tell
-    the rest where the axis turns."""
+    """Compare a motor's moment about an axis of inertia with inertia times angular acceleration.
+
+    There is no gravity; Euler's equations give the moment where the axis rotates.
+    """
     top = ms.Link(mass=1.0, inertia=(0.02, 0.03, 0.04), center=(0, 0, 0))
     ball = ms.Ball(top, origin=(0, 0, 0), motor_rotation=(0, 0, 0))
     scene = ms.Scene(ms.Skeleton([top], [ball]))
@@ -151,7 +158,7 @@ def test_a_motor_in_time_and_what_it_takes():
 
 
 def test_gradient_by_a_motor_in_time():
-    """A motor that turns the next link's ball joint about: by the rotations at the ends of steps."""
+    """Check a motor that moves the ball joint of the next link: the gradient by its rotations at the ends of steps."""
     links = [
         ms.Link(mass=1.0, inertia=0.02, center=(0.5, 0, 0)),
         ms.Link(mass=0.5, inertia=0.02, center=(1, 0, 0)),
@@ -167,12 +174,12 @@ def test_gradient_by_a_motor_in_time():
     given -= given[0]
     weights = np.random.default_rng(4).standard_normal((2, 3))
 
-    def value(turns):
+    def value(rotations):
         move = ms.simulate(
             scene,
             steps=6,
             time_step=2e-2,
-            values={joints[1]: {"motor_rotation": turns}},
+            values={joints[1]: {"motor_rotation": rotations}},
             solver=ms.MixedNewton(tolerance=1e-13),
             progress=False,
         )

@@ -1,4 +1,4 @@
-"""Axes of joints, places of slides and Closures: solves with others, links staying where they are at rest; gradients."""
+"""Changed axes of joints, origins of slides and loop closures: links stay at their rest positions; gradients."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ def _flap(axis=(0.0, 1.0, 0.0)):
     return ms.Scene(ms.Skeleton([rod], [hinge]), gravity=(0, 0, -G)), hinge, rod
 
 
-def _difference(value, at, way, step=1e-4):
-    a, b, c, d = (value(at + k * step * way) for k in (-2, -1, 1, 2))
+def _difference(value, at, direction, step=1e-4):
+    a, b, c, d = (value(at + k * step * direction) for k in (-2, -1, 1, 2))
     return (8 * (c - b) - (d - a)) / (12 * step)
 
 
 def test_a_flap_about_a_leaning_axis():
-    """About an axis that leans by b in its own plane, gravity has the share cos b."""
+    """Compare with the closed form: about an axis tilted by b, gravity acts with the factor cos b."""
     scene, hinge, _ = _flap()
     lean = 0.6
     axis = torch.tensor([0.0, np.cos(lean), np.sin(lean)], dtype=torch.float64, requires_grad=True)
@@ -40,7 +40,7 @@ def test_a_flap_about_a_leaning_axis():
     assert float(axis.grad.numpy() @ across) == pytest.approx(-slope * np.sin(lean), rel=1e-7)
 
 
-def test_only_the_direction_of_an_axis_counts():
+def test_length_of_an_axis_does_not_matter():
     scene, hinge, rod = _flap()
     found = []
     for length in (1.0, 4.0):
@@ -56,8 +56,8 @@ def test_only_the_direction_of_an_axis_counts():
         ms.equilibrium(scene, values={hinge: {"axis": (0.0, 1.0)}})
 
 
-def test_another_axis_is_what_a_scene_made_with_it_has():
-    """A hinge with a slide behind it, both turned, and a damper: places, angles and rates are the same."""
+def test_changed_axis_equals_a_scene_made_with_it():
+    """Check positions, angles and rates of a hinge with a slide behind it, both with new axes, and a damper."""
 
     def made(first, second):
         arm, sled = (ms.Link(mass=m, inertia=0.01, center=(x, 0, 0)) for m, x in ((2.0, 0.3), (0.5, 0.6)))
@@ -84,7 +84,7 @@ def test_another_axis_is_what_a_scene_made_with_it_has():
 
 
 def _arm_in_flesh():
-    """Bones in a bar: a hinge, a slide along a leaning axis, and a ball joint behind them."""
+    """Return a scene of links in a soft bar: a hinge, a slide along an oblique axis, and a ball joint behind them."""
     mesh = ms.meshes.box((0.08, 0.01, 0.01), cells=(8, 1, 1))
     solid = ms.Solid(
         mesh, material=ms.NeoHookean(young_modulus=2e4, poisson_ratio=0.4), mass_density=1e3, element="linear"
@@ -119,8 +119,8 @@ def test_gradient_by_axes_in_flesh_over_200_steps():
 
     def end(shift, tensors=False):
         given = {
-            joint: {"axis": torch.tensor(joint.axis + shift * way, requires_grad=tensors)}
-            for joint, way in zip((hinge, slide), ways, strict=True)
+            joint: {"axis": torch.tensor(joint.axis + shift * direction, requires_grad=tensors)}
+            for joint, direction in zip((hinge, slide), ways, strict=True)
         }
         move = ms.simulate(
             scene,
@@ -134,13 +134,15 @@ def test_gradient_by_axes_in_flesh_over_200_steps():
 
     loss, axes = end(0.0, tensors=True)
     loss.backward()
-    along = sum(float(axis.grad @ torch.tensor(way)) for axis, way in zip(axes, ways, strict=True))
+    along = sum(
+        float(axis.grad @ torch.tensor(direction)) for axis, direction in zip(axes, ways, strict=True)
+    )
     difference = _difference(lambda shift: end(shift)[0].item(), 0.0, 1.0, 1e-3)
     assert along == pytest.approx(difference, rel=1e-5)
 
 
-def test_places_that_nothing_depends_on():
-    """Of a slide and of what is held fast: other origins change nothing, and gradients are zero."""
+def test_origins_of_slides_and_fixed_joints_have_no_effect():
+    """Check that origins of a slide and a fixed joint change nothing, and that their gradients are zero."""
     arm, sled, tool = (ms.Link(mass=0.5, inertia=0.01, center=(x, 0, 0)) for x in (0.3, 0.6, 0.7))
     hinge = ms.Revolute(arm, origin=(0, 0, 0), axis=(0, 1, 0), spring_stiffness=8.0)
     slide = ms.Prismatic(sled, arm, origin=(0.5, 0, 0), axis=(1, 0, 0.3), spring_stiffness=90.0)
@@ -157,31 +159,32 @@ def test_places_that_nothing_depends_on():
         assert np.abs(named["origin"].grad.numpy()).max() == 0.0
 
 
-def test_gradient_by_the_place_of_a_closure():
-    """A beam on two springs of which one is a Closure: the further out it is, the less it is pulled."""
+def test_gradient_by_the_origin_of_a_loop_closure():
+    """Check a beam on two springs, one of them a loop closure that pulls less the further out it is."""
     beam = ms.Link(mass=2.0, inertia=0.1, center=(0.5, 0, 0))
     hinge = ms.Revolute(beam, origin=(0, 0, 0), axis=(0, 1, 0))
     loop = ms.LoopClosure(beam, origin=(0.8, 0, 0), stiffness=200.0)
     scene = ms.Scene(ms.Skeleton([beam], [hinge, loop]), gravity=(0, 0, -G))
 
-    def angle(place):
-        return ms.equilibrium(scene, values={loop: {"origin": place}}, **EXACT)[hinge].angle
+    def angle(origin):
+        return ms.equilibrium(scene, values={loop: {"origin": origin}}, **EXACT)[hinge].angle
 
-    place = torch.tensor([0.8, 0.0, 0.1], dtype=torch.float64, requires_grad=True)
-    found = angle(place)
+    origin = torch.tensor([0.8, 0.0, 0.1], dtype=torch.float64, requires_grad=True)
+    found = angle(origin)
     # k |R o - o|^2 / 2 = k |o|^2 (1 - cos a)
     lever = 200.0 * (0.8**2 + 0.1**2)
     assert lever * np.sin(found.item()) == pytest.approx(2 * G * 0.5 * np.cos(found.item()), rel=1e-9)
     found.backward()
     by_hand = [
-        _difference(lambda at: float(angle(at)), place.detach().numpy(), way, 1e-3) for way in np.eye(3)
+        _difference(lambda at: float(angle(at)), origin.detach().numpy(), direction, 1e-3)
+        for direction in np.eye(3)
     ]
-    np.testing.assert_allclose(place.grad, by_hand, rtol=1e-7, atol=1e-9)
+    np.testing.assert_allclose(origin.grad, by_hand, rtol=1e-7, atol=1e-9)
 
 
 @pytest.mark.parametrize("integrator", [ms.TRBDF2(), ms.ImplicitEuler()], ids=repr)
-def test_gradient_by_places_of_a_thrown_chain(integrator):
-    """Rates at the start, a loop, a motor: what a motion reads of axes and places, at once and one by one."""
+def test_gradient_by_axes_and_origins_of_a_thrown_chain(integrator):
+    """Check axes and origins in a motion with initial rates, a loop closure and a motor, together and one by one."""
     links = [
         ms.Link(mass=m, inertia=0.02, center=c) for m, c in ((1.0, (0.5, 0, 0)), (0.4, (1, 0, 0.3)), (0.3, (1.2, 0.4, 0.1)))
     ]  # fmt: skip
@@ -195,8 +198,8 @@ def test_gradient_by_places_of_a_thrown_chain(integrator):
     weights = np.random.default_rng(2).standard_normal((3, 3))
     turning = np.linspace(0, 0.5, 9) ** 2
 
-    def end(places):
-        values = {joint: {name: place} for (joint, name), place in places.items()}
+    def end(parameters):
+        values = {joint: {name: value} for (joint, name), value in parameters.items()}
         values[joints[2]]["motor_angle"] = turning
         move = ms.simulate(
             scene,
@@ -209,7 +212,7 @@ def test_gradient_by_places_of_a_thrown_chain(integrator):
         )
         centers = [move[link].center[-1] for link in links]
         ways = weights if isinstance(centers[0], np.ndarray) else torch.tensor(weights)
-        return sum((center * way).sum() for center, way in zip(centers, ways, strict=True))
+        return sum((center * direction).sum() for center, direction in zip(centers, ways, strict=True))
 
     keys = [*((joint, "axis") for joint in joints[:3]), (joints[3], "origin")]
     given = {key: np.array(getattr(*key)) for key in keys}
@@ -217,9 +220,11 @@ def test_gradient_by_places_of_a_thrown_chain(integrator):
     end(tensors).backward()
     rng = np.random.default_rng(7)
     for key, value in given.items():
-        way = rng.standard_normal(3)
-        by_hand = _difference(lambda at, key=key: float(end({**given, key: at})), value, way, 3e-3)
-        assert float(tensors[key].grad @ torch.tensor(way)) == pytest.approx(by_hand, rel=2e-6, abs=1e-9)
+        direction = rng.standard_normal(3)
+        by_hand = _difference(lambda at, key=key: float(end({**given, key: at})), value, direction, 3e-3)
+        assert float(tensors[key].grad @ torch.tensor(direction)) == pytest.approx(
+            by_hand, rel=2e-6, abs=1e-9
+        )
 
 
 def test_a_motion_does_not_go_on_from_another_axis():
@@ -234,7 +239,7 @@ def test_a_motion_does_not_go_on_from_another_axis():
 
 
 def test_gradient_by_the_axis_of_a_damped_joint_behind_a_fast_one():
-    """Velocities of steps this long are no turn about the axis alone: how fast the damper is drawn feels it."""
+    """Check steps so long that velocities are no rotation about the axis alone, which the damper's rate includes."""
     arm, hand = (
         ms.Link(mass=m, inertia=(0.02, 0.03, 0.04), center=(x, 0.1, 0)) for m, x in ((2.0, 0.5), (0.5, 1.2))
     )

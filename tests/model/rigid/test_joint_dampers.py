@@ -1,4 +1,4 @@
-"""Dampers in joints: closed forms, orders in time, what they take from the energy, turns and gradients."""
+"""Dampers in joints: closed forms, order in time, dissipated energy, rotations past full circles, gradients."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ G = 9.81
 
 
 def wheel(**law):
-    """A rotor about z, of 0.02 kg m2."""
+    """Return (scene, joint) of a rotor about z with an inertia of 0.02 kg m2."""
     rotor = ms.Link(mass=1.0, inertia=(0.01, 0.01, 0.02), center=(0, 0, 0))
     axle = ms.Revolute(rotor, origin=(0, 0, 0), axis=(0, 0, 1), **law)
     return ms.Scene(ms.Skeleton([rotor], [axle])), axle
@@ -22,8 +22,8 @@ def wheel(**law):
 @pytest.mark.parametrize(
     ("integrator", "order", "rate"), [(ms.TRBDF2(), 2, 8.0), (ms.ImplicitEuler(), 1, 0.2)]
 )
-def test_a_wheel_slows_down_as_its_damper_says(integrator, order, rate):
-    """I w' = -d w, over several turns in one case: theta = w0 I/d (1 - exp(-d t/I))."""
+def test_damped_wheel_slows_down_exponentially(integrator, order, rate):
+    """Compare with theta = w0 I/d (1 - exp(-d t/I)) from I w' = -d w, over several full circles in one case."""
     scene, axle = wheel(damping=0.005, rate=rate)
     exact = rate * 0.02 / 0.005 * (1 - np.exp(-0.005 * 2.5 / 0.02))
     errors = []
@@ -36,7 +36,7 @@ def test_a_wheel_slows_down_as_its_damper_says(integrator, order, rate):
 
 
 def test_a_stiff_damper_holds_over_long_steps():
-    """A hundred thousand times faster than the step: it stops at once, and does not spring back."""
+    """Check a damper 100,000 times faster than the step: the wheel stops at once and does not spring back."""
     scene, axle = wheel(damping=2e3, rate=40.0)
     move = ms.simulate(scene, steps=20, time_step=0.1)
     assert np.abs(move[axle].angle).max() < 1e-3
@@ -73,7 +73,7 @@ def test_a_damped_slide_is_the_oscillator():
 
 
 def test_a_ball_damper_takes_momentum_from_a_spinning_ball():
-    """Isotropic: I w' = -d w, whatever the axis."""
+    """Compare a ball of isotropic inertia with I w' = -d w about any axis."""
     ball = ms.Link(mass=1.0, inertia=0.02, center=(0, 0, 0))
     socket = ms.Ball(ball, origin=(0, 0, 0), damping=0.05, rate=(3.0, -20.0, 10.0))
     move = ms.simulate(ms.Scene(ms.Skeleton([ball], [socket])), steps=800, time_step=1.25e-3)

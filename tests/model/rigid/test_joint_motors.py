@@ -1,4 +1,4 @@
-"""Motors that prescribe joints, moments in ball joints: closed forms, what they take, gradients."""
+"""Motors that prescribe joints, and moments in ball joints: closed forms, torques, gradients."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SLIDER_CRANK = [
 
 
 def arm(motor, **law):
-    """A rod of 2 kg and 1 m, level at rest, that a motor turns upwards."""
+    """Return (scene, hinge, wrist) of a rod of 2 kg and 1 m, level at rest, that a motor turns upwards."""
     rod = ms.Link(mass=2.0, inertia=2.0 / 12, center=(0.5, 0, 0))
     hinge = ms.Revolute(rod, origin=(0, 0, 0), axis=(0, -1, 0), motor_angle=motor, **law)
     hand = ms.Link(mass=0.5, center=(1.2, 0, 0))
@@ -30,7 +30,7 @@ def arm(motor, **law):
     return ms.Scene(ms.Skeleton([rod, hand], [hinge, wrist]), gravity=(0, 0, -G)), hinge, wrist
 
 
-def test_a_motor_holds_an_arm_at_its_angle_and_says_its_torque():
+def test_motor_holds_an_arm_at_its_angle_and_reports_its_torque():
     scene, hinge, wrist = arm(0.7)
     rest = ms.equilibrium(scene)
     assert float(rest[hinge].angle) == pytest.approx(0.7, abs=1e-14)
@@ -39,8 +39,8 @@ def test_a_motor_holds_an_arm_at_its_angle_and_says_its_torque():
     assert float(rest[hinge].motor_torque) == pytest.approx(torque, rel=1e-9)
 
 
-def test_a_motor_that_turns_evenly_needs_what_statics_says():
-    """One rod alone, at a constant rate: its weight's moment, as nothing is accelerated about the hinge."""
+def test_motor_at_constant_rate_needs_the_static_torque():
+    """Compare the torque at a constant rate with the moment of the rod's weight."""
     rod = ms.Link(mass=2.0, inertia=2.0 / 12, center=(0.5, 0, 0))
     hinge = ms.Revolute(rod, origin=(0, 0, 0), axis=(0, -1, 0), motor_angle=0.0, rate=3.0)
     free = ms.Link(mass=1.0, inertia=0.1, center=(5, 0, 0))
@@ -85,7 +85,7 @@ def slider_crank():
 
 @pytest.mark.parametrize(("theta", "x", "speed", "torque"), SLIDER_CRANK)
 def test_a_driven_slider_crank(theta, x, speed, torque):
-    """Case K5: place to 1e-8 (at rest), speed and torque as they converge at second order, to 1e-6."""
+    """Compare with case K5: positions at rest to 1e-8, extrapolated speed and torque to 1e-6."""
     scene, (drive, _, slide, _) = slider_crank()
     rest = None
     for angle in np.linspace(0, theta, 2 + int(3 * theta))[1:]:
@@ -103,7 +103,7 @@ def test_a_driven_slider_crank(theta, x, speed, torque):
         found.append([float(move[slide].rate[-1]), float(move[drive].motor_torque[-1])])
         squares.append(1.0 / steps**2)
     assert found[-1][0] == pytest.approx(speed, abs=1e-4)
-    # By the squares of the steps and their squares; round-off in the closure's force, 1e-6 N m, is evened out.
+    # Fit by the second and fourth powers of the step, which averages round-off of the closure's force, 1e-6 N m.
     powers = np.vander(squares, 3, increasing=True)
     limit = np.linalg.lstsq(powers / np.abs(powers).max(axis=0), np.array(found), rcond=None)[0][0]
     assert limit == pytest.approx([speed, torque], abs=1e-6)
@@ -155,7 +155,7 @@ def test_first_order_response_to_a_motor():
 
 
 def test_a_moment_in_a_ball_joint_keeps_its_direction():
-    """A bob on a spring ball joint: spring and moment alone balance where the angle is m/k about the moment's axis."""
+    """Check a bob on a spring ball joint: the angle is m/k about the moment's axis."""
     bob = ms.Link(mass=1.0, inertia=0.1, center=(0, 0, -1.0))
     moment = np.array([0.6, -0.2, 0.9])
     ball = ms.Ball(bob, origin=(0, 0, 0), spring_stiffness=2.0, torque=moment)
@@ -209,13 +209,13 @@ def test_gradient_by_a_moment_in_time():
         ({"motor_angle": (1.0, 2.0)}, "motor_angle"),
     ],
 )
-def test_bad_motors(law, message):
+def test_bad_motors_are_refused(law, message):
     rod = ms.Link(mass=1.0, inertia=0.1, center=(0.5, 0, 0))
     with pytest.raises(ValueError, match=message):
         ms.Revolute(rod, origin=(0, 0, 0), axis=(0, 1, 0), **law)
 
 
-def test_only_a_motor_says_its_torque():
+def test_motor_torque_of_a_free_joint_raises_an_error():
     scene, _, wrist = arm(0.1)
     with pytest.raises(ValueError, match="motor_angle"):
         ms.equilibrium(scene)[wrist].motor_torque  # noqa: B018

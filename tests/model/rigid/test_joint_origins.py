@@ -1,4 +1,4 @@
-"""Where joints are: solves with other origins, links staying where they are at rest, and gradients by origins."""
+"""Changed origins of joints: links stay at their rest positions; gradients by origins."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ def test_a_flap_hangs_by_its_lever_and_so_does_the_gradient():
     assert angle * SPRING == pytest.approx(WEIGHT * lever * np.cos(angle), rel=1e-9)
     rest[hinge].angle.backward()
     slope = -WEIGHT * np.cos(angle) / (SPRING + WEIGHT * lever * np.sin(angle))
-    # A hinge that is higher by z has the rod at -z beside its arm, whose lever is z sin(angle).
+    # With the hinge higher by z, the rod lies z below it; that adds z sin(angle) to the lever.
     upright = WEIGHT * np.sin(angle) / (SPRING + WEIGHT * lever * np.sin(angle))
     assert origin.grad[0].item() == pytest.approx(slope, rel=1e-7)
     assert abs(origin.grad[1].item()) < 1e-12
     assert abs(origin.grad[2].item()) == pytest.approx(upright, rel=1e-7)
 
 
-def test_another_origin_is_what_a_scene_made_with_it_has():
+def test_changed_origin_equals_a_scene_made_with_it():
     place = (0.06, 0.01, -0.02)
     other = ms.Link(mass=2.0, inertia=0.01, center=(ARM, 0, 0))
     there = ms.Revolute(other, origin=place, axis=(0, 1, 0), spring_stiffness=SPRING, rate=3.0)
@@ -48,7 +48,7 @@ def test_another_origin_is_what_a_scene_made_with_it_has():
 
 
 def _arm_in_flesh():
-    """Two bones in a bar, on a hinge and a ball joint."""
+    """Return a scene of two links in a soft bar, on a hinge and a ball joint."""
     mesh = ms.meshes.box((0.06, 0.01, 0.01), cells=(6, 1, 1))
     solid = ms.Solid(
         mesh, material=ms.NeoHookean(young_modulus=2e4, poisson_ratio=0.4), mass_density=1e3, element="linear"
@@ -114,8 +114,8 @@ def test_a_motion_does_not_go_on_from_other_joints():
     assert np.abs(move[hinge].angle - float(rest[hinge].angle)).max() < 1e-9
 
 
-def test_a_start_goes_along_with_the_place_of_a_motor():
-    """No force tells of it: the tool hangs on a motor, wherever that is."""
+def test_start_follows_the_changed_origin_of_a_motor():
+    """Check that a start follows a motor to its new origin, although no force depends on it."""
     arm, tool = (ms.Link(mass=m, inertia=0.01, center=(x, 0, 0)) for m, x in ((2.0, ARM), (0.5, 0.6)))
     hinge = ms.Revolute(arm, origin=(0, 0, 0), axis=(0, 1, 0), spring_stiffness=SPRING)
     motor = ms.Revolute(tool, arm, origin=(0.5, 0, 0), axis=(0, 0, 1), motor_angle=0.4)

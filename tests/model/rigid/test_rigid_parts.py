@@ -1,4 +1,4 @@
-"""Rigid parts: a free top against Jacobi's elliptic functions, what a payload does to a sheet, and magnets in a field."""
+"""Rigid bodies: a free top against Jacobi's elliptic functions, payloads of shells, and magnets in a field."""
 
 import numpy as np
 import pytest
@@ -46,7 +46,10 @@ def errors(rotations, steps_a_second, times=tuple(TURNED)):
 
 
 def jacobi(times):
-    """(n, 3): the rates in the body's axes, in closed form, where momentum^2 > 2 energy * the middle inertia."""
+    """Compute the rates in the body's axes in closed form, (n, 3) in rad/s.
+
+    The formulas hold where momentum^2 > 2 energy * the middle inertia.
+    """
     a, b, c = INERTIA
     momentum, energy = ((INERTIA * SPIN) ** 2).sum(), (INERTIA * SPIN**2).sum()  # squared; twice
     speed = np.sqrt((c - b) * (momentum - energy * a) / (a * b * c))
@@ -59,7 +62,7 @@ def jacobi(times):
     return sizes * np.stack([cn, sn, dn], axis=-1)
 
 
-def test_the_table_is_that_of_jacobi():
+def test_table_of_rates_is_that_of_jacobi():
     assert jacobi([0.0])[0] == pytest.approx(SPIN, abs=1e-12)
     assert jacobi(list(RATES)) == pytest.approx(np.array(list(RATES.values())), abs=1e-8)
 
@@ -93,7 +96,7 @@ def test_methods_that_fall_to_first_order_are_refused(method):
         spinning(10, 1, method)
 
 
-def test_nothing_drifts_in_a_long_run():
+def test_rotation_stays_orthogonal_in_a_long_run():
     _, part = spinning(20, 300)
     off = part.rotation @ part.rotation.transpose(0, 2, 1) - np.eye(3)
     assert np.abs(off).max() < 1e-13
@@ -162,7 +165,7 @@ def carrying(part, sheet=None, **scene):
 
 
 def test_a_payload_bends_a_strip_as_in_beam_theory():
-    """The part begins at 0.09: a force and a moment there, from its own weight at a center beyond the end."""
+    """Compare with a force and a moment at 0.09 m, where the body begins, from a center beyond the strip's end."""
     mass, weight = 1e-6, 1e-2
     part = ms.RigidBody(END, mass=mass, inertia=1e-12, center=(0.12, 0.005, 0.0))
     light = strip(mass_density=1e-6)
@@ -201,8 +204,8 @@ def test_a_frame_keeps_its_distances(solve):
     assert np.abs(positions - MESH.rest_positions[END]).max() > 0.01
 
 
-def test_it_is_the_limit_of_a_stiff_region():
-    """The same faces, once so stiff that they hardly strain, once rigid as well."""
+def test_rigid_body_is_the_limit_of_a_stiff_region():
+    """Compare faces so stiff that they hardly strain with the same faces made rigid as well."""
     within = np.isin(MESH.faces, END).all(axis=1)
     stiff = strip(young_modulus=np.where(within, 1e11, 1e6))
     supports = {"supports": [ms.Clamp(MESH.edges_at(x=0.0))], "gravity": (0, 0.2, -1.0)}
@@ -218,14 +221,17 @@ def test_it_is_the_limit_of_a_stiff_region():
 
 
 def test_a_payload_lowers_the_frequency_as_rayleigh_says():
-    """A point mass far heavier than the strip: 3 E I / (m L^3)."""
+    """Compare with 3 E I / (m L^3) of a point mass far heavier than the strip."""
     part = ms.RigidBody(END, mass=0.1, inertia=1e-9, center=(0.09, 0.005, 0.0))
     square = ms.vibration_modes(carrying(part), count=1).squares[0]
     assert square == pytest.approx(3.0 * STIFFNESS / (0.1 * 0.09**3), rel=3e-2)
 
 
 def test_a_magnet_against_the_field_buckles_the_strip():
-    """It turns the end by m B theta, the strip back by E I theta / L: only the curvature of turning knows of the former."""
+    """Check the balance of the magnet's moment m B theta and the strip's E I theta / L.
+
+    The former is in the Hessian only through the curvature of rotations.
+    """
     moment = 1e-3
     critical = STIFFNESS / (0.09 * moment)  # T
     part = ms.RigidBody(END, magnetic_moment=(-moment, 0, 0))
@@ -261,7 +267,7 @@ def test_going_on_has_the_same_bits():
 
 
 def test_a_frame_can_be_thrown():
-    """Momenta of a free sheet with a payload stay what they were; velocities of vertices say how the part starts."""
+    """Check that momenta of a free sheet with a payload are conserved, and that vertex velocities start the body."""
     part = ms.RigidBody(END, mass=2e-3, inertia=(1e-8, 2e-8, 2.5e-8))
     scene = ms.Scene([strip(), part], allow_rigid_motions=True)
     turning = np.array([0.0, 3.0, 1.0])
@@ -276,8 +282,8 @@ def test_a_frame_can_be_thrown():
     assert motion.energy == pytest.approx(motion.energy[0], rel=1e-2)
 
 
-def test_two_parts_with_common_faces_and_an_oblique_support():
-    """Blocks of the matrix between parts, and beside nodes with frames of their own: gradients of statics use them all."""
+def test_rigid_bodies_with_common_faces_and_an_oblique_support():
+    """Check matrix blocks between bodies, and beside nodes with local frames, through gradients of statics."""
     turn = Rotation.from_rotvec([0.4, -0.3, 0.7]).as_matrix()
     mesh = ms.TriangleMesh(MESH.rest_positions @ turn.T, MESH.faces)
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.3, mass_density=1e3)
@@ -309,7 +315,7 @@ def test_two_parts_with_common_faces_and_an_oblique_support():
 
 
 def test_a_part_of_a_solid():
-    """The glued end keeps its shape, and its weight bends the bar as a force and a couple there do."""
+    """Check that the rigid end keeps its shape and bends the bar as a force and a moment there do."""
     mesh = ms.meshes.box((0.1, 0.01, 0.01), cells=(10, 2, 2))
     bar = ms.Solid(mesh, material=ms.NeoHookean(young_modulus=1e6, poisson_ratio=0.3), mass_density=1.0)
     end = bar.mesh.vertices_where(lambda x: x[:, 0] > 0.0799)

@@ -1,4 +1,4 @@
-"""Rigid parts: bad input, copies, threads, pictures, and gradients that the generic test does not take."""
+"""Rigid bodies: bad input, copies, threads, pictures, and gradients that the generic test does not cover."""
 
 import copy
 import pickle
@@ -105,7 +105,7 @@ def test_a_free_body_at_rest_is_neutral():
         ms.equilibrium(ms.Scene(ms.RigidBody(mass=1.0, inertia=1.0), allow_rigid_motions=True))
 
 
-def test_several_sheets_say_which():
+def test_bodies_among_several_sheets_name_their_sheet():
     low, high = strip(), strip(0.1)
     part = ms.RigidBody(END, mass=1e-3, body=high)
     held = [ms.Clamp(body.mesh.edges_at(x=0.0), body=body) for body in (low, high)]
@@ -170,8 +170,8 @@ def test_an_end_state_is_kept_in_a_file(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["contact", "water", "nothing"])
-def test_it_goes_with_what_else_acts(kind):
-    """A thrown sheet with a frame: nothing bends it, and a gradient is that of differences."""
+def test_rigid_body_works_with_contact_and_water(kind):
+    """Check a thrown sheet with a frame: its shape stays, and the gradient is that of differences."""
     part, sheet = ms.RigidBody(END, mass=1e-3, inertia=(2e-8, 3e-8, 4e-8)), strip()
     floor = ms.Contact(
         ms.obstacles.Plane((0.1, 0, 1.0), center=(0, 0, -2e-3)),
@@ -221,7 +221,7 @@ def test_a_start_that_says_twice_how_a_free_body_moves():
         ms.simulate(scene, steps=1, time_step=0.1, start=first, values={free: {"velocity": (0, 0, 2.0)}})
 
 
-def test_free_bodies_go_on_whatever_the_vertices_are_told():
+def test_free_bodies_keep_their_velocity_whatever_the_vertices_are_given():
     free, part = ms.RigidBody(mass=1.0, inertia=1.0, velocity=(0, 0, 1.0)), ms.RigidBody(END)
     scene = ms.Scene([strip(), free, part], allow_rigid_motions=True)
     first = ms.simulate(scene, steps=2, time_step=1e-3)
@@ -240,7 +240,7 @@ def differences(function, at, along, step):
 @pytest.mark.parametrize("integrator", [ms.TRBDF2(), ms.ImplicitEuler()])
 @pytest.mark.parametrize("name", ["mass", "inertia", "angular_velocity"])
 def test_gradients_of_a_top_to_1e_6(integrator, name):
-    """The inertia as a tensor, along symmetric changes."""
+    """Check mass, angular velocity, and the inertia as a tensor along symmetric changes."""
     tensor = np.array([[1.0, 0.1, -0.2], [0.1, 2.0, 0.3], [-0.2, 0.3, 2.5]])
     top = ms.RigidBody(
         mass=1.5, inertia=tensor, center=(0.1, 0.2, 0.3), angular_velocity=(0.1, 2.0, 0.2), velocity=(1, 0, 0)
@@ -267,8 +267,8 @@ def test_gradients_of_a_top_to_1e_6(integrator, name):
     along = along + along.T if along.ndim == 2 else along
     long, short = differences(lambda x: float(loss(x)), at, 0.1 * along, 1e-2)
     exact = 0.1 * float((value.grad.numpy() * along).sum())
-    # A solve to 1e-13 leaves as much of the loss, which a difference of 1e-2 has a hundred times: that of a derivative which
-    # vanishes, as the mass's does.
+    # A solve to 1e-13 leaves that relative error in the loss; divided by a step of 1e-2 it bounds the error of a derivative
+    # that vanishes, as the one by the mass does.
     assert (4.0 * short - long) / 3.0 == pytest.approx(exact, rel=1e-6, abs=1e-9 * size.item())
 
 

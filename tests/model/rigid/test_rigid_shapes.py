@@ -1,4 +1,4 @@
-"""Rigid parts that touch with a shape of their own."""
+"""Rigid bodies in contact with a surface of their own."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ CUBE = ms.meshes.box((4e-3, 4e-3, 4e-3), cells=(1, 1, 1)).surface
 
 
 def on_plate(part, height=None, **contact):
-    """Over the middle of a plate that is held altogether, with a gap of 50 um where nothing is said."""
+    """Return a scene of the body over the middle of a held plate, with a gap of 50 um by default."""
     plate = ms.Shell(PLATE, **SOFT)
     touch = ms.Contact(part, plate, **contact)
     held = ms.Pin(np.arange(PLATE.n_vertices), body=plate)
@@ -38,7 +38,7 @@ def test_a_cube_rests_on_a_plate():
 
 @pytest.mark.parametrize("integrator", [ms.ImplicitEuler(), ms.TRBDF2()])
 def test_a_cube_falls_slides_and_stops(integrator):
-    """From a speed that friction brakes within the time, v/(mu g)."""
+    """Check a sliding cube, which friction stops in v/(mu g)."""
     part = ms.RigidBody.of(cube(), 2e3, velocity=(0.02, 0, 0))
     scene = on_plate(part, friction_coefficient=0.5, sticking_speed=1e-4)
     motion = ms.simulate(scene, steps=40, time_step=2.5e-4, integrator=integrator)
@@ -52,8 +52,8 @@ def test_a_cube_falls_slides_and_stops(integrator):
     assert min(motion.contact_state(touch, k).smallest_distance for k in range(41)) > 5e-4
 
 
-def test_two_shapes_hit_each_other():
-    """Two cubes in free flight: momentum stays, and they part again."""
+def test_shapes_of_rigid_bodies_collide():
+    """Check two cubes in free flight: momentum is conserved, and they separate again."""
     a = ms.RigidBody.of(cube(0.0), 1e3, velocity=(0.1, 0, 0))
     b = ms.RigidBody.of(cube(0.4e-3).transformed(translation=(4.3e-3, 0.5e-3, 0)), 2e3)
     touch = ms.Contact(a, b, contact_stiffness=1e5, activation_distance=2e-4)
@@ -66,8 +66,8 @@ def test_two_shapes_hit_each_other():
     assert any(touched) and not touched[0] and not touched[-1]
 
 
-def test_it_is_as_a_rigid_part_of_a_solid():
-    """The same cube as a Solid whose vertices are all one Rigid moves alike."""
+def test_shape_moves_like_a_fully_rigid_solid():
+    """Compare with the same cube as a Solid whose vertices all belong to one rigid body."""
     free = ms.RigidBody.of(cube(), 2e3, velocity=(0.02, 0.01, 0))
     scenes = [
         on_plate(
@@ -146,7 +146,7 @@ def test_gradients_go_through():
 
 
 def test_a_link_touches_with_its_shape():
-    """A pendulum that swings onto a held plate stays on its side."""
+    """Check that a pendulum that swings onto a held plate stays on its side."""
     plate = ms.Shell(PLATE, **SOFT)
     arm = ms.Link.of(cube(1e-3), 2e3)
     joint = ms.Revolute(arm, origin=(-0.02, 0.01, 3e-3), axis=(0, 1, 0))
@@ -162,7 +162,7 @@ def test_a_link_touches_with_its_shape():
     assert motion[arm].center[-1][2] < arm.center[2] - 3e-4
 
 
-def test_pictures_show_it(tmp_path):
+def test_pictures_show_rigid_shapes(tmp_path):
     part = ms.RigidBody.of(cube(), 2e3)
     scene = on_plate(part)
     motion = ms.simulate(scene, steps=2, time_step=1e-3)

@@ -103,7 +103,7 @@ STATES = [  # angles, mass matrix, rates, torques, accelerations
 
 
 def in_state(angles, rates=(None,) * 5, torques=(None,) * 5, **scene):
-    """The chain as it is turned, with that as its rest shape."""
+    """Return the chain in a posture that is its rest shape."""
     links, joints, frame, origin = [], [], np.eye(3), np.zeros(3)
     for angle, rate, torque, link in zip(angles, rates, torques, CHAIN, strict=True):
         axis, placement, offset, mass, sides, com = link
@@ -145,7 +145,7 @@ def test_mass_matrix_is_that_of_pinocchio(angles, mass_matrix):
 
 @pytest.mark.parametrize(("angles", "mass_matrix", "rates", "torques", "accelerations"), STATES)
 def test_accelerations_are_those_of_pinocchio(angles, mass_matrix, rates, torques, accelerations):
-    """From the change of the rates over short steps, extrapolated to none."""
+    """Compute the change of rates over short steps, extrapolated to a step of zero."""
     scene = in_state(angles, rates, torques, gravity=(0, 0, -9.81))
     found = []
     for time_step in (4e-4, 2e-4, 1e-4):

@@ -1,4 +1,4 @@
-"""Skeletons without flesh in what else takes scenes: vibrations, paths, buckling, responses; or a clear refusal."""
+"""Skeletons without soft bodies in vibrations, paths, buckling and linear response, or a clear refusal."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ G = 9.81
 
 
 def double_pendulum(up: bool = False, second: dict | None = None, **first):
-    """Two rods of 1 m and 1 kg, hanging on hinges about y, or standing on them."""
+    """Return (scene, joints) of two rods of 1 m and 1 kg that hang on hinges about y, or stand on them."""
     sign = 1.0 if up else -1.0
     rods = [ms.Link(mass=1.0, inertia=1 / 12, center=(0, 0, sign * (0.5 + k))) for k in range(2)]
     joints = [
@@ -24,13 +24,13 @@ def double_pendulum(up: bool = False, second: dict | None = None, **first):
 
 
 def stiffness_and_mass(spring: float):
-    """In the angles from the vertical; springs in both joints."""
+    """Return the stiffness of springs and of weight, and the mass, in the angles from the vertical."""
     weight = G * np.diag([1.5, 0.5])
     springs = spring * np.array([[2.0, -1.0], [-1.0, 1.0]])
     return springs, weight, np.array([[4 / 3, 0.5], [0.5, 1 / 3]])
 
 
-def test_a_double_pendulum_vibrates_as_it_must():
+def test_double_pendulum_has_the_closed_form_frequencies():
     scene, _ = double_pendulum(spring_stiffness=3.0, second={"spring_stiffness": 3.0})
     modes = ms.vibration_modes(scene, ms.equilibrium(scene), count=1)
     springs, weight, mass = stiffness_and_mass(3.0)
@@ -106,8 +106,8 @@ def _two(bar, first, second):
     ],
     ids=lambda law: next(iter(reversed(law))),
 )
-def test_linear_theory_feels_what_acts_in_joints(pull):
-    """So little of it that the equilibrium is linear."""
+def test_linear_theory_includes_forces_in_joints(pull):
+    """Compare with an equilibrium under loads so small that it is linear."""
     scene, joints = double_pendulum(True, spring_stiffness=30.0, second=pull)
     solved = ms.equilibrium(scene, gravity_factor=0.0, solver=ms.MixedNewton(tolerance=1e-13))
     inputs = plain_inputs(scene, None, None, None, gravity_factor=0.0)
@@ -119,7 +119,7 @@ def test_linear_theory_feels_what_acts_in_joints(pull):
     assert float(solved[joints[1]].angle) == pytest.approx(
         1e-3 / 30.0 if "torque" in pull else 1e-4, rel=1e-1
     )
-    # A limit lets go as it is left, where its tangent goes on.
+    # A limit ends where it is left, while its tangent continues.
     allowed = 0.06 if "lower_limit" in pull else 1e-3
     np.testing.assert_allclose(linear, change, atol=allowed * np.abs(change).max())
     with pytest.raises(ValueError, match=r"acts whatever they are"):

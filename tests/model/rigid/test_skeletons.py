@@ -37,7 +37,7 @@ CHAINS = {
 
 
 def absolute_angles(move, joints, index: int) -> np.ndarray:
-    """From the downward vertical."""
+    """Return the angles of the links from the downward vertical, in rad."""
     return np.pi / 2 - np.cumsum([move[joint].angle[index] for joint in joints])
 
 
@@ -74,7 +74,7 @@ def test_joints_hold_to_round_off_over_ten_thousand_steps():
 
 
 def test_hinge_in_balance():
-    """A rod on a spring hinge under its weight and a torque: k theta = tau + m g l/2 sin(...), to round-off."""
+    """Compare a rod on a spring hinge with k theta = tau + m g l/2 sin(...), to round-off."""
     rod = ms.Link(mass=2.0, inertia=0.1, center=(0.5, 0, 0))
     hinge = ms.Revolute(
         rod, origin=(0, 0, 0), axis=(0, -1, 0), spring_stiffness=30.0, rest_angle=0.3, torque=4.0
@@ -99,7 +99,7 @@ def test_ball_joint_hangs_and_its_spring_holds():
     assert 3.0 * angle == pytest.approx(G * np.sin(start - angle), rel=1e-8)
 
 
-def test_servo_reaches_its_target_and_keeps_its_limit():
+def test_servo_reaches_its_target_within_its_limit():
     rod = ms.Link(mass=1.0, inertia=0.1, center=(0, 0, -0.5))
 
     def angle(**law):
@@ -124,7 +124,7 @@ def test_limit_stops_a_falling_rod():
 
 
 def test_slider_crank_closes_its_loop():
-    """Kinematics of case K5: x = r cos t + sqrt(L^2 - r^2 sin^2 t); the slider's place to 1e-8."""
+    """Compare with case K5, x = r cos t + sqrt(L^2 - r^2 sin^2 t), to 1e-8."""
     r, length, theta = 0.1, 0.3, 1.0
     crank, rod, slider = (
         ms.Link(mass=0.01, inertia=1e-4, center=(r / 2, 0, 0)),
@@ -171,8 +171,8 @@ def _held_with_a_velocity(link):
 
 
 @pytest.mark.parametrize("driven", [False, True])
-def test_bones_that_joints_leave_no_freedom(driven):
-    """Fixed, or where a motor has them: as if the flesh were pinned there."""
+def test_links_without_freedom_act_like_pins(driven):
+    """Compare links that are fixed, or held by motors, with a soft body pinned there."""
     mesh = ms.meshes.box((0.3, 0.04, 0.04), cells=(6, 1, 1))
     bar = ms.Solid(mesh, material=ms.NeoHookean(young_modulus=2e4, poisson_ratio=0.3), mass_density=1e3)
     x = bar.mesh.rest_positions[:, 0] - bar.mesh.rest_positions[:, 0].min()
@@ -230,7 +230,7 @@ def test_gradient_of_a_motion_by_torques_in_time():
         ),
     ],
 )
-def test_bad_input(wrong, message):
+def test_joints_that_do_not_fit_are_refused(wrong, message):
     a, b = (ms.Link(mass=1.0, center=(0, 0, z)) for z in (1.0, 2.0))
     with pytest.raises(ValueError, match=message):
         wrong(a, b)

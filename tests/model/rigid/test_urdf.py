@@ -1,4 +1,4 @@
-"""Skeletons from URDF files: an arm against the same made by hand, and what is refused."""
+"""Skeletons from URDF files: an arm against the same made by hand, and refused files."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def test_a_free_base_falls(tmp_path):
         ("</robot>", "", "not a URDF file"),
     ],
 )
-def test_what_cannot_be_is_refused(tmp_path, old, new, message):
+def test_unsupported_elements_are_refused(tmp_path, old, new, message):
     assert old in ARM
     with pytest.raises(ValueError, match=message):
         ms.Skeleton.from_urdf(written(tmp_path, ARM.replace(old, new)), **LIMIT)

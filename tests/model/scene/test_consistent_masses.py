@@ -1,7 +1,8 @@
-"""Consistent masses beside lumped ones in every kind of scene of gradient_kinds.py, so that no mass of any is forgotten.
+"""Consistent masses against lumped ones in every kind of scene of gradient_kinds.py, so that none omits a mass.
 
-Where an element is linear, the rows of its consistent masses sum up to the lumped ones, which leave more kinetic energy to
-every motion: for triangles a twelfth of their mass times the squared differences of the velocity along their edges.
+The rows of an element's consistent mass matrix sum up to its lumped masses where the element is linear. Lumped masses give
+every motion more kinetic energy: for triangles a twelfth of their mass times the squared differences of the velocity along
+their edges.
 """
 
 import numpy as np
@@ -70,7 +71,10 @@ def test_consistent_masses_with_rigid_parts_are_refused(name):
 def test_bar_with_half_of_its_mass_in_a_skin_on_its_tip_swings_as_slowly_with_consistent_masses(
     element, density
 ):
-    """Of a bar of 20 g the skin on its last tenth has another 20 g: f = sqrt(3 E I / (L^3 (m_tip + 0.236 m))) / 2 pi."""
+    """Check a bar of 20 g whose skin on the last tenth has another 20 g.
+
+    f = sqrt(3 E I / (L^3 (m_tip + 0.236 m))) / 2 pi.
+    """
     length, width = 0.1, 0.02
     mesh = ms.meshes.box((length, width, width), cells=(20, 3, 3))
     tip = mesh.faces_where(lambda x: x[:, 0] > 0.9 * length + 1e-9)

@@ -1,4 +1,4 @@
-"""Energies of a scene in shapes that need not be at rest."""
+"""Energies of a scene in any shape, in equilibrium or not."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ BOX = ms.meshes.box((0.02, 0.02, 0.02), cells=(2, 2, 2))
 
 
 def mixed(**options):
-    """A sheet, a solid and another sheet, in a field and heavy."""
+    """Return a scene of a sheet, a solid and another sheet, in a field and with gravity."""
     rubber = ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.3)
     cube = ms.Solid(BOX.transformed(translation=(0, 0, 0.05)), material=rubber, mass_density=1e3)
     sheets = [ms.Shell(PLATE, **SOFT), ms.Shell(PLATE.transformed(translation=(0, 0, 0.1)), **SOFT)]
@@ -31,7 +31,7 @@ def given(scene):
     return {**GIVEN, "remanent_magnetization": rows}
 
 
-def test_those_of_an_equilibrium_are_its_own():
+def test_energies_of_an_equilibrium_are_those_of_its_result():
     scene = mixed()
     rest = ms.equilibrium(scene, **given(scene))
     found = ms.energies(scene, rest.positions, edge_rotations=rest.edge_rotations, **given(scene))
@@ -42,8 +42,8 @@ def test_those_of_an_equilibrium_are_its_own():
     assert half["gravity"] == pytest.approx(0.5 * found["gravity"])
 
 
-def test_bodies_have_theirs():
-    """One that alone is stretched has all of it; and all of them together make the sum."""
+def test_energies_of_bodies_make_up_the_sum():
+    """Check that one stretched body has all of the energy, and that all bodies make up the sum."""
     scene = mixed()
     for k, body in enumerate(scene.bodies):
         positions = scene.mesh.rest_positions.copy()
@@ -63,8 +63,8 @@ def test_bodies_have_theirs():
         )
 
 
-def test_what_was_solved_before_does_not_matter():
-    """The core remembers the turns of angles on the way to a state; here there was none."""
+def test_energies_do_not_depend_on_earlier_solves():
+    """Check angles beyond half a circle, whose branch the core tracks during a solve."""
     mesh = ms.meshes.rectangle(0.1, 0.01, cells=(10, 1))
     strip = ms.Shell(mesh, thickness=1e-4, young_modulus=1e6, bending="hinge")
     ends = [ms.Clamp(mesh.edges_at(x=0.0)), ms.Clamp(mesh.edges_at(x=0.1), rotation=(3.0, 0, 0))]
@@ -74,7 +74,7 @@ def test_what_was_solved_before_does_not_matter():
     assert ms.energies(scene, mesh.rest_positions) == before
 
 
-def test_other_values_and_friction_are_left_as_they_are():
+def test_values_and_friction_of_the_scene_stay_unchanged():
     scene = two_sheets(rubbing=0.3)
     lower = scene.bodies[0]
     positions = scene.mesh.rest_positions * (1.001, 1, 1)
@@ -106,7 +106,7 @@ def test_bad_input_is_refused():
 
 
 @pytest.mark.parametrize("order", [1, 2])
-def test_a_clamp_that_turns_has_its_direction_there(order):
+def test_rotating_clamp_has_its_director_in_energies(order):
     mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2), order=order)
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.3, mass_density=1e3)
     turned = ms.Clamp(mesh.edges_at(x=0.0), rotation=(0.0, -0.5, 0.0))

@@ -1,4 +1,4 @@
-"""Sheets that have grown and bent by themselves: shapes that are known exactly, and what is measured from them."""
+"""Sheets with growth and rest curvature: exact shapes, and the strains and stresses measured from them."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def shell(mesh, bending, **more):
 
 
 def held(sheet, **more):
-    """Against rigid motions alone: a corner of a sheet along x, an end of its first edge, another corner."""
+    """Return a scene held against rigid motions alone: a corner, an end of its first edge along x, another corner."""
     mesh = sheet.mesh
     at = mesh.rest_positions
     corner = [int(np.argmin(np.abs(at[:, :2]).sum(axis=1)))]
@@ -48,7 +48,7 @@ def test_a_free_sheet_that_grows_evenly_is_scaled_without_energy(bending):
 
 @pytest.mark.parametrize("bending", BENDINGS)
 def test_a_curved_sheet_that_grows_evenly_keeps_its_angles(bending):
-    """Those to the directions of symmetry planes too."""
+    """Check that a curved sheet is scaled, its angles to symmetry planes included."""
     flat = rectangle(bending)
     bent = flat.rest_positions + (flat.rest_positions**2 @ (3.0, 2.0, 0.0))[:, None] * (0, 0, 1)
     mesh = type(flat)(bent, flat.elements)
@@ -63,14 +63,14 @@ def test_a_curved_sheet_that_grows_evenly_keeps_its_angles(bending):
 @pytest.mark.parametrize("bending", BENDINGS)
 def test_growth_along_one_direction(bending):
     mesh = rectangle(bending, irregular=0.2, seed=1)
-    sheet = shell(mesh, bending, growth=np.diag([1.25, 0.9, 7.0]))  # along the normal it does not count
+    sheet = shell(mesh, bending, growth=np.diag([1.25, 0.9, 7.0]))  # growth along the normal has no effect
     found = ms.equilibrium(held(sheet), solver=EXACT)
     np.testing.assert_allclose(found.positions, mesh.rest_positions * (1.25, 0.9, 1.0), atol=1e-11)
     assert abs(sum(found.energies.values())) < 1e-18
 
 
 def rolled(found, sheet):
-    """The angles of a strip's faces, from its one end to its other."""
+    """Return the angles of a strip's faces from one end to the other."""
     at = found.positions[sheet.mesh.elements[:, :3]]
     rest = sheet.mesh.rest_positions[sheet.mesh.elements[:, :3]].mean(axis=1)
     normals = np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0])
@@ -81,7 +81,7 @@ def rolled(found, sheet):
 @pytest.mark.parametrize("bending", ("midedge", "hinge"))
 @pytest.mark.parametrize("growth", (1.0, 1.1))
 def test_a_strip_that_is_bent_at_rest_closes_to_a_ring(bending, growth):
-    """A polygon of the mesh's own strips, whose angles are exactly those of the curvature."""
+    """Compare with a polygon of the mesh's strips, whose angles are exactly those of the curvature."""
     cells = 16
     mesh = rectangle(bending, cells=(cells, 2), diagonals="aligned")
     curvature = 2.0 * np.pi / (growth * LENGTH)
@@ -96,7 +96,7 @@ def test_a_strip_that_is_bent_at_rest_closes_to_a_ring(bending, growth):
     )
     first, last = mesh.vertices_at(x=0.0), mesh.vertices_at(x=LENGTH)
     assert abs(sum(found.energies.values())) < 1e-16
-    # Half a step of the closed polygon is left at the clamp, whose direction the first strip leaves at half an angle.
+    # The first strip leaves the clamp at half of the angle between strips, so both ends coincide.
     np.testing.assert_allclose(found.positions[first], found.positions[last], atol=1e-9)
 
 
@@ -115,8 +115,11 @@ def test_six_nodes_close_to_a_ring():
 
 
 def bilayer(thicknesses, moduli, mismatch):
-    """A strip of two layers, Poisson's ratio 0, the first below and longer by `mismatch`: what it is as one sheet, from its
-    stiffness through the thickness about the middle where stretching and bending do not mix."""
+    """Compute the parameters of one shell equivalent to a strip of two layers, Poisson's ratio 0.
+
+    The first layer is below and longer by `mismatch`. Stiffnesses are taken about the axis where stretching and bending
+    decouple.
+    """
     bounds = np.cumsum([0.0, *thicknesses])
     stiffness = [e * t for e, t in zip(moduli, thicknesses, strict=True)]
     middles = 0.5 * (bounds[1:] + bounds[:-1])
@@ -177,7 +180,7 @@ def test_a_disk_with_a_swollen_rim_goes_into_waves(bending):
 
 
 def test_growth_along_a_path_buckles_where_the_theory_says():
-    """A strip between clamps, as a column: at the strain (pi^2 / 3) (h / L)^2."""
+    """Compare a strip between clamps with a column, which buckles at the strain (pi^2 / 3) (h / L)^2."""
     mesh = ms.meshes.rectangle(LENGTH, 0.004, cells=(40, 1), diagonals="aligned")
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0, growth=np.eye(3))
     ends = [ms.Clamp(mesh.edges_at(x=place)) for place in (0.0, LENGTH)]
@@ -195,7 +198,7 @@ def test_growth_along_a_path_buckles_where_the_theory_says():
     assert critical.kind == "bifurcation"
     strain = np.pi**2 / 3.0 * (1e-3 / LENGTH) ** 2
     assert critical.parameter * 1e-3 == pytest.approx(strain, rel=0.01)
-    # With the growth of each point: compressed by just that much.
+    # Strains are measured with the growth of each point of the path.
     at = path.parameters[-1] * 1e-3
     squeezed = 0.5 * (1.0 - (1.0 + at) ** 2) / (1.0 + at) ** 2
     assert path.strains(-1).membrane.min() == pytest.approx(squeezed, rel=1e-6)
@@ -223,7 +226,7 @@ def test_stresses_of_a_sheet_that_cannot_grow():
 
 @pytest.mark.parametrize("bending", BENDINGS)
 def test_moments_of_a_sheet_that_is_kept_flat(bending):
-    """By curvature alone: M = - Y h^3 / 12 (1 - nu^2) ((1 - nu) K + nu tr K)."""
+    """Compare with M = - Y h^3 / 12 (1 - nu^2) ((1 - nu) K + nu tr K) of a rest curvature alone."""
     mesh = rectangle(bending, cells=(6, 3), diagonals="aligned")
     bent = np.diag([3.0, 1.0, 0.0])
     sheet = shell(mesh, bending, rest_curvature=bent)
@@ -232,7 +235,7 @@ def test_moments_of_a_sheet_that_is_kept_flat(bending):
     modulus = 1e6 * 1e-9 / 12.0 / (1.0 - 0.3**2)
     moments = np.einsum("fai,fab,fbj->fij", stresses.rest_axes, stresses.bending_moments, stresses.rest_axes)
     wanted = -modulus * (0.7 * bent + 0.3 * np.trace(bent) * np.diag([1.0, 1.0, 0.0]))
-    # A hinge has no angle at the border, and nothing there to be held by: inside only.
+    # Hinges have no angle at the border, where nothing holds it: compared inside only.
     inside = (
         ~np.isin(np.arange(len(mesh.faces)), mesh.edge_faces[mesh.boundary_edges].ravel())
         if bending == "hinge"

@@ -1,4 +1,4 @@
-"""Growth of sheets as a value of solves: over time, in files, and where it is refused."""
+"""Growth of shells as a value of solves: over time, in files, and where it is refused."""
 
 import pickle
 
@@ -18,7 +18,7 @@ def shell(mesh=MESH, **more):
 
 
 def held(sheet, **more):
-    """Where it grows in its plane nothing holds it."""
+    """Return a scene whose supports leave growth in the plane free."""
     at = sheet.mesh.rest_positions[:, :2] / sheet.mesh.rest_positions[:, :2].max(axis=0)
     corner, end, side = ([int(np.argmin(np.abs(at - c).sum(axis=1)))] for c in ((0, 0), (1, 0), (0, 1)))
     return ms.Scene(sheet, supports=[ms.Pin(corner), ms.Pin(end, "yz"), ms.Pin(side, "z")], **more)
@@ -27,7 +27,7 @@ def held(sheet, **more):
 @pytest.mark.parametrize("mesh", (MESH, SIX))
 @pytest.mark.parametrize("as_function", (False, True))
 def test_growth_over_time(mesh, as_function):
-    """Slowly: the sheet follows, and its strains are those of its growth then."""
+    """Check slow growth: the sheet follows, and its strains are relative to the growth at their time."""
     sheet = shell(mesh, growth=1.0)
     steps, time_step = 20, 0.05
     ends = 1.0 + 0.2 * np.linspace(0, 1, steps + 1)
@@ -51,8 +51,8 @@ def test_growth_over_time(mesh, as_function):
     assert motion.energies["membrane"].max() < 1e-3 * 1e6 * 1e-3 * 0.04 * LENGTH * WIDTH
 
 
-def test_viscosity_counts_strains_from_what_has_grown():
-    """A jump of growth is no strain in time: what is viscous has the strains of its own time."""
+def test_viscosity_uses_strains_relative_to_growth():
+    """Check that a jump of growth is no strain rate: viscous terms use strains relative to the growth at their time."""
     ends = {}
     for growth in (1.1, 1.0 + 0.1 * (np.arange(6) > 2)):
         sheet = shell(growth=1.0)
@@ -71,7 +71,7 @@ def test_viscosity_counts_strains_from_what_has_grown():
     assert np.abs(ends[1].positions[-1] - 1.1 * MESH.rest_positions).max() > 1e-7
 
 
-def test_results_know_their_growth(tmp_path):
+def test_results_keep_the_growth_of_their_solve(tmp_path):
     sheet = shell(growth=np.ones(N))
     scene = held(sheet)
     grown = ms.equilibrium(scene, values={sheet: {"growth": 1.1}})
@@ -88,8 +88,8 @@ def _saved(result, tmp_path):
     return ms.load(tmp_path / "grown.npz", result.scene)
 
 
-def test_magnetization_stays_what_a_solve_says_while_growth_goes_on(tmp_path):
-    """What a state of a motion has of its own are its growth and nothing else."""
+def test_magnetization_of_a_solve_stays_constant_during_growth(tmp_path):
+    """Check that growth is the only value that differs between the states of a motion."""
     sheet = shell(growth=1.0)
     scene = held(sheet, field=ms.UniformField())
     motion = ms.simulate(
@@ -178,7 +178,7 @@ def test_linear_theory_refuses_a_rest_shape_that_is_none(what):
 
 
 def test_vibrations_about_a_grown_shape_are_those_of_a_larger_sheet():
-    """Free but for rigid motions; the mass stays that of the mesh."""
+    """Compare a grown sheet with a larger one of the same mass, both held against rigid motions only."""
     grown, large = held(shell(growth=1.2)), held(shell(MESH.scaled(1.2)).replaced(mass_density=1e3 / 1.2**2))
     wanted = ms.vibration_modes(large, count=3).frequencies
     with pytest.raises(ValueError, match="has grown or bent at rest"):

@@ -1,4 +1,4 @@
-"""Small deflections of a plate against an independent code of what `midedge` then is: Morley's element."""
+"""Small deflections of a plate against an independent code of Morley's element, to which `midedge` then reduces."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ def test_the_plate_element_is_morleys(support: str, load: str) -> None:
 def morley_plate(
     mesh: ms.TriangleMesh, clamped: bool, vertex_forces: np.ndarray, poisson_ratio: float = 0.3
 ) -> np.ndarray:
-    """Deflections (n_v,) where D = 1, by quadratics that share vertex values and mid-edge slopes."""
+    """Compute the deflections (n_v,) for D = 1 with quadratics that share vertex values and mid-edge slopes."""
     points, n_v, n_e = mesh.rest_positions[:, :2], mesh.n_vertices, mesh.n_edges
     along = points[mesh.edges[:, 1]] - points[mesh.edges[:, 0]]
     normals = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.linalg.norm(along, axis=1)[:, None]

@@ -1,4 +1,4 @@
-"""Linear theory counts edge rotations of six-node sheets from rest, so that the Hessian has fewer entries: same answers."""
+"""Linear theory measures edge rotations of six-node shells from rest, for a sparser Hessian: answers stay the same."""
 
 import numpy as np
 import pytest
@@ -15,12 +15,12 @@ def arched(x: np.ndarray) -> np.ndarray:
 
 
 def folded(x: np.ndarray) -> np.ndarray:
-    """By a right angle about the line of vertices nearest x = 1/2, and more besides."""
+    """Map points to a fold by a right angle at the line of vertices nearest x = 1/2, with some twist added."""
     return np.column_stack([x[:, :2], np.abs(x[:, 0] - 0.5) + 0.3 * x[:, 0] * x[:, 1]])
 
 
-def sheet(place=lambda x: x, **values) -> tuple[ms.QuadraticTriangleMesh, ms.Shell]:
-    mesh = ms.QuadraticTriangleMesh.of(ms.TriangleMesh(place(FLAT.rest_positions), FLAT.faces))
+def sheet(map_positions=lambda x: x, **values) -> tuple[ms.QuadraticTriangleMesh, ms.Shell]:
+    mesh = ms.QuadraticTriangleMesh.of(ms.TriangleMesh(map_positions(FLAT.rest_positions), FLAT.faces))
     values = {"thickness": 0.02, "young_modulus": 1e6, "poisson_ratio": 0.3, **values}
     return mesh, ms.Shell(mesh, bending="midedge2", **values)
 
@@ -33,20 +33,20 @@ def right_edges(mesh: ms.QuadraticTriangleMesh) -> np.ndarray:
     return mesh.edges_where(lambda middles: middles[:, 0] > 1.0 - 1e-9)
 
 
-def pushed(place) -> ms.Scene:
-    mesh, shell = sheet(place)
+def loaded_scene(map_positions) -> ms.Scene:
+    mesh, shell = sheet(map_positions)
     return ms.Scene(shell, supports=[ms.Clamp(left_edges(mesh))], loads=[ms.AreaLoad((0.3, -0.2, 1.0))])
 
 
 def turned_at_its_end() -> ms.Scene:
-    """What holds it moves nodes and directions: forces on rotations."""
+    """Return a scene whose clamp moves nodes and directors, which causes forces on rotations."""
     mesh, shell = sheet(arched)
     turned = ms.Clamp(right_edges(mesh), rotation=(0.0, 0.1, 0.02), displacement=(0, 0, 0.1))
     return ms.Scene(shell, supports=[ms.Clamp(left_edges(mesh)), turned])
 
 
 def held_inside() -> ms.Scene:
-    """Clamped along edges with faces on both sides, which have no rotation, and on symmetry planes that are not aligned."""
+    """Return a scene clamped along inner edges, which have no rotation, and on oblique symmetry planes."""
     turn = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
     mesh, shell = sheet(lambda x: x @ turn.T)
     inner = np.setdiff1d(np.arange(mesh.n_edges), mesh.boundary_edges)[3:6]
@@ -55,7 +55,7 @@ def held_inside() -> ms.Scene:
 
 
 def varied() -> ms.Scene:
-    """Thickness and modulus jump from face to face; pinned along its rim."""
+    """Return a scene pinned along its rim, whose thickness and modulus jump from face to face."""
     random = np.random.default_rng(0)
     thickness, modulus = random.uniform(0.01, 0.05, FLAT.n_faces), random.uniform(1e6, 1e7, FLAT.n_faces)
     mesh, shell = sheet(folded, thickness=thickness, young_modulus=modulus)
@@ -71,26 +71,26 @@ def with_a_rigid_part() -> ms.Scene:
     )
 
 
-def with_a_couple() -> ms.Scene:
+def with_an_edge_moment() -> ms.Scene:
     mesh, shell = sheet(arched)
     couple = ms.EdgeCouple(right_edges(mesh), 1e-2)
     return ms.Scene(shell, supports=[ms.Clamp(left_edges(mesh))], loads=[couple])
 
 
 SCENES = {
-    "flat": lambda: pushed(lambda x: x),
-    "arched": lambda: pushed(arched),
-    "folded": lambda: pushed(folded),
+    "flat": lambda: loaded_scene(lambda x: x),
+    "arched": lambda: loaded_scene(arched),
+    "folded": lambda: loaded_scene(folded),
     "turned at its end": turned_at_its_end,
     "held inside": held_inside,
     "jumps": varied,
     "rigid part": with_a_rigid_part,
-    "couple": with_a_couple,
+    "couple": with_an_edge_moment,
 }
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_the_same_as_from_the_whole_hessian(name) -> None:
+def test_linear_response_equals_that_of_the_full_hessian(name) -> None:
     scene = SCENES[name]()
     found = ms.linear_response(scene)
     inputs = plain_inputs(scene, None, None, None, load_factor=1.0, support_factor=1.0)
@@ -108,8 +108,8 @@ def test_the_same_as_from_the_whole_hessian(name) -> None:
     )
 
 
-def test_solves_afterwards_count_as_ever() -> None:
-    scene, untouched = pushed(arched), pushed(arched)
+def test_later_solves_measure_rotations_as_before() -> None:
+    scene, untouched = loaded_scene(arched), loaded_scene(arched)
     ms.linear_response(scene)
     found, expected = (ms.equilibrium(each, load_factor=10.0) for each in (scene, untouched))
     assert found.displacements == pytest.approx(expected.displacements, rel=0, abs=1e-13)

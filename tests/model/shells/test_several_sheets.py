@@ -1,4 +1,4 @@
-"""Several sheets in one scene: each as if it were alone, and results of each and of all."""
+"""Several shells in one scene: each as if alone, and results of each and of all."""
 
 import copy
 import pickle
@@ -18,7 +18,7 @@ EXACT = {"solver": ms.MixedNewton(tolerance=1e-12)}
 
 
 def parts_of(sheet, body=None):
-    """What holds and loads one of them."""
+    """Return the supports and loads of one sheet."""
     mesh = sheet.mesh
     free = mesh.edges_at(x=0.1)
     return {
@@ -50,7 +50,7 @@ def pair():
 
 
 def symmetric(hessian):
-    """Dense, from the lower triangle of all unknowns."""
+    """Return the dense matrix of all unknowns from its lower triangle."""
     size, starts, rows, values = hessian
     lower = np.zeros((size, size))
     lower[rows, np.repeat(np.arange(size), np.diff(starts))] = values
@@ -58,7 +58,7 @@ def symmetric(hessian):
 
 
 def unknowns(model, vertices=slice(None), edges=slice(None)):
-    """Where the core has these vertices and edges among all unknowns."""
+    """Return the indices of these vertices and edges among all unknowns of the core."""
     numbers = np.arange(1.0, model.size + 1.0)
     found = [model.positions(numbers)[vertices].ravel(), model.edge_rotations(numbers)[edges]]
     found = np.concatenate(found).astype(int)
@@ -79,7 +79,7 @@ def test_vertices_edges_and_faces_are_those_of_one_body_after_another(pair):
 
 
 def test_a_state_has_the_bits_of_two_scenes(pair, rng):
-    """Energy by term, gradient and Hessian: what one sheet feels does not know of the other."""
+    """Compare energy by term, gradient and Hessian: neither sheet affects the other."""
     sheets, scene, alone = pair
     moved = [s.mesh.rest_positions + 1e-4 * rng.standard_normal((s.mesh.n_vertices, 3)) for s in sheets]
     turned = [1e-2 * rng.standard_normal(s.mesh.n_edges) for s in sheets]
@@ -147,7 +147,7 @@ def test_motions_are_those_of_two_scenes(pair, integrator):
 
 
 def test_magnetization_may_be_given_three_ways(pair):
-    """For all at once, body by body, or with the bodies; tensors stay in their graph."""
+    """Check values for all at once, body by body, and of the bodies; tensors stay in their graph."""
     torch = pytest.importorskip("torch")
     sheets, scene, _ = pair
     own = ms.equilibrium(scene, applied_flux_density=STRONG, **EXACT)
@@ -177,7 +177,7 @@ def test_a_gradient_of_one_body_is_by_its_own_values(pair):
     assert by[0].grad.abs().max() < 1e-10 * by[1].grad.abs().max()
 
 
-def test_everything_else_takes_several_sheets(pair, tmp_path):
+def test_solves_of_every_kind_take_several_sheets(pair, tmp_path):
     torch = pytest.importorskip("torch")
     sheets, scene, alone = pair
     n_v = scene.mesh.n_vertices
@@ -198,13 +198,13 @@ def test_everything_else_takes_several_sheets(pair, tmp_path):
     assert linear.displacements.shape == (n_v, 3)
     path = ms.follow_path(scene, applied_flux_density=STRONG, max_step=0.1, progress=False)
     assert path.positions.shape == (len(path), n_v, 3) and path.parameters[-1] >= 1.0
-    assert ms.linear_buckling(pushed(), modes=2).factors == pytest.approx(
-        sorted([*(ms.linear_buckling(pushed(k)).factors[0] for k in (0, 1))]), rel=1e-6
+    assert ms.linear_buckling(compressed_strips(), modes=2).factors == pytest.approx(
+        sorted([*(ms.linear_buckling(compressed_strips(k)).factors[0] for k in (0, 1))]), rel=1e-6
     )
 
 
-def pushed(*which):
-    """Strips pressed along their length, one buckling at about half the load of the other."""
+def compressed_strips(*which):
+    """Return a scene of strips compressed along their length, one buckling at about half the load of the other."""
     sheets = [strip(0, bending="midedge"), strip(1, bending="midedge")]
     chosen = [sheets[k] for k in which or (0, 1)]
     body = {id(s): s if len(chosen) > 1 else None for s in chosen}
@@ -262,7 +262,7 @@ def test_contacts_and_symmetry_planes_hold_all_bodies_or_one():
     )
 
 
-def test_a_thin_sheet_inside_an_obstacle_is_told_beside_a_thick_one():
+def test_thin_sheet_inside_an_obstacle_is_named_beside_a_thick_one():
     thick, thin = strip(0, thickness=8e-3), strip(1, thickness=1e-3)
     floor = ms.Contact(ob.Plane(center=(0, 0, 1e-3)))
     scene = ms.Scene([thick, thin], contacts=[floor], gravity=(0, 0, -1), allow_rigid_motions=True)
@@ -284,7 +284,7 @@ def test_copies_keep_what_is_about_which_body(pair, duplicate):
     np.testing.assert_array_equal(first, second)
 
 
-def test_what_is_replaced_stays_with_its_body(pair):
+def test_replaced_values_stay_with_their_body(pair):
     sheets, scene, alone = pair
     clamp, load = scene.supports[1], scene.loads[4]
     assert clamp.body is sheets[1] and load.body is sheets[1]
@@ -295,7 +295,7 @@ def test_what_is_replaced_stays_with_its_body(pair):
     np.testing.assert_allclose(both[sheets[1]].positions, single.positions, rtol=0, atol=1e-10)
 
 
-def test_the_free_motions_of_each_body_are_told():
+def test_free_motions_of_each_body_are_named():
     sheets = [strip(k, remanent_magnetization=None) for k in (0, 1)]
     with pytest.raises(ValueError, match="of part 1"):
         ms.Scene(sheets, supports=[ms.Clamp(sheets[0].mesh.edges_at(x=0.0), body=sheets[0])])
@@ -317,7 +317,7 @@ def test_strains_are_those_of_each_sheet(pair):
     assert len(both.self_intersections()) == 0
 
 
-def test_caps_of_the_second_sheet_are_told_by_their_number_in_the_scene():
+def test_obtuse_faces_of_the_second_sheet_are_named_by_their_number_in_the_scene():
     good = magnetic_strip.scene(ms.meshes.rectangle(LENGTH, WIDTH, cells=(40, 4)), "midedge").shell
     capped = crossed(LENGTH, WIDTH, (40, 4), [0.01, 0.5, 0.5, 0.5]).transformed(translation=(0, FAR, 0))
     bad = magnetic_strip.scene(capped, "midedge").shell
@@ -329,7 +329,7 @@ def test_caps_of_the_second_sheet_are_told_by_their_number_in_the_scene():
     assert np.degrees(scene.mesh.quality.largest_angles[named]) > 177
 
 
-def test_a_failure_looks_at_all_sheets(pair):
+def test_failure_messages_consider_all_sheets(pair):
     _, scene, _ = pair
     solver = ms.MixedNewton(max_iterations=1, max_relaxation_steps=1)
     with pytest.raises(ms.NotConverged, match="out of balance most at") as told:

@@ -1,4 +1,4 @@
-"""What a scene of several sheets refuses, and in which words."""
+"""Bad input to scenes of several shells, and the messages that refuse it."""
 
 import numpy as np
 import pytest
@@ -89,6 +89,6 @@ HEAVY = ms.Scene([A, B], supports=HELD, gravity=(0, 0, -1))
         (lambda: strip(0, remanent_magnetization=(1, 2)), r"remanent_magnetization \[A/m\] must have shape"),
     ],
 )
-def test_bad_input(act, words):
+def test_scenes_of_several_sheets_refuse_bad_input(act, words):
     with pytest.raises(ValueError, match=words):
         act()

@@ -31,7 +31,7 @@ def at(shell, positions, rotations=0.0):
 
 
 def plane_stress(strains, modulus):
-    """modulus/(1 - nu^2) ((1 - nu) E + nu tr E), (..., 3, 3) in a plane across z."""
+    """Compute modulus/(1 - nu^2) ((1 - nu) E + nu tr E) in a plane across z, (..., 3, 3)."""
     traces = np.trace(strains, axis1=-2, axis2=-1)[..., None, None] * np.diag([1, 1, 0])
     return modulus / (1 - POISSON**2) * ((1 - POISSON) * strains + POISSON * traces)
 
@@ -50,7 +50,7 @@ def strip(n=20, **given):
 @pytest.mark.parametrize("bending", ["midedge", "hinge"])
 @pytest.mark.parametrize("mesh", [None, crossed(0.3, 0.2, (6, 4), [0.5, 0.01, 0.01, 0.5])], ids=["", "caps"])
 def test_a_stretched_sheet(mesh, bending):
-    """Also on caps, whose stretch is measured on other triangles."""
+    """Compare a homogeneous deformation, also on obtuse faces, whose strain is measured on other triangles."""
     shell = sheet(mesh, bending=bending)
     stretch = np.array([[1.1, 0.05, 0], [-0.1, 0.9, 0], [0, 0, 1]])
     found = at(shell, shell.mesh.rest_positions @ stretch.T @ OBLIQUE.T + (0.1, 0.2, 0.3))
@@ -72,7 +72,7 @@ def test_a_stretched_sheet(mesh, bending):
     "curvature", [[[1, 0], [0, 0]], [[0.36, 0.48], [0.48, 0.64]], [[0, 1], [1, 0]]], ids=str
 )
 def test_a_curved_sheet(curvature):
-    """z = x.k x/2: with the normals up they lean together where k is positive, so the top is compressed there."""
+    """Compare z = x.k x/2, with normals up: positive k makes them lean together and compresses the top."""
     shell, plane = sheet(curvature_scale=0.7), np.zeros((3, 3))
     plane[:2, :2] = 1e-3 * np.array(curvature, dtype=float)
     plan = shell.mesh.rest_positions
@@ -94,9 +94,11 @@ def test_a_curved_sheet(curvature):
 
 
 @pytest.mark.parametrize("bending", ["midedge", "hinge"])
-def test_virtual_work(bending):
-    """The sum of N : dE + M : dK over the faces is the derivative of the energy along any motion, with material and
-    curvature_scale of every face and edge its own."""
+def test_forces_and_moments_do_the_virtual_work_of_the_energy(bending):
+    """Compare the sum of N : dE + M : dK over the faces with the derivative of the energy along a motion.
+
+    Material and curvature_scale differ from face to face and from edge to edge.
+    """
     random = np.random.default_rng(3)
     mesh = ms.meshes.rectangle(0.3, 0.2, cells=(6, 4), irregular=0.25, seed=7)
     own = {name: random.uniform(0.5, 1.5, mesh.n_faces) for name in ("thickness", "young_modulus", "nu")}
@@ -152,7 +154,7 @@ def test_a_sheet_carries_the_force_at_its_end(bending):
 
 @pytest.mark.parametrize("bending", ["midedge", "hinge"])
 def test_a_cantilever_carries_force_times_arm(bending):
-    """Bent upwards, its normals lean together. nu = 0, so that it bends along only."""
+    """Check a strip bent upwards, whose normals lean together; nu = 0, so that it bends along only."""
     shell, end, clamp = strip(bending=bending, poisson_ratio=0.0)
     rest = ms.equilibrium(ms.Scene(shell, supports=[clamp], loads=[ms.EdgeLoad(end, (0, 0, 1e-4))]))
     stresses = rest[shell].stresses()
@@ -171,7 +173,7 @@ def test_a_couple_at_the_end_is_the_moment_everywhere():
     assert np.abs(moments).max(axis=1) == pytest.approx(np.full(len(found), 2e-3), rel=1e-6)
 
 
-def test_every_kind_of_result_has_them_with_the_values_it_was_found_with():
+def test_stresses_of_every_kind_of_result_use_the_values_of_its_solve():
     shell, end, clamp = strip(mass_density=1e3)
     scene = ms.Scene(shell, supports=[clamp], loads=[ms.EdgeLoad(end, (1.0, 0, 0))])
     rest = ms.equilibrium(scene)

@@ -1,4 +1,4 @@
-"""Shells of six-node elements: every kind of thing that shells do, and what is refused."""
+"""Shells of six-node elements: everything that shells do, and refused input."""
 
 import numpy as np
 import pytest
@@ -22,14 +22,14 @@ def clamped(sheet, **more):
     return ms.Scene(sheet, supports=[ms.Clamp(sheet.mesh.edges_at(x=0.0))], **more)
 
 
-def turn(vector):
+def rotation(vector):
     x, y, z = vector
     k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     a = np.linalg.norm(vector)
     return np.eye(3) + np.sin(a) / a * k + (1 - np.cos(a)) / a**2 * k @ k
 
 
-def test_defaults():
+def test_bending_follows_from_the_mesh_by_default():
     sheet = strip()
     assert sheet.bending == "midedge2" and "8 six-node elements" in repr(sheet)
     assert ms.Shell(sheet.mesh.first_order(), thickness=1e-3, young_modulus=1e6).bending == "midedge"
@@ -38,13 +38,13 @@ def test_defaults():
 def test_rigid_motions_cost_nothing():
     sheet = arch()
     scene = ms.Scene(sheet, allow_rigid_motions=True)
-    moved = sheet.mesh.rest_positions @ turn((0.4, -1.0, 0.7)).T + (1.0, 2.0, 3.0)
+    moved = sheet.mesh.rest_positions @ rotation((0.4, -1.0, 0.7)).T + (1.0, 2.0, 3.0)
     scale = MODULUS * THICKNESS * sheet.mesh.element_areas.sum()
     assert sum(ms.energies(scene, positions=moved).values()) < 1e-14 * scale
 
 
 def test_constant_strain_is_exact_on_irregular_meshes():
-    """Patch test: a plane sheet pulled at its border keeps the linear displacement, with the energy of its Green strain."""
+    """Check the patch test: linear displacements and the energy of their Green strain."""
     mesh = ms.meshes.rectangle(1.0, 1.0, cells=(3, 3), irregular=0.25, order=2)
     sheet = ms.Shell(mesh, thickness=0.1, young_modulus=2.0, poisson_ratio=0.3)
     gradient = np.array([[1.1, 0.05, 0], [-0.02, 0.95, 0], [0, 0, 1.0]])
@@ -63,8 +63,8 @@ def test_constant_strain_is_exact_on_irregular_meshes():
     assert np.abs(strains.bending).max() < 1e-9
 
 
-def test_values_one_an_element():
-    """Half of a strip twice as thick: the end moves as beam theory has it."""
+def test_values_may_be_given_per_element():
+    """Compare a strip whose one half is twice as thick with beam theory."""
     mesh = strip((8, 1)).mesh
     thick = mesh.element_centers[:, 0] < 0.5 * LENGTH
     sheet = ms.Shell(
@@ -89,7 +89,7 @@ def test_values_one_an_element():
 
 
 def test_weight_and_area_loads_are_the_same():
-    """By shape functions both: a cantilever bends as under q L^4 / (8 EI)."""
+    """Compare weight with an area load, and the deflection of a cantilever with q L^4 / (8 EI)."""
     sheet = strip(mass_density=1e3)
     heavy = ms.linear_response(clamped(sheet, gravity=(0, 0, -1e-3)))
     loaded = ms.linear_response(clamped(sheet, loads=[ms.AreaLoad((0, 0, -1e-3 * 1e3 * THICKNESS))]))
@@ -100,8 +100,8 @@ def test_weight_and_area_loads_are_the_same():
     )
 
 
-def test_vibration():
-    """A cantilever: 3.516 and 22.03 sqrt(EI / m L^4)."""
+def test_cantilever_has_the_frequencies_of_beam_theory():
+    """Compare with 3.516 and 22.03 sqrt(EI / m L^4)."""
     unit = np.sqrt(MODULUS * THICKNESS**2 / (12 * 1e3)) / (2 * np.pi * LENGTH**2)
     for mass, precision in (("consistent", 2e-3), ("lumped", 4e-3)):
         found = ms.vibration_modes(clamped(strip((10, 1), mass_density=1e3)), count=2, mass=mass)
@@ -125,8 +125,8 @@ def test_motion_keeps_its_energy():
     assert motion.energies["bending"].max() > 0.5 * total[0]
 
 
-def test_magnetization_one_an_element():
-    """Of the half that is magnetized only the field turns: dead moments, as forces in pairs."""
+def test_magnetization_may_be_given_per_element():
+    """Check that a field bends only the magnetized half: its moments are dead, as forces in pairs."""
     sheet = strip((4, 1))
     mesh = sheet.mesh
     moment = np.where(mesh.element_centers[:, :1] > 0.5 * LENGTH, 1e5, 0.0) * (1, 0, 0)
@@ -146,7 +146,7 @@ def test_magnetization_one_an_element():
 
 
 def test_a_curved_magnet_in_its_own_field():
-    """Normal magnetization in a field that varies: the force is minus the difference of energies."""
+    """Compare the force on a normal magnetization in a nonuniform field with differences of the energy."""
     sheet = arch(remanent_magnetization=(1e4, 2e4, -1e4))
     source = ms.Dipoles([[0.02, 0.0, 0.12]], [[0.3, -0.4, 0.5]])
     scene = ms.Scene(sheet, field=source, allow_rigid_motions=True)
@@ -173,7 +173,7 @@ def _with_field(scene):
 
 
 def test_stress_of_a_bent_strip():
-    """Clamps turned into an arc: M = EI kappa and no membrane force, at both ends and everywhere."""
+    """Check a strip whose clamps are rotated into an arc: M = EI kappa and no membrane force everywhere."""
     sheet, angle = strip((6, 1)), 0.5
     far = ms.Clamp(
         sheet.mesh.edges_at(x=LENGTH),
@@ -197,8 +197,8 @@ def test_stress_of_a_bent_strip():
     assert bent.energies["bending"] == pytest.approx(work, rel=1e-3)
 
 
-def test_beside_a_sheet_of_three_nodes():
-    """Each has its own rows, whatever the order in the scene."""
+def test_scene_with_a_sheet_of_three_nodes_has_both_results():
+    """Check that each body has its own rows, whatever its order in the scene."""
     six, flat = (
         strip(mass_density=1e3),
         ms.Shell(
@@ -229,8 +229,8 @@ def test_beside_a_sheet_of_three_nodes():
         )
 
 
-def test_welded_to_another():
-    """Two halves of a strip that is stretched are one."""
+def test_welded_halves_stretch_as_one_strip():
+    """Compare two welded halves of a stretched strip with one strip."""
     halves = [
         ms.Shell(
             ms.meshes.rectangle(0.5 * LENGTH, WIDTH, cells=(2, 1), order=2).transformed(
@@ -257,8 +257,8 @@ def test_welded_to_another():
     assert tied.energies["membrane"] == pytest.approx(one.energies["membrane"], rel=1e-10)
 
 
-def test_rests_on_a_floor():
-    """The whole weight is borne."""
+def test_six_node_sheet_rests_on_a_floor():
+    """Check that contact with a floor carries the full weight."""
     sheet = strip(mass_density=1e3)
     floor = ms.Contact(ms.obstacles.Plane((0, 0, 1), center=(0, 0, -2e-3)), contact_stiffness=1.0)
     side = ms.Pin(sheet.mesh.vertices_at(x=0.0), "xy")
@@ -297,13 +297,13 @@ STUFF = {"thickness": 1e-3, "young_modulus": 1e6}
 
 
 @pytest.mark.parametrize("message, make", REFUSED)
-def test_is_refused(message, make):
+def test_bad_six_node_shells_are_refused(message, make):
     flat = ms.meshes.rectangle(LENGTH, WIDTH, cells=(4, 1))
     with pytest.raises(ValueError, match=message):
         make(flat, strip().mesh)
 
 
-def test_curvature_scale_is_no_value_of_it():
+def test_curvature_scale_is_no_value_of_six_node_shells():
     scene = clamped(strip(), loads=[ms.AreaLoad((0, 0, 1e-3))])
     with pytest.raises(ValueError, match="curvature_scale"):
         ms.equilibrium(scene, curvature_scale=2.0)

@@ -1,4 +1,4 @@
-"""Results say how far a sheet is stretched and bent, exactly where the answer is known, and warn beyond the model."""
+"""Strains of a sheet in results: exact where the answer is known, with warnings beyond the model."""
 
 import warnings
 
@@ -27,7 +27,7 @@ def strains(shell, positions, rotations):
 
 
 def strip(bending="midedge", cells=(20, 2), **options):
-    """10 cm x 2 cm, clamped at one end."""
+    """Return a scene of a strip of 10 cm x 2 cm, clamped at one end."""
     mesh = ms.meshes.rectangle(0.1, 0.02, cells=cells)
     shell = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0, bending=bending)
     return ms.Scene(shell, **{"supports": [ms.Clamp(mesh.edges_at(x=0.0))], **options})
@@ -63,7 +63,7 @@ def test_a_stretched_sheet_has_greens_strain(bending):
     ids=["cylinder", "oblique cylinder", "saddle", "twist", "sphere"],
 )
 def test_a_curved_sheet_has_half_the_thickness_times_its_curvature(curvature):
-    """Small enough for the plan to stay what it is; positive where the normals lean together."""
+    """Check a curvature so small that the plan hardly changes; positive where the normals lean together."""
     shell, curvature = sheet(), 1e-3 * np.array(curvature, dtype=float)
     plan = shell.mesh.rest_positions[:, :2]
     positions = np.column_stack([plan, 0.5 * np.einsum("vi,ij,vj->v", plan, curvature, plan)])
@@ -75,7 +75,7 @@ def test_a_curved_sheet_has_half_the_thickness_times_its_curvature(curvature):
 
 
 def test_a_strip_rolled_by_a_couple_has_the_strain_of_its_circle():
-    """M = D / R, so the outer fibres have h / 2R everywhere."""
+    """Check that with M = D / R the outer fibres have the strain h / 2R everywhere."""
     scene = strip()
     radius, rigidity = 0.04, 1e6 * 1e-3**3 / 12.0
     mesh = scene.mesh
@@ -89,7 +89,7 @@ def test_a_strip_rolled_by_a_couple_has_the_strain_of_its_circle():
 
 
 def by_numpy(shell, positions, rotations):
-    """The tensors sum s_i S_i and h/2 sum delta_i R_i of every face in its plane, from DESIGN.md 2.1."""
+    """Compute the tensors sum s_i S_i and h/2 sum delta_i R_i of every face in its plane, from DESIGN.md 2.1."""
     mesh = shell.mesh
     corners, rest = positions[mesh.faces], mesh.rest_positions[mesh.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -124,7 +124,7 @@ def by_numpy(shell, positions, rotations):
     return membrane, bent
 
 
-def test_any_state_is_what_numpy_says(rng):
+def test_strains_of_any_state_are_those_of_numpy(rng):
     shell = sheet(cells=(4, 3))
     mesh = shell.mesh
     positions = mesh.rest_positions + 5e-3 * rng.standard_normal(mesh.rest_positions.shape)
@@ -136,8 +136,8 @@ def test_any_state_is_what_numpy_says(rng):
 
 
 @pytest.mark.parametrize("bending", ["midedge", "hinge"])
-def test_strains_carry_the_energies(bending, rng):
-    """Clamp, thickness and all: what the terms integrate is what is shown."""
+def test_strains_reproduce_the_energies(bending, rng):
+    """Check that the terms integrate the strains shown, with a clamp and varying thickness."""
     mesh = ms.meshes.rectangle(0.3, 0.2, cells=(6, 4), irregular=0.25, seed=7)
     thickness, nu = rng.uniform(1e-3, 3e-3, mesh.n_faces), 0.3
     shell = ms.Shell(mesh, thickness=thickness, young_modulus=YOUNG, poisson_ratio=nu, bending=bending)
@@ -180,7 +180,7 @@ def test_load_cases_have_the_largest_of_all():
     assert cases.largest_membrane_strain == max(case.largest_membrane_strain for case in cases)
 
 
-def test_a_path_has_them_at_each_point():
+def test_path_has_strains_at_each_point():
     scene = strip(field=ms.UniformField())
     path = ms.follow_path(scene, remanent_magnetization=MAGNETIZATION, applied_flux_density=(0, 0, 2e-3))
     assert len(path.largest_bending_strain) == len(path)
@@ -191,8 +191,8 @@ def test_a_path_has_them_at_each_point():
 
 
 @pytest.mark.parametrize("dtype", [None, "float64", "float32"])
-def test_a_motion_has_them_in_each_state(dtype):
-    """With a clamp that turns, whose direction is in none of the arrays that come back."""
+def test_motion_has_strains_in_each_state(dtype):
+    """Check a clamp that rotates, whose director is in none of the returned arrays."""
     mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
     shell = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
     clamp = ms.Clamp(mesh.edges_at(x=0.0), rotation=(0.0, -0.5, 0.0))
@@ -221,8 +221,8 @@ def test_a_motion_has_them_in_each_state(dtype):
 # The warning
 
 
-def test_far_beyond_the_model_it_warns_at_the_callers_line():
-    """1000 T on a strip is "stable" at several times its length."""
+def test_large_strain_is_warned_of_at_the_callers_line():
+    """Check a strip at 1000 T, which is "stable" at several times its length."""
     with pytest.warns(ms.LargeStrainWarning, match=r"40 of 40 faces are, the first of them \d") as caught:
         found = in_field(1000.0, strip(cells=(10, 2), field=ms.UniformField()))
     assert found.stable and found.largest_membrane_strain > 2.0
@@ -231,7 +231,7 @@ def test_far_beyond_the_model_it_warns_at_the_callers_line():
     assert [warning.filename for warning in strains] == [__file__]
 
 
-def test_it_warns_once_a_scene_and_again_where_strains_have_doubled():
+def test_strain_warning_comes_once_a_scene_and_again_at_doubled_strain():
     scene = strip(cells=(10, 2), field=ms.UniformField())
     with pytest.warns(ms.LargeStrainWarning) as caught:
         for flux_density in (50.0, 51.0, 52.0, 400.0):
@@ -240,13 +240,13 @@ def test_it_warns_once_a_scene_and_again_where_strains_have_doubled():
     assert sum(warning.category is ms.LargeStrainWarning for warning in caught) == 2
 
 
-def test_small_strains_warn_of_nothing():
+def test_small_strains_give_no_warning():
     with warnings.catch_warnings():
         warnings.simplefilter("error", ms.LargeStrainWarning)
         in_field(2e-3)
 
 
-def test_made_an_error_it_comes_every_time_and_holds_the_result():
+def test_strain_warning_as_an_error_contains_the_result():
     scene = strip(cells=(10, 2), field=ms.UniformField())
     for _ in range(2):
         with warnings.catch_warnings():

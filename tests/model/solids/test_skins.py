@@ -1,4 +1,4 @@
-"""Magnetized solids, in their skins and throughout: energies and forces against formulas of their own, exact cases."""
+"""Magnetized solids, in their skin and throughout: energies and forces against separate formulas, exact cases."""
 
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ def bent(scene):
 
 
 def flux_at(points):
-    """As the uniform field and the dipoles make it there."""
+    """Compute the flux density of the uniform field and the dipoles at points, (n, 3) in T."""
     total = torch.tensor(FLUX).expand_as(points)
     for place, moment in zip(DIPOLES.positions, DIPOLES.moments, strict=True):
         r = points - torch.tensor(np.array(place))
@@ -79,13 +79,13 @@ def energy_of_skin(solid, x):
 
 
 def shapes(at):
-    """Shape functions of ten nodes at barycentric coordinates (n, 4)."""
+    """Compute the shape functions of ten nodes at barycentric coordinates (n, 4)."""
     corners = [at[:, i] * (2 * at[:, i] - 1) for i in range(4)]
     return torch.stack(corners + [4 * at[:, i] * at[:, j] for i, j in ENDS], dim=1)
 
 
 def energy_of_volume(solid, x):
-    """F from derivatives of the mapping by automatic differentiation of the shape functions."""
+    """Compute the magnetic energy of a solid, with F from automatic differentiation of the shape functions."""
     rest, nodes = torch.tensor(np.array(solid.mesh.rest_positions)), solid.mesh.tetrahedra.astype(int)
     if solid.element == "linear":
         places, weight, shape = torch.full((1, 4), 0.25, dtype=torch.float64), 1 / 6, lambda at: at
@@ -160,7 +160,10 @@ def test_the_hessian_is_the_derivative_of_the_forces(make, element):
 
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
 def test_uniform_magnetization_pushes_only_at_the_boundary(element):
-    """Validation M1: -int (F M).B dV = -sum over the boundary of (M.N) B.u, whatever the mesh and the state."""
+    """Check validation case M1 on any mesh and in any state.
+
+    -int (F M).B dV = -sum over the boundary of (M.N) B.u.
+    """
     solid = block(element, magnetization=(2e4, 1e4, -3e4))
     scene = in_field(solid)
     model, q = scene._model, bent(scene)
@@ -171,7 +174,7 @@ def test_uniform_magnetization_pushes_only_at_the_boundary(element):
     for face, area, normal in zip(mesh.faces, mesh.face_areas, mesh.face_normals, strict=True):
         pull = -area * (normal @ (2e4, 1e4, -3e4)) * FLUX / 3
         ends = mesh.rest_positions[face]
-        # A third each: of straight elements at the corners, of quadratic ones at the middles of their edges.
+        # A third each: at the corners of linear elements, at the edge midpoints of quadratic ones.
         places = ends if element == "linear" else 0.5 * (ends + np.roll(ends, 1, axis=0))
         for place in places:
             wanted[np.argmin(np.linalg.norm(x - place, axis=1))] += pull
@@ -204,7 +207,7 @@ def test_same_bits_on_any_number_of_threads(element):
 
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
 def test_a_skin_with_mass_weighs_and_is_inert(element):
-    """Thickness times density on each face, beside the solid's own; without one as before."""
+    """Check that a skin adds thickness times density on each face to the solid's masses."""
     mesh = ms.meshes.box((0.06, 0.02, 0.02), cells=(2, 1, 1))
     rows = np.linspace(1e3, 2e3, mesh.n_faces)
     heavy, light = (

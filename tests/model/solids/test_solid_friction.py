@@ -1,4 +1,4 @@
-"""F4 of the validation set: a soft block on a slope sticks or slides as Coulomb says of its resultants."""
+"""Friction of a soft block on a slope (F4): it sticks or slides as Coulomb's law of its resultants predicts."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from magshell.model.supports.supports import rotation_matrix
 
 GRAVITY = 9.81  # m/s2
 SIDE, TIME_STEP = 0.02, 5e-3  # m, s
-STICKING = 1e-4 * SIDE  # m/s: what counts as at rest
+STICKING = 1e-4 * SIDE  # m/s: slower is at rest
 DOWNHILL, ACROSS, NORMAL = np.eye(3)
 
 # slope [deg], friction coefficient, acceleration [m/s2]
@@ -26,9 +26,9 @@ ELEMENTS = pytest.mark.parametrize("element", ["linear", "quadratic"])
 def slid(
     degrees, friction, *, element="linear", tilted=False, lagged=False, velocities=(0.0, 0.0, 0.0), steps=80
 ):
-    """Velocities of the mass center down the slope, across it and off it, (n, 3) m/s, at the ends of the steps.
+    """Return the velocity of the mass center down the slope, across and off it at the ends of steps, (n, 3) in m/s.
 
-    tilted: the slope itself is, and the block on it; otherwise gravity.
+    tilted: the slope and the block are rotated; otherwise gravity is.
     """
     angle = np.radians(degrees)
     turn = rotation_matrix(np.array([0.0, angle, 0.0])) if tilted else np.eye(3)
@@ -63,7 +63,7 @@ def slid(
 
 
 def held(velocities, degrees) -> tuple[np.ndarray, np.ndarray]:
-    """Friction against sliding and the normal force, a mass [m/s2], in every step: what the motion leaves of gravity."""
+    """Compute friction against sliding and the normal force per mass in every step, in m/s2, from the motion."""
     change = np.diff(velocities, axis=0) / TIME_STEP
     angle = np.radians(degrees)
     return GRAVITY * np.sin(angle) - change @ DOWNHILL, GRAVITY * np.cos(angle) + change @ NORMAL
@@ -71,8 +71,8 @@ def held(velocities, degrees) -> tuple[np.ndarray, np.ndarray]:
 
 @ELEMENTS
 @ROWS
-def test_accelerations_are_the_set_s(degrees, friction, acceleration, element):
-    """In the second half, when the block has settled on the ground."""
+def test_accelerations_are_those_of_the_validation_set(degrees, friction, acceleration, element):
+    """Check the second half of the motion, when the block has settled on the ground."""
     along = slid(degrees, friction, element=element) @ DOWNHILL
     if acceleration:
         half = len(along) // 2
@@ -91,7 +91,7 @@ def test_sliding_friction_is_its_coefficient_of_the_normal_force(element, lagged
 
 
 def test_friction_is_against_the_motion_where_that_is_oblique():
-    """Pushed across the slope at 20 degrees with 0.3, the block keeps none of its way across in the end."""
+    """Push the block across a slope of 20 degrees with mu = 0.3; its motion across vanishes in the end."""
     velocities = slid(20, 0.3, velocities=(0.0, 0.2, 0.0), steps=40)
     change = np.diff(velocities, axis=0)[10:] / TIME_STEP
     sliding = velocities[11:] * (DOWNHILL + ACROSS)

@@ -7,7 +7,7 @@ import magshell as ms
 from magshell.model.solids.solid_stresses import states_of
 
 TINY = 1e-9
-# (Poisson's ratio, material, mode): (stretch, nominal stress, stretch of the free sides).
+# (Poisson's ratio, material, mode) -> rows (stretch, nominal stress, stretch of the free sides).
 STRETCHED = {
     (0.45, "ln J", "uniaxial"): [
         (0.5, -1086102.809, 1.350869747),
@@ -93,7 +93,7 @@ STRETCHED = {
         (2.0, 1428571.429, 0.1428571429),
     ],
 }
-# (Poisson's ratio, material): simple shear by gamma: gamma, P12, P21, P11, P22, P33.
+# (Poisson's ratio, material) -> rows of simple shear: gamma, P12, P21, P11, P22, P33.
 SHEARED = {
     (0.45, "ln J"): [
         (0.1, 34482.75862, 34482.75862, 0.0, 0.0, 0.0),
@@ -148,7 +148,7 @@ def block(material: str, poisson_ratio: float, element: str, diagonals: str) -> 
 
 
 def nominal_stresses(solid: ms.Solid, rest: ms.Equilibrium) -> np.ndarray:
-    """First Piola-Kirchhoff's, (n_t p, 3, 3)."""
+    """Compute the first Piola-Kirchhoff stresses, (n_t p, 3, 3) in Pa."""
     found = states_of(rest.scene, solid, rest._state)
     ratios = found.volume_ratios[..., None, None]
     stresses = ratios * found.cauchy_stresses @ np.linalg.inv(found.deformation_gradients).swapaxes(-1, -2)
@@ -169,7 +169,7 @@ def pull(solid: ms.Solid, pulled: str, stretch: float) -> ms.Scene:
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
 @pytest.mark.parametrize("case", STRETCHED, ids=lambda case: "{} {} {}".format(*case))
 def test_t2a_stretched_blocks(case, element):
-    """One cell: of more, a block at half its length is a saddle between shapes that bulge to one side."""
+    """Stretch a block of one cell; with more, half its length is a saddle between shapes that bulge to one side."""
     poisson_ratio, material, mode = case
     solid = block(material, poisson_ratio, element, "aligned")
     pulled = "x" if mode == "uniaxial" else "xy"

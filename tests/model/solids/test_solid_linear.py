@@ -25,7 +25,7 @@ def root(solid):
 
 
 def timoshenko(mode, nu):
-    """Hz, of a cantilever by Euler and Bernoulli with the share of shear and rotary inertia for small h/L."""
+    """Compute the frequency of a cantilever in Hz: Euler-Bernoulli with shear and rotary inertia for small h/L."""
     k = {1: 1.8751041, 2: 4.6940911}[mode] / L
     inertia, area = H**4 / 12, H**2
     radius = inertia / area
@@ -51,27 +51,29 @@ def test_frequencies_of_a_cantilever(nu):
     solid = bar(nu, cells=(16, thick, thick))
     modes = ms.vibration_modes(ms.Scene(solid, supports=[ms.Pin(root(solid))]), count=4)
     assert modes.unstable == 0
-    assert np.allclose(modes.frequencies[:2], timoshenko(1, nu), rtol=0.01)  # both ways, of a square section
+    assert np.allclose(
+        modes.frequencies[:2], timoshenko(1, nu), rtol=0.01
+    )  # in both directions of a square section
     assert np.allclose(modes.frequencies[2:], timoshenko(2, nu), rtol=0.02)
 
 
 def test_a_mean_volume_needs_two_cells_through_a_thickness():
-    """What Solid's docstring says of it: with one cell the two lowest frequencies are 2 and 12 % too low."""
+    """Check the errors that Solid's docstring states: with one cell the two lowest frequencies are 2 and 12 % low."""
     solid = bar(0.45, cells=(16, 1, 1))
     found = ms.vibration_modes(ms.Scene(solid, supports=[ms.Pin(root(solid))]), count=2).frequencies
     assert np.allclose(found / timoshenko(1, 0.45), [0.877, 0.984], atol=0.005)
 
 
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
-def test_axial_frequencies(element):
-    """(2 n - 1) c / 4 L, c = sqrt(E / rho), of a bar that is kept straight."""
+def test_bar_kept_straight_has_the_axial_frequencies(element):
+    """Compare with (2 n - 1) c / 4 L, c = sqrt(E / rho)."""
     solid = bar(0.0, element)
     sides = [ms.Pin(np.arange(solid.mesh.n_vertices), "yz"), ms.Pin(root(solid), "x")]
     modes = ms.vibration_modes(ms.Scene(solid, supports=sides), count=2)
     assert np.allclose(modes.frequencies, np.array([1, 3]) * np.sqrt(E / RHO) / (4 * L), rtol=5e-3)
 
 
-def test_a_free_solid_has_six_motions_that_nothing_resists():
+def test_free_solid_has_six_rigid_motions():
     scene = ms.Scene(bar(0.3, cells=(4, 1, 1)), allow_rigid_motions=True)
     modes = ms.vibration_modes(scene, count=7)
     assert np.all(modes.squares[:6] == 0.0) and modes.squares[6] > 0
@@ -124,7 +126,7 @@ def test_vibrations_without_a_density_are_refused():
 
 
 def test_a_column_buckles_at_euler_s_load():
-    """Shortened between its root and an end that may sway but not turn: pi^2 E I / L^2 = E A u / L."""
+    """Compare a column that may sway but not turn at its end with pi^2 E I / L^2 = E A u / L."""
     solid = bar(0.0)
     end = ms.Pin(solid.mesh.vertices_at(x=L), "x", displacement=(-1e-3, 0, 0))
     found = ms.linear_buckling(ms.Scene(solid, supports=[ms.Pin(root(solid)), end]), modes=2)

@@ -1,5 +1,4 @@
-"""Loads that are consistent with the elements' shapes: the patch test, curved faces and elements, case T3 of the validation
-set."""
+"""Consistent loads of solids: patch test, curved faces and elements, case T3 of the validation set."""
 
 import numpy as np
 import pytest
@@ -32,7 +31,7 @@ def bar(cells, element="quadratic", diagonals="crossed") -> ms.Solid:
 def test_t3_end_load(load, stretch, element):
     solid = bar((8, 1, 1), element)
     end = np.flatnonzero(solid.mesh.face_barycenters[:, 0] > 1 - 1e-9)
-    # Half as long, it would rather fall over.
+    # At half its length it would rather buckle.
     aside = ms.Pin(np.setdiff1d(np.arange(solid.mesh.n_vertices), solid.mesh.vertices_at(x=0.0)), "yz")
     supports = [ms.Pin(solid.mesh.vertices_at(x=0.0)), *([aside] if load < 0 else [])]
     loads = [ms.AreaLoad((load * E, 0, 0), faces=end)]
@@ -42,9 +41,11 @@ def test_t3_end_load(load, stretch, element):
 
 
 @pytest.mark.parametrize(("load", "length"), HANGING)
-def test_t3_hanging(load, length):
-    """To 1e-6 on all of the lower end: with 8 cells along up to a = 0.5, with 16 always. A box whose cells are all cut the
-    same way is 30 times worse: it bends the end by what it is not symmetric."""
+def test_hanging_bar_has_the_length_of_t3(load, length):
+    """Check all of the lower end to 1e-6, with 8 cells along up to a = 0.5 and 16 always.
+
+    Cells all cut the same way would be 30 times worse: their asymmetry bends the end.
+    """
     weighed = load * E / 1e3
     for cells in (8, 16) if load <= 0.5 else (16,):
         solid = bar((cells, 1, 1))
@@ -55,7 +56,7 @@ def test_t3_hanging(load, length):
 
 
 @pytest.mark.parametrize(("load", "length"), STANDING)
-def test_t3_standing(load, length):
+def test_standing_bar_has_the_length_of_t3(load, length):
     solid = bar((16, 1, 1))
     inside = np.setdiff1d(np.arange(solid.mesh.n_vertices), solid.mesh.vertices_at(x=0.0))
     supports = [ms.Pin(solid.mesh.vertices_at(x=0.0)), ms.Pin(inside, "yz")]
@@ -72,7 +73,7 @@ def test_t3_linear_elements_hang_to_1e_3_with_32_cells():
 
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
 def test_patch_under_tractions_all_around(element):
-    """An irregular block under the nominal tractions of a homogeneous state of large strain, one a face: to 1e-10."""
+    """Check an irregular block under the nominal tractions of a homogeneous state, one per face, to 1e-10."""
     mesh = ms.meshes.box((1.0, 1.0, 1.0), cells=(2, 2, 2))
     x = np.array(mesh.rest_positions)
     inside = np.setdiff1d(np.arange(mesh.n_vertices), mesh.surface_vertices)
@@ -103,14 +104,14 @@ def curved_tube(cells=(2, 4, 1)) -> ms.Solid:
 
 
 def test_area_loads_on_curved_faces():
-    """The area of a cylinder, and the moment of its area, converge as the shapes do, at least with the third power."""
+    """Check that area and moment of area of a cylinder converge with the third power at least."""
     errors = []
     for n in (2, 4):
         solid = curved_tube((2, n, 1))
         mesh = solid.mesh
         outer = np.flatnonzero((np.hypot(*mesh.rest_positions[mesh.faces][..., :2].T) > 2 - 1e-9).all(axis=0))
         scene = ms.Scene(solid, loads=[ms.AreaLoad((0, 0, 3.0), faces=outer)], allow_rigid_motions=True)
-        forces = 3.0 * _shares(scene)
+        forces = 3.0 * _load_per_vertex(scene)
         errors.append(
             [
                 forces.sum() / (3.0 * np.pi * 0.5) - 1,
@@ -121,8 +122,8 @@ def test_area_loads_on_curved_faces():
     assert (fine < 1e-3).all() and (coarse / fine > 7.0).all()
 
 
-def _shares(scene) -> np.ndarray:
-    """What each vertex feels of a load of 1 N/m2 along z, m2."""
+def _load_per_vertex(scene) -> np.ndarray:
+    """Return the area that each vertex carries of a load of 1 N/m2 along z, in m2."""
     layout, model = scene._control_layout, scene._model
     on = layout.packed({("scene", "load_factor"): 1.0}, layout.zeros())
     state = model.rest_state()
@@ -131,19 +132,22 @@ def _shares(scene) -> np.ndarray:
 
 
 def test_flat_quarters_of_a_side_carry_a_quarter_each():
-    """Exactly, with a moment about their own middles; alone they are not a side's middle nodes only."""
+    """Check sum and moment of a load on each quarter; its forces reach beyond the side's middle nodes."""
     solid = bar((2, 1, 1))
     mesh = solid.mesh
     for face in range(4):
         load = ms.AreaLoad((0, 0, 1.0), faces=[face])
         scene = ms.Scene(solid, loads=[load], allow_rigid_motions=True)
-        shares = _shares(scene)
+        shares = _load_per_vertex(scene)
         assert shares.sum() == pytest.approx(mesh.face_areas[face], rel=1e-12)
         assert np.allclose(shares @ mesh.rest_positions, mesh.face_areas[face] * mesh.face_barycenters[face])
 
 
-def test_the_weight_of_curved_elements_is_where_it_is():
-    """Its sum and its moments, which shapes of the second degree have exactly: by integration with many points."""
+def test_weight_of_curved_elements_has_exact_sum_and_moments():
+    """Compare sum and moments of the weight with integrals by many points.
+
+    Shape functions of second degree have both exactly.
+    """
     solid = curved_tube()
     mesh, weights = solid.mesh, solid._weighed_masses
     points, lengths = np.polynomial.legendre.leggauss(6)

@@ -1,4 +1,4 @@
-"""What results say of solids: strain and stress of their tetrahedra, in words, with the values they were found with."""
+"""Results for solids: strain and stress of their tetrahedra with the values of their solve."""
 
 import warnings
 
@@ -21,7 +21,7 @@ def strip():
 
 
 def pulled(solid, by=0.02, **given):
-    """By its ends, which may shrink."""
+    """Return a scene of a solid pulled at its ends, which may contract laterally."""
     x = solid.mesh
     left, right = x.vertices_at(x=0.0), x.vertices_at(x=0.1)
     ends = [ms.Pin(left, components="x", body=solid), ms.Pin(right, "x", displacement=(by, 0, 0), body=solid)]
@@ -41,7 +41,7 @@ def with_a_strip(order):
 
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
 def test_uniaxial_tension_of_a_neo_hookean_bar(element):
-    """P = mu (s - 1/s) + lambda ln J / s along and 0 across give the stretch across; the stress is one-dimensional."""
+    """Compare with P = mu (s - 1/s) + lambda ln J / s along and zero stress across."""
     solid = bar(element)
     strains = ms.equilibrium(pulled(solid))[solid].strains()
     mu, lam = 1e5 / 2.6, 1e5 * 0.3 / (1.3 * 0.4)
@@ -59,7 +59,7 @@ def test_uniaxial_tension_of_a_neo_hookean_bar(element):
 
 
 def test_stress_is_that_of_the_values_the_result_was_found_with():
-    """Also after another solve of the scene has put others into its core."""
+    """Check the stress after another solve has put other values into the core."""
     solid = bar()
     scene = pulled(solid)
     soft = ms.equilibrium(scene)
@@ -69,7 +69,7 @@ def test_stress_is_that_of_the_values_the_result_was_found_with():
     assert np.array_equal(soft[solid].strains().von_mises_stresses, before)
 
 
-def test_every_kind_of_result_says_what_its_solid_goes_through():
+def test_every_kind_of_result_has_strains_of_its_solid():
     solid = bar(mass_density=1e3)
     scene = pulled(solid, gravity=(0, 0, 1e-6))
     rest = ms.equilibrium(scene)
@@ -88,7 +88,7 @@ def test_every_kind_of_result_says_what_its_solid_goes_through():
     assert cases[solid].strains(0).volume_ratios.max() < ratio
 
 
-def test_large_strains_of_solids_warn_of_nothing():
+def test_large_strains_of_solids_give_no_warning():
     with warnings.catch_warnings():
         warnings.simplefilter("error", ms.LargeStrainWarning)
         rest = ms.equilibrium(pulled(bar(), by=0.1))
@@ -134,7 +134,7 @@ def test_a_face_of_a_quadratic_solid_is_not_held_by_its_corners_alone():
 
 
 def test_an_eighth_behind_symmetry_planes_is_the_whole():
-    """A block that is pulled by both ends, and its eighth."""
+    """Compare a block pulled at both ends with its eighth."""
     material = ms.NeoHookean(**MODULI)
     whole = ms.Solid(ms.meshes.box((0.2, 0.04, 0.04), cells=(4, 2, 2)), material=material)
     part = ms.Solid(ms.meshes.box((0.1, 0.02, 0.02), cells=(2, 1, 1)), material=material)

@@ -21,7 +21,7 @@ GUCCIONE = {
 
 
 def finger(element="quadratic", material=None, cells=(4, 1, 1)):
-    """A cantilever under its weight: (solid, scene)."""
+    """Return (solid, scene) of a cantilever under its weight."""
     mesh = ms.meshes.box((0.1, 0.02, 0.02), cells=cells)
     solid = ms.Solid(mesh, material=material or ms.NeoHookean(**MODULI), mass_density=1e3, element=element)
     root = np.flatnonzero(solid.mesh.rest_positions[:, 0] < 1e-9)
@@ -85,7 +85,7 @@ def test_masses_and_weights_add_up_and_masses_are_positive(element):
 
 @pytest.mark.parametrize("a, tolerance", [(0.5, 2e-6), (2.0, 2e-5)])
 def test_t3_hanging_bar(a, tolerance):
-    """Poisson's ratio 0: x(L)/L = a/2 + (sqrt(1 + a^2) + asinh(a)/a)/2, a = rho g L/E."""
+    """Compare with x(L)/L = a/2 + (sqrt(1 + a^2) + asinh(a)/a)/2, a = rho g L/E, Poisson's ratio 0."""
     mesh = ms.meshes.box((1.0, 0.2, 0.2), cells=(8, 2, 2))
     solid = ms.Solid(mesh, material=ms.NeoHookean(young_modulus=1e4, poisson_ratio=0.0), mass_density=1e3)
     x = solid.mesh.rest_positions
@@ -101,7 +101,7 @@ def test_t3_hanging_bar(a, tolerance):
 @pytest.mark.parametrize("nu", [0.45, 0.499])
 @pytest.mark.parametrize("volume", ["isochoric", "ln J"])
 def test_t6_cantilever_takes_as_many_iterations_at_any_poisson_ratio(volume, nu):
-    """10 x 1 x 1 under P L^2/EI = 2 in one call from rest."""
+    """Solve a 10 x 1 x 1 bar under P L^2/EI = 2 in one call from rest."""
     mesh = ms.meshes.box((10.0, 1.0, 1.0), cells=(10, 2, 2))
     solid = ms.Solid(mesh, material=ms.NeoHookean(volume, young_modulus=1e5, poisson_ratio=nu))
     x = solid.mesh.rest_positions
@@ -197,7 +197,7 @@ def test_clamps_are_refused_on_solids():
 
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
 def test_strains_and_stresses_of_a_stretched_bar(element):
-    """Poisson's ratio 0, 20 % longer: nothing happens across."""
+    """Check a bar 20 % longer with Poisson's ratio 0, which does not contract."""
     mesh = ms.meshes.box((0.1, 0.02, 0.02), cells=(3, 1, 1))
     solid = ms.Solid(
         mesh, material=ms.StVenantKirchhoff(young_modulus=1e5, poisson_ratio=0.0), element=element
