@@ -1,4 +1,4 @@
-"""Answers that hard cases give: numbers near a reference, bounds, states, refusals."""
+"""Answers of hard cases: numbers near a reference, bounds, states, refusals."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ import magshell as ms
 
 
 def near(name: str, got, expected, *, rel: float = 0.0, scale: float | None = None) -> Answer:
-    """Numbers within `rel` of the largest expected one, or of `scale`; the one farthest off is shown."""
+    """Compare numbers with a reference within `rel` of the largest expected one, or of `scale`.
+
+    The number farthest off is shown.
+    """
     got, expected = np.atleast_1d(np.asarray(got, float)), np.atleast_1d(np.asarray(expected, float))
     if got.shape != expected.shape:
         return Answer(f"{name} of shape {expected.shape}", f"shape {got.shape}", False)
@@ -38,7 +41,7 @@ def holds(name: str, condition, got: str = "") -> Answer:
 
 
 def both(*answers: Answer) -> Answer:
-    """All of them, as one."""
+    """Combine several answers to one, which is right if all are."""
     return Answer(
         "; ".join(each.expected for each in answers),
         "; ".join(each.got for each in answers),
@@ -47,7 +50,7 @@ def both(*answers: Answer) -> Answer:
 
 
 def refused(act: Callable[[], object], words: str, error: type[Exception] = ValueError) -> Answer:
-    """act() must raise this error with a message that matches `words`."""
+    """Check that act() raises this error with a message that matches `words`."""
     expected = f"{error.__name__}: ...{words}..."
     try:
         result = act()
@@ -58,7 +61,7 @@ def refused(act: Callable[[], object], words: str, error: type[Exception] = Valu
 
 
 def at_rest(found: ms.Equilibrium) -> Answer:
-    """A stable equilibrium, its forces balanced as far as the solver promises."""
+    """Check that an equilibrium is stable and its forces balance to the solver's tolerance."""
     right = found.stable and found.load_fraction == 1.0 and found.residual <= 1e-10
     return Answer(
         "stable, in balance", f"{'stable' if found.stable else 'unstable'}, {found.residual:.0e}", right

@@ -76,7 +76,7 @@ def grown(times):
     shear, lame = 1e4 / (2 * 1.3), 1e4 * 0.3 / (1.3 * 0.4)
 
     def over(j: float) -> float:
-        """Of the pressure on a free block: what its material and its cell take, (mu (J^2/3 - 1) + lam ln J)/J and theirs."""
+        """Return the excess pressure on a free block, by its material, (mu (J^2/3 - 1) + lam ln J)/J, and its cell."""
         return (shear * (np.cbrt(j) ** 2 - 1) + lame * np.log(j)) / j + 1e5 * (j - times)
 
     free = brentq(over, 0.1, 10.0)

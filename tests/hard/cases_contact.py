@@ -15,7 +15,7 @@ WEIGHT = DENSITY * THICKNESS * SIDE**2 * GRAVITY  # N, of the plate
 
 
 def plate(contacts, cells=(4, 4), at=(0.0, 0.0, 0.0), turned=(0.0, 0.0, 0.0), **options) -> ms.Scene:
-    """A free square sheet around `at`, turned by a rotation vector."""
+    """Return a scene of a free square sheet around `at`, rotated by a rotation vector."""
     flat = ms.meshes.rectangle(SIDE, SIDE, cells=cells).transformed(translation=(-SIDE / 2, -SIDE / 2, 0))
     mesh = flat.transformed(rotation_matrix(np.array(turned)), at)
     sheet = ms.Shell(mesh, thickness=THICKNESS, young_modulus=1e7, poisson_ratio=0.3, mass_density=DENSITY)
@@ -33,8 +33,11 @@ def moved(scene: ms.Scene, steps: int, time_step: float, **options) -> ms.Trajec
     return ms.simulate(scene, steps=steps, time_step=time_step, **given)
 
 
-def carried(depth: np.ndarray, stiffness: float) -> float:
-    """N: what the floor bears of vertices at these depths, after the parabola of the smoothing."""
+def floor_force(depth: np.ndarray, stiffness: float) -> float:
+    """Compute the force of the floor on vertices at these depths, in N.
+
+    The law is a parabola within the smoothing length, then linear.
+    """
     inside = np.clip(depth, 0.0, None)
     early, late = stiffness * inside**2 / (2.0 * SMOOTHING), stiffness * (inside - SMOOTHING / 2.0)
     return float(np.where(inside < SMOOTHING, early, late).sum())
@@ -44,7 +47,7 @@ def carried(depth: np.ndarray, stiffness: float) -> float:
 def lies_on_the_floor(stiffness):
     scene = plate([floor(stiffness)])
     motion = moved(scene, 150, 4e-3)
-    borne = carried(-motion.positions[-1][:, 2], stiffness)
+    borne = floor_force(-motion.positions[-1][:, 2], stiffness)
     return both(
         near("force of the floor", borne, WEIGHT, rel=1e-2),
         below("largest speed", np.abs(motion.velocities[-1]).max(), 1e-3),
@@ -53,7 +56,7 @@ def lies_on_the_floor(stiffness):
 
 @case("dropped from {} m on a corner, by steps of 1 ms", over=(1.0, 10.0))
 def dropped(height):
-    """It must come to rest on the floor, and not in it."""
+    """Check that the plate comes to rest on the floor, and not in it."""
     scene = plate([floor(1e3, 0.5)], at=(0, 0, height), turned=(0.4, 0.3, 0.0))
     before = round(0.98 * np.sqrt(2.0 * height / GRAVITY) * 1e3)
     motion = moved(scene, before + 1500, 1e-3, record_every=10)
@@ -68,8 +71,8 @@ def dropped(height):
 SLOPE = 0.5  # rad: tan = 0.546
 
 
-def slide(friction: float, time_step: float, lagged: bool = False) -> Answer:
-    """g (sin - mu cos) down a slope, or none where friction holds."""
+def sliding_speed(friction: float, time_step: float, lagged: bool = False) -> Answer:
+    """Compare the acceleration down a slope with g (sin - mu cos), or zero where friction holds."""
     plane = ms.obstacles.slope(SLOPE)
     rubs = ms.Contact(plane, contact_stiffness=1e3, friction_coefficient=friction, lagged_friction=lagged)
     resting = THICKNESS * DENSITY * SIDE**2 * GRAVITY * np.cos(SLOPE) / 25 / 1e3 + SMOOTHING / 2
@@ -83,23 +86,23 @@ def slide(friction: float, time_step: float, lagged: bool = False) -> Answer:
 
 
 @case("a slope, and a friction coefficient of {}", over=(0.0, 0.3, 0.6, 2.0))
-def slides_down(friction):
-    return slide(friction, 1e-3)
+def slope_with_friction(friction):
+    return sliding_speed(friction, 1e-3)
 
 
 @case("a slope, by steps of {:g} s", over=(1e-5, 1e-4, 1e-2))
-def slides_down_in_steps(time_step):
-    return slide(0.3, time_step)
+def slope_in_steps(time_step):
+    return sliding_speed(0.3, time_step)
 
 
 @case("a slope, friction of the step before")
-def slides_down_lagged():
-    return slide(0.3, 1e-3, lagged=True)
+def slope_with_lagged_friction():
+    return sliding_speed(0.3, 1e-3, lagged=True)
 
 
 @case("dragged at 10 m/s over a floor with friction")
 def dragged():
-    """Pulled by one side; it follows, taut and flat."""
+    """Pull the plate by one side; it follows, taut and flat."""
     scene = plate([floor(1e3, 0.5)])
     side = ms.Pin(scene.mesh.vertices_at(x=SIDE / 2), displacement=(1.0, 0, 0))
     held = ms.Scene(
@@ -130,7 +133,7 @@ def into_a_corner():
 
 @case("dropped over the sharp edge of a box, half of it beyond")
 def over_a_sharp_edge():
-    """Its center is beyond the edge: it must tip over and fall."""
+    """Check that a plate whose center is beyond the edge tips over and falls."""
     box = ms.obstacles.Box((0.1, 0.1, 0.1), center=(-0.05, 0, -0.05))
     touch = ms.Contact(box, contact_stiffness=1e3, friction_coefficient=0.3, face_samples=3)
     scene = plate([touch], at=(0.005, 0, 1e-3))

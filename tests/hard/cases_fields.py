@@ -20,11 +20,11 @@ from theory import along_a_strong_force, hanging, stretch
 
 import magshell as ms
 
-NARROW = 4e-4  # m: where it bends at the clamp alone, its cells must not be wider than the bend
+NARROW = 4e-4  # m: it bends at the clamp alone, and its cells must not be wider than the bend
 
 
 def in_field(number: float, angle: float, rel: float) -> Answer:
-    """The end along a field at this angle to the strip, of M B h w L^2 / (E I) = number."""
+    """Compare the end of a strip in a field at this angle with the elastica, M B h w L^2 / (E I) = number."""
     mesh = graded(strip((80, 2), width=NARROW))
     sheet = shell(mesh, thickness=1e-4 * LENGTH)  # the elastica does not stretch
     direction = np.array([np.cos(angle), 0.0, np.sin(angle)])
@@ -53,7 +53,7 @@ def against():
 
 
 def guided(field_over_modulus: float) -> ms.Equilibrium:
-    """A strip that may only get longer, in a field along it; M B over E."""
+    """Compute the equilibrium of a strip that can only change its length, in a field M B over E along it."""
     mesh = strip((8, 2))
     sheet = shell(mesh)
     vertices = np.arange(mesh.n_vertices)
@@ -73,7 +73,7 @@ def pulled(strength):
 
 
 @case("M B of 100 E against a guided strip: no length is left to it but that of the strip turned round")
-def pushed():
+def compressed():
     found = guided(-100.0)
     end = end_position(found.scene.mesh, found.positions)[0] / LENGTH
     return both(near("end x / L", end, -stretch(100.0), rel=1e-9), at_rest(found))
@@ -93,7 +93,7 @@ def heavy_strip(number):
 
 @case("a strip on a dipole that pulls 1e3 times harder than it can bear, in a scene that keeps them apart")
 def close_to_a_dipole():
-    """Pinned to a line below the dipole it can only stretch; by symmetry its middle stays."""
+    """Check a strip pinned to a line below the dipole, which can only stretch; by symmetry its middle stays."""
     mesh = strip((20, 2))
     sheet = shell(mesh)
     dipole = ms.Dipoles([[LENGTH / 2, 0.005, 0.02]], [[0.0, 0.0, 50.0]])
@@ -109,5 +109,5 @@ def close_to_a_dipole():
 
 
 def mesh_mirror(mesh: ms.TriangleMesh) -> np.ndarray:
-    """The vertex at (L - x, y) for each at (x, y)."""
+    """Return the vertex at (L - x, y) for each vertex at (x, y)."""
     return np.array([mesh.nearest_vertex((LENGTH - x, y, z)) for x, y, z in mesh.rest_positions])

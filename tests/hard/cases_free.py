@@ -1,4 +1,4 @@
-"""Bodies that nothing holds: they fall, fly, turn in a field; and where there is no equilibrium, they say so."""
+"""Unsupported bodies: they fall, fly, rotate in a field, or raise an error where no equilibrium exists."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def free_sheet(**options) -> ms.Scene:
 
 
 def center(scene: ms.Scene, vectors: np.ndarray) -> np.ndarray:
-    """The mean of vectors at the vertices, weighted by mass."""
+    """Compute the mean of vectors at the vertices, weighted by mass."""
     return np.tensordot(scene.shell.vertex_masses, vectors, axes=(0, -2)) / scene.shell.vertex_masses.sum()
 
 

@@ -1,4 +1,4 @@
-"""Obstacles that are thin, sharp, fast or narrow, friction that sticks to nearly nothing: a valid motion or an error."""
+"""Obstacles that are thin, sharp, fast or narrow, and tiny sticking speeds: a valid motion or an error."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ TIP_UP = np.arccos(1 / np.sqrt(3)) / np.sqrt(2) * np.array([1.0, -1.0, 0.0])  # 
 
 
 def plate(obstacles, friction=0.6, gravity=(0, 0, -GRAVITY), cells=(6, 6), **contact) -> ms.Scene:
-    """A soft sheet with its middle at the origin."""
+    """Return a scene of a soft sheet with its middle at the origin."""
     mesh = ms.meshes.rectangle(SIDE, SIDE, cells=cells).transformed(translation=(-SIDE / 2, -SIDE / 2, 0))
     sheet = ms.Shell(mesh, thickness=THICKNESS, young_modulus=1e5, mass_density=1e3)
     touch = ms.Contact(obstacles, friction_coefficient=friction, **contact)
@@ -28,7 +28,7 @@ def moved(scene: ms.Scene, steps: int, time_step: float, **options) -> ms.Trajec
 
 
 def deepest(motion: ms.Trajectory) -> float:
-    """m, over all recorded states."""
+    """Return the largest penetration over all recorded states, in m."""
     return max(
         -float(obstacle.signed_distance(positions, time).min())
         for obstacle in motion.scene.obstacles
@@ -37,7 +37,7 @@ def deepest(motion: ms.Trajectory) -> float:
 
 
 def valid(motion: ms.Trajectory, depth: float) -> Answer:
-    """At no time deeper than that, and no energy from obstacles at rest."""
+    """Check that a motion is never deeper than `depth` and gains no energy from obstacles at rest."""
     energy = motion.energy
     return both(
         holds("finite", np.isfinite(motion.positions).all() and motion.steps_done == motion.steps),
@@ -48,7 +48,7 @@ def valid(motion: ms.Trajectory, depth: float) -> Answer:
 
 @case("thrown at {} m/s at a wall 1 mm thin, by steps of 1 ms", over=(1, 2, 5))
 def thin_wall(speed):
-    """A step is longer than the wall is thick."""
+    """Throw a plate at a wall thinner than its displacement per step."""
     wall = ms.obstacles.Box((0.06, 0.06, 1e-3), center=(0, 0, -2e-3))
     motion = moved(plate(wall), 60, 1e-3, velocities=(0, 0, -speed))
     above = holds("before the wall", motion.positions[..., 2].min() > -2e-3)
@@ -69,7 +69,7 @@ def wall_that_no_step_sees(speed):
 
 @case("dropped from 1 m onto its face, by steps of {:g} s", over=(1e-5, 1e-4, 1e-3, 1e-2))
 def dropped_flat(time_step):
-    """The stiffness lets it sink sqrt(m / k) v at most, 0.13 mm at the middle of the sheet."""
+    """Check that the plate sinks at most sqrt(m / k) v, 0.13 mm at the middle of the sheet."""
     start = {"velocities": (0, 0, -4.43)} if time_step < 1e-3 else {"start": None}
     height = 1e-4 if time_step < 1e-3 else 1.0
     floor = ms.obstacles.Plane(center=(0, 0, -height))
@@ -79,7 +79,7 @@ def dropped_flat(time_step):
 
 @case("sticks below {:g} m/s on a slope, by steps of 0.1 ms", over=(1e-7, 1e-6, 1e-5))
 def sticks_to_nothing(sticking_speed):
-    """In a step of that speed it goes no farther than round-off lets positions tell."""
+    """Check a sticking speed at which the displacement per step is near round-off of the positions."""
     ground = ms.obstacles.Plane()
     level = plate(ground, None)
     settled = moved(level, 6, 1.0).positions[-1]
@@ -121,7 +121,10 @@ def tetrahedron(part):
 
 @case("a ball that flies at it with {} m/s", over=(1, 10, 40))
 def struck_by_a_ball(speed):
-    """Frictionless; it ends as fast as the ball at least, and sinks in by sqrt(m / k) times the speed at most."""
+    """Check a plate struck by a ball without friction.
+
+    It ends at least as fast as the ball, and the ball sinks in by at most sqrt(m / k) times the speed.
+    """
     ball = ms.obstacles.Sphere(0.01, center=(0, 0, -0.0101), motion=lambda t: (0, 0, speed * t))
     motion = moved(plate(ball, None, gravity=(0, 0, 0)), 40, 2.5e-3 / speed)
     return both(
@@ -133,7 +136,7 @@ def struck_by_a_ball(speed):
 
 @case("strikes the floor askew, thin and soft, with a friction of {}", over=(0.0, 0.6, 2.0))
 def askew(friction):
-    """It crumples."""
+    """Throw a plate obliquely onto the floor, where it crumples."""
     scene = plate(ms.obstacles.Plane(center=(0, 0, -0.011)), friction)
     start = scene.mesh.rest_positions @ rotation_matrix(np.array([0.8, 0.3, 0.0])).T
     return valid(moved(scene, 20, 1e-3, start=start, velocities=(0, 0, -4.43)), 1e-3)
@@ -141,7 +144,7 @@ def askew(friction):
 
 @case("dragged at 10 m/s, loose, with a friction of 0.6, by steps of {:g} s", over=(1e-4, 1e-3, 1e-2))
 def loose_at_10_m_per_s(time_step):
-    """It slows by mu g from the time on at which the floor bears it."""
+    """Check that the plate slows by mu g as soon as the floor carries it."""
     motion = moved(plate(ms.obstacles.Plane()), round(0.1 / time_step), time_step, velocities=(10.0, 0, 0))
     slowed = 10.0 - motion.velocities[-1, :, 0].mean()
     return both(valid(motion, 1e-5), near("slowed by, m/s", slowed, 0.06 * GRAVITY, rel=2e-2))

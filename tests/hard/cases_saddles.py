@@ -1,4 +1,4 @@
-"""Perfectly symmetric states that are no minima: a solve must leave them, and end where theory says."""
+"""Symmetric unstable equilibria: a solve must leave them and end where theory says."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from theory import buckle_height, elastica
 import magshell as ms
 
 
-def shortened(ratio: float, share: float, cells=(40, 2)) -> ms.Scene:
-    """A strip of this thickness over length, clamped at both ends, one of them pushed in by a share of its length."""
+def shortened(ratio: float, shortening: float, cells=(40, 2)) -> ms.Scene:
+    """Return a scene of a strip of thickness over length `ratio`, clamped at both ends and shortened by a fraction."""
     mesh = strip(cells)
     near_end, far_end = ends(mesh)
-    push = ms.Clamp(far_end, displacement=(-share * LENGTH, 0, 0))
+    push = ms.Clamp(far_end, displacement=(-shortening * LENGTH, 0, 0))
     return ms.Scene(shell(mesh, thickness=ratio * LENGTH), supports=[ms.Clamp(near_end), push])
 
 
 @case("pushed in its plane by a tenth of its length, thickness over length {:g}", over=(1e-2, 1e-3, 1e-4))
 def flat_strip_between_clamps(ratio):
-    """30, 3e3 and 3e5 times as far as where it buckles."""
+    """Shorten strips by 30, 3e3 and 3e5 times their critical shortening."""
     found = ms.equilibrium(shortened(ratio, 0.1))
     height = np.ptp(found.positions[:, 2])
     return both(near("height", height, LENGTH * buckle_height(0.1), rel=1e-2), at_rest(found))
@@ -51,7 +51,7 @@ def strip_magnetized_against_the_field(factor):
     )
     end = end_position(mesh, found.positions) / LENGTH
     got = (end[0], abs(end[2]))
-    # Close to where it buckles the height is a square root of what is left of the load.
+    # Close to the critical load the height grows with the square root of the excess load.
     return both(near("end x, z", got, elastica(number, np.pi), rel=4e-3, scale=1.0), at_rest(found))
 
 
@@ -61,7 +61,7 @@ def compass_needle_upside_down():
     sheet = shell(mesh, thickness=1e-2 * LENGTH)
     axis = ms.Pin(mesh.vertices_at(x=0.0))
     scene = ms.Scene(sheet, supports=[axis], field=ms.UniformField(), allow_rigid_motions=True)
-    strength = 1e-3  # T: it can turn long before it can bend
+    strength = 1e-3  # T: enough to rotate it, far too little to bend it
     found = ms.equilibrium(
         scene, remanent_magnetization=(MAGNETIZATION, 0, 0), applied_flux_density=(-strength, 0, 0)
     )

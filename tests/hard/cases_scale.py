@@ -1,4 +1,4 @@
-"""The same sheet from a micron to a thousand kilometres, far from the origin, and of any stiffness."""
+"""Scales from a micron to a thousand kilometres, positions far from the origin, and moduli of any size."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SIZES = (1e-6, 1e-3, 1e3, 1e6)
 
 
 def buckled(size: float = 1.0, modulus: float = 1e6, shift=(0.0, 0.0, 0.0)) -> ms.Equilibrium:
-    """A strip of this length [m], clamped at both ends and shortened to four times where it buckles."""
+    """Compute the equilibrium of a clamped strip of length `size` [m], shortened to four times the critical value."""
     mesh = strip((20, 2), length=size, width=0.1 * size)
     ends = mesh.edges_at(x=0.0), mesh.edges_at(x=size)
     mesh = mesh.transformed(translation=shift)
@@ -21,7 +21,7 @@ def buckled(size: float = 1.0, modulus: float = 1e6, shift=(0.0, 0.0, 0.0)) -> m
     shortening = 4.0 * np.pi**2 * thickness**2 / (3.0 * size)
     sheet = shell(mesh, thickness=thickness, young_modulus=modulus)
     supports = [ms.Clamp(ends[0]), ms.Clamp(ends[1], displacement=(-shortening, 0, 0))]
-    # A little to one side, so that all of them buckle there.
+    # A small load to one side, so that all of them buckle to it.
     load = ms.AreaLoad((0, 0, 1e-7 * modulus))
     return ms.equilibrium(ms.Scene(sheet, supports=supports, loads=[load]))
 
@@ -43,7 +43,10 @@ def buckled_strip_of_modulus(modulus):
 
 @case("{:g} lengths from the origin", over=(1e3, 1e6))
 def buckled_strip_from_afar(distance):
-    """Positions lose as many digits; half of those that are left go into a buckle."""
+    """Compare with the strip at the origin; positions lose digits in proportion to the distance.
+
+    Half of the remaining digits are lost in buckling.
+    """
     here, there = buckled(), buckled(shift=(distance, -distance, 0.5 * distance))
     return near("displacements", there.displacements, here.displacements, rel=1e-10 * distance)
 
@@ -55,7 +58,7 @@ def swinging_strip(size):
         sheet = shell(mesh, thickness=1e-2 * length, mass_density=1e3)
         load = ms.EdgeLoad(mesh.edges_at(x=length), (0, 0, 0.3e-6 * 1e6 * length))
         scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[load])
-        # A wave of the membrane takes length sqrt(rho / E) from end to end.
+        # A membrane wave travels from end to end in length sqrt(rho / E).
         return ms.simulate(scene, steps=30, time_step=10.0 * length * np.sqrt(1e3 / 1e6), progress=False)
 
     here, there = swing(1.0), swing(size)

@@ -1,4 +1,4 @@
-"""Skeletons: at limits, past poles, whips of fifty links, masses apart by a million, torques far too strong."""
+"""Skeletons: at limits, past poles, whips of fifty links, mass ratios of a million, torques far too strong."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ G = 9.81
 
 
 def rods(count: int, masses=None, length: float = 1.0, **law):
-    """A chain along x that hinges about y, from the origin."""
+    """Return links and joints of a chain along x from the origin, with hinges about y."""
     masses = [1.0] * count if masses is None else masses
     links = [
         ms.Link(mass=m, inertia=m * length**2 / 12, center=((k + 0.5) * length, 0, 0))
@@ -30,16 +30,16 @@ def connected(move, joints):
     return holds("joints hold", gap < 1e-12, f"{gap:.1e} m")
 
 
-def no_gain(move, share: float = 2e-2):
-    """Of the energy that goes to and fro."""
+def no_gain(move, fraction: float = 2e-2):
+    """Check that the energy grows by at most this fraction of the largest kinetic energy."""
     energy, kinetic = move.energy, move.kinetic_energy.max()
     gained = float(energy.max() - energy[0]) / kinetic
-    return holds(f"gains at most {share:g} of its kinetic energy", gained < share, f"{gained:.1e}")
+    return holds(f"gains at most {fraction:g} of its kinetic energy", gained < fraction, f"{gained:.1e}")
 
 
 @case("a joint lies on a limit of {:g} N m/rad with 500 times its weight's moment", over=(1e4, 1e8))
 def limit_under_load(stiffness):
-    """The load over the stiffness, from where the soft part ends."""
+    """Compare the depth beyond the limit with load over stiffness, counted from the end of the smoothing."""
     links, joints = rods(1, upper_limit=0.3, limit_stiffness=stiffness, limit_smoothing=1e-3, torque=2500.0)
     rest = ms.equilibrium(ms.Scene(ms.Skeleton(links, joints), gravity=(0, 0, -G)))
     angle = float(rest[joints[0]].angle)
@@ -50,7 +50,7 @@ def limit_under_load(stiffness):
 
 @case("a ball joint's spring, from next to half a turn about {}", over=("x", "y", "z"))
 def ball_past_poles(axis):
-    """Where Euler angles would lock: it comes back as a wheel on a spring does, whatever the axis."""
+    """Compare a ball joint with a wheel on a spring about any axis, where Euler angles would be singular."""
     turn = np.eye(3)["xyz".index(axis)]
     ball = ms.Link(mass=1.0, inertia=0.02, center=(0, 0, 0))
     rate = np.sqrt(2.0 / 0.02) * 3.1  # it turns to 3.1 of pi and back
@@ -74,7 +74,7 @@ def whip():
 
 @case("a link of {:g} kg hangs on one of 1 kg", over=(1e-6, 1e6))
 def masses_apart(mass):
-    """A light one swings as from a point that the heavy one moves; a heavy one drags the light one along."""
+    """Check a light link that swings from a heavy one, and a heavy one that drags a light one along."""
     links, joints = rods(2, masses=(1.0, mass))
     move = ms.simulate(ms.Scene(ms.Skeleton(links, joints), gravity=(0, 0, -G)), steps=200, time_step=2.5e-3)
     answers = [connected(move, joints), no_gain(move)]
@@ -94,7 +94,7 @@ def masses_apart(mass):
 
 @case("a torque ten thousand times too strong on a free hinge, for one step of 10 ms")
 def far_too_strong():
-    """It fails in words, or holds together: a torque of 1e4 on 1/3 kg m2 turns it 1.5 rad in the step."""
+    """Check a torque of 1e4 N m on 1/3 kg m2: a clear error, or a connected chain after 1.5 rad in a step."""
     links, joints = rods(1, torque=1e4)
     scene = ms.Scene(ms.Skeleton(links, joints))
     try:

@@ -1,4 +1,4 @@
-"""Faces that are long and thin, flat and obtuse, or tiny beside their neighbours: the answers of the plain strip."""
+"""Faces that are long and thin, obtuse, or tiny beside their neighbours, with the answers of a regular strip."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ASPECT = 1000
 
 
 def bent(mesh: ms.TriangleMesh, rel: float, thickness: float = LENGTH / 400) -> Answer:
-    """The end of a cantilever of this mesh under a force that bends it far, against the elastica."""
+    """Compare the end of a cantilever of this mesh under a large force with the elastica."""
     sheet = shell(mesh, thickness=thickness)
     found = ms.equilibrium(cantilever(sheet, (0, 0, force_for(NUMBER, sheet, LENGTH))))
     end = end_position(mesh, found.positions) / LENGTH
@@ -33,7 +33,7 @@ def bent(mesh: ms.TriangleMesh, rel: float, thickness: float = LENGTH / 400) -> 
 
 
 def lines(x: np.ndarray, y: np.ndarray) -> ms.TriangleMesh:
-    """A rectangle with its cells between these coordinates."""
+    """Return a rectangle with its cells between these coordinates."""
     mesh = ms.meshes.rectangle(1.0, 1.0, cells=(len(x) - 1, len(y) - 1))
     u, v, z = mesh.rest_positions.T
     places = [np.interp(w, np.linspace(0.0, 1.0, len(at)), at) for w, at in ((u, x), (v, y))]
@@ -45,13 +45,16 @@ THIN_X, THIN_Y = X[1] / ASPECT, Y[1] / ASPECT
 
 
 def with_flat_triangles() -> ms.TriangleMesh:
-    """Every tenth face cut into three at a point by its edge 0, so that one of them has an angle of almost 180 degrees."""
+    """Return a strip with every tenth face cut into three, one with an angle of almost 180 degrees."""
     mesh = strip()
     return cut_inside(mesh, np.arange(0, mesh.n_faces, 10), 1.0 / ASPECT)
 
 
 def cut_inside(mesh: ms.TriangleMesh, chosen: np.ndarray, height: float) -> ms.TriangleMesh:
-    """These faces cut into three at a point over the middle of their edge 0, at this share of their own height."""
+    """Return the mesh with these faces cut into three at a point over the middle of their edge 0.
+
+    height: of that point, as a fraction of the face's own height.
+    """
     corners = mesh.faces[chosen]
     weights = np.array([height, 0.5 * (1 - height), 0.5 * (1 - height)])
     new = mesh.n_vertices + np.arange(len(corners))
@@ -62,7 +65,10 @@ def cut_inside(mesh: ms.TriangleMesh, chosen: np.ndarray, height: float) -> ms.T
 
 
 def tiny_face(mesh: ms.TriangleMesh, face: int, size: float) -> ms.TriangleMesh:
-    """One face gets a triangle of `size` of its own at its middle, joined to its corners by six others."""
+    """Return the mesh with a small triangle in the middle of one face, joined to its corners by six others.
+
+    size: of the triangle, over that of the face.
+    """
     corners = mesh.faces[face]
     x = mesh.rest_positions[corners]
     small = x.mean(axis=0) + size * (x - x.mean(axis=0))
@@ -86,8 +92,8 @@ def far_bent_with_a_row_of_slivers(where):
 
 
 @case("rows and columns of slivers, thickness over length {:g}", over=(1e-5, 1e-2))
-def far_bent_with_slivers_both_ways(ratio):
-    """Beside the thickness they are five thousandths, or five times as wide."""
+def far_bent_with_slivers_along_and_across(ratio):
+    """Check slivers as wide as five thousandths of the thickness, or five times the thickness."""
     mesh = lines(np.sort([*X, X[10] + THIN_X]), np.sort([*Y, Y[1] + THIN_Y]))
     return bent(mesh, 2e-3, thickness=ratio * LENGTH)
 
@@ -103,7 +109,7 @@ def far_bent_strip_with_flat_triangles():
 
 
 @case("a cap of height {:g} in every face that shares its edge 0 with another", over=(0.05, 0.01, 0.001))
-def far_bent_strip_of_caps(height):
+def far_bent_strip_of_obtuse_faces(height):
     mesh = strip((40, 4))
     inside = np.isin(mesh.face_edges[:, 0], mesh.interior_edges)
     return bent(cut_inside(mesh, np.flatnonzero(inside), height), 5e-3)
@@ -116,7 +122,10 @@ def far_bent_strip_with_a_tiny_face(size):
 
 @case("a face of 5 nm in a strip of 0.1 m, 0.25 mm thick: the round-off of its folds outweighs the load")
 def far_bent_strip_with_a_face_of_nanometres():
-    """Positions are known to 1e-17 m, its folds to 2e-9 rad; over its own size that is a force like the load's."""
+    """Check that a face of nanometres is refused.
+
+    Positions are accurate to 1e-17 m, so its dihedral angles to 2e-9 rad; over its size that causes forces like the load's.
+    """
     return refused(lambda: bent(tiny_face(strip(), 39, 1e-6), 1.0), "nearly degenerate", ms.NotConverged)
 
 
@@ -127,7 +136,7 @@ def far_bent_strip_with_a_tiny_face_at_the_clamp():
 
 @case("slivers, and hinges instead of directors")
 def small_deflection_of_hinges_on_slivers():
-    """Hinges are soft by what their mesh makes of it: as soft without the slivers."""
+    """Check that slivers do not change the compliance of hinges, which depends on the mesh."""
 
     def response(mesh):
         sheet = shell(mesh, bending="hinge")

@@ -1,4 +1,4 @@
-"""Snap-through and snap-back: loads beyond a limit point, paths round it."""
+"""Snap-through and snap-back: loads beyond a limit point, and paths past it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ BAR = float(np.hypot(HALF_SPAN, RISE))
 
 
 def toggle() -> tuple[ms.Scene, np.ndarray]:
-    """Two plates that lean on each other, hinged along feet and ridge, and the vertices of the ridge.
+    """Return a scene of two plates that lean on each other, hinged along feet and ridge, and the ridge's vertices.
 
     Von Mises' truss in St. Venant-Kirchhoff material: P = E h b z (z0^2 - z^2) / l^3 at the height z, so the limit
     points are at z = +- z0 / sqrt(3). The scene holds their load.
@@ -40,7 +40,7 @@ def limit_load() -> float:
 
 
 def heights(factor: float) -> np.ndarray:
-    """The real heights at which the truss bears that multiple of its limit load, ascending."""
+    """Return the real heights at which the truss carries that multiple of its limit load, ascending."""
     load = factor * limit_load() * BAR**3 / (YOUNG_MODULUS * THICKNESS * DEPTH)
     roots = np.roots([-1.0, 0.0, RISE**2, -load])
     return np.sort(roots[np.abs(roots.imag) < 1e-9 * RISE].real)
@@ -80,7 +80,7 @@ def toggle_by_arc_length():
 
 
 def roof(thickness: float, load: float) -> ms.Scene:
-    """A quarter of the shallow roof of the accuracy table, with a quarter of `load` [N] on its center."""
+    """Return a quarter of the shallow roof of the accuracy table, with a quarter of `load` [N] at its center."""
     mesh = cylinder_roof.quarter((12, 12))
     sheet = ms.Shell(
         mesh,
@@ -95,7 +95,7 @@ def roof(thickness: float, load: float) -> ms.Scene:
 
 
 def sunk(scene: ms.Scene, positions: np.ndarray) -> np.ndarray:
-    """How far the center has come down, mm."""
+    """Return the deflection of the center, in mm."""
     center = scene.mesh.nearest_vertex((0, 0, cylinder_roof.RADIUS))
     return cylinder_roof.RADIUS - positions[..., center, 2]
 
@@ -118,7 +118,7 @@ def roof_snaps_back():
 
 @case("a thin roof, whose path turns back in load and in deflection")
 def thin_roof_by_arc_length():
-    """Limit loads of 590 and -380 N at half the thickness: Sze, Liu, Lo (2004) and others since."""
+    """Compare with limit loads of 590 and -380 N at half the thickness: Sze, Liu, Lo (2004) and others since."""
     scene = roof(cylinder_roof.THICKNESS / 2.0, 1000.0)
     path = ms.follow_path(
         scene, until=lambda _, positions: sunk(scene, positions) > 27.0, max_step=0.001, progress=False

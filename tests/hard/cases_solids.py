@@ -1,4 +1,4 @@
-"""Solids: nearly incompressible, crushed, turned inside out, of slivers, of one element, free, with holes."""
+"""Solids: nearly incompressible, crushed, inverted, of slivers, of one element, free, with holes."""
 
 from __future__ import annotations
 
@@ -46,7 +46,10 @@ def stretched(solid: ms.Solid, factor: float) -> ms.Equilibrium:
 
 @case("Poisson's ratio 0.4999, bent to half its length in one call")
 def hardly_compressible():
-    """As much as with 0.499, of which the validation set knows 4.905, and two cells through it are 2.5 % too soft."""
+    """Compare Poisson's ratio 0.4999 with 0.499, whose deflection in the validation set is 4.905.
+
+    Two cells through the thickness are 2.5 % too soft.
+    """
     found = []
     for poisson_ratio in (0.499, 0.4999):
         material = ms.NeoHookean("isochoric", young_modulus=1e5, poisson_ratio=poisson_ratio)
@@ -87,7 +90,7 @@ def starts(x: np.ndarray) -> dict[str, np.ndarray]:
     }
 
 
-# Corotated, turned inside out: it has crumpled shapes that are stable as well, see below.
+# An inverted Corotated solid is missing: it has stable crumpled shapes as well, see below.
 BAD_STARTS = [
     f"{start}, {name}"
     for name in STABLE
@@ -141,7 +144,10 @@ def slivers():
 
 @case("one tetrahedron, {}", over=("linear", "quadratic"))
 def one_tetrahedron(element):
-    """Its base held and Poisson's ratio 0: F = E A u / (3 h) at the top of a linear one; a quadratic one gives way more."""
+    """Compare the top of a linear tetrahedron with F = E A u / (3 h); a quadratic one deforms more.
+
+    Its base is held, and Poisson's ratio is 0.
+    """
     mesh = ms.TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 2]], [[0, 1, 2, 3]])
     material = ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.0)
     solid = ms.Solid(mesh, material=material, element=element)
@@ -225,7 +231,10 @@ def twisted_tube():
 
 @case("time and memory in proportion to the elements, from 648 to 24,000")
 def scaling():
-    """What `python -m benchmarks scaling` measures up to 500,000: assembly goes by elements, L by their power 4/3."""
+    """Check the exponents that `python -m benchmarks scaling` measures up to 500,000 elements.
+
+    Assembly grows with the number of elements, the entries of L with its power 4/3.
+    """
     small, large = (costs(cells, rounds=1) for cells in ((12, 3, 3), (40, 10, 10)))
     grown = exponents([small, large])
     return both(

@@ -1,4 +1,4 @@
-"""Starts that are nowhere near: random, folded, inverted, blown up. Where there is one equilibrium, it is found."""
+"""Starts far from any equilibrium: random, folded, inverted, scaled up. A unique equilibrium is found."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from magshell.model.supports.supports import rotation_matrix
 
 
 def idle_strip() -> ms.Scene:
-    """Nothing acts on it: all of its energy goes, whatever it starts from."""
+    """Return a scene of a strip without loads, whose equilibrium has no energy."""
     return cantilever(shell(strip((20, 2)), thickness=1e-3))
 
 
 def found_again(start_from) -> Answer:
-    """From start_from(rest positions) back to the rest shape."""
+    """Check that a solve from start_from(rest positions) returns to the rest shape."""
     scene = idle_strip()
     rest = np.array(scene.mesh.rest_positions)
     found = ms.equilibrium(scene, start=start_from(rest))
@@ -32,13 +32,13 @@ def noise(part):
 
 @case("folded over at its middle, back onto itself")
 def folded():
-    def fold(x):
-        # By 180 degrees but for a hair: a sheet in its own plane has no side to unfold to.
+    def folded_positions(x):
+        # By slightly less than 180 degrees: exactly flat, neither side to unfold to would be preferred.
         x, beyond = x.copy(), x[:, 0] > LENGTH / 2
         x[beyond] = np.stack([LENGTH - x[beyond, 0], x[beyond, 1], 1e-4 + 0 * x[beyond, 0]], axis=1)
         return x
 
-    return found_again(fold)
+    return found_again(folded_positions)
 
 
 @case("turned end to end: it starts where its clamp is not")
@@ -54,7 +54,7 @@ def turned(degrees):
 
 @case("upside down: folded over sharply at its clamp, where creases can hold each other")
 def upside_down():
-    """Between the clamp and the first cells it crumples, and may stay so: a stable equilibrium will do."""
+    """Check that any stable equilibrium is reached: the strip crumples at the clamp and may stay so."""
     scene = idle_strip()
     start = (0, WIDTH, 0) + scene.mesh.rest_positions * (1, -1, -1)
     return at_rest(ms.equilibrium(scene, start=start))
@@ -66,8 +66,8 @@ def blown_up(factor):
 
 
 @case("half its size: it may burst into folds that hold each other")
-def halved():
-    """Whether it does depends on the last digits of the first steps, so a stable equilibrium will do."""
+def half_size():
+    """Check that any stable equilibrium is reached; which one depends on the last digits of the first steps."""
     scene = idle_strip()
     return at_rest(ms.equilibrium(scene, start=0.5 * scene.mesh.rest_positions))
 
@@ -84,7 +84,7 @@ def rolled():
 
 @case("every vertex anywhere in a box: knots, inverted faces, strains of hundreds")
 def random_positions():
-    """Any stable equilibrium will do, as a crumpled sheet has many; but its energy must have come down."""
+    """Check that a stable equilibrium of much less energy is reached; a crumpled sheet has many."""
     scene = idle_strip()
     start = np.random.default_rng(7).uniform(-0.5, 0.5, size=scene.mesh.rest_positions.shape) * LENGTH
     found = ms.equilibrium(scene, start=start)
@@ -94,7 +94,10 @@ def random_positions():
 
 @case("a hundredth of its size: it bursts into crumples of single faces, which nothing keeps from collapsing")
 def squeezed():
-    """St. Venant-Kirchhoff material resists no collapse to zero area, where bending forces have no limit."""
+    """Check the refusal of a collapse to zero area.
+
+    St. Venant-Kirchhoff material does not resist it, and bending forces are unbounded there.
+    """
     scene = idle_strip()
     return refused(
         lambda: ms.equilibrium(scene, start=0.01 * scene.mesh.rest_positions),

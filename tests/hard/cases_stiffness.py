@@ -1,4 +1,4 @@
-"""Moduli that vary by 1e6 between neighbouring faces."""
+"""Moduli that vary by a factor of 1e6 between neighbouring faces."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ CONTRAST = 1e6
 
 
 def striped(cells: int, a_stripe: int) -> tuple[ms.TriangleMesh, np.ndarray, np.ndarray]:
-    """A strip of soft and stiff stripes in turn, each of so many cells: mesh, moduli (n_f,), bounds of stripes."""
+    """Return a strip of alternating soft and stiff stripes of `a_stripe` cells: mesh, moduli (n_f,), stripe bounds."""
     mesh = strip((cells, 2))
     count = cells // a_stripe
     stripe = np.floor(mesh.face_barycenters[:, 0] / LENGTH * count).astype(int)
@@ -64,7 +64,7 @@ def living_hinge(degrees):
 
 @case("moduli of single faces drawn from 1 to 1e6")
 def reciprocity_of_a_patchwork():
-    """Betti: the work of one load on the displacements of another is the same the other way round."""
+    """Check Betti's theorem: the work of one load on the displacements of another is symmetric."""
     rng = np.random.default_rng(5)
     mesh = strip((20, 4), irregular=0.25)
     sheet = shell(mesh, young_modulus=YOUNG_MODULUS * CONTRAST ** rng.random(mesh.n_faces), poisson_ratio=0.4)
@@ -82,7 +82,7 @@ def reciprocity_of_a_patchwork():
 
 @case("moduli 1e6 apart in neighbouring faces, in a field that bends it far")
 def patchwork_in_a_field():
-    """However its parts differ, a magnetized strip that is free to turn at its end pulls with h w M B."""
+    """Compare a magnetized strip with one under the end force h w M B, whatever its local moduli."""
     rng = np.random.default_rng(6)
     mesh = strip((40, 4))
     columns = rng.random(40)[np.floor(mesh.face_barycenters[:, 0] / LENGTH * 40).astype(int)]

@@ -1,4 +1,4 @@
-"""Thickness over length from 1e-5 to 1e-1: membrane and bending stiffness apart by up to 1e10."""
+"""Thickness over length from 1e-5 to 1e-1: bending and membrane stiffness differ by up to 1e10."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def bent_far(ratio):
 
 @case("thickness over length {:g}, rolled up by 324 degrees", over=(1e-6, 1e-5, 1e-3))
 def rolled_up(ratio):
-    """Not further: from the full circle on, a strip under a couple about its edge swings out of its plane."""
+    """Compare a strip rolled up by 1.8 pi with a circle; beyond the full circle it would buckle out of its plane."""
     mesh = strip((40, 2))
     sheet = shell(mesh, thickness=ratio * LENGTH)
     near_end, far_end = ends(mesh)
@@ -55,7 +55,7 @@ def stepped_beam():
     sheet = shell(mesh, thickness=np.where(outer, thin, thick))
     force = 1e-12
     found = ms.linear_response(cantilever(sheet, (0, 0, force)))
-    # The outer half is a cantilever of its own; the inner one turns and lifts it.
+    # The outer half is a cantilever; the inner half rotates and lifts it.
     half = LENGTH / 2
     soft, stiff = (YOUNG_MODULUS * h**3 / 12.0 for h in (thin, thick))
     expected = force * half**3 / (3.0 * soft) + force * (LENGTH**3 - half**3) / (3.0 * stiff)

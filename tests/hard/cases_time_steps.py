@@ -1,4 +1,4 @@
-"""Time steps from 1e-7 to 10 s for a sheet that swings in a tenth of a second, fields that jump at every one."""
+"""Time steps from 1e-7 to 10 s for a sheet that swings in a tenth of a second, and fields that jump at every step."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def heavy_strip() -> ms.Scene:
 
 @case("ten steps of 1e-7 s: inertia is 1e9 times the stiffness", over=INTEGRATORS)
 def shortest_steps(integrator):
-    """Before a wave has come from the clamp, the sheet falls freely; the end in 1e-6 s by 5 pm."""
+    """Check free fall before a wave arrives from the clamp; the end falls by 5 pm in 1e-6 s."""
     motion = ms.simulate(heavy_strip(), steps=10, time_step=1e-7, integrator=integrator, progress=False)
     free = motion.scene.mesh.rest_positions[:, 0] > LENGTH / 2
     velocities = motion.velocities[-1][free, 2]
@@ -31,7 +31,7 @@ def shortest_steps(integrator):
 
 @case("six steps of 10 s: inertia is 1e-5 of the stiffness", over=INTEGRATORS)
 def longest_steps(integrator):
-    """What is damped by L-stability ends at rest, where statics says."""
+    """Check that L-stable integrators end in the static equilibrium after steps far too long to resolve the motion."""
     scene = heavy_strip()
     rest = ms.equilibrium(scene)
     motion = ms.simulate(scene, steps=6, time_step=10.0, integrator=integrator, progress=False)
@@ -40,7 +40,7 @@ def longest_steps(integrator):
 
 @case("steps of {:g} s, the same 2 ms", over=(1e-6, 1e-5, 1e-4))
 def same_motion_in_any_steps(time_step):
-    """Against the smooth motion of the slowest modes, which all of these resolve."""
+    """Compare with the smooth motion of the slowest modes, which all of these steps resolve."""
     scene = heavy_strip()
     steps = round(2e-3 / time_step)
     motion = ms.simulate(scene, steps=steps, time_step=time_step, record_every=steps, progress=False)
@@ -48,14 +48,14 @@ def same_motion_in_any_steps(time_step):
 
 
 def exact_fall(scene: ms.Scene, time: float) -> np.ndarray:
-    """Displacements of a strip that begins to feel its weight, by all modes of the linear problem."""
+    """Compute the displacements of a strip suddenly under gravity, by all modes of the linear problem."""
     problem = Problem(scene, Controls(gravity_factor=1.0))
     model = problem.model
     q = model.rest_state()
     stiffness, force = problem.hessian(q, reduced=True), -model.reduce(problem.gradient(q))
     mass = np.asarray(model.free_weights(scene.shell.vertex_masses))
     moving = mass > 0
-    # Edge rotations have no mass: they follow.
+    # Edge rotations have no mass: they are condensed statically.
     inner = stiffness[np.ix_(~moving, ~moving)]
     coupling = stiffness[np.ix_(moving, ~moving)]
     condensed = stiffness[np.ix_(moving, moving)] - coupling @ np.linalg.solve(inner, coupling.T)
@@ -88,7 +88,7 @@ def strong_jumps():
 
 @case("a weak field that jumps at every step, against the same scheme in dense algebra")
 def weak_jumps():
-    """Implicit Euler of the linear problem, (M / dt^2 + K) x = M (x^ + dt v^) / dt^2 + f_n, by numpy."""
+    """Compare with implicit Euler of the linear problem, (M / dt^2 + K) x = M (x^ + dt v^) / dt^2 + f_n, in numpy."""
     scene = cantilever(shell(strip((10, 1)), mass_density=1e3), field=ms.UniformField())
     rng = np.random.default_rng(4)
     fields, steps, dt = 1e-9 * rng.choice([-1.0, 1.0], size=(60, 3)), 60, 2e-3

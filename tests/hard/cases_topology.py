@@ -1,4 +1,4 @@
-"""Closed surfaces, several pieces, and surfaces that are none: one-sided, branching, pinched."""
+"""Closed surfaces, several pieces, and meshes that are no surfaces: one-sided, branching, pinched."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import magshell as ms
 
 
 def moebius_strip(cells: int = 24) -> tuple[np.ndarray, np.ndarray]:
-    """Positions and faces of a strip whose ends are joined with half a twist."""
+    """Return positions and faces of a strip whose ends are joined with half a twist."""
     angle = 2.0 * np.pi * np.arange(cells) / cells
     rows = [
         np.stack(
@@ -61,7 +61,7 @@ def doubled_face():
 
 
 def joined_at_a_vertex(*supports) -> ms.Scene:
-    """Two squares with one vertex in common, the first of them clamped at x = 0, and heavy."""
+    """Return a scene of two heavy squares with one common vertex, the first clamped at x = 0."""
     other = SQUARE + np.array((1, 1, 0))
     points = np.concatenate([SQUARE, other[1:]])
     mesh = ms.TriangleMesh(points, [[0, 1, 2], [0, 2, 3], [2, 4, 5], [2, 5, 6]])
@@ -72,7 +72,10 @@ def joined_at_a_vertex(*supports) -> ms.Scene:
 
 @case("two sheets that touch in one vertex: it is a ball joint")
 def bow_tie():
-    """The second hangs by its corner; the corner opposite, kept at y = 2, comes to 1 m below, as both are sqrt(2) apart."""
+    """Check that the second square hangs from the common corner.
+
+    The opposite corner, kept at y = 2, hangs 1 m below, as both are sqrt(2) apart.
+    """
     found = ms.equilibrium(joined_at_a_vertex(ms.Pin([5], "y")))
     drop = found.positions[2, 2] - found.positions[5, 2]
     return both(near("drop", drop, 1.0, rel=1e-4), at_rest(found))
@@ -94,7 +97,7 @@ def unused_vertex():
 
 @case("closed: a sphere under pressure, held only against rigid motions")
 def sphere_under_pressure():
-    """u = p R^2 (1 - nu) / (2 E h) inwards."""
+    """Compare with the inward displacement u = p R^2 (1 - nu) / (2 E h)."""
     mesh = ms.meshes.spherical_cap(1.0, 0.0, np.pi, cells=(32, 24))
     sheet = shell(mesh, thickness=1e-2, poisson_ratio=0.3)
     supports = three_points(mesh)
@@ -114,7 +117,7 @@ def three_points(mesh: ms.TriangleMesh) -> list[ms.Pin]:
 
 @case("an eighth of a closed sphere with three symmetry planes: its buckling pressure")
 def sphere_buckles():
-    """2 E (h / R)^2 / sqrt(3 (1 - nu^2)), Zoelly 1915; many modes close together."""
+    """Compare with 2 E (h / R)^2 / sqrt(3 (1 - nu^2)), Zoelly 1915, where many modes lie close together."""
     thickness = 0.05
     mesh = ms.meshes.spherical_cap(1.0, 0.0, np.pi / 2, np.pi / 2, cells=(24, 24))
     sheet = shell(mesh, thickness=thickness, poisson_ratio=0.3)
@@ -126,7 +129,7 @@ def sphere_buckles():
 
 @case("vertices of three faces: two neighbours of a face meet in one vertex")
 def vertices_of_three_faces():
-    """Every face cut into three at its middle; the Hessian must be the derivative of the forces all the same."""
+    """Check the Hessian of a mesh with every face cut into three at its middle."""
     whole = strip((6, 2))
     mesh = cut_inside(whole, np.arange(whole.n_faces), 1 / 3)
     return hessian_is_right(mesh)
@@ -139,7 +142,7 @@ def tetrahedron():
 
 
 def hessian_is_right(mesh: ms.TriangleMesh) -> Answer:
-    """H p against central differences of the gradient, from a state that is nowhere special."""
+    """Compare H p with central differences of the gradient, in a generic state."""
     problem = Problem(ms.Scene(shell(mesh, thickness=0.01 * mesh.size), allow_rigid_motions=True), Controls())
     rng = np.random.default_rng(2)
     length = mesh.edge_lengths.min()
@@ -159,7 +162,7 @@ def free_sphere():
 
 @case("a closed ring pinched by two forces: bending only, 1e-6 of the membrane stiffness")
 def pinched_ring():
-    """(pi/4 - 2/pi) P R^3 / (E I)."""
+    """Compare the deflection with (pi/4 - 2/pi) P R^3 / (E I)."""
     radius, width, thickness = 1.0, 0.1, 1e-3
     mesh = ms.meshes.cylinder(radius, width, cells=(96, 2))
     sheet = shell(mesh, thickness=thickness)
@@ -175,12 +178,15 @@ def pinched_ring():
 
 
 def square_tube(side: float, length: float, cells: tuple[int, int]) -> ms.TriangleMesh:
-    """Along y, with four folds of 90 degrees in its rest shape; cells a side and along."""
+    """Return a tube along y with four edges of 90 degrees in its rest shape.
+
+    cells: per side and along.
+    """
     round_tube = ms.meshes.cylinder(
         1.0, length, (np.pi / 4, np.pi / 4 + 2 * np.pi), cells=(4 * cells[0], cells[1])
     )
     x, y, z = round_tube.rest_positions.T
-    # The angle, a multiple of the cells', becomes the way along the sides.
+    # The angle, a multiple of the cells', becomes the arc length along the sides.
     way = np.mod(np.arctan2(x, z) - np.pi / 4, 2 * np.pi) / (np.pi / 2)
     quarter, share = np.divmod(np.round(way * cells[0]) / cells[0], 1.0)
     corners = side / 2 * np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
@@ -191,7 +197,7 @@ def square_tube(side: float, length: float, cells: tuple[int, int]) -> ms.Triang
 
 @case("folds of 90 degrees in the rest shape: a square tube in torsion")
 def box_beam():
-    """Bredt: an end turns by T L p / (4 A^2 G h), with the perimeter p = 4 a and A = a^2."""
+    """Compare with Bredt's twist T L p / (4 A^2 G h), with the perimeter p = 4 a and A = a^2."""
     side, length, thickness = 0.1, 0.5, 1e-3
     mesh = square_tube(side, length, (6, 24))
     sheet = shell(mesh, thickness=thickness, poisson_ratio=0.3)

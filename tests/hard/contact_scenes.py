@@ -1,6 +1,6 @@
-"""Random drops, throws and squeezes of small sheets and solids, and how each of them has to end.
+"""Random drops, throws and squeezes of small sheets and solids, and how each of them must end.
 
-python contact_scenes.py FIRST COUNT        seeds FIRST to FIRST + COUNT - 1, those that end wrongly are printed
+python contact_scenes.py FIRST COUNT        runs seeds FIRST to FIRST + COUNT - 1 and prints those that end wrongly
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ INTEGRATORS = (ms.ImplicitEuler(), ms.TRBDF2(), ms.SDIRK2(), ms.SDIRK3())
 TIME_LIMIT = 120.0  # s, of one scene
 STEPS = 12
 FASTEST = 2.0  # times the speed of waves
-ENERGY_GROWTH = 0.02  # of the energy at hand: kinetic, and what gravity may give
+ENERGY_GROWTH = 0.02  # [-] of the available energy: kinetic, and the work that gravity can do
 
 
 class TooLong(Exception):
-    """A scene outlived its time."""
+    """Raised when a scene exceeds its time limit."""
 
 
 @dataclass
@@ -42,7 +42,10 @@ class Drawn:
 
 
 def drawn(seed: int) -> Drawn:
-    """The scene of a seed: stiffness 1e3 to 1e8 Pa, friction 0 to 1, time steps 1e-4 to 1e-2 s, sizes 1 cm to 1 m."""
+    """Return the scene of a seed.
+
+    Stiffness is 1e3 to 1e8 Pa, friction 0 to 1, time steps 1e-4 to 1e-2 s, sizes 1 cm to 1 m.
+    """
     rng = np.random.default_rng(seed)
     kind = KINDS[seed % len(KINDS)]
     size = 10.0 ** rng.uniform(-2.0, 0.0)
@@ -53,12 +56,12 @@ def drawn(seed: int) -> Drawn:
         lagged_friction=bool(rng.random() < 0.5),
     )
     bodies, supports, contacts, thrown = _BUILDERS[kind](rng, size, modulus, law)
-    # Its own weight does not crush it, nor is it thrown much faster than its own waves run: there no material has an answer.
+    # The weight must not crush a body, nor the speed much exceed that of waves: no material model holds there.
     gravity = min(
         9.81 * (1e3 if kind == "squeeze" and rng.random() < 0.5 else 1.0), 0.2 * modulus / (1e3 * size)
     )
     alone = [body for body in bodies if not any(contact._sides == (body,) for contact in contacts)]
-    contacts += [ms.SelfContact(body, **law) for body in alone]  # whatever may meet is told so
+    contacts += [ms.SelfContact(body, **law) for body in alone]  # every pair that may meet gets a contact
     scene = ms.Scene(
         bodies, supports=supports, contacts=contacts, gravity=(0.0, 0.0, -gravity), allow_rigid_motions=True
     )
@@ -89,9 +92,9 @@ def _energy_at_hand(bodies, velocities, scene, gravity, size) -> float:
 
 def _sheet(rng, size, modulus, cells, move, thickness=0.02):
     mesh = ms.meshes.rectangle(size, size, cells=cells, irregular=rng.uniform(0.0, 0.25))
-    turn, shift = move
+    rotation, shift = move
     middle = np.array([0.5 * size, 0.5 * size, 0.0])
-    mesh = mesh.transformed(translation=-middle).transformed(rotation=turn, translation=shift)
+    mesh = mesh.transformed(translation=-middle).transformed(rotation=rotation, translation=shift)
     return ms.Shell(
         mesh, thickness=thickness * size, young_modulus=modulus, poisson_ratio=0.3, mass_density=1e3
     )
@@ -119,8 +122,8 @@ def _heading(rng):
 
 def _sheet_on_sheet(rng, size, modulus, law):
     floor, held = _floor(rng, size, modulus)
-    turn = _anyhow(rng) if rng.random() < 0.5 else Rotation.from_rotvec([0.0, 0.0, rng.uniform(0.0, 6.0)])
-    sheet = _sheet(rng, 0.6 * size, modulus, (3, 3), (turn, np.array([0.0, 0.0, 0.05 * size])))
+    rotation = _anyhow(rng) if rng.random() < 0.5 else Rotation.from_rotvec([0.0, 0.0, rng.uniform(0.0, 6.0)])
+    sheet = _sheet(rng, 0.6 * size, modulus, (3, 3), (rotation, np.array([0.0, 0.0, 0.05 * size])))
     return _above(floor, held, sheet, law, size, rng)
 
 
@@ -131,7 +134,7 @@ def _ball_on_sheet(rng, size, modulus, law):
 
 
 def _above(floor, held, body, law, size, rng):
-    """The second body raised to just above the first."""
+    """Return a scene's parts with the second body raised to just above the first."""
     gap = size * (0.03 + 0.1 * rng.random())
     up = gap - body.mesh.rest_positions[:, 2].min() + floor.mesh.rest_positions[:, 2].max()
     body = _raised(body, [*0.2 * size * rng.uniform(-1.0, 1.0, 2), up])
@@ -151,20 +154,20 @@ def _raised(body, shift):
     return ms.Solid(mesh, material=body.material, mass_density=body.mass_density)
 
 
-def _block(rng, size, modulus, shift=(0.0, 0.0, 0.0), turn=None):
+def _block(rng, size, modulus, shift=(0.0, 0.0, 0.0), rotation=None):
     mesh = ms.meshes.box((size, 0.7 * size, 0.5 * size), cells=tuple(rng.integers(1, 3, 3)))
-    mesh = mesh.transformed(rotation=turn, translation=np.asarray(shift))
+    mesh = mesh.transformed(rotation=rotation, translation=np.asarray(shift))
     return _solid(mesh, modulus)
 
 
 def _block_on_block(rng, size, modulus, law):
     lower = _block(rng, size, modulus)
     held = ms.Pin(lower.mesh.vertices_at(z=lower.mesh.rest_positions[:, 2].min()), body=lower)
-    return _above(lower, held, _block(rng, 0.5 * size, modulus, turn=_anyhow(rng)), law, size, rng)
+    return _above(lower, held, _block(rng, 0.5 * size, modulus, rotation=_anyhow(rng)), law, size, rng)
 
 
 def _squeeze(rng, size, modulus, law):
-    """A soft block between two others, all of them heavy."""
+    """Return a soft block between two others, all of them heavy."""
     lower = _block(rng, size, modulus)
     held = ms.Pin(lower.mesh.vertices_at(z=lower.mesh.rest_positions[:, 2].min()), body=lower)
     layers, top = [lower], lower.mesh.rest_positions[:, 2].max()
@@ -178,7 +181,7 @@ def _squeeze(rng, size, modulus, law):
 
 
 def _folding(rng, size, modulus, law):
-    """A strip of which one half is thrown onto the other."""
+    """Return a strip of which one half is thrown onto the other."""
     mesh = ms.meshes.rectangle(size, 0.25 * size, cells=(8, 2), irregular=rng.uniform(0.0, 0.2))
     angle = np.clip((mesh.rest_positions[:, 0] / size - 0.4) / 0.2, 0.0, 1.0) * np.pi * 0.8
     places = np.array(mesh.rest_positions)
@@ -206,7 +209,7 @@ _BUILDERS = {
 
 
 def surfaces_of(scene) -> list[np.ndarray]:
-    """Faces of every body, of the scene's vertices."""
+    """Return the faces of every body, in the scene's vertices."""
     return [
         span.first_vertex + body.mesh.faces
         for body, span in zip(scene.bodies, scene._bodies.spans, strict=True)
@@ -240,7 +243,7 @@ class Watch:
 
 
 def verdict(seed: int) -> str | None:
-    """None, or what went wrong with the scene of this seed."""
+    """Return None, or a sentence about what went wrong with the scene of this seed."""
     each = drawn(seed)
 
     def too_long(*_):

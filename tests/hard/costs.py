@@ -1,7 +1,9 @@
-"""python tests/hard/costs.py [WORDS ...] [--all]: cases whose equilibria take many factorizations, beside what they took.
+"""Cases whose equilibria take many factorizations, beside the counts that were measured.
 
-The counts of `MEASURED` were taken before statics had one principle (issue 31), which is to lower them. Cases marked slow
-take minutes, or do not end; they run with --all, or where WORDS name them.
+python tests/hard/costs.py [WORDS ...] [--all]
+
+The counts of `MEASURED` were taken before a redesign of statics that is to lower them. Cases marked slow take minutes, or
+do not end; they run with --all, or where WORDS name them.
 """
 
 from __future__ import annotations
@@ -31,7 +33,7 @@ MEASURED: dict[str, tuple[int, int, str]] = {
 
 @dataclass(frozen=True)
 class Cost:
-    """A case. run: yields each equilibrium, with what is to be printed of it."""
+    """A case that takes many factorizations. run: yields each equilibrium, with the text to print about it."""
 
     name: str
     run: Callable[[], Iterator[tuple[ms.Equilibrium, str]]]
@@ -39,10 +41,10 @@ class Cost:
 
 
 def ventricle(cells: tuple[int, int]) -> tuple[ms.Scene, ms.Pressure, int]:
-    """Problem 2 of Land et al. (2015): a truncated ellipsoid of Guccione's material, 10 kPa on its inner side.
+    """Return problem 2 of Land et al. (2015): a truncated ellipsoid of Guccione's material, 10 kPa on its inner side.
 
-    cells: from the apex to the base, and through the wall. Its scene, its pressure, and the vertex of the inner apex, which
-    goes to z = -26.6 mm.
+    cells: from the apex to the base, and through the wall. Returns the scene, its pressure, and the vertex of the inner
+    apex, which goes to z = -26.6 mm.
     """
     flat = ms.meshes.extruded(ms.meshes.disk(1.0, cells=cells[0]), 1.0, cells[1])
     a, b, depth = flat.rest_positions.T
@@ -75,9 +77,10 @@ def ventricle(cells: tuple[int, int]) -> tuple[ms.Scene, ms.Pressure, int]:
 
 
 def thick_tube(cells: tuple[int, int, int]) -> tuple[ms.Scene, ms.Pressure, ms.Pressure]:
-    """An eighth of a closed tube of rubber, nu = 0.4999, free to extend. cells: through the wall, around, along.
+    """Return an eighth of a closed tube of rubber, nu = 0.4999, free to extend.
 
-    Its pressures: inside, and what the ends pull at the wall per pascal of it.
+    cells: through the wall, around, along. Returns the scene and its pressures: inside, and the pull of the ends on the wall
+    per pascal of it.
     """
     inner, outer, length = 1.0, 1.5, 2.0
     sheet = ms.meshes.sector(inner, outer, (0.0, np.pi / 2), cells=cells[:2])
@@ -95,9 +98,9 @@ def thick_tube(cells: tuple[int, int, int]) -> tuple[ms.Scene, ms.Pressure, ms.P
 
 
 def arm(cells: tuple[int, int, int]) -> tuple[ms.Scene, ms.Pressure]:
-    """An arm of rubber with four chambers side by side, walls of a cell between them; the pressure is in one of them.
+    """Return an arm of rubber with four chambers side by side, and the pressure in one of them.
 
-    cells: along, and 7 times 7 across for chambers of two.
+    The walls between the chambers are one cell thick. cells: along, and 7 times 7 across for chambers of two.
     """
     size = np.array([0.15, 0.035, 0.035])
     block = ms.meshes.box(tuple(size), cells=cells)
@@ -117,17 +120,17 @@ def arm(cells: tuple[int, int, int]) -> tuple[ms.Scene, ms.Pressure]:
 
 
 def _on(mesh: ms.TetMesh, vertices: np.ndarray) -> np.ndarray:
-    """The faces all of whose corners are among these, (n_v,) bool."""
+    """Return the faces all of whose corners are among these vertices, (n_v,) bool."""
     return np.flatnonzero(vertices[mesh.faces].all(axis=1))
 
 
 def _split(faces: np.ndarray, parts: int) -> np.ndarray:
-    """Their flat triangles on a mesh of quadratic tetrahedra, which shows so many a face."""
+    """Return the flat triangles of these faces on a mesh of quadratic tetrahedra, `parts` per face."""
     return (parts * faces[:, None] + np.arange(parts)).ravel()
 
 
 def _upright(x: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
-    """Of positive volumes: all turned round if they are negative."""
+    """Return tetrahedra of positive volume: all are reversed if their volumes are negative."""
     edges = x[tetrahedra[:, 1:]] - x[tetrahedra[:, :1]]
     return tetrahedra if np.linalg.det(edges).sum() > 0.0 else tetrahedra[:, [0, 2, 1, 3]]
 
@@ -148,7 +151,7 @@ def _ventricle_in_four(cells):
 
 def _tube(cells):
     scene, inside, end = thick_tube(cells)
-    pull = 1.0 / (1.5**2 - 1.0)  # [-] of the pressure: pi r^2 over the area of the wall
+    pull = 1.0 / (1.5**2 - 1.0)  # [-] over the pressure: pi r^2 over the area of the wall
     found = None
     for each in (0.5e5, 1e5, 1.5e5, 2e5):
         values = {inside: {"pressure": each}, end: {"pressure": -pull * each}}

@@ -1,4 +1,4 @@
-"""The cases whose counts are kept: every family of effort.py, motions, contact and projective rounds."""
+"""Cases whose counts are kept: every family of effort.py, motions, contact and projective iterations."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def all_families() -> Iterator[Counted]:
 
 
 def _is_counted(name: str) -> bool:
-    """Whether a case of effort.py is among those that are small enough for every day."""
+    """Return whether a case of effort.py is small enough for everyday runs."""
     parts = name.split("/")
     if parts[0] == "C1":
         return (parts[2] == "10x1" and parts[3] in ("2", "10", "50")) or parts[1:] == ["150", "40x4", "10"]
@@ -43,15 +43,15 @@ def _is_counted(name: str) -> bool:
     return name not in COSTLY
 
 
-# Cases that take seconds each, or (scaling) repeat their solve until a clock says so.
+# Cases that take seconds each, or (scaling) repeat their solve for a given time.
 COSTLY = {
     "hard solids/scaling",
-    "hard contact/slides down in steps, 1e-05",
+    "hard contact/slope in steps, 1e-05",
     "hard contact/dropped, 10",
     "hard time steps/weak jumps",
     "hard cavities/filled, 30",
     "hard fields/against",
-    "hard folds/twisted and back",
+    "hard large rotations/twisted and back",
     "hard saddles/flat strip between clamps, 0.001",
     "hard saddles/flat strip between clamps, 0.0001",
     "hard saddles/strip magnetized against the field, 40",
@@ -62,7 +62,7 @@ COSTLY = {
     "hard starts/folded",
     "hard starts/inverted",
     "hard starts/upside down",
-    "hard starts/halved",
+    "hard starts/half size",
     "hard starts/rolled",
     "hard starts/random positions",
     "hard starts/squeezed",

@@ -1,5 +1,9 @@
-"""python tests/hard/effort.py [WORDS ...] [--out FILE] [--against FILE]: what equilibria cost, family by family, and where
-they end: factorizations of every call of ms.equilibrium, and energies, beside those of an earlier run."""
+"""Cost of equilibria, family by family: factorizations of every call of ms.equilibrium, and final energies.
+
+python tests/hard/effort.py [WORDS ...] [--out FILE] [--against FILE]
+
+--against compares with those of an earlier run.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +21,7 @@ import magshell as ms
 from benchmarks.cases import magnetic_strip, rolled_strip
 from benchmarks.statics import CASES, oblique_field, semi_cylinder
 
-_SAME = 1e-6  # of an energy
+_SAME = 1e-6  # [-] relative difference below which energies are equal
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -130,7 +134,7 @@ def _solved(scene: ms.Scene, controls: dict | None = None) -> bool:
 
 
 def _pinched(cells: int, force: float) -> ms.Scene:
-    """A6: an eighth of a cylinder on rigid diaphragms, under two opposite forces [N] (Sze, Liu, Lo 2004)."""
+    """Return A6: an eighth of a cylinder on rigid diaphragms, under two opposite forces [N] (Sze, Liu, Lo 2004)."""
     radius, half = 100.0, 100.0
     mesh = ms.meshes.cylinder(radius, half, (0.0, np.pi / 2), cells=(cells, cells))
     sheet = ms.Shell(mesh, thickness=1.0, young_modulus=30e3, poisson_ratio=0.3)
@@ -141,7 +145,7 @@ def _pinched(cells: int, force: float) -> ms.Scene:
 
 
 def _rolled(ratio: float, cells: tuple[int, int], degrees: float) -> ms.Scene:
-    """A strip of this thickness over its length, rolled up by a couple at its end."""
+    """Return a strip of thickness over length `ratio`, rolled up by a moment at its end."""
     length, young_modulus = magnetic_strip.LENGTH, 1e6
     mesh = ms.meshes.rectangle(length, 0.1 * length, cells=cells)
     sheet = ms.Shell(mesh, thickness=ratio * length, young_modulus=young_modulus, poisson_ratio=0.0)
@@ -158,7 +162,7 @@ def _count(row: dict) -> int:
 
 
 def _ends(row: dict, before: dict) -> tuple[int, int, float]:
-    """How many calls end higher, how many lower, and by how much together [shares of the energies]."""
+    """Count the calls that end higher and lower, and sum up the relative changes of their energies."""
     higher = lower = 0
     change = 0.0
     for new, old in zip(row["calls"], before["calls"], strict=False):

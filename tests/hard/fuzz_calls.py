@@ -14,7 +14,7 @@ import magshell as ms
 
 @dataclass
 class Call:
-    """What is called, with arguments that it takes. cost: how many times rarer than others it is drawn."""
+    """A function to call, with arguments that it takes. cost: how many times rarer than others it is drawn."""
 
     name: str
     function: Callable
@@ -22,11 +22,8 @@ class Call:
     cost: int = 1
 
 
-# What users do not make themselves, but get as results, catch, or are told.
-
-
 class Sample:
-    """A small scene, and what was computed with it, to call everything else with."""
+    """A small scene and its results, with which everything else is called."""
 
     def __init__(self, folder: Path):
         self.folder = folder
@@ -51,7 +48,7 @@ class Sample:
 
 
 def calls(s: Sample) -> Iterator[Call]:
-    """All of them."""
+    """Yield all calls of this file."""
     yield from _meshes(s)
     yield from _scenes(s)
     yield from _fields(s)

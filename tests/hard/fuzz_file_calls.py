@@ -1,4 +1,4 @@
-"""What writes and draws results and reads files, with arguments that work, for the fuzzing to spoil."""
+"""Functions that write and draw results or read files, with arguments that work, for the fuzzing to spoil."""
 
 from __future__ import annotations
 

@@ -53,11 +53,11 @@ DOCUMENTED = (
 
 
 class TooLong(BaseException):
-    """A call outlived its time."""
+    """Raised when a call exceeds its time limit."""
 
 
 def documented(call: Call, error: BaseException) -> bool:
-    """Whether a user was told to expect this of bad input."""
+    """Return whether the documentation names this error for bad input."""
     if isinstance(error, OSError):
         return "path" in call.arguments or "checkpoint" in call.arguments
     if isinstance(error, ImportError):
@@ -85,7 +85,7 @@ def everything(folder: Path) -> list[Call]:
 
 
 def spoil(table: list[Call], number: int) -> tuple[Call, dict, str]:
-    """The call with this number: what, its arguments, and which of them are spoilt."""
+    """Return the call with this number, its arguments, and a text of those that are spoilt."""
     rng = np.random.default_rng([SEED, number])
     weights = np.array([1.0 / call.cost for call in table])
     # First every function in turn, so that none is missed, then as it comes.
@@ -107,7 +107,7 @@ def _shown(value) -> str:
 
 
 def run(call: Call, arguments: dict) -> BaseException | None:
-    """The error the call ends with."""
+    """Return the error that the call ends with, or None."""
 
     def late(*_):
         raise TooLong(f"not done in {TIME_LIMIT:g} s")

@@ -1,4 +1,4 @@
-"""What of magshell needs torch, with arguments that work: objectives, controls, parametrizations, optimizers."""
+"""Functions that need torch, with arguments that work: objectives, controls, parametrizations, optimizers."""
 
 from __future__ import annotations
 

@@ -118,7 +118,7 @@ def junk(rng: np.random.Generator):
 
 
 def spoilt(valid, rng: np.random.Generator):
-    """The value with something wrong with it, or only unusual; junk where its kind has no ways of its own."""
+    """Return the value with an error or an oddity in it; junk where its kind has none of its own."""
     if isinstance(valid, bool) or valid is None:
         return junk(rng)
     if isinstance(valid, int | float):

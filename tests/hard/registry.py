@@ -1,4 +1,4 @@
-"""What a hard case is: a function that solves something difficult and says what should have come out and what did."""
+"""Table of hard cases: functions that solve something difficult and return an expected and a found answer."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TIME_LIMIT = 60.0  # s, of a case
 
 @dataclass(frozen=True)
 class Answer:
-    """What a case must reach, what it reached, and whether that is right."""
+    """The answer that a case must reach, the one it reached, and whether that is right."""
 
     expected: str
     got: str
@@ -37,7 +37,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Verdict:
-    """How a case ended. An exception that the case did not ask for is a failure, in words."""
+    """The end of a case. An exception that the case did not ask for is a failure, with its text."""
 
     case: Case
     answer: Answer
@@ -52,9 +52,9 @@ CASES: list[Case] = []
 
 
 def case(hard: str, over: Iterable = ()):
-    """Enters a function into the table: once, or once for each value of `over`, its only argument.
+    """Enter a function into the table: once, or once for each value of `over`, its only argument.
 
-    `hard` may hold a place for the value, as in "thickness over length {:g}". The family is the file's name, the
+    `hard` may contain a placeholder for the value, as in "thickness over length {:g}". The family is the file's name, the
     row's name the function's.
     """
 
@@ -73,14 +73,14 @@ def case(hard: str, over: Iterable = ()):
 
 
 def all_cases() -> list[Case]:
-    """Those of every file beside this one that is named cases_*.py."""
+    """Return the cases of every file beside this one that is named cases_*.py."""
     for path in sorted(Path(__file__).parent.glob("cases_*.py")):
         importlib.import_module(path.stem)
     return list(CASES)
 
 
 def judge(case: Case) -> Verdict:
-    """Runs a case."""
+    """Run a case and return its verdict."""
     began = time.perf_counter()
     try:
         answer = case.run()

@@ -57,7 +57,7 @@ def motion_gradient(on: ms.Scene):
 
 
 def saddle(on: ms.Scene):
-    """Magnetized against the field: it has to be pushed off, and falls to the same side every time."""
+    """Solve from a state magnetized against the field, which must be perturbed and falls to the same side every time."""
     return ms.equilibrium(
         on, remanent_magnetization=MAGNETIZATION, applied_flux_density=(-5e-3, 0, 0)
     ).positions
@@ -68,7 +68,7 @@ def modes(on: ms.Scene):
 
 
 def failing(on: ms.Scene):
-    """Far too little time for it; what it hands back is a result all the same."""
+    """Solve with far too few iterations; the last good state is the result."""
     hasty = ms.MixedNewton(max_iterations=2, min_load_step=1.0, max_relaxation_steps=1)
     try:
         ms.equilibrium(
@@ -80,7 +80,7 @@ def failing(on: ms.Scene):
 
 
 def interrupted(on: ms.Scene):
-    """Ctrl-C at the first iteration."""
+    """Stop a solve by Ctrl-C at the first iteration."""
 
     def press(*_):
         signal.raise_signal(signal.SIGINT)
@@ -92,18 +92,18 @@ def interrupted(on: ms.Scene):
 
 
 def rebuilt(on: ms.Scene):
-    """A new scene each time, with what its core allocates."""
+    """Solve a new scene each time, with the memory that its core allocates."""
     return equilibrium(scene())
 
 
 REPEATS = (equilibrium, gradient, motion, motion_gradient, saddle, modes, failing, interrupted, rebuilt)
 
 
-def digest(array) -> str:
+def checksum(array) -> str:
     return hashlib.sha256(np.ascontiguousarray(array).tobytes()).hexdigest()[:16]
 
 
 def resident() -> int:
-    """Bytes of this process in memory (Linux)."""
+    """Return the resident memory of this process in bytes (Linux)."""
     with open("/proc/self/statm") as file:
         return int(file.read().split()[1]) * 4096

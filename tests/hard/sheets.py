@@ -20,41 +20,41 @@ def shell(mesh: ms.TriangleMesh, **properties) -> ms.Shell:
 
 
 def ends(mesh: ms.TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
-    """The edges at the smallest x, and at the largest."""
+    """Return the edges at the smallest x, and at the largest."""
     x = mesh.rest_positions[:, 0]
     return mesh.edges_at(x=x.min()), mesh.edges_at(x=x.max())
 
 
 def cantilever(sheet: ms.Shell, force_per_length=None, **options) -> ms.Scene:
-    """Clamped at its smallest x, with a dead line load [N/m] at the other end."""
+    """Return a scene clamped at its smallest x, with a dead line load [N/m] at the other end."""
     near, far = ends(sheet.mesh)
     loads = [] if force_per_length is None else [ms.EdgeLoad(far, force_per_length)]
     return ms.Scene(sheet, supports=[ms.Clamp(near)], loads=loads, **options)
 
 
 def end_position(mesh: ms.TriangleMesh, positions: np.ndarray) -> np.ndarray:
-    """The mean position of what is at the largest x at rest, (3,) m."""
+    """Return the mean position of the vertices at the largest rest x, (3,) in m."""
     x = mesh.rest_positions[:, 0]
     return positions[mesh.vertices_at(x=x.max())].mean(axis=0)
 
 
 def load_number(force_per_length: float, sheet: ms.Shell, length: float) -> float:
-    """P L^2 / (E I)."""
+    """Return P L^2 / (E I) of a line load at the end."""
     return 12.0 * force_per_length * length**2 / (sheet.young_modulus[0] * sheet.thickness[0] ** 3)
 
 
 def force_for(number: float, sheet: ms.Shell, length: float) -> float:
-    """The line load [N/m] at the end that makes this P L^2 / (E I)."""
+    """Return the line load [N/m] at the end for this P L^2 / (E I)."""
     return number / load_number(1.0, sheet, length)
 
 
 def field_for(number: float, sheet: ms.Shell, length: float) -> float:
-    """The flux density [T] in which a strip magnetized along itself bends as under an end force of this number."""
+    """Return the flux density [T] that bends a strip magnetized along itself like an end force of this number."""
     return force_for(number, sheet, length) / (MAGNETIZATION * sheet.thickness[0])
 
 
 def graded(mesh: ms.TriangleMesh, power: float = 2.0) -> ms.TriangleMesh:
-    """A strip from x = 0 with its cells packed towards there."""
+    """Return a strip from x = 0 with its cells concentrated there."""
     positions = np.array(mesh.rest_positions)
     length = positions[:, 0].max()
     positions[:, 0] = length * (positions[:, 0] / length) ** power

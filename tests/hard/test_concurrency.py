@@ -1,4 +1,4 @@
-"""Many solves at once, of every kind, on a pool whose size changes meanwhile: each gives what it gives alone."""
+"""Many solves at once, of every kind, on a pool whose size changes meanwhile: each gives the result it gives alone."""
 
 import itertools
 import os
@@ -18,7 +18,7 @@ DIPOLES = ms.Dipoles([[0.05, 0.0, 0.1]], [[0.0, 0.0, 0.5]])
 
 
 def cantilever(bending):
-    """1512 faces, so that a colour has several parts and the matrix several subtrees."""
+    """Return a scene of 1512 faces, so that a colour has several blocks and the matrix several subtrees."""
     mesh = ms.meshes.rectangle(0.1, 0.03, cells=(54, 14), irregular=0.2)
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3, bending=bending)
     return ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=[ms.UniformField(), DIPOLES])
@@ -53,7 +53,7 @@ def gradients(scene):
 
 @pytest.fixture
 def restless_pool():
-    """The pool's size changes every few milliseconds."""
+    """Change the pool's size every few milliseconds."""
     before, stop = ms.num_threads(), threading.Event()
 
     def change():
@@ -105,8 +105,8 @@ assert np.array_equal(ms.equilibrium(scene).positions, expected)
 @pytest.mark.skipif(
     "san.so" in os.environ.get("LD_PRELOAD", ""), reason="sanitizers need that memory themselves"
 )
-def test_fewer_threads_than_wanted_do_the_work():
-    """Every thread has a stack of 256 MB, as its process says, and there are 700 MB: two start, 997 do not."""
+def test_solves_work_with_fewer_threads_than_requested():
+    """Check a process with 700 MB whose threads have stacks of 256 MB: two start, 997 do not."""
     resource = pytest.importorskip("resource")
     _, hard = resource.getrlimit(resource.RLIMIT_STACK)
     done = subprocess.run(

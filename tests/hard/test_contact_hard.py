@@ -1,4 +1,4 @@
-"""Hard cases of contact between bodies: whatever happens, nothing passes through anything."""
+"""Hard cases of contact between bodies, none of which may pass through another."""
 
 import itertools
 
@@ -24,7 +24,7 @@ def solid(mesh, young_modulus=2e5, element="linear") -> ms.Solid:
 
 
 def sheet(side, cells, at=(0.0, 0.0, 0.0), **given) -> ms.Shell:
-    """A square around `at`."""
+    """Return a square sheet around `at`."""
     flat = ms.meshes.rectangle(side, side, cells=(cells, cells))
     return shell(flat.transformed(translation=np.asarray(at) - (side / 2, side / 2, 0.0)), **given)
 
@@ -34,7 +34,7 @@ def everywhere(body) -> np.ndarray:
 
 
 def of_body(scene, body, value) -> np.ndarray:
-    """(n_v, 3): a vector on the vertices of one body, none on the others."""
+    """Return a vector on the vertices of one body, zero on the others, (n_v, 3)."""
     all_of = np.zeros((scene.mesh.n_vertices, 3))
     all_of[scene._bodies.spans[scene.bodies.index(body)].vertices] = value
     return all_of
@@ -53,12 +53,12 @@ def assert_nothing_passes(scene, motion) -> None:
 
 
 def between(*bodies, **law) -> list:
-    """Contact of each with the next."""
+    """Return the contacts of each body with the next."""
     return [ms.Contact(a, b, **law) for a, b in itertools.pairwise(bodies)]
 
 
 def test_a_sheet_folded_to_zero_gap():
-    """Half a strip is turned over onto the other half until a thousandth of its thickness is left between them."""
+    """Turn half a strip over onto the other half until a thousandth of its thickness is left between them."""
     mesh = ms.meshes.rectangle(0.06, 0.01, cells=(20, 2))
     strip = shell(mesh, thickness=5e-4)
     gap = 5e-7
@@ -70,7 +70,7 @@ def test_a_sheet_folded_to_zero_gap():
 
 
 def test_twenty_layers_stacked():
-    """They fall on each other and come to rest: layer k bears those above it."""
+    """Check that layers that fall on each other come to rest, each carrying those above it."""
     layers = [sheet(0.02, 2, (3e-4 * (k % 3), 2e-4 * (k % 2), 1.12e-3 * k)) for k in range(20)]
     contacts = between(*layers)
     scene = ms.Scene(
@@ -87,7 +87,7 @@ def test_twenty_layers_stacked():
 
 
 def needle(radius, length, sides=6) -> ms.TetMesh:
-    """A cone that stands on its tip at the origin."""
+    """Return a cone that stands on its tip at the origin."""
     angle = 2 * np.pi * np.arange(sides) / sides
     rim = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(sides, length)], axis=1)
     points = np.concatenate([[(0.0, 0.0, 0.0), (0.0, 0.0, length)], rim])
@@ -96,7 +96,7 @@ def needle(radius, length, sides=6) -> ms.TetMesh:
 
 @pytest.mark.parametrize("at", [(0.001, 0.002), (0.0, 0.0)], ids=["on a face", "on a vertex"])
 def test_a_needle_on_a_sheet(at):
-    """Of an opening of 2 degrees, at 5 m/s."""
+    """Drop a cone with an opening of 2 degrees at 5 m/s."""
     floor = sheet(0.06, 4)
     cone = solid(needle(3.5e-4, 0.02).transformed(translation=(*at, 1e-3)), young_modulus=1e8)
     scene = ms.Scene(
@@ -112,7 +112,7 @@ def test_a_needle_on_a_sheet(at):
 
 @pytest.mark.parametrize("friction", [None, 0.5])
 def test_an_edge_slides_over_an_edge(friction):
-    """Of two sheets that stand across each other."""
+    """Check the edges of two sheets that stand across each other."""
     upright = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])
     across = np.array([[0, -1.0, 0], [1.0, 0, 0], [0, 0, 1.0]])
     flat = ms.meshes.rectangle(0.04, 0.01, cells=(4, 1)).transformed(translation=(-0.02, -0.01, 0))
@@ -180,7 +180,7 @@ def test_sheets_pressed_together_by_a_thousand_times_their_weight(law):
 
 
 def knotted(width, cells) -> ms.TetMesh:
-    """A cord of square section along an open overhand knot, m."""
+    """Return a cord of square cross-section along an open overhand knot, in m."""
     t = np.linspace(-2.15, 2.15, 2001)
     path = 0.02 * np.stack([t**3 - 3 * t, t**4 - 4 * t**2, 0.2 * (t**5 - 10 * t)], axis=1)
     length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1)))
@@ -201,7 +201,7 @@ def knotted(width, cells) -> ms.TetMesh:
 
 
 def test_a_knot_pulled_tight():
-    """A cord along an open overhand knot, its ends drawn apart to nearly three times their distance."""
+    """Draw the ends of a knotted cord apart to nearly three times their distance."""
     mesh = knotted(0.003, 80)
     cord = solid(mesh, young_modulus=1e5)
     touch = ms.SelfContact(cord)
@@ -220,7 +220,7 @@ def test_a_knot_pulled_tight():
 
 
 def squeezed(advance, axes=range(3)) -> ms.Scene:
-    """A soft block among plates, two to an axis, that come nearer by `advance`."""
+    """Return a scene of a soft block among plates, two per axis, that approach it by `advance`."""
     block = solid(ms.meshes.box((0.01, 0.01, 0.01), cells=(2, 2, 2)).transformed(translation=(-5e-3,) * 3))
     plates, supports = [], []
     for axis, sign in itertools.product(axes, (-1.0, 1.0)):
@@ -239,7 +239,7 @@ PRESSING = {"support_factor": np.linspace(0, 1, 11), "integrator": ms.ImplicitEu
 
 
 def test_a_body_squeezed_until_it_cannot_move():
-    """On all six sides, to four fifths of its size."""
+    """Check a block squeezed on all six sides to four fifths of its size."""
     scene = squeezed(1.2e-3)
     motion = moved(scene, 10, 1e-3, **PRESSING)
     block = motion[scene.bodies[0]].positions[-1]
@@ -247,8 +247,8 @@ def test_a_body_squeezed_until_it_cannot_move():
     np.testing.assert_allclose(np.ptp(block, axis=0), 8.1e-3, rtol=1e-3)
 
 
-def test_what_has_no_place_left_is_told():
-    """Two plates that are to pass through each other, and what is between them."""
+def test_blocked_contact_names_the_faces_in_the_way():
+    """Check two plates that are moved through each other and a block between them."""
     scene = squeezed(5.5e-3, axes=(2,))
     way = r"face \d+ of body \d and face \d+ of body \d are in each other's way"
     with pytest.raises(ms.NotConverged, match=way) as told:
@@ -259,7 +259,7 @@ def test_what_has_no_place_left_is_told():
 
 @pytest.mark.parametrize("integrator", [ms.ImplicitEuler(), ms.TRBDF2()], ids=repr)
 def test_contact_that_opens_and_closes_in_every_step(integrator):
-    """A plate hammers on a block: down in one step, up in the next."""
+    """Check a plate that hammers on a block: down in one step, up in the next."""
     block = solid(
         ms.meshes.box((6e-3, 6e-3, 4e-3), cells=(1, 1, 1)).transformed(translation=(-3e-3, -3e-3, 0))
     )

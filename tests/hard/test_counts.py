@@ -1,4 +1,4 @@
-"""Factorizations and iterations of every family stay those of the last release, or the file says so."""
+"""Factorizations and iterations of every family stay those of the last release, or counts.json is changed."""
 
 import json
 
@@ -16,7 +16,10 @@ def changed(**cases):
 
 
 def test_counts_of_every_family_are_those_of_the_last_release(capsys):
-    """A family's sum may grow by 5 %, a case by half. `python tests/hard/counts.py --write` writes the file anew."""
+    """Check that a family's sum grows by at most 5 %, a case by at most half.
+
+    `python tests/hard/counts.py --write` writes the file anew.
+    """
     last = read()
     now = measure([], shown=lambda line: None)
     lines, failures = compare(now, last)

@@ -47,8 +47,8 @@ def test_every_public_name_is_called(table):
     assert set(NOT_CALLED) <= public_names(ms)
 
 
-def test_what_is_spoilt_works(table):
-    """Or else nothing but the first refusal would be tested."""
+def test_arguments_work_before_they_are_spoilt(table):
+    """Check that all calls work; otherwise only their first refusal would be tested."""
     pytest.importorskip("magpylib")
     for call in table:
         call.function(**call.arguments)

@@ -10,12 +10,12 @@ CASES = all_cases()
 
 @pytest.mark.filterwarnings("ignore::magshell.UnitWarning")  # limits of theory, far beyond any material
 @pytest.mark.parametrize("case", [pytest.param(case, id=case.id) for case in CASES])
-def test_answer(case):
+def test_hard_case_reaches_its_answer(case):
     verdict = judge(case)
     assert verdict.answer.right, f"expected {verdict.answer.expected}, got {verdict.answer.got}"
     assert verdict.seconds < TIME_LIMIT
 
 
-def test_there_are_enough_of_them():
+def test_table_has_enough_distinct_cases():
     assert sum(case.family not in ("contact", "water") for case in CASES) >= 60
     assert max(Counter(case.id for case in CASES).values()) == 1

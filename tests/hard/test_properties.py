@@ -15,7 +15,7 @@ some = settings(max_examples=12, deadline=None, suppress_health_check=[HealthChe
 
 
 def random_mesh(seed: int) -> ms.TriangleMesh:
-    """A Delaunay triangulation of random points in a slightly curved unit square, of all shapes but slivers."""
+    """Return a Delaunay triangulation of random points in a slightly curved unit square, without slivers."""
     rng = np.random.default_rng(seed)
     points = [np.array(corner, float) for corner in ((0, 0), (0, 0.5), (0, 1), (1, 0), (1, 1))]
     while len(points) < 24:
@@ -98,7 +98,7 @@ def test_the_response_is_the_limit_of_small_loads(seed, bending):
     gradient=st.lists(st.floats(-0.2, 0.2), min_size=4, max_size=4),
 )
 def test_an_affine_boundary_makes_an_affine_sheet(seed, ratio, gradient):
-    """The patch test, large strains and any mesh: in its plane every uniform stretch is an equilibrium."""
+    """Check the patch test on any mesh at large strain: every uniform stretch is an equilibrium in the plane."""
     curved = random_mesh(seed)
     flat = ms.TriangleMesh(curved.rest_positions * (1, 1, 0), curved.faces)
     deformed = flat.rest_positions.copy()
@@ -116,7 +116,7 @@ def test_an_affine_boundary_makes_an_affine_sheet(seed, ratio, gradient):
 
 @some
 @given(seed=SEEDS, exponent=st.integers(-6, 6))
-def test_only_the_product_of_magnetization_and_field_counts(seed, exponent):
+def test_solution_depends_on_the_product_of_magnetization_and_field(seed, exponent):
     mesh = random_mesh(seed)
     scene = ms.Scene(sheet(mesh), supports=[clamp(mesh)], field=ms.UniformField())
     magnetization = np.random.default_rng(seed).normal(size=(mesh.n_faces, 3)) * 1e4
@@ -130,8 +130,8 @@ def test_only_the_product_of_magnetization_and_field_counts(seed, exponent):
 
 @some
 @given(seed=SEEDS)
-def test_fields_add(seed):
-    """The magnetic forces in several fields are the sum of those in each."""
+def test_forces_of_several_fields_add_up(seed):
+    """Compare the magnetic forces in several fields with the sum of those in each."""
     mesh = random_mesh(seed)
     dipoles = [ms.Dipoles([(0.5, 0.5, z)], [(0.1, 0.2, 1.0)]) for z in (0.8, -0.6)]
     magnetization = np.random.default_rng(seed).normal(size=(mesh.n_faces, 3)) * 1e4
@@ -222,7 +222,10 @@ def test_numbering_does_not_matter_to_a_motion(seed):
     density=st.floats(1e-3, 1e6),
 )
 def test_units_do_not_matter_to_a_motion(seed, length, modulus, density):
-    """Lengths by L, stresses by E, densities by R: times by L sqrt(R / E), forces by E L^2, damping by E L t."""
+    """Check scaling: with lengths by L, stresses by E and densities by R, times scale by L sqrt(R / E).
+
+    Forces scale by E L^2, damping by E L t.
+    """
     mesh = random_mesh(seed)
     force = loads(mesh, seed, 1.0)
     time = length * np.sqrt(density / modulus)
@@ -245,7 +248,7 @@ def test_units_do_not_matter_to_a_motion(seed, length, modulus, density):
 @some
 @given(seed=SEEDS, bending=BENDINGS)
 def test_a_motion_run_backwards_comes_back_as_steps_get_shorter(seed, bending):
-    """The equations are reversible; the schemes are so to their order."""
+    """Check reversibility, which the equations have exactly and the integrators up to their order."""
     mesh = random_mesh(seed)
     scene = ms.Scene(sheet(mesh, bending), supports=[clamp(mesh)])
     slow = ms.vibration_modes(scene, count=2).modes[1]

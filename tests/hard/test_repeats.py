@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip("torch")
 
 import repeats
-from repeats import REPEATS, digest, resident, scene
+from repeats import REPEATS, checksum, resident, scene
 
 import magshell as ms
 
@@ -45,28 +45,28 @@ def threads():
 @pytest.mark.parametrize("solve", REPEATS, ids=lambda f: f.__name__)
 def test_the_same_bits_every_time(solve, threads):
     on = scene(cells=(50, 16))
-    expected = digest(solve(on))
+    expected = checksum(solve(on))
     others = [each for each in REPEATS if each is not solve]
     for count, before in ((2, others[0]), (1, others[-1]), (2, repeats.failing)):
         ms.set_num_threads(count)
         before(on)  # leaves its own state in the scene
-        assert digest(solve(on)) == expected
-        assert digest(solve(scene(cells=(50, 16)))) == expected
+        assert checksum(solve(on)) == expected
+        assert checksum(solve(scene(cells=(50, 16)))) == expected
 
 
 def test_the_same_bits_in_another_process():
     code = (
-        "import json; from repeats import REPEATS, digest, scene; on = scene();"
-        "print(json.dumps({f.__name__: digest(f(on)) for f in REPEATS}))"
+        "import json; from repeats import REPEATS, checksum, scene; on = scene();"
+        "print(json.dumps({f.__name__: checksum(f(on)) for f in REPEATS}))"
     )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(HERE), *sys.path]), "PYTHONHASHSEED": "7"}
     run = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True
     )
     on = scene()
-    assert json.loads(run.stdout) == {f.__name__: digest(f(on)) for f in REPEATS}
+    assert json.loads(run.stdout) == {f.__name__: checksum(f(on)) for f in REPEATS}
 
 
-def test_digests_tell_bits_apart():
+def test_checksums_differ_for_different_bits():
     x = np.ones(5)
-    assert digest(x) != digest(np.nextafter(x, 2.0))
+    assert checksum(x) != checksum(np.nextafter(x, 2.0))

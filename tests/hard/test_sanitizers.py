@@ -17,7 +17,7 @@ CMAKE = shutil.which("cmake", path=os.pathsep.join([str(Path(sys.executable).par
     reason="compiles the extension twice: MAGSHELL_TEST_SANITIZERS=1, or make sanitize",
 )
 @pytest.mark.parametrize("sanitizers", ["address,undefined", "thread"], ids=["memory", "races"])
-def test_nothing_to_report(sanitizers):
+def test_sanitizers_report_no_error(sanitizers):
     run = subprocess.run(
         [ROOT / "scripts/sanitize.sh", sanitizers],
         env={**os.environ, "PYTHON": sys.executable},

@@ -1,4 +1,4 @@
-"""Closed answers that the hard cases are held against."""
+"""Closed-form answers with which the hard cases are compared."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from scipy.special import ellipe, ellipk
 
 
 def _bent(curving, angle: float, load: float) -> tuple[float, float]:
-    """The end (x, y) / L of a cantilever with theta'' = curving(s, theta), which tends to `angle` as the load grows."""
+    """Return the end (x, y) / L of a cantilever with theta'' = curving(s, theta).
+
+    theta tends to `angle` as the load grows.
+    """
     s = np.linspace(0.0, 1.0, 400) ** 2  # steep at the clamp
     guess = angle * (1.0 - np.exp(-np.sqrt(load) * s)) * min(1.0, load / 2.0)
     found = solve_bvp(
@@ -28,26 +31,26 @@ def _bent(curving, angle: float, load: float) -> tuple[float, float]:
 
 
 def elastica(load: float, angle: float = np.pi / 2) -> tuple[float, float]:
-    """The end (x, y) / L of an inextensible cantilever under a dead end force at `angle` to its axis.
+    """Return the end (x, y) / L of an inextensible cantilever under a dead end force at `angle` to its axis.
 
         theta'' = - load sin(angle - theta),   theta(0) = theta'(1) = 0,   load = P L^2 / (E I)
 
-    A strip that is magnetized along itself in a uniform field B is one, with P = h w M B.
+    A strip magnetized along itself in a uniform field B is such a cantilever, with P = h w M B.
     """
     return _bent(lambda s, theta: -load * np.sin(angle - theta), angle, load)
 
 
 def along_a_strong_force(load: float, angle: float) -> float:
-    """How far the end of that cantilever gets along the force, over L, where sqrt(load) is large.
+    """Return the end's coordinate along the force over L of that cantilever, where sqrt(load) is large.
 
-    From the first integral of the elastica, theta'^2 / 2 = load (1 - cos(angle - theta)) then; what is left out is
-    of the order exp(-sqrt(load)).
+    It follows from the first integral of the elastica, theta'^2 / 2 = load (1 - cos(angle - theta)). The error is of the
+    order exp(-sqrt(load)).
     """
     return 1.0 - 2.0 * (1.0 - np.cos(angle / 2.0)) / np.sqrt(load)
 
 
 def stretch(stress: float) -> float:
-    """The stretch under a dead stress over E, of St. Venant-Kirchhoff material that may narrow freely.
+    """Return the stretch under a dead stress over E, of St. Venant-Kirchhoff material with free lateral contraction.
 
     l (l^2 - 1) / 2 = stress
     """
@@ -55,7 +58,7 @@ def stretch(stress: float) -> float:
 
 
 def hanging(weight: float) -> tuple[float, float]:
-    """The end (x, z) / L of an inextensible cantilever that its own weight pulls down.
+    """Return the end (x, z) / L of an inextensible cantilever under its own weight.
 
     theta'' = weight (1 - s) cos(theta),   theta(0) = theta'(1) = 0,   weight = w L^3 / (E I)
     """
@@ -63,7 +66,7 @@ def hanging(weight: float) -> tuple[float, float]:
 
 
 def buckle_height(shortening: float) -> float:
-    """The height over L of an inextensible strip clamped at both ends that come nearer by `shortening` L.
+    """Return the height over L of an inextensible strip between clamps that approach by `shortening` L.
 
     Four quarters of an elastica of modulus k: 2 E(k) / K(k) - 1 = 1 - shortening, height k L / K(k).
     """

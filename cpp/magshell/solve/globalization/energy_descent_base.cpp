@@ -8,7 +8,7 @@ namespace {
 
 // [-] Displacement at which a descent has settled, over the extent; see test_a_compressed_strip_leaves_the_saddle.
 constexpr double settled = 1e-4;
-// [-] Largest rate, over the stiffness or the rate of the forces; larger ones allow no useful step. See test_what_has_no_place_left_is_told.
+// [-] Largest rate, over the stiffness or the rate of the forces; larger ones allow no useful step. See test_blocked_contact_names_the_faces_in_the_way.
 constexpr double max_rate_ratio = 1e4;
 // [-] Displacement over the extent that defines the rate of the forces; see test_far_beyond_its_first_instability_a_sheet_has_many.
 constexpr double forced_length = 0.05;

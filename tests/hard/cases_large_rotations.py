@@ -1,4 +1,4 @@
-"""Folds past 170 degrees and past the half turn, twists by full turns, hairpins of few faces."""
+"""Creases beyond 170 and 180 degrees, twists by full circles, hairpins of few faces."""
 
 from __future__ import annotations
 
@@ -12,8 +12,11 @@ import magshell as ms
 ANGLES = (170, 179.99, 190, 350)
 
 
-def two_wings(bending: str) -> ms.Scene:
-    """Two squares joined at x = 1; the second can be turned about their common edge, by one degree a motion factor."""
+def two_squares(bending: str) -> ms.Scene:
+    """Return a scene of two squares joined at x = 1; the second rotates about their common edge.
+
+    The support factor is its angle in degrees.
+    """
     mesh = ms.meshes.rectangle(2.0, 1.0, cells=(2, 1))
     sheet = shell(mesh, thickness=1e-2, bending=bending)
     fixed = mesh.vertices_where(lambda x: x[:, 0] < 1.5)
@@ -21,32 +24,32 @@ def two_wings(bending: str) -> ms.Scene:
     return ms.Scene(sheet, supports=[ms.Pin(fixed), turned])
 
 
-@case("one fold of {} degrees (directors)", over=ANGLES)
-def fold_of_directors(degrees):
-    return fold("midedge", degrees)
+@case("one crease of {} degrees (midedge)", over=ANGLES)
+def crease_of_directors(degrees):
+    return crease("midedge", degrees)
 
 
-@case("one fold of {} degrees (hinges)", over=ANGLES)
-def fold_of_hinges(degrees):
-    return fold("hinge", degrees)
+@case("one crease of {} degrees (hinge)", over=ANGLES)
+def crease_of_hinges(degrees):
+    return crease("hinge", degrees)
 
 
-def fold(bending: str, degrees: float):
-    """The energy of a fold is the square of its angle.
+def crease(bending: str, degrees: float):
+    """Check that the energy of a crease is proportional to the square of its angle.
 
-    Past half a turn the wings would have gone through each other, and the positions are those of a fold to the other
+    Beyond 180 degrees the halves would have passed through each other; positions are then those of a crease to the other
     side: 190 degrees are -170.
     """
-    scene = two_wings(bending)
+    scene = two_squares(bending)
     one_degree = ms.equilibrium(scene).energies["bending"]
     found = ms.equilibrium(scene, support_factor=degrees)
     angle = min(degrees, 360.0 - degrees)
-    return near("energy of the fold", found.energies["bending"], angle**2 * one_degree, rel=1e-6)
+    return near("energy of the crease", found.energies["bending"], angle**2 * one_degree, rel=1e-6)
 
 
 @case("twisted by two full turns and back")
 def twisted_and_back():
-    """There and back again: nothing of the turns may stay behind."""
+    """Check that a twist by two full circles and back leaves no rotation behind."""
     mesh = strip((40, 2))
     near_end, far_end = ends(mesh)
     sheet = shell(mesh, thickness=1e-4)
