@@ -1,4 +1,4 @@
-"""Pictures of ms.plot within a figure."""
+"""A helper that puts pictures of ms.plot into a figure."""
 
 import io
 
@@ -8,7 +8,7 @@ import magshell as ms
 
 
 def paste(axes, picture: ms.Picture, margin: int = 12) -> None:
-    """The picture without the white around it but for a margin, pixels, in place of the axes."""
+    """Draw the picture in place of the axes, without the white around it except for a margin in pixels."""
     from matplotlib import pyplot as plt
 
     image = plt.imread(io.BytesIO(picture._repr_png_()))

@@ -1,4 +1,4 @@
-"""What every example does as a script: compute, tell the numbers, and leave pictures and movies in out/."""
+"""The common script of all examples: compute, print the numbers, and write pictures and movies into out/."""
 
 import time
 from collections.abc import Callable

@@ -53,7 +53,10 @@ SHOWN = (16, 2, 0)  # the sheet, the ball and the throw of the pictures
 
 
 def main(cases: Sequence = CASES, throws: Sequence[Throw] = THROWS, steps: int = STEPS) -> dict:
-    """The figure's numbers, in SI units: a row a case and throw, and one for a sheet as soft as the paper's code has it."""
+    """Return the figure's numbers, in SI units.
+
+    They are one row for each case and throw, and one for a sheet as soft as in the paper's code.
+    """
     rows = [
         thrown(cells, ball_cells, number, throw, steps)
         for cells, ball_cells in cases
@@ -67,7 +70,7 @@ def main(cases: Sequence = CASES, throws: Sequence[Throw] = THROWS, steps: int =
 def thrown(
     cells: int, ball_cells: int, number: int, throw: Throw, steps: int, stretch: float = STRETCH
 ) -> dict:
-    """What one throw does. The time is the processor's, of all threads."""
+    """Simulate and measure one throw. The time is the processor's, of all threads."""
     scene = scenery(throw, cells, ball_cells, stretch)
     began = time.process_time()
     with warnings.catch_warnings():  # told in the summary
@@ -100,7 +103,7 @@ def thrown(
 
 
 def plot(result: dict):
-    """The ball in the sheet at four times; its height and width; how near the two come in all throws."""
+    """Draw the ball in the sheet at four times, its height and width, and the distances of both in all throws."""
     from matplotlib import pyplot as plt
 
     figure = plt.figure(figsize=(11, 6), layout="constrained")

@@ -29,7 +29,7 @@ import magshell as ms
 
 
 def main(word="MAGSHELL", cells=64, iterations=60, bending="midedge", progress=False) -> dict:
-    """The banner at rest, and for each letter of the word the error alone and in the banner, and what moved, m."""
+    """Compute the banner's equilibrium, and for each letter the error alone and in the banner, and its change, m."""
     tasks = {letter: Task(letter, cells, bending) for letter in dict.fromkeys(word)}
     began = time.perf_counter()
     designs = {letter: designed(task, VARIANTS[-1], iterations, progress) for letter, task in tasks.items()}
@@ -55,7 +55,7 @@ def main(word="MAGSHELL", cells=64, iterations=60, bending="midedge", progress=F
 
 
 def summary(result: dict) -> str:
-    """The errors over the letters' height, and what it took."""
+    """Return the errors over the letters' height, and the cost."""
     rest = result["rest"]
     lines = ["letter   error alone   in the banner   moved at most"]
     for row in result["letters"]:
@@ -75,7 +75,7 @@ def summary(result: dict) -> str:
 
 
 def plot(result: dict):
-    """From above, in slanting light."""
+    """Draw the banner from above, in slanting light."""
     from matplotlib import pyplot as plt
 
     mesh = result["rest"].scene.mesh
@@ -86,7 +86,7 @@ def plot(result: dict):
 
 
 def picture(result: dict) -> ms.Picture:
-    """In space, coloured by height."""
+    """Draw the banner in space, coloured by height."""
     rest = result["rest"]
     return ms.plot(
         rest.scene.mesh,

@@ -60,8 +60,11 @@ def main(
     beats=2,
     progress=False,
 ) -> dict:
-    """{"heart": Heart, "hearts": {area: {"linear": Design, "quadratic": Design, "outcomes": [Outcome], "volumes",
-    "beating": Beating}}}; volumes: of the chamber, contracted, over that at rest, one an outcome."""
+    """Return the designs and the beating heart of every area.
+
+    {"heart": Heart, "hearts": {area: {"linear": Design, "quadratic": Design, "outcomes": [Outcome], "volumes",
+    "beating": Beating}}}; volumes: of the contracted chamber over that at rest, one for each outcome.
+    """
     heart, finer, faced = (Heart.of(n) for n in (n_tetrahedra, fine, with_faces))
     hearts = {}
     for area in areas:
@@ -89,18 +92,20 @@ def main(
 
 
 def outcome(what: str, design: Design, elsewhere: Task | None) -> tuple[Outcome, float]:
-    """What a design does where it was found, or elsewhere with the field turned on; and the chamber's volume."""
+    """Return the outcome of a design on its own mesh, or on another one with the field turned on, and the chamber's
+    volume.
+    """
     if elsewhere is None:
         positions, task, search = design.rest.positions, design.task, (design.iterations, design.seconds)
     else:
         of_skin = transferred(design.remanent_magnetization, design.task.solid, elsewhere.solid)
         positions, task, search = elsewhere.at_rest(of_skin).positions, elsewhere, (None, None)
     volumes = [task.chamber.volume(x) for x in (positions, task.solid.mesh.rest_positions)]
-    return Outcome(what, task.solid, task.miss(positions), *search), float(volumes[0] / volumes[1])
+    return Outcome(what, task.solid, task.rms_error(positions), *search), float(volumes[0] / volumes[1])
 
 
 def plot(result: dict):
-    """The searches; the chamber's volume and the field while it beats."""
+    """Draw the searches, and the chamber's volume and the field over time."""
     from matplotlib import pyplot as plt
 
     figure = plt.figure(figsize=(11, 4), layout="constrained")

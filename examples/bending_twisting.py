@@ -46,7 +46,7 @@ SUDDEN_FIELD, SUDDEN_STEPS = 0.2e-3, (1e-2, 5e-3, 2.5e-3)  # T, s
 
 
 def main(cells=CELLS, bending_time=60.0, turning_time=6.0, undamped_time=2.0) -> dict:
-    """The figure's numbers, in SI units."""
+    """Return the figure's numbers, in SI units."""
     sheet = strip(cells)
     return {
         "strip": sheet,
@@ -57,7 +57,7 @@ def main(cells=CELLS, bending_time=60.0, turning_time=6.0, undamped_time=2.0) ->
 
 
 def bent(sheet: Strip, strength: float, duration: float) -> dict:
-    """The strip while a field grows to its strength [T] and stays, and where it comes to rest."""
+    """Simulate the strip while a field grows to its strength [T] and stays, and find its equilibrium there."""
 
     def field(time):
         return strength * min(time / RISE, 1.0) * DIRECTION
@@ -80,13 +80,13 @@ def bent(sheet: Strip, strength: float, duration: float) -> dict:
 
 
 def turning(time: float) -> np.ndarray:
-    """The field [T] that starts along +z and turns about the strip's long axis."""
+    """Return the field [T] that starts along +z and rotates about the strip's long axis."""
     angle = 2 * np.pi * TURNS * min(time / TURNING, 1.0)
     return TURNING_FIELD * np.array([0.0, np.sin(angle), np.cos(angle)])
 
 
 def twisted(sheet: Strip, duration: float) -> dict:
-    """The strip in the turning field, which stands still from `TURNING` on."""
+    """Simulate the strip in the rotating field, which is constant from `TURNING` on."""
     motion = sheet.simulate(turning, duration)
     fields = np.array([turning(time) for time in motion.times])
     middle = sheet.mesh.nearest_vertex((sheet.mesh.rest_positions[:, 0].max(), 0.0, 0.0))
@@ -101,7 +101,10 @@ def twisted(sheet: Strip, duration: float) -> dict:
 
 
 def undamped(sheet: Strip, time_step: float, duration: float) -> dict:
-    """A field that comes at once and stays, without damping: the share of the magnetic energy's range that is lost."""
+    """Simulate a suddenly applied constant field without damping, and return the energy lost.
+
+    It is given over the range of the magnetic energy.
+    """
     motion = sheet.simulate(SUDDEN_FIELD * DIRECTION, duration, time_step=time_step, damping=0.0)
     exchanged = np.ptp(motion.energies["magnetic"])
     return {
@@ -113,7 +116,7 @@ def undamped(sheet: Strip, time_step: float, duration: float) -> dict:
 
 
 def plot(result: dict):
-    """Alignment against the field; the turning strip; its energies; what TR-BDF2 loses."""
+    """Draw the alignment against the field, the twisting, its energies, and the loss of TR-BDF2."""
     from matplotlib import pyplot as plt
 
     figure, axes = plt.subplots(2, 2, figsize=(9, 6.2), layout="constrained")
@@ -128,7 +131,7 @@ def plot(result: dict):
 
 
 def bent_picture(result: dict) -> ms.Picture:
-    """The five bent states, coloured by magnetic energy."""
+    """Draw the five bent states, coloured by magnetic energy."""
     sheet, states = result["strip"], result["bent"]
     return ms.plot(
         sheet.mesh,
@@ -145,7 +148,7 @@ def bent_picture(result: dict) -> ms.Picture:
 
 
 def twisted_picture(result: dict, moments=(0.0, 0.5, 1.0, 1.5, 2.0, 2.2, 2.5, 3.0, 6.0)) -> ms.Picture:
-    """The strip at these times [s], coloured by magnetic energy."""
+    """Draw the strip at these times [s], coloured by magnetic energy."""
     sheet, motion, fields = result["strip"], result["twisted"]["motion"], result["twisted"]["fields"]
     shown = np.searchsorted(motion.times, np.minimum(moments, motion.times[-1]) - TIME_STEP / 2)
     return ms.plot(
@@ -162,7 +165,7 @@ def twisted_picture(result: dict, moments=(0.0, 0.5, 1.0, 1.5, 2.0, 2.2, 2.5, 3.
 
 
 def movie(result: dict, path, every=4, fps=25) -> Path:
-    """The twisting, and how it comes undone."""
+    """Write the movie of the twisting, and of its end."""
     sheet, motion, fields = result["strip"], result["twisted"]["motion"], result["twisted"]["fields"]
     return ms.animate(
         sheet.mesh,

@@ -44,7 +44,7 @@ import magshell as ms
 
 
 def main(cells=(96, 16), meshes=MESHES) -> dict:
-    """The figure's numbers, in SI units; displacements are from the buckled state towards the other side."""
+    """Return the figure's numbers, in SI units; displacements are from the buckled state towards the other side."""
     sheet = beam(cells)
     start = buckled(sheet)
     height = sheet.height(start.positions)
@@ -54,7 +54,7 @@ def main(cells=(96, 16), meshes=MESHES) -> dict:
     critical_field = HIGHEST_FIELD * first.parameter
     curve = sections(sheet, path, HIGHEST_FIELD, height)
 
-    # What the beam does instead of going back: just past the critical field, it leaves for the other side.
+    # The beam does not follow the unstable path: just past the critical field it snaps to the other side.
     snapped = sheet.equilibrium(1.05 * critical_field, start=first.positions)
     measured = measured_ramp()
     plateau = measured["fields"] > 10e-3
@@ -82,7 +82,9 @@ def main(cells=(96, 16), meshes=MESHES) -> dict:
 
 
 def sections(sheet: Beam, path: ms.EquilibriumPath, field: float, height: float) -> list[dict]:
-    """The path cut at its first and last critical points: fields [T], displacements [m], whether stable."""
+    """Return the path cut at its first and last critical points: fields [T], displacements [m], and whether it is
+    stable.
+    """
     joints = (path.critical[0], path.critical[-1])
     cuts = [joint.after_point + 1 for joint in joints]
     fields = np.split(field * path.parameters, cuts)
@@ -101,7 +103,7 @@ def sections(sheet: Beam, path: ms.EquilibriumPath, field: float, height: float)
 
 
 def plot(result: dict):
-    """Displacement against field beside the measured ramp, and the critical field against the cells."""
+    """Draw displacement against field with the measured ramp, and the critical field against the cell size."""
     from matplotlib import pyplot as plt
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), width_ratios=(2.1, 1), layout="constrained")
@@ -114,7 +116,7 @@ def plot(result: dict):
 
 
 def picture(result: dict) -> ms.Picture:
-    """The beam buckled, at its critical field, and after the snap; its magnetization and the field."""
+    """Draw the beam buckled, at its critical field, and after the snap, with its magnetization and the field."""
     sheet, states = beam(result["cells"]), result["states"]
     return ms.plot(
         sheet.scene.mesh,

@@ -61,7 +61,7 @@ STEP_RINGS = (0.1, 0.4)  # s, of the step's curves: swings small enough, and not
 
 
 def main(cells=(96, 16), time_step=2e-3, study_cells=(48, 8)) -> dict:
-    """The figure's numbers, in SI units; displacements are from the buckled state towards the other side."""
+    """Return the figure's numbers, in SI units; displacements are from the buckled state towards the other side."""
     sheet = beam(cells)
     limit = stability_loss(sheet)
     pulled = ramp(sheet, time_step)
@@ -92,7 +92,7 @@ def _times_and_displacements(measured: dict) -> dict:
 
 
 def curve(times, displacements) -> dict:
-    """Of a ramp: when it snaps, how far it overshoots and falls back."""
+    """Return the time of a ramp's snap, its overshoot, and its first minimum."""
     snap = passing(times, displacements)
     after = displacements[(times > snap) & (times < snap + 0.1)]
     peak = int(after.argmax())
@@ -105,14 +105,16 @@ def curve(times, displacements) -> dict:
 
 
 def plateau(measured: dict, motion: Motion | None) -> float:
-    """Mean displacement [m] at the measured times above 10 mT, of a motion or, without one, of the experiment."""
+    """Return the mean displacement [m] at the measured times above 10 mT, of a motion or, without one, of the
+    experiment.
+    """
     times = measured["times"][measured["fields"] > 10e-3]
     curve = measured if motion is None else vars(motion)
     return float(np.interp(times, curve["times"], curve["displacements"]).mean())
 
 
 def rings(times, displacements) -> dict:
-    """Of a step: its first peak, its mean in the last third, and the frequency of its ringing."""
+    """Return the first peak of a step, its mean in the last third, and its ringing."""
     chosen = (times > STEP_RINGS[0]) & (times < STEP_RINGS[1])
     return {
         "peak": displacements[times < 0.1].max(),
@@ -122,20 +124,22 @@ def rings(times, displacements) -> dict:
 
 
 def released(motion: Motion) -> Ringing:
-    """The ringing of a pluck once the branch has forgotten the release."""
+    """Return the ringing of a pluck after the Maxwell branch has relaxed."""
     later = motion.times > 3 * MAXWELL_TIME
     return ringing(motion.times[later], motion.displacements[later])
 
 
 def first_symmetric_frequency(sheet) -> float:
-    """Hz, of the vibration modes about the buckled state, without viscosity."""
+    """Return the frequency of the first symmetric vibration mode about the buckled state, without viscosity, Hz."""
     modes = ms.vibration_modes(sheet.scene, buckled(sheet), count=3)
     heights = [abs(sheet.height(mode)) / np.abs(mode).max() for mode in modes.modes]
     return float(modes.frequencies[int(np.argmax(np.array(heights) > 0.5))])
 
 
 def other_mounting(measured: dict, cells, time_step) -> dict:
-    """The beam whose mean in 5 mT is the measured step's: its step, and where the ramp would make it snap."""
+    """Compute the beam whose mean displacement in 5 mT is that of the measured step: its step, and its snap in the
+    ramp.
+    """
     shortening = shortening_for(last_third(**_times_and_displacements(measured)), cells)
     sheet = beam(cells, shortening=shortening)
     motion = step(sheet, time_step)
@@ -150,7 +154,7 @@ def other_mounting(measured: dict, cells, time_step) -> dict:
 
 
 def plot(result: dict):
-    """The ramp, its snap in detail, the step and the pluck, beside what was measured."""
+    """Draw the ramp, its snap in detail, the step and the pluck, with the measurements."""
     from matplotlib import pyplot as plt
 
     figure, axes = plt.subplots(2, 2, figsize=(9.5, 6.5), layout="constrained")
@@ -165,7 +169,7 @@ def plot(result: dict):
 
 
 def picture(result: dict) -> ms.Picture:
-    """The beam on its way to the other side."""
+    """Draw the beam while it snaps to the other side."""
     motion: Motion = result["ramp"]["motion"]
     times = np.append(0.0, result["ramp"]["snap"] + np.array([-0.05, 0.0, 0.015, 0.03, 0.06]))
     shown = np.clip(np.searchsorted(motion.times, times), 0, len(motion.times) - 1)
@@ -182,7 +186,7 @@ def picture(result: dict) -> ms.Picture:
 
 
 def movie(result: dict, path, before=0.15, after=0.3, fps=25) -> Path:
-    """The snap, slowed down."""
+    """Write the movie of the snap, in slow motion."""
     motion: Motion = result["ramp"]["motion"]
     snap = result["ramp"]["snap"]
     shown = (motion.times > snap - before) & (motion.times < snap + after)

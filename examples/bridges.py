@@ -55,9 +55,10 @@ BRIDGES = {"suspension": suspension, "arch": arch}
 
 
 def main(bridges=tuple(BRIDGES), every: int = 1) -> dict:
-    """{"searches": [Found], "slopes": {bridge: error of the slope along the gradient}, "known": [Knowledge]}.
+    """Return the numbers of the figure.
 
-    every: of the surface's vertices, one in so many is measured.
+    {"searches": [Found], "slopes": {bridge: error of the slope along the gradient}, "known": [Knowledge]}.
+    every: one in `every` vertices of the surface is measured.
     """
     searches = [found_by_gradient(Task(BRIDGES[name]())) for name in bridges]
     return {
@@ -68,7 +69,9 @@ def main(bridges=tuple(BRIDGES), every: int = 1) -> dict:
 
 
 def slope_error(task: Task, step: float = 1e-3) -> float:
-    """Of the gradient at the start, over all steps: the slope along it against central differences."""
+    """Return the relative error of the slope along the gradient at the start, over all steps, against central
+    differences.
+    """
     x = torch.tensor(task.start, requires_grad=True)
     (gradient,) = torch.autograd.grad(task.loss(x), x)
     direction = (gradient / gradient.norm()).numpy()
@@ -78,7 +81,7 @@ def slope_error(task: Task, step: float = 1e-3) -> float:
 
 
 def plot(result: dict):
-    """The searches; how many combinations of moduli each kind of data knows."""
+    """Draw the searches, and the singular values of each kind of data."""
     from matplotlib import pyplot as plt
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4), layout="constrained")

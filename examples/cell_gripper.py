@@ -61,19 +61,23 @@ def main(
     slope_steps: int = STEPS,
     difference: float = 1e-3,
 ) -> dict:
-    """{"found": [Found of each start], "motion": with the controls of the first, "forward", "backward": ms of the processor,
-    a step, "slope": error of the slope at the start of the search, over so many steps, "slope_found": at what
-    the first one found, "slips": the same motion without friction}. difference: of the controls, which go from -1 to 1."""
+    """Return the search and its checks.
+
+    {"found": [Found of each start], "motion": with the controls of the first, "forward", "backward": ms of the
+    processor, a step, "slope": error of the slope at the start of the search, over `slope_steps` steps, "slope_found":
+    at the controls that the first search found, "slips": the same motion without friction}. difference: of the
+    controls, which go from -1 to 1.
+    """
     result = searched(
         CellGripper(levels, ball_cells), steps, target, episodes, starts, slope_steps, difference
     )
     slippery = CellGripper(levels, ball_cells, friction_coefficient=0.0)
     controls = result["found"][0].controls
-    return {**result, "slips": slippery.way(slippery.motion(controls))}
+    return {**result, "slips": slippery.displacement(slippery.motion(controls))}
 
 
 def plot(result: dict):
-    """The miss against episodes and time; what was found."""
+    """Draw the distance against episodes and time, and the controls that were found."""
     from matplotlib import pyplot as plt
 
     figure, axes = plt.subplots(1, 3, figsize=(13, 3.6), layout="constrained")

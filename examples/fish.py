@@ -55,14 +55,17 @@ def main(
     slope_steps: int = STEPS,
     difference: float = 1e-4,
 ) -> dict:
-    """{"found": [Found of each start], "motion": with the torques of the first, "forward", "backward": ms of the processor,
-    a step, "slope": error of the slope at the start of the search, over so many steps, "slope_found": at what
-    the first one found}. difference: of torques, over the largest."""
+    """Return the search and its checks.
+
+    {"found": [Found of each start], "motion": with the torques of the first, "forward", "backward": ms of the
+    processor, a step, "slope": error of the slope at the start of the search, over `slope_steps` steps, "slope_found":
+    at the torques that the first search found}. difference: of torques, over the largest.
+    """
     return searched(Fish(n_tetrahedra), steps, target, episodes, starts, slope_steps, difference)
 
 
 def plot(result: dict):
-    """The miss against episodes and time; the torques found."""
+    """Draw the distance against episodes and time, and the torques found."""
     from matplotlib import pyplot as plt
 
     figure, axes = plt.subplots(1, 3, figsize=(13, 3.6), layout="constrained")

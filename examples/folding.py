@@ -30,14 +30,16 @@ from pathlib import Path
 
 import numpy as np
 from _folding.model import Strip, coiling, folding
-from _folding.report import draw_angles, draw_coil, draw_fold, movie, summary
+from _folding.report import draw_angles, draw_coil, draw_folding, movie, summary
 from _run import run
 
 import magshell as ms
 
 
 def main(cells=(42, 60), angles=(12, 16)) -> dict:
-    """The two strips' numbers, in SI units. cells, angles: of the one that folds, and the one that coils up."""
+    """Return the numbers of both strips, in SI units. cells, angles: of the one that folds, and the one that coils
+    up.
+    """
     return {
         "fold": measured(folding(cells[0], angles[0])),
         "coil": measured(coiling(cells[1], angles[1])),
@@ -74,12 +76,12 @@ def measured(strip: Strip) -> dict:
 
 
 def plot(result: dict):
-    """The strip that folds, on its way and back; the coil; how far their ends have turned, and how hard they touch."""
+    """Draw both strips, the rotation of their ends, and their contact forces."""
     from matplotlib import pyplot as plt
 
     figure = plt.figure(figsize=(11, 7.6), layout="constrained")
     grid = figure.add_gridspec(3, 2, height_ratios=(1, 1.1, 1.1))
-    draw_fold(figure.add_subplot(grid[0, :]), result["fold"])
+    draw_folding(figure.add_subplot(grid[0, :]), result["fold"])
     draw_coil(figure.add_subplot(grid[1, :]), result["coil"])
     for column, name in enumerate(("fold", "coil")):
         axes = figure.add_subplot(grid[2, column])

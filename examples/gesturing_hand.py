@@ -50,9 +50,10 @@ def main(
     iterations=(40, 25),
     progress: bool = False,
 ) -> dict:
-    """{gesture: {"designs": {name: Design}, "converged": {name: State}, "way": m, rms, from rest to the targets}}.
+    """Return the designs of every gesture.
 
-    iterations: with linear and with quadratic elements.
+    {gesture: {"designs": {name: Design}, "converged": {name: State}, "way": rms distance from the reference shape to
+    the targets, m}}. iterations: with linear and with quadratic elements.
     """
     coarse, fine = Body(n_tetrahedra, "linear"), Body(of_its_faces, "linear")
     quadratic, reference = Body(n_tetrahedra, "quadratic"), Body(converged, "quadratic")
@@ -74,7 +75,7 @@ def main(
 
 
 def plot(result: dict):
-    """How far the anchors are from their targets, against iterations and time."""
+    """Draw the distance of the anchors from their targets, against iterations and time."""
     from matplotlib import pyplot as plt
 
     figure, axes = plt.subplots(1, 2, figsize=(9, 3.8), sharey=True, layout="constrained")
@@ -83,7 +84,7 @@ def plot(result: dict):
 
 
 def hands(result: dict):
-    """As in [Chen22] Figure 14: what the skin is made of, and the gestures with anchors and targets."""
+    """Draw the magnetization of the skin, and the gestures with anchors and targets, as in [Chen22] Figure 14."""
     return draw_hands(result)
 
 

@@ -44,7 +44,7 @@ BEGIN = 20e3  # A/m, outwards along the arms: the start of the search
 
 
 def main(cell: float = 1.5e-3, iterations: int = 6, steps: int = 150) -> dict:
-    """The design's and the motion's numbers, in SI units. cell: m, of the sheet's mesh."""
+    """Return the numbers of design and motion, in SI units. cell: edge length of the sheet's mesh, m."""
     gripper = Gripper(cell)
     found = designed(gripper, iterations)
     to_print = printed(gripper, found["remanent_magnetization"], iterations)
@@ -59,11 +59,11 @@ def main(cell: float = 1.5e-3, iterations: int = 6, steps: int = 150) -> dict:
 
 
 def designed(gripper: Gripper, iterations: int) -> dict:
-    """The search; the objective is in mm2."""
-    miss = Miss(gripper)
+    """Search for the magnetization by L-BFGS; the objective is in mm2."""
+    mismatch = Mismatch(gripper)
 
-    def objective(share: torch.Tensor) -> torch.Tensor:
-        return miss(LIMIT * share)
+    def objective(fraction: torch.Tensor) -> torch.Tensor:
+        return mismatch(LIMIT * fraction)
 
     share = torch.from_numpy(BEGIN / LIMIT * gripper.outwards).requires_grad_()
     began = time.process_time()
@@ -83,24 +83,24 @@ def designed(gripper: Gripper, iterations: int) -> dict:
 
 
 def printed(gripper: Gripper, begin: np.ndarray, iterations: int) -> ms.PrintableMinimum:
-    """Every face in one of six directions, at full strength."""
-    miss = Miss(gripper)
+    """Search for a printable magnetization: every face in one of six directions, at full strength."""
+    mismatch = Mismatch(gripper)
     ink = ms.PrintableSet(LIMIT, np.vstack([np.eye(3), -np.eye(3)]), levels=(1,))
     return ms.minimize_printable(
-        miss,
+        mismatch,
         begin,
         ink,
         max_iterations=iterations,
         blocks=6,
         stage_iterations=4,
         exchanges=0,
-        stateful=[miss.at_rest],
+        stateful=[mismatch.at_rest],
         progress=False,
     )
 
 
-class Miss:
-    """Mean squared distance from the wrapped shape, mm2, of a magnetization, (n_f, 3) A/m."""
+class Mismatch:
+    """The mean squared distance from the wrapped shape, mm2, as a function of a magnetization, (n_f, 3) A/m."""
 
     def __init__(self, gripper: Gripper):
         self.sheet, self.wanted = gripper.sheet, torch.from_numpy(gripper.wrapped)
@@ -113,7 +113,7 @@ class Miss:
 
 
 def plot(result: dict):
-    """The magnetization found, the search, the arms closing and lifting, and the heights of ball and sheet."""
+    """Draw the magnetization found, the search, the arms closing and lifting, and the heights of ball and sheet."""
     from matplotlib import pyplot as plt
 
     figure = plt.figure(figsize=(11, 7.2), layout="constrained")

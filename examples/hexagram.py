@@ -47,7 +47,7 @@ AZIMUTHS = np.radians(30.0) * np.arange(13)
 
 
 def main(edges_per_side=12, n_vertices=1097, iterations=50) -> dict:
-    """The figure's numbers, in SI units and radians."""
+    """Return the figure's numbers, in SI units and radians."""
     star = design(edges_per_side, n_vertices)
     runs = {
         "from beam theory": optimized(star, from_beam_theory(star.mesh), iterations),
@@ -62,7 +62,7 @@ def main(edges_per_side=12, n_vertices=1097, iterations=50) -> dict:
         "runs": runs,
         "magnetization": magnetization,
         "positions": best["positions"],
-        "plain_sum": float(star.misses(torch.tensor(best["positions"]))),
+        "plain_sum": float(star.squared_distance(torch.tensor(best["positions"]))),
         "rms": ARM_LENGTH * np.sqrt(best["objective"] / len(FIELDS)),
         "largest_magnetization": np.linalg.norm(magnetization, axis=1).max(),
         "normal_magnetization": np.abs(magnetization[:, 2]).max(),
@@ -78,7 +78,7 @@ def main(edges_per_side=12, n_vertices=1097, iterations=50) -> dict:
 
 
 def optimized(star: Design, start: torch.Tensor, iterations: int) -> dict:
-    """MMA's run from these variables: history, magnetization, equilibria, and what these took."""
+    """Run MMA from these variables: history, magnetization, equilibria, and their cost."""
     at_rest, seconds = ms.WarmStart(star.scene), []
 
     def objective(variables):
@@ -107,7 +107,9 @@ def optimized(star: Design, start: torch.Tensor, iterations: int) -> dict:
 
 
 def shaken(star: Design, magnetization: np.ndarray, start: ms.Equilibrium) -> dict:
-    """Equilibria in a field that goes round a cone about the vertical: fields, positions, tips' heights."""
+    """Find the equilibria in a field that goes round a cone about the vertical: fields, positions, heights of the
+    tips.
+    """
     at_rest = ms.WarmStart(star.scene, start=start)
     around = [
         np.sin(TILT) * np.cos(AZIMUTHS),
@@ -130,13 +132,13 @@ def shaken(star: Design, magnetization: np.ndarray, start: ms.Equilibrium) -> di
 
 
 def chord_angles(mesh: ms.TriangleMesh, positions: np.ndarray) -> np.ndarray:
-    """How far down the straight lines from the roots' places at rest to the tips point, (6,), rad."""
+    """Return how far down the chords from the reference roots to the tips point, (6,), rad."""
     x, y, z = positions[tips(mesh)].T
     return np.arctan2(-z, np.hypot(x, y) - ARM_LENGTH)
 
 
 def tip_angles(mesh: ms.TriangleMesh, positions: np.ndarray) -> np.ndarray:
-    """By how much the faces at the tips have turned from the horizontal, (6,), rad."""
+    """Return the angle of the faces at the tips to the horizontal, (6,), rad."""
     faces = [np.flatnonzero((mesh.faces == tip).any(axis=1))[0] for tip in tips(mesh)]
     a, b, c = np.moveaxis(positions[mesh.faces[faces]], 1, 0)
     normal = np.cross(b - a, c - a)
@@ -144,7 +146,7 @@ def tip_angles(mesh: ms.TriangleMesh, positions: np.ndarray) -> np.ndarray:
 
 
 def plot(result: dict):
-    """The objective against iteration and time, and the magnetization along the arms beside beam theory's."""
+    """Draw the objective against iteration and time, and the magnetization along the arms with that of beam theory."""
     from matplotlib import pyplot as plt
 
     figure, (left, middle, right) = plt.subplots(1, 3, figsize=(12, 3.8), layout="constrained")
@@ -159,7 +161,9 @@ def plot(result: dict):
 
 
 def pictures(result: dict) -> dict[str, ms.Picture]:
-    """Of Figure 3b the magnetization; of Figure 4 relaxed, down, up and shaking; the shaking in six steps."""
+    """Draw the magnetization of Figure 3b, the states of Figure 4 (relaxed, down, up, shaking), and six steps of the
+    shaking.
+    """
     mesh, magnetization, shaking = result["design"].mesh, result["magnetization"], result["shaking"]
     down, up = result["positions"]
     chosen = [0, 2, 4, 6, 8, 10]

@@ -41,7 +41,10 @@ import magshell as ms
 def main(
     kinds=KINDS, n_tetrahedra: int = TETRAHEDRA, n_starts: int = 5, steps: int = STEPS, slope=True
 ) -> dict:
-    """{"body": Body, "falls": {kind: [Fall, one a start]}, "slope": error of the slope, or None}."""
+    """Return the falls of every kind of skeleton.
+
+    {"body": Body, "falls": {kind: [Fall, one a start]}, "slope": error of the slope, or None}.
+    """
     body = Body.of(n_tetrahedra)
     figures = {kind: Figure(body, kind) for kind in kinds}
     falls = {
@@ -52,7 +55,7 @@ def main(
 
 
 def plot(result: dict):
-    """The right shoulder over time; the errors of joint angles."""
+    """Draw the angle of the right shoulder over time, and the errors of the joint angles."""
     from matplotlib import pyplot as plt
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.6), layout="constrained")

@@ -1,4 +1,4 @@
-"""What is a sheet made of? Young's modulus and magnetization from where its vertices are seen in three fields.
+"""Identification of a sheet's Young's modulus and magnetization from the positions of its vertices in three fields.
 
 A strip of 50 x 30 x 1 mm, clamped at one end, hangs in fields of 20 mT along z, x and y, and in none. Its modulus
 varies smoothly from 1 to 2.5 MPa, with an inclusion of 10 MPa; its five strips are magnetized each in a direction of
@@ -45,7 +45,7 @@ PRICES = (1.0, 0.3, 0.1, 0.03, 0.01)
 
 
 def main(cells=(30, 18), nodes=(11, 7), prices=PRICES, iterations=40, limits_on=(20, 12)) -> dict:
-    """The figure's numbers, in SI units."""
+    """Return the figure's numbers, in SI units."""
     torch.set_num_threads(1)
     noisy = identified(cells, nodes, prices, iterations, NOISE)
     chosen = noisy["stages"][noisy["chosen"]]
@@ -82,7 +82,11 @@ def identified(cells, nodes, prices, iterations, noise, same_mesh=False) -> dict
 
 
 def errors(problem: Problem, p: torch.Tensor) -> dict:
-    """Against the truth: root mean square of log10 Y, relative of Y and of M, all by area; and the median of Y's."""
+    """Compute the errors against the truth.
+
+    They are the root mean square errors of log10 Y, of Y and of M (both relative), weighted by area, and the median
+    of Y's.
+    """
     mesh = problem.sheet.mesh
     shares = mesh.face_areas / mesh.face_areas.sum()
     truth, found = problem.sheet.scene.shell.young_modulus, 10 ** problem.decades(p).numpy()
@@ -96,7 +100,7 @@ def errors(problem: Problem, p: torch.Tensor) -> dict:
 
 
 def plot(result: dict):
-    """The misfit on its way down, and the magnetization beside the true one."""
+    """Draw the modulus, the misfit during the search, and the magnetization with the true one."""
     from matplotlib import pyplot as plt
 
     figure = plt.figure(figsize=(10, 7.6), layout="constrained")

@@ -89,8 +89,11 @@ def main(
     spacings=(None, COARSE, FINE),
     progress=False,
 ) -> dict[str, dict]:
-    """A design's numbers each, in SI units. spacings: m, of the meshes with linear elements (None: as many tetrahedra as
-    the paper has), of quadratic ones to search with, and of finer ones; the last two may be None to go without."""
+    """Return the numbers of each design, in SI units.
+
+    spacings: m, of the meshes with linear elements (None: as many tetrahedra as the paper has), of quadratic ones to
+    search with, and of finer ones; the last two may be None to skip them.
+    """
     torch.set_num_threads(1)
     linear, coarse, fine = spacings
     papers = ms.meshes.from_distance(shape(), linear, n_tetrahedra=TETRAHEDRA if linear is None else None)
@@ -126,8 +129,11 @@ def searched(jump: Jump, start: np.ndarray, iterations: int, progress: bool) -> 
 
 
 def measured(jump: Jump, unknowns: np.ndarray) -> dict:
-    """What a field does. over: m, the lowest that any of the starfish is above the bar, infinite if it never is there;
-    clears: whether that is higher than the bar, and all of it is beyond at the end."""
+    """Simulate and measure the jump in a field.
+
+    over: m, the lowest point of the starfish above the bar, infinite if it never is there; clears: whether that is
+    higher than the bar, and all of the starfish is beyond at the end.
+    """
     field = blurred(torch.tensor(unknowns)).numpy()
     began = time.process_time()
     move = jump.move(field)
@@ -143,7 +149,7 @@ def measured(jump: Jump, unknowns: np.ndarray) -> dict:
         "positions": move.positions,
         "center": center,
         "lowest": z.min(axis=1),
-        "miss": float(jump.miss(torch.tensor(center))) ** 0.5,
+        "rms_distance": float(jump.mean_square_distance(torch.tensor(center))) ** 0.5,
         "over": float(over),
         "clears": bool(over > BAR_HEIGHT and x[-1].min() > BAR),
         "rms": float(np.sqrt((field**2).sum(axis=1).mean())),
@@ -155,7 +161,7 @@ def measured(jump: Jump, unknowns: np.ndarray) -> dict:
 
 
 def plot(results: dict[str, dict]):
-    """A column a design: its jump, height, field, the field of the first steps with four pictures, and the search."""
+    """Draw one column for each design: its jump, height, field, take-off, and search."""
     from matplotlib import pyplot as plt
 
     figure = plt.figure(figsize=(5.2 * len(results), 15.5), layout="constrained")
@@ -185,7 +191,7 @@ def plot(results: dict[str, dict]):
 
 
 def take_off_frames(motion: dict) -> list[int]:
-    """Four of the first steps: the field begins to turn down at the second, as far down as it goes at the third."""
+    """Return four of the first steps: at the second the field begins to point down, at the third it is lowest."""
     down = motion["field"][:, 2]
     last = min(TAKE_OFF, len(down) - 1)
     lowest = int(np.argmin(down[:last]))

@@ -42,7 +42,7 @@ import magshell as ms
 def main(
     targets: int = 4, each: float = 1.75, delay: float = 1.0, iterations: int = 10, progress=False
 ) -> dict:
-    """The figure's numbers, in SI units. each: how long a target is active; delay: until its distance counts."""
+    """Return the figure's numbers, in SI units. each: how long a target is active; delay: until its distance counts."""
     torch.set_num_threads(1)
     tower = Tower.designed()
     task = Reaching(tower, drawn_targets(tower, targets, seed=13), each, delay)
@@ -74,8 +74,11 @@ def main(
 
 
 def measured(task: Reaching, field: torch.Tensor, parts: int = 1) -> dict:
-    """What a field (steps, 3) T does: where the center is, how far from the active target, and the angle between the
-    field and the vector from the origin to the target, as in [Chen22] Figure 13. parts: of each time step."""
+    """Simulate and measure the motion in a field (steps, 3) T.
+
+    Measured are the positions, the center's distance from the active target, and the angle between the field and the
+    vector from the origin to the target, as in [Chen22] Figure 13. parts: of each time step.
+    """
     values = field.detach().numpy()
     move = task.tower.move(np.repeat(values, parts, axis=0), time_step=TIME_STEP / parts, record_every=parts)
     targets, counts = (each.numpy() for each in task.active)
@@ -97,7 +100,7 @@ def measured(task: Reaching, field: torch.Tensor, parts: int = 1) -> dict:
 
 
 def timed(task: Reaching) -> dict:
-    """Wall time of a motion and of the gradient through it, s."""
+    """Measure the wall time of a motion and of the gradient through it, s."""
     field = task.field(task.first_control_points()).requires_grad_()
     began = time.perf_counter()
     value = sum(task.objective(field).values())
@@ -107,7 +110,7 @@ def timed(task: Reaching) -> dict:
 
 
 def plot(result: dict):
-    """The tower at its targets; its distance from them in time, the field's direction, and the field."""
+    """Draw the tower at its targets, its distance from them in time, the field's direction, and the field."""
     from matplotlib import pyplot as plt
 
     figure = plt.figure(figsize=(10, 9.5))

@@ -40,7 +40,7 @@ import magshell as ms
 
 
 def main(searches: Sequence[Search] = SEARCHES, iterations: int = 95, trials: int = 30) -> dict:
-    """The figure's numbers, in SI units; the first search's tower is the one that is checked."""
+    """Return the figure's numbers, in SI units; the checks are of the first search's tower."""
     torch.set_num_threads(1)
     sheet = kirigami()
     found = [search.run(sheet, iterations) for search in searches]
@@ -58,7 +58,7 @@ def main(searches: Sequence[Search] = SEARCHES, iterations: int = 95, trials: in
 
 
 def plot(result: dict):
-    """The design and its tower; the height against time and against the field."""
+    """Draw the design and its tower, and the height against time and against the field."""
     from matplotlib import pyplot as plt
 
     figure = plt.figure(figsize=(10, 8.4), layout="constrained")

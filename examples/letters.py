@@ -40,7 +40,10 @@ import magshell as ms
 
 
 def main(letters="AS", cells=64, iterations=90, bending="midedge", progress=False) -> dict:
-    """{letter: {"task": Task, "designs": {variant: Design}, "checks": {...}}}; the checks are of the last design."""
+    """Return the designs of every letter.
+
+    {letter: {"task": Task, "designs": {variant: Design}, "checks": {...}}}; the checks are of the last design.
+    """
     result = {}
     for letter in letters:
         task = Task(letter, cells, bending)
@@ -50,14 +53,15 @@ def main(letters="AS", cells=64, iterations=90, bending="midedge", progress=Fals
 
 
 def checks(task: Task, design: Design) -> dict:
-    """The error again with the field raised from zero instead of the search's own last step; and with the other
-    model of bending."""
+    """Compute the error with the field raised from zero instead of the search's last step, and with the other
+    bending model.
+    """
     other = Task(task.letter, task.cells, "hinge" if task.bending == "midedge" else "midedge")
     return {"raised": raised(task, design), "other bending": raised(other, design)}
 
 
 def raised(task: Task, design: Design) -> float:
-    """The error of a design in a sheet at rest whose field is turned on."""
+    """Compute the error of a design when the field is turned on over the flat sheet."""
     rest = ms.equilibrium(
         task.scene,
         remanent_magnetization=design.remanent_magnetization,
@@ -69,7 +73,7 @@ def raised(task: Task, design: Design) -> float:
 
 
 def plot(result: dict):
-    """The objective against iterations and time, for every letter and variant."""
+    """Draw the objective against iterations and time, for every letter and variant."""
     from matplotlib import pyplot as plt
 
     figure, axes = plt.subplots(1, 2, figsize=(9, 3.8), sharey=True, layout="constrained")
@@ -78,7 +82,7 @@ def plot(result: dict):
 
 
 def sheets(result: dict):
-    """As in [Chen22] Figure 9: what the joint design is made of, then the shapes of all variants and the target."""
+    """Draw the properties of the joint design, the shapes of all variants and the target, as in [Chen22] Figure 9."""
     from matplotlib import pyplot as plt
 
     rows = len(result)
@@ -92,7 +96,7 @@ def sheets(result: dict):
 
 
 def picture(result: dict) -> ms.Picture:
-    """The shapes in space, coloured by height."""
+    """Draw the shapes in space, coloured by height."""
     shapes = [
         (f"{letter}, {NAMES[variant]}", design.positions)
         for letter, entry in result.items()

@@ -55,10 +55,13 @@ def main(
     slope_steps: int = STEPS,
     difference: float = 1e-3,
 ) -> dict:
-    """{"found": [Found of each start], "motion": with the controls of the first, "forward", "backward": ms of the processor,
-    a step, "slope": error of the slope at the start of the search, over so many steps, "slope_found": at what
-    the first one found, "dead": how many of the unknowns have no gradient at the start}. difference: of the controls, which
-    go from -1 to 1."""
+    """Return the search and its checks.
+
+    {"found": [Found of each start], "motion": with the controls of the first, "forward", "backward": ms of the
+    processor, a step, "slope": error of the slope at the start of the search, over `slope_steps` steps, "slope_found":
+    at the controls that the first search found, "dead": how many of the unknowns have no gradient at the start}.
+    difference: of the controls, which go from -1 to 1.
+    """
     octopus = MuscleOctopus(cells)
     result = searched(octopus, steps, target, episodes, starts, slope_steps, difference)
     gradient = gradient_at(octopus, octopus.first_controls(steps, **starts[0]), target)
@@ -66,7 +69,7 @@ def main(
 
 
 def plot(result: dict):
-    """The miss against episodes and time; the activations found."""
+    """Draw the distance against episodes and time, and the activations found."""
     from matplotlib import pyplot as plt
 
     figure, axes = plt.subplots(1, 3, figsize=(13, 3.6), layout="constrained")

@@ -27,7 +27,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from _muscle_strip.report import draw_bent, draw_swimming, draw_way, movie, summary
+from _muscle_strip.report import draw_bent, draw_path, draw_swimming, movie, summary
 from _run import run
 
 import magshell as ms
@@ -44,13 +44,13 @@ def strip(cells, poisson_ratio: float) -> ms.Solid:
 
 
 def sides(body: ms.Solid) -> list[np.ndarray]:
-    """The tetrahedra of the upper and of the lower half."""
+    """Return the masks of the tetrahedra of the upper and of the lower half."""
     upper = body.mesh.tetrahedron_barycenters[:, 2] > 0.5 * HEIGHT
     return [upper, ~upper]
 
 
 def bent(cells, activation: float, stiffness: float = YOUNG) -> dict:
-    """The strip with its upper muscle activated, and its curvature, 1/m, with that of a bilayer."""
+    """Find the equilibrium with the upper muscle activated, and its curvature [1/m] with that of a bilayer."""
     body = strip(cells, 0.0)
     upper, _ = sides(body)
     muscle = ms.Muscle(body, (1, 0, 0), elements=upper, stiffness=stiffness)
@@ -68,7 +68,7 @@ def bent(cells, activation: float, stiffness: float = YOUNG) -> dict:
 
 
 def curvature(points: np.ndarray) -> float:
-    """1/m, of the circle through points (n, 3) about the y axis, by least squares."""
+    """Return the curvature of the circle through points (n, 3) about the y axis, by least squares, 1/m."""
     x, z = points[:, 0], points[:, 2]
     rows = np.stack([x, z, np.ones_like(x)], axis=1)
     a, b, c = np.linalg.lstsq(rows, x**2 + z**2, rcond=None)[0]
@@ -76,13 +76,15 @@ def curvature(points: np.ndarray) -> float:
 
 
 def bilayer(strain: float, ratio: float) -> float:
-    """1/m, of two layers of half of the height each, one of which is stiffer by the ratio and would be shorter by the
-    strain (Timoshenko 1925)."""
+    """Return the curvature of a bilayer by Timoshenko (1925), 1/m.
+
+    It has two layers of half of the height each, one stiffer by `ratio`, whose free length is shorter by `strain`.
+    """
     return 6 * strain * 4 / (HEIGHT * (12 + (1 + ratio) * (1 + 1 / ratio)))
 
 
 def swim(cells, steps: int, time_step: float, speed: float, wavelength: float = 0.8 * LENGTH) -> dict:
-    """A motion in water from rest. speed: m/s, of the wave, towards the tail where it is positive."""
+    """Simulate the motion in water from rest. speed: of the wave, m/s, positive towards the tail."""
     body = strip(cells, 0.45)
     muscles = []
     for height, elements in zip((HEIGHT, 0.0), sides(body), strict=True):
@@ -122,7 +124,7 @@ def swim(cells, steps: int, time_step: float, speed: float, wavelength: float = 
 
 
 def main(cells=(24, 4, 2), activation=0.05, steps=200, time_step=1e-2, wave_speed=0.16) -> dict:
-    """The strip bent, and swimming by a wave each way; in SI units."""
+    """Return the strip bent, and swimming by a wave in each direction; in SI units."""
     return {
         "bent": bent(cells, activation),
         "swims": swim(cells, steps, time_step, wave_speed),
@@ -131,14 +133,14 @@ def main(cells=(24, 4, 2), activation=0.05, steps=200, time_step=1e-2, wave_spee
 
 
 def plot(result: dict):
-    """The bent strip, the swimmer at four times, coloured by activation, and the way of its middle."""
+    """Draw the bent strip, the swimmer at four times, coloured by activation, and the path of its middle."""
     from matplotlib import pyplot as plt
 
     figure = plt.figure(figsize=(10, 7.5), layout="constrained")
     rows = figure.add_gridspec(3, 1, height_ratios=[1.2, 1.5, 1.2])
     draw_bent(figure.add_subplot(rows[0]), result["bent"])
     draw_swimming(figure.add_subplot(rows[1]), result["swims"])
-    draw_way(figure.add_subplot(rows[2]), result)
+    draw_path(figure.add_subplot(rows[2]), result)
     return figure
 
 

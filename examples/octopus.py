@@ -91,8 +91,11 @@ def main(
     gradients: bool = True,
     progress=False,
 ) -> dict[str, dict]:
-    """A channel's numbers each, in SI units. goal: m, other than the channels' own, for shorter motions. noise: m, in the
-    start; seed: of it, and of what the search tries. gradients: False tries only, with as many motions."""
+    """Return the numbers of every channel, in SI units.
+
+    goal: m, instead of the channels' own, for shorter motions. noise: m, at the start; seed: of it, and of the trials
+    of the search. gradients: False for random trials only, with as many motions.
+    """
     torch.set_num_threads(1)
     results = {}
     for name in channels:
@@ -116,8 +119,9 @@ def main(
 
 
 def measured(swim: Swim, field: np.ndarray) -> dict:
-    """What a field does in one motion of all steps: where the mass center is, and the last of the octopus; when it has
-    passed the channel [s], or None."""
+    """Simulate and measure one motion of all steps: the mass center, the last tip, and the time of passing [s], or
+    None.
+    """
     began = time.process_time()
     move = swim.move(field)
     processor_time = time.process_time() - began
@@ -139,7 +143,7 @@ def measured(swim: Swim, field: np.ndarray) -> dict:
 
 
 def plot(results: dict[str, dict]):
-    """A column a channel: the octopus in it at five times, its way, the field, and the search."""
+    """Draw one column for each channel: the octopus at five times, its path, the field, and the search."""
     from matplotlib import pyplot as plt
 
     rows = len(SNAPSHOTS) + 3
@@ -163,7 +167,7 @@ def plot(results: dict[str, dict]):
 
 
 def shown_until(result: dict) -> float:
-    """s: when the channel is passed, or the end."""
+    """Return the time at which the channel is passed, or the end, s."""
     passed = result["found"]["passed"]
     return result["times"][-1] if passed is None else passed
 

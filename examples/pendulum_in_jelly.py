@@ -48,7 +48,7 @@ class Pendulum:
 
 
 def pendulum(cells: int, **swing) -> Pendulum:
-    """Hanging down along z. cells: along it. swing: of the shoulder."""
+    """Build the pendulum hanging down along z. cells: along it. swing: keyword arguments of the shoulder joint."""
     mesh = ms.meshes.box((SIDE, SIDE, LENGTH), cells=(2, 2, cells))
     bar = ms.Solid(
         mesh,
@@ -68,7 +68,7 @@ def pendulum(cells: int, **swing) -> Pendulum:
 
 
 def turned(hanging: Pendulum, angle: float) -> np.ndarray:
-    """The bar's vertices, turned about the hinge as a whole."""
+    """Return the positions of the bar's vertices, rotated about the hinge as a rigid body."""
     pivot = np.asarray(hanging.shoulder.origin)
     sine, cosine = np.sin(angle), np.cos(angle)
     turn = np.array([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]])
@@ -80,7 +80,7 @@ def let_go(hanging: Pendulum, angle: float, steps: int, time_step: float) -> ms.
 
 
 def swings(hanging: Pendulum, motion: ms.Trajectory) -> float:
-    """Hz, from where the upper bone passes the vertical."""
+    """Return the frequency from the times at which the upper link passes the vertical, Hz."""
     angles, times = motion[hanging.shoulder].angle, motion.times
     before = np.flatnonzero(np.diff(np.sign(angles)))
     share = angles[before] / (angles[before] - angles[before + 1])
@@ -88,8 +88,8 @@ def swings(hanging: Pendulum, motion: ms.Trajectory) -> float:
     return float((len(passes) - 1) / (2 * (passes[-1] - passes[0])))
 
 
-def bone_error(hanging: Pendulum, motion: ms.Trajectory) -> float:
-    """By how much, of its length, a bone's vertices come nearer to each other or part."""
+def link_length_error(hanging: Pendulum, motion: ms.Trajectory) -> float:
+    """Return the largest relative change of the distances between a link's vertices."""
     worst = 0.0
     for bone in hanging.bones:
         at = motion[bone].positions
@@ -99,7 +99,7 @@ def bone_error(hanging: Pendulum, motion: ms.Trajectory) -> float:
 
 
 def main(cells: int = 12, steps: int = STEPS) -> dict:
-    """The numbers of the table, in SI units, and the motion that is shown."""
+    """Return the numbers of the table, in SI units, and the motion that is shown."""
     hanging = pendulum(cells)
     rest = ms.equilibrium(hanging.scene)
     small = let_go(hanging, 0.05, 2 * steps, 2 * TIME_STEP)
@@ -110,7 +110,7 @@ def main(cells: int = 12, steps: int = STEPS) -> dict:
         "modes": ms.vibration_modes(hanging.scene, rest, count=2).frequencies,
         "swung": swings(hanging, small),
         "stiff": np.sqrt(GRAVITY * LENGTH / 2 / ((LENGTH**2 / 3) + SIDE**2 / 12)) / (2 * np.pi),
-        "bone_error": max(bone_error(hanging, each) for each in (small, large)),
+        "link_length_error": max(link_length_error(hanging, each) for each in (small, large)),
         "elbow": float(np.abs(large[hanging.elbow].angle).max()),
         "energy_lost": float((large.energy[0] - large.energy[-1]) / (falls[0] - falls.min())),
         "energy_gained": float((large.energy.max() - large.energy[0]) / (falls[0] - falls.min())),
@@ -126,14 +126,14 @@ def summary(outcome: dict) -> str:
         f"  small swings, by modes     {first:.4f} Hz (and the elbow's, {second:.3f} Hz)\n"
         f"  in time                    {outcome['swung']:.4f} Hz\n"
         f"  one stiff bar              {outcome['stiff']:.4f} Hz\n"
-        f"  bones change by            {outcome['bone_error']:.1e} of their length\n"
+        f"  bones change by            {outcome['link_length_error']:.1e} of their length\n"
         f"  the elbow bends by         {outcome['elbow']:.3f} rad\n"
         f"  energy lost, of the fall   {outcome['energy_lost']:.2e}; gained at most {outcome['energy_gained']:.1e}"
     )
 
 
 def plot(outcome: dict):
-    """The bar with its bones at five times; the angles of both joints."""
+    """Draw the bar with its bones at five times, and the angles of both joints."""
     from matplotlib import pyplot as plt
 
     hanging, motion = outcome["pendulum"], outcome["motion"]

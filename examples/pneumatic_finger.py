@@ -29,7 +29,7 @@ FILLED = 115e3  # Pa, absolute
 
 
 def finger() -> ms.Solid:
-    """The bar without the tetrahedra of its channel."""
+    """Build the bar without the tetrahedra of its channel."""
     box = ms.meshes.box(SIZE, cells=CELLS)
     cell = np.array(SIZE) / CELLS
     at = np.floor(box.tetrahedron_barycenters / cell).astype(int)
@@ -41,7 +41,7 @@ def finger() -> ms.Solid:
 
 
 def bending_angle(solid: ms.Solid, positions: np.ndarray) -> np.ndarray:
-    """(...) rad: how far the free end's plane has turned, positive downwards."""
+    """Return the rotation of the plane of the free end, (...) rad, positive downwards."""
     x = solid.mesh.rest_positions
     end = np.flatnonzero(x[:, 0] > SIZE[0] - 1e-9)
     up = positions[..., end[x[end, 2] > SIZE[2] - 1e-9], :].mean(axis=-2)
@@ -50,7 +50,9 @@ def bending_angle(solid: ms.Solid, positions: np.ndarray) -> np.ndarray:
 
 
 def main() -> dict:
-    """Pressures (n,) Pa, angles (n,) rad, volumes (n,) m3 along the path, and of the finger that is filled with air."""
+    """Return pressures (n,) Pa, angles (n,) rad and volumes (n,) m3 along the path, and of the finger filled with
+    air.
+    """
     solid = finger()
     root = [ms.Pin(solid.mesh.vertices_at(x=0.0))]
     channel = ms.Cavity(solid, pressure=PRESSURE)
@@ -73,7 +75,7 @@ def main() -> dict:
 
 
 def plot(result: dict):
-    """The finger at rest, half and all of the way, and its angle over the pressure."""
+    """Draw the finger at rest, at half and at full pressure, and its angle over the pressure."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9, 3.4), layout="constrained")

@@ -55,9 +55,10 @@ CYCLES = {"flat": 3, "bump": 8, "slope": 4}
 
 
 def main(cycles=CYCLES, time_step=TIME_STEP, with_study=False) -> dict:
-    """{"walks": {ground: (Crawler, Trajectory)}, "back", "study", "time_step"}; cycles: turns of the field.
+    """Return the motions on every ground; cycles: number of rotations of the field.
 
-    "back" is the first turn on flat ground of a field that turns the other way.
+    {"walks": {ground: (Crawler, Trajectory)}, "back", "study", "time_step"}; "back" is one rotation of the field in
+    the other sense, on flat ground.
     """
     walks = {name: walk(name, turns, time_step) for name, turns in cycles.items()}
     return {
@@ -68,13 +69,14 @@ def main(cycles=CYCLES, time_step=TIME_STEP, with_study=False) -> dict:
     }
 
 
-def walk(name: str, turns: int, time_step, **options) -> tuple[Crawler, ms.Trajectory]:
+def walk(name: str, rotations: int, time_step, **options) -> tuple[Crawler, ms.Trajectory]:
+    """Simulate a number of rotations of the field on one of the grounds."""
     who = crawler(GROUNDS[name]())
-    return who, who.crawl(turns, time_step=time_step, **options)
+    return who, who.crawl(rotations, time_step=time_step, **options)
 
 
 def plot(result: dict):
-    """The crawler from the side on each ground, and the way of its center."""
+    """Draw the crawler from the side on each ground, and the path of its center."""
     from matplotlib import pyplot as plt
 
     walks = result["walks"]
@@ -93,7 +95,7 @@ def plot(result: dict):
 
 
 def animation(result: dict, name: str, path: Path, **options) -> Path:
-    """The crawler on one of the grounds, as a .gif or an .mp4."""
+    """Write the movie of the crawler on one of the grounds, as a .gif or an .mp4."""
     return movie(*result["walks"][name], path, name, **options)
 
 

@@ -39,7 +39,10 @@ FLUX_DENSITY = (0.3, 0.5, 0.8)  # T
 
 
 def main(cells=CELLS, layers=LAYERS, angles=ANGLES) -> dict:
-    """{"rows": one a deformation, angle, magnetization and number of layers, "plates": what was deformed}."""
+    """Return the energies of all cases.
+
+    {"rows": one for each deformation, angle, magnetization and number of layers, "plates": the deformed plates}.
+    """
     plates = {k: Plate((LENGTH, WIDTH, THICKNESS), cells, k) for k in layers}
     rows = []
     for name, deform in DEFORMATIONS.items():
@@ -68,7 +71,7 @@ def main(cells=CELLS, layers=LAYERS, angles=ANGLES) -> dict:
 
 
 def plot(result: dict):
-    """The accumulated difference against the angle, a panel a deformation."""
+    """Draw the accumulated difference against the angle, one panel for each deformation."""
     from matplotlib import pyplot as plt
 
     figure, axes = plt.subplots(1, 3, figsize=(11, 3.8), sharey=True, layout="constrained")
@@ -77,7 +80,7 @@ def plot(result: dict):
 
 
 def picture(result: dict) -> ms.Picture:
-    """The largest deformations."""
+    """Draw the largest deformations."""
     return draw_plates(result)
 
 

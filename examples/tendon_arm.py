@@ -27,7 +27,7 @@ SIDES = ((0, 1), (0, -1), (1, 0), (-1, 0))
 
 
 def arm(cells=(16, 2, 2)) -> tuple[ms.Solid, list[ms.Tendon]]:
-    """The bar along x, its axis through the origin, and its tendons."""
+    """Build the bar along x, its axis through the origin, and its tendons."""
     mesh = ms.meshes.box((LENGTH, WIDTH, WIDTH), cells=cells).transformed(
         translation=(0, -WIDTH / 2, -WIDTH / 2)
     )
@@ -38,7 +38,7 @@ def arm(cells=(16, 2, 2)) -> tuple[ms.Solid, list[ms.Tendon]]:
 
 
 def main() -> dict:
-    """Angles (n,) rad under PULLS of the first tendon, and those of beam theory."""
+    """Return the angles (n,) rad under PULLS of the first tendon, and those of beam theory."""
     solid, tendons = arm()
     scene = ms.Scene(solid, supports=[ms.Pin(solid.mesh.vertices_at(x=0.0))], actuators=tendons)
     x = solid.mesh.rest_positions
@@ -62,7 +62,7 @@ def main() -> dict:
 
 
 def plot(result: dict):
-    """The arm at rest and pulled most, with its tendons."""
+    """Draw the arm at rest and at the largest tension, with its tendons."""
     return ms.plot([result["shapes"][0], result["shapes"][-1]], titles=["slack", "one tendon pulls"])
 
 

@@ -47,7 +47,10 @@ import magshell as ms
 
 
 def main(cells=CELLS, tasks=tuple(TASKS), methods=tuple(METHODS), iterations=100, progress=False) -> dict:
-    """{"strip", "fits": {task: {method: Fit}}, "costs": {task: {method: ms a step}}}."""
+    """Return the fits and their costs.
+
+    {"strip", "fits": {task: {method: Fit}}, "costs": {task: {method: ms a step}}}.
+    """
     sheet = strip(cells)
     fits = {
         task: {
@@ -64,7 +67,7 @@ def main(cells=CELLS, tasks=tuple(TASKS), methods=tuple(METHODS), iterations=100
 
 
 def plot(result: dict):
-    """A row a curve: the strip and its tip's track beside the curve, convergence, the field in time."""
+    """Draw one row for each curve: the strip and its tip's track, convergence, and the field in time."""
     from matplotlib import pyplot as plt
 
     rows = len(result["fits"])
@@ -82,12 +85,12 @@ def plot(result: dict):
 
 
 def picture(result: dict, name: str) -> ms.Picture:
-    """The strip in space while it draws one of the curves, its magnetization and the field."""
+    """Draw the strip in space while it follows one of the curves, with its magnetization and the field."""
     return states(result["strip"], list(result["fits"][name].values())[-1])
 
 
 def animation(result: dict, name: str, path: Path) -> Path:
-    """The strip while it draws one of the curves, as a .gif or an .mp4."""
+    """Write the movie of the strip while it follows one of the curves, as a .gif or an .mp4."""
     return movie(result["strip"], list(result["fits"][name].values())[-1], path)
 
 

@@ -162,7 +162,7 @@ class RobotTask(Task):
         return self._miss(unknowns) ** 2
 
     def _miss(self, unknowns):
-        return self._robot.miss(self._robot.motion(unknowns.reshape(self.actions, -1)))
+        return self._robot.relative_distance(self._robot.motion(unknowns.reshape(self.actions, -1)))
 
 
 def robot_task(name: str) -> RobotTask:

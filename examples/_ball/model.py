@@ -19,7 +19,7 @@ TIME_STEP = 5e-3
 
 @dataclass(frozen=True)
 class Throw:
-    """Where the ball is thrown from, m from the middle, and how fast, m/s."""
+    """A throw of the ball: its start relative to the middle of the sheet [m], and its velocity [m/s]."""
 
     aside: tuple[float, float]
     velocity: tuple[float, float, float]
@@ -35,7 +35,10 @@ THROWS = (
 
 
 def ball_mesh(cells: int) -> ms.TetMesh:
-    """cells: 2 for the paper's ball, whose tetrahedra all meet in the middle, or more."""
+    """Return the mesh of the ball.
+
+    cells: 2 for the paper's ball, whose tetrahedra all meet in the middle, or more.
+    """
     mesh = ms.meshes.ball(RADIUS, cells=cells)
     if cells > 2:
         return mesh
@@ -63,9 +66,10 @@ class Scenery:
 
 
 def scenery(throw: Throw, cells: int, ball_cells: int = 2, stretch: float = STRETCH) -> Scenery:
-    """cells: of the sheet, along a side. stretch: N/m, of it.
+    """Build the scene of one throw.
 
-    Thickness and modulus of the sheet are those of its stiffnesses in the plane and in bending.
+    cells: of the sheet, along a side; ball_cells: as in ball_mesh. stretch: membrane stiffness of the sheet, N/m.
+    Thickness and modulus of the sheet are computed from its stiffnesses in the plane and in bending.
     """
     thickness = np.sqrt(12 * (1 - POISSON**2) * BENDING / stretch)
     sheet_mesh = ms.meshes.rectangle(SIDE, SIDE, cells=(cells, cells))

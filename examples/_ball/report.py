@@ -18,12 +18,12 @@ VIEW = (14, -62)
 
 
 def _heights(row: dict, frame: int) -> np.ndarray:
-    """cm: how high every vertex is."""
+    """Return the height of every vertex in one frame, cm."""
     return 100 * row["motion"].positions[frame, :, 2]
 
 
 def draw_snapshots(axes, row: dict) -> None:
-    """From the start to where the ball is off the sheet again."""
+    """Draw four states, from the start until the ball has left the sheet again."""
     motion = row["motion"]
     lowest = int(np.argmin(row["center"][:, 2]))
     off = lowest + int(np.argmax(row["forces"][lowest:] == 0))
@@ -51,7 +51,7 @@ def draw_shapes(axes, row: dict) -> None:
 
 
 def draw_gaps(axes, rows: list[dict]) -> None:
-    """How near ball and sheet come in every throw, over what always stays between them."""
+    """Draw the distance of ball and sheet in every throw, over the minimum distance that contact maintains."""
     named = set()
     for row in rows:
         case = row["case"][:2]
@@ -99,7 +99,7 @@ def summary(result: dict) -> str:
 
 
 def _line(rows: list[dict]) -> str:
-    def spread(name: str, scale: float) -> str:
+    def mean_and_deviation(name: str, scale: float) -> str:
         values = scale * np.array([row[name] for row in rows])
         return f"{values.mean():.3g} +- {np.abs(values - values.mean()).max():.2g}"
 
@@ -108,7 +108,7 @@ def _line(rows: list[dict]) -> str:
     return (
         f"{rows[0]['sheet_nodes']:5d}   {f'{nodes} / {tetrahedra}':12s}"
         f"{sum(row['penetrations'] for row in rows):8d}{nearest:11.3f}"
-        f"{spread('compression', 100):>15s}{spread('stretching', 100):>15s}"
+        f"{mean_and_deviation('compression', 100):>15s}{mean_and_deviation('stretching', 100):>15s}"
         f"{100 * max(row['sheet_strain'] for row in rows):10.0f}{np.mean([row['newton'] for row in rows]):9.1f}"
-        f"{sum(row['halved'] for row in rows):8d}  {spread('seconds_a_step', 1e3)}"
+        f"{sum(row['halved'] for row in rows):8d}  {mean_and_deviation('seconds_a_step', 1e3)}"
     )

@@ -1,1 +1,1 @@
-"""What examples/bending_twisting.py is made of: the strip, its energy's balance, the report."""
+"""The parts of examples/bending_twisting.py: the strip, its energy balance, the report."""

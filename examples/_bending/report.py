@@ -21,11 +21,11 @@ def draw_alignment(axes, states) -> None:
     axes.legend(frameon=False, loc="center right")
 
 
-def draw_turning(axes, twisted: dict, turning: float, turns: int) -> None:
+def draw_turning(axes, twisted: dict, turning: float, rotations: int) -> None:
     times = twisted["motion"].times
     axes.plot(times, twisted["alignment"], color=BLUE)
     axes.axvline(turning, color=GREY, lw=1, ls=":")
-    axes.text(turning, 0.02, f"  {turns} turns done", color=GREY)
+    axes.text(turning, 0.02, f"  {rotations} turns done", color=GREY)
     axes.plot(times, twisted["end"][:, 0] / twisted["end"][0, 0], color=RED)
     axes.text(times[-1], 0.22, "cosine of magnet and field", color=BLUE, ha="right")
     axes.text(times[-1], 0.12, "x of the end / length", color=RED, ha="right")
@@ -51,7 +51,7 @@ def draw_undamped(axes, runs) -> None:
 
 
 def summary(result: dict) -> str:
-    """What a person would ask first."""
+    """Return the summary: alignment in bending, the twisting, and the energy lost without damping."""
     return "\n\n".join((bending(result["bent"]), twisting(result["twisted"]), conserved(result["undamped"])))
 
 

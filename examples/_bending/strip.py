@@ -1,4 +1,4 @@
-"""The strip, its motions, and what a field does to it."""
+"""The strip, its motions, and its magnetic moment and energy balance in a field."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ REMANENT_MAGNETIZATION = 40e3  # A/m
 
 @dataclass(frozen=True)
 class Strip:
-    """A scene, the magnetization of the free end (n_f, 3) [A/m], and the damping of a vertex [N s/m]."""
+    """The strip: a scene, the magnetization of the free end (n_f, 3) [A/m], and the damping of a vertex [N s/m]."""
 
     scene: ms.Scene
     remanent_magnetization: np.ndarray
@@ -32,7 +32,10 @@ class Strip:
         return self.scene.mesh
 
     def simulate(self, field, duration, *, time_step=TIME_STEP, damping=None) -> ms.Trajectory:
-        """The motion from the rest shape; field: (3,) T, or a function of the time [s]."""
+        """Simulate the motion from the reference shape.
+
+        field: (3,) T, or a function of the time [s].
+        """
         return ms.simulate(
             self.scene,
             steps=round(duration / time_step),
@@ -44,7 +47,10 @@ class Strip:
         )
 
     def moments(self, positions) -> np.ndarray:
-        """(n, 3), A m^2, of states (n, n_v, 3) m: the magnetization is carried along with the normal."""
+        """Return the total magnetic moment of states (n, n_v, 3) m, (n, 3) A m^2.
+
+        The magnetization is normal to the sheet and rotates with the normal.
+        """
         corners = positions[:, self.mesh.faces]
         normals = np.cross(corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0])
         normals /= np.linalg.norm(normals, axis=2, keepdims=True)
@@ -52,7 +58,9 @@ class Strip:
         return np.einsum("f,nfi->ni", volumes, normals)
 
     def alignment(self, positions, field) -> np.ndarray:
-        """The cosine between the magnetization and the field, a mean over the magnet: 1 if all of it points along."""
+        """Return the mean cosine between the magnetization and the field over the magnet, (n,): 1 if all of it is
+        aligned.
+        """
         strongest = THICKNESS * self.mesh.face_areas @ self.remanent_magnetization[:, 2]
         field = np.broadcast_to(field, (len(positions), 3))
         directions = field / np.linalg.norm(field, axis=1, keepdims=True)
@@ -60,7 +68,10 @@ class Strip:
 
 
 def strip(cells=CELLS) -> Strip:
-    """Clamped at x = 0; damped as much as a sheet as on the mesh of the paper, on whichever mesh."""
+    """Build the strip, clamped at x = 0.
+
+    The damping per vertex is scaled so that the total damping is that of the paper's mesh, on whichever mesh.
+    """
     mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells=cells, diagonals="crossed")
     sheet = ms.Shell(
         mesh,
@@ -77,7 +88,9 @@ def strip(cells=CELLS) -> Strip:
 
 @dataclass(frozen=True)
 class Balance:
-    """Energies since the start, (n,) J: gained, received from the changing field, lost to damping."""
+    """The change of the strip's energy since the start, (n,) J: gained, received from the changing field, lost to
+    damping.
+    """
 
     gained: np.ndarray
     received: np.ndarray
@@ -85,13 +98,15 @@ class Balance:
 
     @property
     def error(self) -> float:
-        """The largest gap, over all that has been turned over by the end."""
+        """The largest gap in the balance, over the energy exchanged and dissipated by the end."""
         gap = np.abs(self.gained - self.received + self.lost).max()
         return float(gap / (np.abs(np.diff(self.received)).sum() + self.lost[-1]))
 
 
 def balance(sheet: Strip, motion: ms.Trajectory, fields) -> Balance:
-    """d(kinetic + elastic + magnetic) = -m . dB - sum of damping |v|^2 dt, by the trapezoidal rule.
+    """Compute the energy balance of a motion by the trapezoidal rule.
+
+        d(kinetic + elastic + magnetic) = -m . dB - sum of damping |v|^2 dt
 
     fields: (n, 3) T, at the motion's times.
     """

@@ -1,1 +1,1 @@
-"""What examples/bistable_beam.py is made of: the model, the studies of its numbers, the report."""
+"""The parts of examples/bistable_beam.py: the model, the studies of its numbers, the report."""

@@ -68,7 +68,7 @@ def _computed(axes, motion) -> None:
 
 
 def summary(result: dict) -> str:
-    """What a person would ask first."""
+    """Return the summary: ramp, step, pluck and variations, computed and measured."""
     sections = (ramp, steps, pluck, varied)
     return "\n\n".join(section(result) for section in sections)
 

@@ -1,4 +1,4 @@
-"""The experiment's curves, as digitised; their sources stand in the files."""
+"""The digitised curves of the experiment; each file names its source."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ FOLDER = Path(__file__).parents[1]
 
 
 def measured_ramp() -> dict:
-    """Times [s], fields [T] and displacements [m] while the field grows by 6.5 mT/s."""
+    """Return times [s], fields [T] and displacements [m] measured while the field grows by 6.5 mT/s."""
     curve = _curve("bistable_beam_ramp.csv")
     return {**curve, "fields": RAMP * curve["times"]}
 
 
 def measured_step() -> dict:
-    """Times [s] and displacements [m] after a field of 5 mT is switched on."""
+    """Return times [s] and displacements [m] measured after a field of 5 mT is switched on."""
     return _curve("bistable_beam_step.csv")
 
 

@@ -23,7 +23,7 @@ NO_SNAP = 5.0e-3  # T, a constant field under which the beam stays
 
 @dataclass(frozen=True)
 class Beam:
-    """A scene, the magnetization of its halves (n_f, 3) [A/m], and the vertex in the middle."""
+    """The beam: a scene, the magnetization of its halves (n_f, 3) [A/m], and the vertex in the middle."""
 
     scene: ms.Scene
     remanent_magnetization: np.ndarray
@@ -40,12 +40,15 @@ class Beam:
         return {"remanent_magnetization": self.remanent_magnetization, "applied_flux_density": (0, 0, field)}
 
     def height(self, positions) -> float:
-        """Of mid-span, m."""
+        """Return the height of mid-span, m."""
         return float(positions[self.middle, 2])
 
 
 def beam(cells, *, width=WIDTH, thickness=THICKNESS, shortening=SHORTENING, poisson_ratio=0.5) -> Beam:
-    """The beam between clamps that share the shortening, with an even number of cells each way."""
+    """Build the beam between two clamps, each displaced by half of the shortening.
+
+    cells: an even number each way.
+    """
     mesh = ms.meshes.rectangle(LENGTH, width, cells=cells)
     sheet = ms.Shell(
         mesh,
@@ -66,9 +69,10 @@ def beam(cells, *, width=WIDTH, thickness=THICKNESS, shortening=SHORTENING, pois
 
 
 def buckled(beam: Beam) -> ms.Equilibrium:
-    """The beam without field, buckled to the side +z.
+    """Find the equilibrium without field, buckled to the side +z.
 
-    Compressed straight it would rest on a saddle between two sides; a field that pushes upwards chooses one.
+    Compressed straight, the beam would stay at the saddle point between its two buckled states; a small field upwards
+    selects one of them.
     """
     scale = beam.shortening / SHORTENING
     pushed = beam.equilibrium(field=-1e-3 * scale**1.5)
@@ -76,7 +80,9 @@ def buckled(beam: Beam) -> ms.Equilibrium:
 
 
 def stability_loss(beam: Beam, *, field=8e-3, max_step=0.006) -> dict:
-    """Height [m], field [T] and height of the limit point and of the bifurcation, and which is the first."""
+    """Return the height [m], and field [T] and height of the limit point and of the bifurcation, and which comes
+    first.
+    """
     start = buckled(beam)
     height = beam.height(start.positions)
     path = beam.follow(

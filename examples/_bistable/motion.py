@@ -1,4 +1,4 @@
-"""The beam in time: the two experiments, a pluck, and what is read off a curve."""
+"""The motion of the beam: the two experiments, a pluck, and the quantities read from their curves."""
 
 from __future__ import annotations
 
@@ -11,16 +11,18 @@ import magshell as ms
 
 from .model import HIGHEST_FIELD, NO_SNAP, RAMP, SHEAR_MODULUS, SHORTENING, Beam, beam, buckled
 
-# As Stewart & Anand chose it for this material; nothing is adjusted here.
+# The Maxwell branch that Stewart & Anand chose for this material; it is not fitted here.
 MAXWELL_MODULUS = 500e3 / SHEAR_MODULUS  # over the elastic one
 MAXWELL_TIME = 10e-3  # s
-SNAPPED = 4e-3  # m: a displacement that says that the beam has gone to the other side
+SNAPPED = 4e-3  # m: beyond this displacement the beam has snapped to the other side
 PLUCK = 0.5e-3  # T, released
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Times (n,) s, displacements of mid-span from the buckled state (n,) m, and all of the trajectory."""
+    """A motion of the beam: times (n,) s, displacements of mid-span from the buckled state (n,) m, and the
+    trajectory.
+    """
 
     times: np.ndarray
     displacements: np.ndarray
@@ -28,17 +30,17 @@ class Motion:
 
     @property
     def snap(self) -> float | None:
-        """When mid-span passes `SNAPPED`, s, between the steps; None if it never does."""
+        """The time at which mid-span passes `SNAPPED` [s], interpolated between steps; None if it never does."""
         return passing(self.times, self.displacements)
 
     @property
     def last_third(self) -> float:
-        """Mean displacement, m."""
+        """The mean displacement over the last third of the time, m."""
         return last_third(self.times, self.displacements)
 
 
 def passing(times, displacements, level=SNAPPED) -> float | None:
-    """The first time at which a curve passes a level, s, by straight lines; None if it never does."""
+    """Return the first time at which a curve passes a level [s], by linear interpolation; None if it never does."""
     above = displacements > level
     k = int(np.argmax(above))
     if not above[k]:
@@ -53,9 +55,10 @@ def last_third(times, displacements) -> float:
 def move(
     sheet: Beam, start: ms.Equilibrium, field, duration, time_step, *, viscous=True, **options
 ) -> Motion:
-    """The motion from an equilibrium; field [T]: along z, a number or a function of the time [s].
+    """Simulate the motion from an equilibrium.
 
-    Displacements count from the buckled state, whatever the start.
+    field [T]: along z, a number or a function of the time [s]. Displacements count from the buckled state, whatever
+    the start.
     """
     flux_density = (lambda time: (0, 0, field(time))) if callable(field) else (0, 0, field)
     branch = {"maxwell_modulus": MAXWELL_MODULUS, "maxwell_time": MAXWELL_TIME} if viscous else {}
@@ -82,14 +85,17 @@ def step(sheet: Beam, time_step, duration=0.8, **options) -> Motion:
 
 
 def pluck(sheet: Beam, time_step, duration=0.6, **options) -> Motion:
-    """Let go of by a small field."""
+    """Simulate the free vibration after a small field is switched off."""
     held = sheet.equilibrium(PLUCK, start=buckled(sheet))
     return move(sheet, held, 0.0, duration, time_step, **options)
 
 
 @dataclass(frozen=True)
 class Ringing:
-    """frequency: Hz; decay: 1/s, of the amplitude; misfit: rms, over the amplitude at the start."""
+    """A damped oscillation fitted to a curve.
+
+    frequency: Hz; decay: rate of the amplitude, 1/s; misfit: rms, over the amplitude at the start.
+    """
 
     frequency: float
     decay: float
@@ -97,7 +103,9 @@ class Ringing:
 
 
 def ringing(times, displacements, guess=16.0) -> Ringing:
-    """The decaying cosine nearest to a curve: for a frequency and a decay, the rest is linear."""
+    """Fit a decaying cosine to a curve by least squares; for a given frequency and decay the other coefficients are
+    linear.
+    """
 
     def parts(parameters):
         frequency, decay = parameters
@@ -116,7 +124,7 @@ def ringing(times, displacements, guess=16.0) -> Ringing:
 
 
 def variations(cells, time_step) -> list[tuple[str, float]]:
-    """When the ramp snaps [s] as one thing at a time is changed."""
+    """Return the time at which the ramp snaps [s], with one parameter changed at a time: rows of (change, time)."""
     given, longer = beam(cells), beam(cells, shortening=1.01 * SHORTENING)
     rows = [
         ("as given", given, {}),
@@ -130,7 +138,9 @@ def variations(cells, time_step) -> list[tuple[str, float]]:
 
 
 def shifted(sheet: Beam, distance=2.5e-3) -> np.ndarray:
-    """The magnetization (n_f, 3) [A/m] with its change of sign moved along x: pushes the beam off its middle."""
+    """Return the magnetization (n_f, 3) [A/m] with its change of sign moved along x, which makes the beam
+    asymmetric.
+    """
     mesh, magnetization = sheet.scene.mesh, sheet.remanent_magnetization
     x = mesh.face_barycenters[:, 0]
     middle = mesh.rest_positions[:, 0].max() / 2
@@ -138,13 +148,13 @@ def shifted(sheet: Beam, distance=2.5e-3) -> np.ndarray:
 
 
 def drag(sheet: Beam, rate) -> float:
-    """N s/m a vertex, for a drag of `rate` [1/s] times the mass."""
+    """Return the damping per vertex [N s/m] of a drag of `rate` [1/s] times the mass."""
     mesh = sheet.scene.mesh
     return rate * float(sheet.scene.shell.vertex_masses.sum()) / mesh.n_vertices
 
 
 def shortening_for(displacement, cells) -> float:
-    """The shortening [m] with which the beam at rest in 5 mT has moved this far [m]."""
+    """Find the shortening [m] with which the beam in equilibrium at 5 mT has moved by a given displacement [m]."""
 
     def excess(factor):
         sheet = beam(cells, shortening=factor * SHORTENING)

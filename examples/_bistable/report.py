@@ -72,7 +72,7 @@ def draw_convergence(axes, study: dict) -> None:
 
 
 def summary(result: dict) -> str:
-    """What a person would ask first."""
+    """Return the summary: the critical point, its convergence, and the comparison with theory and experiment."""
     return "\n\n".join(
         (
             outcome(result),

@@ -1,4 +1,4 @@
-"""How far the critical field is converged, and why it is not that of beam theory."""
+"""The convergence of the critical field with the mesh, and its difference from beam theory."""
 
 from __future__ import annotations
 
@@ -22,11 +22,10 @@ MESHES = ((24, 4), (48, 8), (96, 16), (192, 32))
 
 
 def convergence(meshes=MESHES) -> dict:
-    """Height, limit point and bifurcation on each mesh, and what they tend to.
+    """Compute height, limit point and bifurcation on each mesh, and extrapolate them.
 
-    The last three meshes, each twice as fine as the one before, give the order by the ratio of their
-    differences and the limit by Aitken's formula; how far that moves when the finest mesh is left out is the
-    error estimate.
+    The last three meshes, each twice as fine as the one before, give the order by the ratio of their differences and
+    the limit by Aitken's formula. The error estimate is the change of that limit when the finest mesh is left out.
     """
     rows = [{"cells": cells, **stability_loss(beam(cells))} for cells in meshes]
     columns = {
@@ -53,10 +52,12 @@ def _extrapolated(values) -> dict:
 def beam_theory(
     *, shortening=SHORTENING, modulus=YOUNG_MODULUS, bending=1.0, extensible=True
 ) -> tuple[float, float]:
-    """Buckled height [m] and critical field [T] of a shallow clamped beam; `bending`: a factor on EI.
+    """Return the buckled height [m] and critical field [T] of a shallow clamped beam; `bending`: a factor on EI.
 
     Under an axial force P = k^2 EI and a force F at mid-span, the slope from the clamp to the middle is
+
         w' = F / (2P) (1 - cos(k x - a/2) / cos(a/2)),                                   a = k L / 2,
+
     and the clamps come together by the compression P L / EA and by the integral of w'^2 / 2. Stability ends
     at the antisymmetric bifurcation, tan a = a.
     """
@@ -74,13 +75,13 @@ def beam_theory(
 
 
 def straight_buckling(beam: Beam) -> float:
-    """The shortening [m] at which the straight beam buckles."""
+    """Return the shortening [m] at which the straight beam buckles."""
     path = beam.follow(0.0, first_step=0.02, max_step=2e-5, until=lambda parameter, _: parameter > 0.6)
     return path.critical[0].parameter * beam.shortening
 
 
 def differences(cells) -> dict:
-    """From beam theory to the shell, one effect at a time: rows of (what, height [m], critical field [T])."""
+    """Compare beam theory and shell, one effect at a time: rows of (effect, height [m], critical field [T])."""
     rows = [
         ("beam theory, inextensible", *beam_theory(extensible=False)),
         ("beam theory", *beam_theory()),

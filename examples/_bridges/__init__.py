@@ -1,1 +1,1 @@
-"""What examples/bridges.py is made of: shapes, the search, what data say of the field, pictures."""
+"""The parts of examples/bridges.py: shapes, the search, the identifiability of the moduli, pictures."""

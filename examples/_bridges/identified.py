@@ -1,8 +1,9 @@
-"""What measurements at rest say of the moduli of every tetrahedron.
+"""Identifiability of the moduli of every tetrahedron from measured equilibria.
 
-With displacements u of known noise s, and moduli known beforehand to P (independent from one tetrahedron to the next), the
-spread that is left is (J^T J / s^2 + P^-2)^(-1/2), J the derivative of u by the moduli, as the adjoint gives it, one
-row a back-substitution. In the whitened J P / s a direction is known from the data where its singular value is above 1.
+For displacements u with known noise s, and a prior with standard deviations P of the moduli (independent from one
+tetrahedron to the next), the posterior covariance is (J^T J / s^2 + P^-2)^-1, where J is the derivative of u by the
+moduli; the adjoint gives it at one back-substitution a row. A singular value of the whitened J P / s above 1 marks a
+combination of moduli about which the data tell more than the prior.
 """
 
 from __future__ import annotations
@@ -20,14 +21,17 @@ NOISE = 1e-4  # m, of a measured displacement: a tenth of a millimeter
 PRIOR_LOG, PRIOR_POISSON = (
     0.5,
     0.08,
-)  # what is known before: Young's modulus to a factor 1.65, Poisson's ratio
+)  # standard deviations of the prior: log of Young's modulus (a factor 1.65), Poisson's ratio
 WEIGHT = 9.81  # m/s2
 
 
 @dataclass(frozen=True)
 class Knowledge:
-    """numbers: how many are measured. singular_values: of the whitened sensitivity, falling. left: (2 n_t,), the spread
-    that is left, over what was known before."""
+    """The information that one kind of data gives about the moduli.
+
+    numbers: how many are measured. singular_values: of the whitened sensitivity, in falling order. left: (2 n_t,), the
+    posterior standard deviation over that of the prior.
+    """
 
     data: str
     numbers: int
@@ -36,7 +40,7 @@ class Knowledge:
 
     @property
     def directions(self) -> int:
-        """Combinations of moduli that the data know better than what was known before."""
+        """The number of combinations of moduli that the data determine better than the prior."""
         return int((self.singular_values > 1).sum())
 
     def of(self, which: str) -> np.ndarray:
@@ -44,7 +48,7 @@ class Knowledge:
         return self.left[:n] if which == "young_modulus" else self.left[n:]
 
     def identified(self, which: str, at_most: float = 0.5) -> float:
-        """The share of the tetrahedra whose modulus the data leave at most so much of the spread."""
+        """Return the fraction of tetrahedra whose posterior standard deviation is below `at_most` times the prior's."""
         return float((self.of(which) < at_most).mean())
 
 
@@ -52,8 +56,11 @@ DIRECTIONS = ((0, 0, -1), (1, 0, 0), (0, 1, 0))  # of the weight
 
 
 def knowledge(task: Task, every: int = 1) -> list[Knowledge]:
-    """Of four kinds of data: the sag of the middle; all of the surface (or one vertex in `every`); the bridge on its side
-    and on its end as well; and that with a hundredth of the noise."""
+    """Compute the information of four kinds of data.
+
+    They are: the sag of the middle; the displacements of the surface (or of one vertex in `every`); those together
+    with the bridge on its side and on its end; and the same with a hundredth of the noise.
+    """
     solid, bridge = task.solid, task.bridge
     seen = np.setdiff1d(solid.mesh.surface_vertices, bridge.held)[::every]
     down, *turned = (_rows(task, direction, seen) for direction in DIRECTIONS)
@@ -68,7 +75,7 @@ def knowledge(task: Task, every: int = 1) -> list[Knowledge]:
 
 
 def _rows(task: Task, direction, vertices: np.ndarray) -> np.ndarray:
-    """d(displacement) / d(unknowns) of an equilibrium under the weight along a direction, (3 n, 2 n_t)."""
+    """Return d(displacement) / d(unknowns) of an equilibrium under the weight along a direction, (3 n, 2 n_t)."""
     scene = ms.Scene(
         task.solid,
         supports=[ms.Pin(task.bridge.held)],

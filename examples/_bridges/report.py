@@ -20,9 +20,9 @@ def draw_search(axes, searches: list[Found]) -> None:
     for found in searches:
         name = found.task.bridge.name
         label = f"{name}, {len(found.unknowns)} unknowns"
-        axes.semilogy(found.simulations, 100 * found.misses, "o-", color=COLORS[name], label=label)
+        axes.semilogy(found.simulations, 100 * found.errors, "o-", color=COLORS[name], label=label)
     axes.axhline(1, color="#999999", lw=0.8, ls=":")
-    axes.set(xlabel="simulations", ylabel="miss [% of the sag]")
+    axes.set(xlabel="simulations", ylabel="distance from the target [% of the sag]")
     axes.legend(frameon=False, fontsize=8)
 
 
@@ -36,7 +36,7 @@ def draw_singular_values(axes, known: list[Knowledge]) -> None:
 
 
 def picture(found: Found) -> ms.Picture:
-    """At rest and at the end, with the modulus that was found."""
+    """Draw the bridge at rest and at the end, coloured by the modulus that was found."""
     task = found.task
     motion = task.motion(found.unknowns)
     moduli = task.moduli(found.unknowns)["young_modulus"] / YOUNG_MODULUS
@@ -53,7 +53,7 @@ def picture(found: Found) -> ms.Picture:
 
 
 def _of_faces(mesh: ms.TetMesh, values: np.ndarray) -> np.ndarray:
-    """The mean of the tetrahedra at each vertex: numbers of elements as numbers of vertices."""
+    """Return the mean over the tetrahedra at each vertex: values of elements as values of vertices."""
     sums, counts = np.zeros(mesh.n_vertices), np.zeros(mesh.n_vertices)
     np.add.at(sums, mesh.tetrahedra, values[:, None])
     np.add.at(counts, mesh.tetrahedra, 1.0)

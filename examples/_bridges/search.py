@@ -17,24 +17,27 @@ REACHED = 0.01  # of the sag asked for
 
 @dataclass(frozen=True)
 class Found:
-    """unknowns: (2 n_t,), as in Task. misses: distances from the target over the sag asked for, at the start and after
-    every iteration; simulations, seconds: until then."""
+    """The result of a search for the moduli.
+
+    unknowns: (2 n_t,), as in Task. errors: distances from the target over the sag asked for, at the start and after
+    every iteration; simulations, seconds: until then.
+    """
 
     task: Task
     unknowns: np.ndarray
-    misses: np.ndarray
+    errors: np.ndarray
     simulations: np.ndarray
     seconds: np.ndarray
 
     @property
     def iterations(self) -> int | None:
-        """Until 1 % of the sag; None where it was not reached."""
-        reached = np.flatnonzero(self.misses < REACHED)
+        """The number of iterations until the error is below 1 % of the sag; None where it was not reached."""
+        reached = np.flatnonzero(self.errors < REACHED)
         return int(reached[0]) if len(reached) else None
 
 
 def found_by_gradient(task: Task, iterations: int = 10) -> Found:
-    """L-BFGS from uniform moduli, until 1 % of the sag or so many iterations."""
+    """Search from uniform moduli by L-BFGS until the error is below 1 % of the sag, for at most `iterations`."""
     low, high = map(torch.tensor, task.bounds)
     x = torch.tensor(task.start, requires_grad=True)
     optimizer = ms.optim.LBFGS([x], lower=low, upper=high)
@@ -51,5 +54,5 @@ def found_by_gradient(task: Task, iterations: int = 10) -> Found:
         rows.append((float(loss) ** 0.5, task.simulations, time.perf_counter() - began))
         if rows[-1][0] < REACHED:
             break
-    misses, simulations, seconds = map(np.array, zip(*rows, strict=True))
-    return Found(task, x.detach().numpy().copy(), misses, simulations, seconds)
+    errors, simulations, seconds = map(np.array, zip(*rows, strict=True))
+    return Found(task, x.detach().numpy().copy(), errors, simulations, seconds)

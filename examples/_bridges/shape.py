@@ -1,6 +1,6 @@
-"""Two bridges of hexahedral cells cut into tetrahedra, of about the sizes and counts of [Qiao21]'s.
+"""Two bridges of hexahedral cells cut into tetrahedra, with about the sizes and counts of those of [Qiao21].
 
-Cells of a lattice are chosen by their numbers; then the lattice is bent: levels of z follow the cable or the arch.
+Cells of a lattice are selected by their indices; then the levels of z are mapped to follow the cable or the arch.
 """
 
 from __future__ import annotations
@@ -14,7 +14,10 @@ import magshell as ms
 
 @dataclass(frozen=True)
 class Bridge:
-    """mesh: four nodes a tetrahedron. held: vertices on the ground. middle: vertices whose sag is measured."""
+    """A bridge and its vertex sets.
+
+    mesh: four nodes a tetrahedron. held: vertices on the ground. middle: vertices whose sag is measured.
+    """
 
     name: str
     mesh: ms.TetMesh
@@ -27,7 +30,7 @@ ARCH = (0.74, 0.19, 0.36)  # m; 821 nodes, 2911 tetrahedra, 115 nodes held there
 
 
 def suspension() -> Bridge:
-    """A deck that hangs from two cables over two towers, held at its ends and at the towers' feet."""
+    """Build a deck that hangs from two cables over two towers, held at its ends and at the towers' feet."""
     columns, towers, hangers = 19, (4, 14), (6, 8, 10, 12)
     i, j, k = _cells((columns, 3, 4))
     side = j != 1
@@ -45,11 +48,11 @@ def suspension() -> Bridge:
     at_ends = (u < 0.5) | (u > columns - 0.5)
     held = np.flatnonzero(at_ends | (w < 0.5))
     middle = np.flatnonzero((np.abs(u - columns / 2) < 1) & (np.abs(w - 1.5) < 0.6))
-    return Bridge("suspension", _placed(lattice, x, y, z), held, middle)
+    return Bridge("suspension", _with_positions(lattice, x, y, z), held, middle)
 
 
 def arch() -> Bridge:
-    """A road over two arches, held at the feet of three piers. Its middle: those of the two spans."""
+    """Build a road over two arches, held at the feet of three piers; its middle is that of both spans."""
     columns, rows, below = 24, 3, 7
     piers = [(0, 3), (10, 14), (21, 24)]
     i, _, k = _cells((columns, rows, below + 4))
@@ -69,16 +72,16 @@ def arch() -> Bridge:
     held = np.flatnonzero(w < 1.5)
     centers = np.array([(a + b) / 2 for a, b in spans])
     middle = np.flatnonzero((np.abs(u[:, None] - centers) < 1).any(axis=1) & (w > below + 2.5))
-    return Bridge("arch", _placed(lattice, x, y, z), held, middle)
+    return Bridge("arch", _with_positions(lattice, x, y, z), held, middle)
 
 
 def _cells(counts) -> tuple[np.ndarray, ...]:
-    """The numbers of each cell along the axes."""
+    """Return the indices of each cell along the axes."""
     return tuple(each.ravel() for each in np.meshgrid(*map(np.arange, counts), indexing="ij"))
 
 
 def _lattice(counts, chosen: np.ndarray) -> ms.TetMesh:
-    """Cells of size 1, of which some are kept."""
+    """Build a mesh of the chosen cells of size 1."""
     block = ms.meshes.box(counts, cells=counts)
     numbers = np.floor(block.rest_positions[block.tetrahedra].mean(axis=1)).astype(int)
     kept = chosen.reshape(counts)[tuple(numbers.T)]
@@ -86,5 +89,5 @@ def _lattice(counts, chosen: np.ndarray) -> ms.TetMesh:
     return ms.TetMesh(block.rest_positions[vertices], tetrahedra.reshape(-1, 4))
 
 
-def _placed(lattice: ms.TetMesh, x, y, z) -> ms.TetMesh:
+def _with_positions(lattice: ms.TetMesh, x, y, z) -> ms.TetMesh:
     return ms.TetMesh(np.stack([x, y, z], axis=1), lattice.tetrahedra)

@@ -1,4 +1,4 @@
-"""What a bridge does under its weight, as a function of the moduli of every tetrahedron."""
+"""The sag of a bridge under its weight, as a function of the moduli of every tetrahedron."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import magshell as ms
 from .shape import Bridge
 
 YOUNG_MODULUS, POISSON_RATIO = 2e5, 0.4  # Pa, 1: where the search starts, as [Qiao21]'s
-MASS_DENSITY = 1e3  # kg/m3; theirs is not told
+MASS_DENSITY = 1e3  # kg/m3; not given in the paper
 STEPS, TIME_STEP = 10, 5e-3  # s, as theirs
 GRAVITY = 100.0  # m/s2, as in their code: at 9.81 nothing falls 8 cm in the 50 ms of these steps
 SAG = 0.08  # m, of the mean node
@@ -24,7 +24,7 @@ POISSON_RANGE = (0.05, 0.45)
 
 @dataclass
 class Task:
-    """Unknowns are (2 n_t,): log(E / 2e5 Pa), then Poisson's ratio."""
+    """The fall of a bridge from rest. Unknowns are (2 n_t,): log(E / 2e5 Pa), then Poisson's ratio."""
 
     bridge: Bridge
     gravity: float = GRAVITY
@@ -58,7 +58,7 @@ class Task:
         return {"young_modulus": YOUNG_MODULUS * exp(unknowns[:n]), "poisson_ratio": unknowns[n:]}
 
     def motion(self, unknowns, **options) -> ms.Trajectory:
-        """Of the fall from rest: counted."""
+        """Simulate the fall from rest, and count the simulation."""
         self.simulations += 1
         with warnings.catch_warnings():  # it is to sag that far
             warnings.simplefilter("ignore", ms.LargeStrainWarning)
@@ -73,12 +73,12 @@ class Task:
             )
 
     def distance(self, motion: ms.Trajectory):
-        """m, of the mean node at the end from where it is to be."""
+        """Return the distance of the mean node at the end from its target, m."""
         moved = motion.displacements[-1].mean(0)
         target = (0.0, 0.0, -self.sag)
         away = moved - (moved.new_tensor(target) if isinstance(moved, torch.Tensor) else np.array(target))
         return (away**2).sum() ** 0.5
 
     def loss(self, unknowns):
-        """The distance over the sag that is asked for, squared."""
+        """Compute the square of the distance over the sag that is asked for."""
         return (self.distance(self.motion(unknowns)) / self.sag) ** 2

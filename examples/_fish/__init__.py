@@ -1,1 +1,1 @@
-"""What examples/fish.py is made of: the search for its torques, pictures. The fish itself is robots.fish."""
+"""The parts of examples/fish.py: the search for its torques, pictures. The fish itself is in robots.fish."""

@@ -1,4 +1,4 @@
-"""A strip with a crease that folds, and one that coils up: each with a magnetized end, in a field that turns."""
+"""Two strips with a magnetized end in a rotating field: one folds at a crease, one coils up."""
 
 from __future__ import annotations
 
@@ -11,16 +11,22 @@ import magshell as ms
 MAGNETIZATION = 60e3  # A/m
 THICKNESS = 4e-4  # m
 MATERIAL = {"young_modulus": 5e5, "poisson_ratio": 0.45, "mass_density": 2e3}
-LEAF, CREASE, FLAP, WIDTH = 21e-3, 3e-3, 18e-3, 8e-3  # m: the leaf that lies, what bends, the leaf that turns
+LEAF, CREASE, FLAP, WIDTH = (
+    21e-3,
+    3e-3,
+    18e-3,
+    8e-3,
+)  # m: the resting leaf, the crease, the leaf that rotates, the width
 CREASE_THICKNESS = 1.5e-4
 LENGTH, NARROW = 80e-3, 6e-3  # m, of the strip that coils up
 
 
 @dataclass(frozen=True)
 class Strip:
-    """flux_density: T, of the field that turns about y, against the way it would turn a wheel that rolls along x.
+    """A strip that touches itself, in a field that rotates about y.
 
-    angles: degrees from x towards z, one after the other. end: the vertices of the magnetized part.
+    flux_density: T; the field rotates against the sense in which a wheel rolls along x. angles: of the field, degrees
+    from x towards z, in the order of the load steps. end: the vertices of the magnetized part.
     """
 
     scene: ms.Scene
@@ -34,7 +40,7 @@ class Strip:
         return self.flux_density * np.array([np.cos(turn), 0.0, np.sin(turn)])
 
     def states(self) -> list[ms.Equilibrium]:
-        """At rest in the field at every angle, each from the one before."""
+        """Find the equilibrium in the field at every angle, each from the one before."""
         found: list[ms.Equilibrium] = []
         for angle in self.angles:
             start = found[-1] if found else None
@@ -43,7 +49,10 @@ class Strip:
 
 
 def folding(cells: int = 42, angles: int = 12) -> Strip:
-    """On a table, and back; cells: along the strip, a multiple of 14. angles: on the way to where it is folded flat."""
+    """Build the strip that folds flat on a table and opens again.
+
+    cells: along the strip, a multiple of 14. angles: number of field angles until it is folded flat.
+    """
     length = LEAF + CREASE + FLAP
     mesh = ms.meshes.rectangle(length, WIDTH, cells=(cells, max(2, cells // 14)))
     x = mesh.face_barycenters[:, 0]
@@ -68,7 +77,10 @@ def folding(cells: int = 42, angles: int = 12) -> Strip:
 
 
 def coiling(cells: int = 60, angles: int = 16) -> Strip:
-    """In nearly two turns of the field. Half as thick at its end, so that the end bends more and gets inside."""
+    """Build the strip that coils up in nearly two rotations of the field.
+
+    Its end is half as thick, so that it bends more and gets inside.
+    """
     mesh = ms.meshes.rectangle(LENGTH, NARROW, cells=(cells, 2))
     x = mesh.face_barycenters[:, 0]
     shell = ms.Shell(

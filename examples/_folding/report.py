@@ -13,8 +13,8 @@ BLUE, RED, GREY = "#20639b", "#c8442d", "#777777"
 VIEWS = {"fold": (12, -72), "coil": (14, -65)}
 
 
-def draw_fold(axes, result: dict) -> None:
-    """Four states on the way there, the last of them folded flat, and one on the way back."""
+def draw_folding(axes, result: dict) -> None:
+    """Draw four states until the strip is folded flat, and one as it opens again."""
     folded = int(np.argmax(result["angles"]))
     frames = [*np.linspace(0, folded, 4).round().astype(int), (folded + len(result["states"])) // 2]
     _draw(axes, result, "fold", frames)
@@ -39,7 +39,7 @@ def _draw(axes, result: dict, name: str, frames) -> None:
 
 
 def draw_angles(axes, result: dict, name: str) -> None:
-    """Angle of the strip's end and force between its parts, over the angle of the field."""
+    """Draw the angle of the strip's end and the force between its parts against the angle of the field."""
     there = slice(0, int(np.argmax(result["angles"])) + 1)
     back = slice(there.stop - 1, None)
     turned = result["turned"] - result["turned"][0]
@@ -48,13 +48,13 @@ def draw_angles(axes, result: dict, name: str) -> None:
         axes.plot(result["angles"][back], turned[back], "o--", ms=3, mfc="w", color=BLUE, label="back")
     axes.set(xlabel="angle of the field [degrees]", ylabel="the end has turned by [degrees]")
     axes.yaxis.label.set_color(BLUE)
-    beside = axes.twinx()
-    beside.plot(result["angles"][there], 1e3 * result["forces"][there], "-", color=RED)
+    right = axes.twinx()
+    right.plot(result["angles"][there], 1e3 * result["forces"][there], "-", color=RED)
     if name == "fold":
-        beside.plot(result["angles"][back], 1e3 * result["forces"][back], "--", color=RED)
+        right.plot(result["angles"][back], 1e3 * result["forces"][back], "--", color=RED)
         axes.legend(frameon=False, loc="upper left")
-    beside.set_ylabel("force between parts [mN]", color=RED)
-    beside.spines["top"].set_visible(False)
+    right.set_ylabel("force between parts [mN]", color=RED)
+    right.spines["top"].set_visible(False)
     axes.set_title(name, loc="left", fontweight="bold")
 
 

@@ -1,4 +1,4 @@
-"""The motion: arms close around a ball that is free, and lift it."""
+"""The motion of the gripper: its arms close around a free ball and lift it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ RISE, CLOSED, UP, END = (
 
 
 def closing_and_lift(gripper: Gripper, remanent_magnetization: np.ndarray, steps: int) -> dict:
-    """remanent_magnetization: A/m, (n_f, 3)."""
+    """Simulate closing and lifting, and measure both.
+
+    remanent_magnetization: (n_f, 3) A/m.
+    """
     scene = gripper.lifting
     times = np.linspace(0.0, END, steps + 1)
     share = np.clip((times - CLOSED) / (UP - CLOSED), 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""A sheet of four arms above a ball: the scene of the design, at rest, and that of the lift, in time."""
+"""A sheet of four arms above a ball: the scene for the design in equilibrium, and that of the lift in time."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ GRAVITY = (0.0, 0.0, -9.81)
 
 
 def cross(cell: float) -> ms.TriangleMesh:
-    """Four arms around a square."""
+    """Build the mesh of four arms around a square; cell: edge length, m."""
     reach = HALF_WIDTH + ARM
     cells = 2 * round(reach / cell)
     square = ms.meshes.rectangle(2 * reach, 2 * reach, cells=(cells, cells))
@@ -28,7 +28,7 @@ def cross(cell: float) -> ms.TriangleMesh:
 
 @dataclass
 class Gripper:
-    """cell: m, of the sheet. ball_cells: along an edge of the ball's icosahedron."""
+    """The gripper and its ball. cell: m, of the sheet. ball_cells: along an edge of the ball's icosahedron."""
 
     cell: float = 1.5e-3
     ball_cells: int = 2
@@ -49,7 +49,7 @@ class Gripper:
 
     @cached_property
     def outwards(self) -> np.ndarray:
-        """Unit vectors along the arms, (n_f, 3); zero in the middle."""
+        """The unit vectors along the arms, (n_f, 3); zero in the middle."""
         x = self.mesh.face_barycenters
         along_x = np.abs(x[:, :1]) > np.abs(x[:, 1:2])
         out = np.where(along_x, np.sign(x) * [1, 0, 0], np.sign(x) * [0, 1, 0])
@@ -57,7 +57,7 @@ class Gripper:
 
     @cached_property
     def wrapped(self) -> np.ndarray:
-        """Where the arms would lie close to the ball all the way, (n_v, 3) m."""
+        """The target of the design: positions (n_v, 3) m at which the arms follow the ball along their whole length."""
         x = self.mesh.rest_positions
         along_x = np.abs(x[:, :1]) > np.abs(x[:, 1:2])
         radius = RADIUS + 0.6 * THICKNESS
@@ -68,7 +68,9 @@ class Gripper:
 
     @cached_property
     def closing(self) -> ms.Scene:
-        """The ball stands on its lowest vertices; nothing rubs, as at rest nothing does."""
+        """The scene of the design: the ball stands on its lowest vertices, without friction, which does no work in
+        an equilibrium.
+        """
         standing = self.ball.mesh.vertices_where(lambda x: x[:, 2] < -THICKNESS - 1.7 * RADIUS)
         return ms.Scene(
             [self.sheet, self.ball],
@@ -80,7 +82,7 @@ class Gripper:
 
     @cached_property
     def lifting(self) -> ms.Scene:
-        """The ball is free, on a table, and the middle of the sheet moves up by 20 mm."""
+        """The scene of the lift: the ball is free, on a table, and the middle of the sheet moves up by 20 mm."""
         moved = ms.Clamp(self.held_edges, displacement=(0, 0, 20e-3), body=self.sheet)
         table = ms.obstacles.Plane(center=(0, 0, -THICKNESS - 2 * RADIUS))
         return ms.Scene(

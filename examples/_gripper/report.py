@@ -111,5 +111,5 @@ def summary(result: dict) -> str:
 
 
 def _millimeters(square: float | None) -> str:
-    """Of an objective, mm2, that may not have been there."""
+    """Return the square root of an objective in mm2 as text; it may be missing."""
     return "nothing" if square is None else f"{square**0.5:.2f} mm"

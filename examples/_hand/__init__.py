@@ -1,1 +1,1 @@
-"""What examples/gesturing_hand.py is made of: the shape, the gestures, the designs, the report."""
+"""The parts of examples/gesturing_hand.py: the shape, the gestures, the designs, the report."""

@@ -19,13 +19,13 @@ SKIN = 1e-3  # m, [Chen22] Table 1 for all that is thin
 FLUX_DENSITY = (0.0, 0.0, 0.05)  # T, upwards: the strongest in [Chen22]
 LARGEST_MAGNETIZATION = 3e5  # A/m; the paper has no bound
 HELD = 8 * UNIT  # m: the wrist is held up to there
-PRICE = 3e-4  # of the mean square of |M_r| over its cap, beside the mean square miss in fingers' lengths
+PRICE = 3e-4  # weight of the mean square of |M_r| over its limit, added to the mean square error in fingers' lengths
 REACH = 40 * UNIT  # m, about the length of a finger
 
 
 @dataclass(frozen=True)
 class Body:
-    """The hand of so many tetrahedra, and what is computed with."""
+    """The hand of about `n_tetrahedra` tetrahedra, with its scene."""
 
     n_tetrahedra: int
     element: str
@@ -42,7 +42,7 @@ class Body:
 
     @property
     def faces(self) -> np.ndarray:
-        """(k,): of each face of the skin, the face of a four-node mesh that it is or is a quarter of."""
+        """The face of the four-node mesh that each face of the skin is, or is a quarter of, (k,)."""
         parts = 4 if self.element == "quadratic" else 1
         return self.solid.skin.faces // parts
 
@@ -51,7 +51,7 @@ class Body:
         return anchors_of(mesh.rest_positions, gesture, np.unique(mesh.faces))
 
     def equilibrium(self, magnetization) -> ms.Equilibrium:
-        """In the field turned on. magnetization: (k, 3) A/m, for the skin's faces."""
+        """Find the equilibrium in the field. magnetization: (k, 3) A/m, for the skin's faces."""
         return ms.equilibrium(
             self.scene,
             applied_flux_density=FLUX_DENSITY,
@@ -61,7 +61,9 @@ class Body:
 
 @dataclass(frozen=True)
 class State:
-    """A hand at rest in the field. remanent_magnetization: (k, 3) A/m, of the skin's faces. positions: (n_v, 3) m."""
+    """An equilibrium of a hand in the field. remanent_magnetization: (k, 3) A/m, of the skin's faces. positions:
+    (n_v, 3) m.
+    """
 
     body: Body
     gesture: str
@@ -73,20 +75,20 @@ class State:
         return self.body.anchors(self.gesture)
 
     @property
-    def misses(self) -> np.ndarray:
-        """(k,) m, of the anchors from their targets."""
+    def distances(self) -> np.ndarray:
+        """The distances of the anchors from their targets, (k,) m."""
         anchors = self.anchors
         return np.linalg.norm(self.positions[anchors.vertices] - anchors.targets, axis=1)
 
     @property
-    def miss(self) -> float:
-        """Root mean square, m."""
-        return rms(self.misses)
+    def rms_distance(self) -> float:
+        """The root mean square distance of the anchors from their targets, m."""
+        return rms(self.distances)
 
 
 @dataclass(frozen=True)
 class Design(State):
-    """The best that was found. history: as that of ms.minimize, whose `terms` hold the mean square miss."""
+    """The best state of a search. history: that of ms.minimize, whose `terms` hold the mean square error."""
 
     history: list
 
@@ -100,8 +102,8 @@ class Design(State):
 
     @property
     def rms_history(self) -> np.ndarray:
-        """m, at every iteration."""
-        return REACH * np.sqrt([float(record.terms["miss"]) for record in self.history])
+        """The root mean square distance at every iteration, m."""
+        return REACH * np.sqrt([float(record.terms["error"]) for record in self.history])
 
 
 def rms(distances: np.ndarray) -> float:
@@ -109,13 +111,13 @@ def rms(distances: np.ndarray) -> float:
 
 
 def on(body: Body, design: Design) -> State:
-    """What a design does on another mesh of the hand, when the field is turned on."""
+    """Find the state that a design takes on another mesh of the hand when the field is turned on."""
     magnetization = transferred(design.remanent_magnetization, design.body.solid, body.solid)
     return State(body, design.gesture, magnetization, body.equilibrium(magnetization).positions)
 
 
 def designed(body: Body, gesture: str, iterations: int, progress: bool = False) -> Design:
-    """The best of so many iterations of L-BFGS, from no magnetization."""
+    """Search for the magnetization by L-BFGS from zero, and return the best design."""
     anchors, skin = body.anchors(gesture), body.solid.skin
     faces, targets = torch.tensor(body.faces), torch.tensor(anchors.targets)
     count = int(faces.max()) + 1
@@ -134,9 +136,9 @@ def designed(body: Body, gesture: str, iterations: int, progress: bool = False) 
             values={skin: {"remanent_magnetization": magnetization()}},
         )
         squares = ms.objectives.shape_matching(rest.positions, targets, anchors.vertices)
-        miss = squares / (len(targets) * REACH**2)
+        error = squares / (len(targets) * REACH**2)
         price = PRICE * ms.objectives.magnitude(ms.parametrize.softly_limited(shares, 1.0), areas)
-        return miss + price, {"miss": miss.detach()}
+        return error + price, {"error": error.detach()}
 
     found = ms.minimize(
         objective, [shares], ms.optim.LBFGS([shares]), max_iterations=iterations, progress=progress

@@ -1,4 +1,6 @@
-"""Three gestures: how far each finger curls towards the palm and leans sideways, and where that puts its points."""
+"""Three gestures: how far each finger curls towards the palm and leans sideways, and the resulting targets of its
+points.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 @dataclass(frozen=True)
 class Anchors:
-    """Vertices (k,) of a mesh, their targets (k, 3) m, and which finger (k,) they are on."""
+    """The vertices (k,) of a mesh that have targets, their targets (k, 3) m, and the finger (k,) of each."""
 
     vertices: np.ndarray
     targets: np.ndarray
@@ -28,10 +30,10 @@ class Anchors:
 
 
 def curled(points: np.ndarray, finger: Finger, palmward: float, sideways: float) -> np.ndarray:
-    """Where points (n, 3) m of a finger are when it bends by these angles, in rad.
+    """Return the positions of points (n, 3) m of a finger that bends by these angles, in rad.
 
-    Its axis is bent most at the knuckle and not at all at the tip, as a uniform torque along it would do it: at s of its
-    length it is turned by 2 s - s^2 of the whole angle. Sections stay plane.
+    Its axis is bent most at the knuckle and not at all at the tip, as by a uniform torque along it: at the fraction s
+    of its length it has rotated by 2 s - s^2 of the whole angle. Sections stay plane.
     """
     along, to_palm, aside = finger.frame
     angle = float(np.hypot(palmward, sideways))
@@ -56,9 +58,12 @@ def curled(points: np.ndarray, finger: Finger, palmward: float, sideways: float)
 
 
 def anchors_of(points: np.ndarray, gesture: str, surface: np.ndarray) -> Anchors:
-    """On each finger at each station, the vertices of the surface nearest to its palm side, its back and both flanks.
+    """Select the anchors of a gesture and compute their targets.
 
-    points: (n_v, 3) m, at rest. surface: (k,), the vertices that may be chosen.
+    On each finger at each station they are the vertices of the surface nearest to its palm side, its back and both
+    flanks.
+
+    points: (n_v, 3) m, in the reference configuration. surface: (k,), the vertices that may be chosen.
     """
     vertices, targets, fingers = [], [], []
     for number, finger in enumerate(FINGERS):

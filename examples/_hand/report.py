@@ -23,18 +23,18 @@ COLORS = {"linear": BLUE, "linear, the paper's faces": GREY, "quadratic": RED}
 
 
 def outcomes(entry: dict) -> Iterable[Outcome]:
-    """Of one gesture: every design on its own mesh, and what it does on the converged one."""
+    """Yield the outcomes of one gesture: every design on its own mesh, and on the converged one."""
     for name, design in entry["designs"].items():
         yield Outcome(
             f"{name}: as designed",
             design.body.solid,
-            design.miss,
+            design.rms_distance,
             design.iterations,
             design.seconds_per_iteration,
         )
         if name in entry["converged"]:
             there = entry["converged"][name]
-            yield Outcome("   on the converged mesh", there.body.solid, there.miss)
+            yield Outcome("   on the converged mesh", there.body.solid, there.rms_distance)
 
 
 def summary(result: dict) -> str:
@@ -45,10 +45,10 @@ def summary(result: dict) -> str:
     for gesture, entry in result.items():
         lines += ["", f"{gesture}: {1e3 * entry['way']:.1f} mm to go", table(outcomes(entry))]
         for name, design in entry["designs"].items():
-            lines.append(f"   {name + ':':28s} {by_finger(design.misses, design.anchors)}")
+            lines.append(f"   {name + ':':28s} {by_finger(design.distances, design.anchors)}")
         for name, there in entry["converged"].items():
-            lines.append(f"   {name + ', converged:':28s} {by_finger(there.misses, there.anchors)}")
-    lines += ["", *beside_the_paper(result)]
+            lines.append(f"   {name + ', converged:':28s} {by_finger(there.distances, there.anchors)}")
+    lines += ["", *paper_comparison(result)]
     return "\n".join(lines)
 
 
@@ -62,7 +62,7 @@ def by_finger(distances: np.ndarray, anchors: Anchors) -> str:
     return ", ".join(f"{finger.name} {1e3 * d:.2f}" for finger, d in zip(FINGERS, each, strict=True)) + " mm"
 
 
-def beside_the_paper(result: dict) -> list[str]:
+def paper_comparison(result: dict) -> list[str]:
     designs = [entry["designs"] for entry in result.values()]
     seconds = [each["linear"].seconds_per_iteration for each in designs]
     body, fine = designs[0]["linear"].body, designs[0]["linear, the paper's faces"].body
@@ -77,7 +77,7 @@ def beside_the_paper(result: dict) -> list[str]:
 
 
 def draw_convergence(axes, result: dict) -> None:
-    """The rms distance against iterations and seconds, a line a gesture and an element."""
+    """Draw the rms distance against iterations and seconds, one line for each gesture and element."""
     for style, (gesture, entry) in zip(("-", (0, (4, 1.5)), ":"), result.items(), strict=False):
         for name, design in entry["designs"].items():
             color = COLORS[name]
@@ -96,8 +96,11 @@ def draw_convergence(axes, result: dict) -> None:
 
 
 def draw_hands(result: dict, width: int = 2400):
-    """A row a gesture: the magnetization on the hand at rest; the linear design as found, and on the converged mesh; the
-    quadratic one there. Targets are rings, anchors dots; a line joins a pair."""
+    """Draw one row of pictures for each gesture.
+
+    Columns: the magnetization on the hand at rest; the linear design as found, and on the converged mesh; the quadratic
+    design on the converged mesh. Targets are rings, anchors dots; a line joins each pair.
+    """
     from matplotlib import pyplot as plt
 
     columns = (
@@ -124,7 +127,12 @@ def draw_hands(result: dict, width: int = 2400):
             _paint(axis, surface, at, width // 4, style=ms.Style(show_field=False))
             _mark(axis, state)
             axis.text(
-                0.02, 0.02, f"{1e3 * state.miss:.2f} mm", transform=axis.transAxes, fontsize=9, color=RED
+                0.02,
+                0.02,
+                f"{1e3 * state.rms_distance:.2f} mm",
+                transform=axis.transAxes,
+                fontsize=9,
+                color=RED,
             )
         row[0].set_ylabel(gesture, fontsize=11)
     for axis, title in zip(axes[0], columns, strict=True):
@@ -133,7 +141,7 @@ def draw_hands(result: dict, width: int = 2400):
 
 
 def projected(points: np.ndarray) -> np.ndarray:
-    """(n, 2) m, on the screen."""
+    """Return the projection of points onto the screen, (n, 2) m."""
     elevation, azimuth = np.radians(VIEW)
     right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
     up = np.array(
@@ -147,7 +155,7 @@ def projected(points: np.ndarray) -> np.ndarray:
 
 
 def _paint(axis, mesh: ms.TriangleMesh, positions: np.ndarray, width: int, **how) -> None:
-    """A picture of ms.plot within these axes, in metres of the screen."""
+    """Draw a picture of ms.plot within these axes, in metres of the screen."""
     picture = ms.plot(mesh, positions=positions, view=VIEW, width=width, color=None, **how)
     panel = picture.figure.axes[0]
     for image in panel.images:

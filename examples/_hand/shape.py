@@ -14,7 +14,7 @@ import magshell as ms
 
 @dataclass(frozen=True)
 class Finger:
-    """A tapered capsule from the knuckle to the center of the tip's half ball, m; it bends from `root` on."""
+    """A tapered capsule from the knuckle to the center of the half ball at the tip, m; it bends from `root` on."""
 
     name: str
     root: tuple[float, float, float]
@@ -25,12 +25,15 @@ class Finger:
 
     @property
     def length(self) -> float:
-        """From the knuckle to the end of the tip, m."""
+        """The length from the knuckle to the end of the tip, m."""
         return float(np.linalg.norm(np.subtract(self.tip, self.root))) + self.tip_radius
 
     @property
     def frame(self) -> np.ndarray:
-        """(3, 3), rows: along the finger, towards the palm, sideways (towards the thumb's side, +x, if it points up)."""
+        """The local axes as rows, (3, 3): along the finger, towards the palm, sideways.
+
+        Sideways is towards the thumb's side, +x, if the finger points up.
+        """
         along = np.subtract(self.tip, self.root)
         along = along / np.linalg.norm(along)
         palmward = self.palmward - np.dot(self.palmward, along) * along
@@ -62,7 +65,7 @@ FILLET = 8 * UNIT  # of those between thumb, palm and wrist
 
 
 def hand() -> ms.shapes.Shape:
-    """The wrist ends at z = 0."""
+    """Return the hand, whose wrist ends at z = 0."""
     knuckles = ms.shapes.capsule((-15 * UNIT, 0, 46 * UNIT), (15 * UNIT, 0, 49 * UNIT), 6.2 * UNIT)
     palm = ms.shapes.box((41 * UNIT, 13 * UNIT, 36 * UNIT), (0, 0, 32 * UNIT), rounding=6 * UNIT)
     ball_of_thumb = ms.shapes.capsule(

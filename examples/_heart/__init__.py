@@ -1,1 +1,1 @@
-"""What examples/beating_heart.py is made of: the shape, the task, the design, the beating, pictures."""
+"""The parts of examples/beating_heart.py: the shape, the task, the design, the beating, pictures."""

@@ -1,4 +1,4 @@
-"""The heart in a field that switches to and fro."""
+"""The motion of the heart in a field that switches between two directions."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ VISCOSITY = 5e-3  # s: stress a rate of strain, over the modulus
 
 
 def field_at(time: float) -> np.ndarray:
-    """(3,) T: contracting at first and expanding then, with straight lines between."""
+    """Return the field at a time [s], (3,) T: contracting first, expanding then, with linear transitions."""
     into = time % PERIOD
     ends = [0.0, SWITCHING, CONTRACTING, CONTRACTING + 2 * SWITCHING, PERIOD - SWITCHING, PERIOD]
     shares = [0.0, 1.0, 1.0, -EXPANDING, -EXPANDING, 0.0]
@@ -31,7 +31,7 @@ def field_at(time: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Beating:
-    """motion; volumes: (n,) m3, of the chamber; at_rest: m3, without a field."""
+    """The motion of a beating heart. volumes: of the chamber, (n,) m3; at_rest: its volume without a field, m3."""
 
     motion: ms.Trajectory
     volumes: np.ndarray
@@ -39,7 +39,7 @@ class Beating:
 
     @property
     def stroke(self) -> float:
-        """What a beat moves, over the volume without a field; of the last beat."""
+        """The volume displaced in the last beat, over the volume without a field."""
         last = self.volumes[self.motion.times >= self.motion.times[-1] - PERIOD]
         return float(np.ptp(last)) / self.at_rest
 

@@ -11,34 +11,35 @@ import magshell as ms
 
 from .task import FLUX_DENSITY, LARGEST_MAGNETIZATION, Task
 
-FARTHEST = 3.0  # of a design's numbers: three of them take |M_r| to 0.95 of the limit and more
-# Beside the mean square distance over that at rest, a price on jumps from face to face, per length of edge: on a finer
-# mesh faces magnetized by turns would crumple the wall below them.
+FARTHEST = 3.0  # bound of the design variables: |M_r| then reaches at least 0.95 of the limit
+# Weight of the penalty on jumps of magnetization between faces, per length of edge; the error is normalized by that of the
+# reference shape. Without it, faces magnetized in alternating directions would crumple the wall on a finer mesh.
 ROUGHNESS_PRICE = 0.04
 SMOOTHING = 0.1  # of the limit: jumps far below it count by their squares
 
 
 @dataclass(frozen=True)
 class Design:
-    """remanent_magnetization: (k, 3) A/m, a row for each of `task.solid.skin`. rest: contracted by the field.
+    """The result of a search.
 
-    misses: m, at every iteration; seconds: of an iteration.
+    remanent_magnetization: (k, 3) A/m, a row for each of `task.solid.skin`. rest: the equilibrium contracted by the
+    field. errors: rms distances from the target at every iteration, m; seconds: of an iteration.
     """
 
     task: Task
     remanent_magnetization: np.ndarray
     rest: ms.Equilibrium
-    misses: np.ndarray
+    errors: np.ndarray
     iterations: int
     seconds: float
 
     @property
-    def miss(self) -> float:
-        return self.task.miss(self.rest.positions)
+    def rms_error(self) -> float:
+        return self.task.rms_error(self.rest.positions)
 
 
 class Search:
-    """The objective of a skin's magnetization, and the equilibria from design to design."""
+    """The objective of a skin's magnetization, with equilibria warm-started from design to design."""
 
     def __init__(self, task: Task):
         self.task = task
@@ -46,7 +47,10 @@ class Search:
         self._edge_faces, self._edge_lengths = _edges_within(task)
 
     def equilibrium(self, numbers: torch.Tensor) -> ms.Equilibrium:
-        """numbers: (n_designed, 3), of which each face's magnetization is made."""
+        """Find the equilibrium of a design.
+
+        numbers: (n_designed, 3), the design variables of each face's magnetization.
+        """
         of_skin = self.task.of_skin(LARGEST_MAGNETIZATION * capped(numbers))
         return self._at_rest(
             applied_flux_density=FLUX_DENSITY,
@@ -54,8 +58,8 @@ class Search:
         )
 
     def objective(self, numbers: torch.Tensor) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
-        """The mean square distance over that at rest, and the price on jumps."""
-        square = self.task.square(self.equilibrium(numbers).positions) / self.task.way**2
+        """Compute the mean square distance over that of the reference shape, plus the penalty on jumps."""
+        square = self.task.square(self.equilibrium(numbers).positions) / self.task.target_distance**2
         jumps = ms.objectives.total_variation(
             capped(numbers), self._edge_faces, self._edge_lengths, SMOOTHING
         )
@@ -70,14 +74,14 @@ class Search:
             self.task,
             self.task.of_skin(LARGEST_MAGNETIZATION * capped(numbers).numpy()),
             rest,
-            self.task.way * np.sqrt([record.terms["square"] for record in history]),
+            self.task.target_distance * np.sqrt([record.terms["square"] for record in history]),
             last.iteration,
             (last.seconds - history[0].seconds) / max(1, last.iteration),
         )
 
 
 def designed(task: Task, iterations: int, progress: bool = False) -> Design:
-    """The best of so many iterations of L-BFGS, from a skin without magnetization."""
+    """Search for the magnetization by L-BFGS from zero, and return the best design."""
     search = Search(task)
     numbers = torch.zeros(task.n_designed, 3, dtype=torch.float64, requires_grad=True)
     optimizer = ms.optim.LBFGS([numbers], lower=-FARTHEST, upper=FARTHEST)
@@ -86,12 +90,12 @@ def designed(task: Task, iterations: int, progress: bool = False) -> Design:
 
 
 def capped(numbers: torch.Tensor) -> torch.Tensor:
-    """(n, 3), each shorter than 1."""
+    """Map the variables to vectors shorter than 1, (n, 3)."""
     return ms.parametrize.softly_limited(numbers, 1.0)
 
 
 def _edges_within(task: Task) -> tuple[torch.Tensor, torch.Tensor]:
-    """The edges between faces that are designed: (n, 2) their numbers among those, and lengths (n,) m."""
+    """Return the edges between designed faces: (n, 2) their indices among those, and lengths (n,) m."""
     surface, area = task.heart.mesh.surface, getattr(task.heart, task.area)
     numbers = np.full(surface.n_faces, -1)
     numbers[area] = np.arange(len(area))

@@ -1,4 +1,4 @@
-"""[Chen22] Table 1, Heart (top) and (bottom)."""
+"""The figures of [Chen22] Table 1, Heart (top) and (bottom)."""
 
 FACES, TETRAHEDRA = 1326, 1963
 VARIABLES = (1400, 500)

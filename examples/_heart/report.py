@@ -21,17 +21,17 @@ ARROWS = 150
 
 
 def draw_search(axes, result: dict) -> None:
-    """How far the surface is from its target, at every iteration of each search."""
+    """Draw the rms distance of the surface from its target at every iteration of each search."""
     for area, found in result["hearts"].items():
         for design, style in ((found["linear"], "--"), (found["quadratic"], "-")):
             label = f"{NAMES[area]}, {design.task.element} elements"
-            axes.plot(1e3 * design.misses, style, color=COLORS[area], label=label)
+            axes.plot(1e3 * design.errors, style, color=COLORS[area], label=label)
     axes.set(xlabel="iteration", ylabel="rms distance from the target [mm]", ylim=(0, None))
     axes.legend(frameon=False, fontsize=8)
 
 
 def draw_volumes(axes, field_axes, result: dict) -> None:
-    """The chamber's volume over time, above the field."""
+    """Draw the chamber's volume over time, above the field."""
     for area, found in result["hearts"].items():
         beats: Beating = found["beating"]
         axes.plot(
@@ -47,12 +47,12 @@ def draw_volumes(axes, field_axes, result: dict) -> None:
 
 
 def states_of(beats: Beating) -> dict[str, int]:
-    """Which states of the motion are shown."""
+    """Return the frames of the motion that are shown, by name."""
     return {"at rest": 0, "contracted": int(beats.volumes.argmin()), "expanded": int(beats.volumes.argmax())}
 
 
 def picture(found: dict, area: str) -> ms.Picture:
-    """As a row of [Chen22] Fig. 16: at rest, contracted, expanded; coloured where it is magnetized."""
+    """Draw the heart at rest, contracted and expanded, coloured by its magnetization: a row of [Chen22] Fig. 16."""
     beats = found["beating"]
     states = states_of(beats)
     return ms.plot(
@@ -78,7 +78,7 @@ def movie(found: dict, area: str, path: Path, **options) -> Path:
 
 
 def _colors(design: Design) -> dict:
-    """How strongly each face is magnetized, kA/m."""
+    """Return the plot options that colour each face by its magnetization, kA/m."""
     mesh, skin = design.task.solid.mesh, design.task.solid.skin
     strength = np.zeros(mesh.n_faces)
     strength[skin.faces] = 1e-3 * np.linalg.norm(design.remanent_magnetization, axis=1)
@@ -103,7 +103,7 @@ def _of_area(area: str, found: dict) -> str:
     shares = 100 * beats.volumes / beats.at_rest
     seconds = beats.motion.wall_time / beats.motion.steps_done
     return (
-        f"{NAMES[area]}: the surface is to go {1e3 * design.task.way:.3f} mm (rms)\n{table(found['outcomes'])}\n"
+        f"{NAMES[area]}: the surface is to go {1e3 * design.task.target_distance:.3f} mm (rms)\n{table(found['outcomes'])}\n"
         f"  the contracted chamber, in this order: {volumes} % of its volume at rest\n"
         f"  beating: {shares.min():.1f} to {shares.max():.1f} %, a stroke of {100 * beats.stroke:.1f} %; "
         f"{seconds:.2f} s a step"

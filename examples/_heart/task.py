@@ -23,7 +23,9 @@ BASE, WAIST = 36.0, 0.0  # units: held above the base; the contraction grows fro
 
 
 def contracted(points: np.ndarray) -> np.ndarray:
-    """(n, 3) m: where points at rest are in the most contracted shape: flatter from front to back, longer below."""
+    """Return the positions of points (n, 3) m in the most contracted shape: flatter from front to back, longer
+    below.
+    """
     x, y, z = np.moveaxis(points / UNIT, -1, 0)
     share = np.clip((BASE - z) / (BASE - WAIST), 0, 1)
     share = share**2 * (3 - 2 * share)
@@ -35,7 +37,7 @@ def contracted(points: np.ndarray) -> np.ndarray:
 class Task:
     """A heart in a field from front to back, held above its base, with atria and vessel.
 
-    area: "lower_half" or "ribbon", where it has a skin.
+    area: "lower_half" or "ribbon", the part that has a magnetic skin.
     """
 
     heart: Heart
@@ -63,11 +65,14 @@ class Task:
 
     @property
     def n_designed(self) -> int:
-        """Faces with a magnetization of their own: those of the tetrahedra, whatever their nodes."""
+        """The number of faces with a magnetization of their own: those of the tetrahedra, whatever their order."""
         return len(getattr(self.heart, self.area))
 
     def of_skin(self, magnetization):
-        """(k, 3) for `solid.skin` from (n_designed, 3) A/m: four flat triangles a face of ten-node tetrahedra."""
+        """Return the magnetization (k, 3) for `solid.skin` from that of the designed faces, (n_designed, 3) A/m.
+
+        A face of a ten-node tetrahedron has four flat triangles.
+        """
         repeats = len(self.solid.skin.faces) // self.n_designed
         if isinstance(magnetization, torch.Tensor):
             return magnetization.repeat_interleave(repeats, dim=0)
@@ -75,31 +80,36 @@ class Task:
 
     @cached_property
     def _weights(self) -> np.ndarray:
-        """(n_v,), 1: each vertex's share of the surface. They make distances of all meshes comparable."""
+        """The fraction of the surface that belongs to each vertex, (n_v,); it makes distances on all meshes
+        comparable.
+        """
         mesh, weights = self.solid.mesh, np.zeros(self.solid.mesh.n_vertices)
         np.add.at(weights, mesh.faces, mesh.face_areas[:, None] / 3)
         return weights / weights.sum()
 
     @cached_property
     def target(self) -> np.ndarray:
-        """(n_v, 3) m."""
+        """The target positions of the vertices, (n_v, 3) m."""
         return contracted(self.solid.mesh.rest_positions)
 
     @cached_property
-    def way(self) -> float:
-        """m: the root mean square distance that the surface is to go."""
-        return self.miss(self.solid.mesh.rest_positions)
+    def target_distance(self) -> float:
+        """The root mean square distance of the reference surface from the target, m."""
+        return self.rms_error(self.solid.mesh.rest_positions)
 
     def square(self, positions: torch.Tensor) -> torch.Tensor:
-        """m2: the mean over the surface of the square of its distance from the target."""
+        """Compute the mean over the surface of the squared distance from the target, m2."""
         return ms.objectives.shape_matching(positions, torch.from_numpy(self.target), weights=self._weights)
 
-    def miss(self, positions) -> float:
-        """m: root mean square distance of the surface from the target."""
+    def rms_error(self, positions) -> float:
+        """Compute the root mean square distance of the surface from the target, m."""
         return float(self.square(as_tensor(positions))) ** 0.5
 
     def at_rest(self, of_skin: np.ndarray, flux_density=FLUX_DENSITY) -> ms.Equilibrium:
-        """With the field turned on over the heart at rest. of_skin: (k, 3) A/m; flux_density: (3,) T."""
+        """Find the equilibrium with the field turned on, from the reference shape.
+
+        of_skin: (k, 3) A/m; flux_density: (3,) T.
+        """
         return ms.equilibrium(
             self.scene,
             applied_flux_density=flux_density,

@@ -1,1 +1,1 @@
-"""What examples/hexagram.py is made of: the sheet and its wanted shape, the design problem, the report."""
+"""The parts of examples/hexagram.py: the sheet and its target shape, the design problem, the report."""

@@ -1,4 +1,4 @@
-"""The design problem: the sheet in its field, the magnetizations to choose from, and what is wanted."""
+"""The design problem: the sheet in its field, the admissible magnetizations, and the targets."""
 
 from __future__ import annotations
 
@@ -24,8 +24,11 @@ FIELDS = np.array([(0.0, 0.0, FLUX_DENSITY), (0.0, 0.0, -FLUX_DENSITY)])  # T, t
 
 @dataclass(frozen=True)
 class Design:
-    """The scene; targets (2, n_v, 3) m; shares of the mass (n_v,); frames (n_f, 3, 3) of arm axis, root and
-    normal; and the brush, an averaging matrix (n_f, n_f)."""
+    """The design problem of the hexagram.
+
+    scene; targets (2, n_v, 3) m, one for each load case; mass_shares (n_v,), the fraction of the mass at each vertex;
+    frames (n_f, 3, 3) of arm axis, root and normal; brush, an averaging matrix (n_f, n_f).
+    """
 
     scene: ms.Scene
     targets: torch.Tensor
@@ -38,31 +41,33 @@ class Design:
         return self.scene.mesh
 
     def remanent_magnetization(self, variables: torch.Tensor) -> torch.Tensor:
-        """(n_f, 3) A/m, below the cap, of variables (n_f, 3): outwards along the arm, along its root, up.
+        """Return the magnetization (n_f, 3) [A/m], below the limit, of variables (n_f, 3): outwards along the arm,
+        along its root, up.
 
-        MMA treats every variable by itself, so what it does depends on the axes: in these the six arms are
-        alike. The brush, a cone filter (Bourdin 2001), leaves no features finer than itself.
+        MMA treats every variable by itself, so its result depends on the axes: in these the six arms are equivalent.
+        The brush, a cone filter (Bourdin 2001), removes features finer than its radius.
         """
         vectors = torch.einsum("fk,fki->fi", variables, self.frames)
         return CAP * ms.parametrize.softly_limited(self.brush @ vectors, 1.0)
 
-    def misses(self, positions: torch.Tensor, weights: torch.Tensor | None = None) -> torch.Tensor:
-        """Weighted sum of |x - x*|^2 over the vertices and both load cases, m2. positions: (2, n_v, 3)."""
+    def squared_distance(self, positions: torch.Tensor, weights: torch.Tensor | None = None) -> torch.Tensor:
+        """Compute the weighted sum of |x - x*|^2 over the vertices and both load cases, m2. positions: (2, n_v, 3)."""
         cases = zip(positions, self.targets, strict=True)
         return sum(ms.objectives.shape_matching(x, target, weights=weights) for x, target in cases)
 
     def objective(self, rest: ms.EquilibriumSet) -> torch.Tensor:
-        """Mean square distance from the targets, by mass, in squares of the arm length; both cases' sum."""
-        return self.misses(rest.positions, self.mass_shares) / ARM_LENGTH**2
+        """Compute the mass-weighted mean square distance from the targets over the squared arm length, summed over
+        both cases.
+        """
+        return self.squared_distance(rest.positions, self.mass_shares) / ARM_LENGTH**2
 
 
 def design(edges_per_side: int, n_vertices: int) -> Design:
-    """The sheet without gravity, held as far as a free body has to be, and no further.
+    """Build the problem: the sheet without gravity, with its six rigid motions removed and nothing else.
 
     The center cannot move sideways, a corner of the hexagon cannot move round it, and every second corner
-    keeps its height: six conditions for six rigid motions. The reactions are those that balance the field's
-    torque on the whole sheet. Heights stay zero under a reflection of z, so the supports do not tell up from
-    down.
+    keeps its height: six conditions for six rigid motions. The reactions balance the field's torque on the whole sheet.
+    The supported heights are zero, so that the supports are symmetric under a reflection of z.
     """
     mesh = hexagram(edges_per_side, n_vertices)
     sheet = ms.Shell(
@@ -85,7 +90,7 @@ def design(edges_per_side: int, n_vertices: int) -> Design:
 
 
 def from_beam_theory(mesh: ms.TriangleMesh) -> torch.Tensor:
-    """Variables (n_f, 3) whose magnetization would roll the arms if they were beams on a rigid hexagon.
+    """Return variables (n_f, 3) whose magnetization would roll the arms if they were beams on a rigid hexagon.
 
     An arm of width w(s), magnetized by M inwards along its axis and rolled to the curvature k, is in
     equilibrium in a vertical field B if D k w' = - M h B cos(k s) w. The stiffness D is a plate's, for a
@@ -93,8 +98,8 @@ def from_beam_theory(mesh: ms.TriangleMesh) -> torch.Tensor:
 
         M(s) = Y h^2 k / (12 (1 - nu^2) B (l - s) cos(k s)).
 
-    That is infinite at the tip, also because no torque turns a tip any more that points along the field: it
-    is cut off below the cap. The hexagon gets none.
+    That is infinite at the tip, also because there is no torque on a tip that points along the field: it
+    is cut off below the limit. The hexagon has no magnetization.
     """
     _, s = arm_coordinates(mesh.face_barycenters)
     curvature = ROLL / ARM_LENGTH
@@ -116,7 +121,9 @@ def _frames(mesh: ms.TriangleMesh) -> np.ndarray:
 
 
 def _brush(mesh: ms.TriangleMesh) -> torch.Tensor:
-    """Means over the faces around each, weighted by areas and by a cone that is zero at the radius."""
+    """Return the matrix that averages over the faces around each, weighted by areas and by a cone that is zero at
+    the radius.
+    """
     centers = cKDTree(mesh.face_barycenters)
     near = centers.sparse_distance_matrix(centers, BRUSH, output_type="coo_matrix")
     weights = (1.0 - near.data / BRUSH) * mesh.face_areas[near.col]

@@ -12,7 +12,7 @@ COLORS = {"from beam theory": BLUE, "from none": RED}
 
 
 def draw_objective(axes, runs: dict, against: str) -> None:
-    """The objective of every run, in squares of the arm length, against "iteration" or "seconds"."""
+    """Draw the objective of every run, in squares of the arm length, against "iteration" or "seconds"."""
     for name, run in runs.items():
         across = [getattr(record, against) for record in run["history"]]
         axes.semilogy(
@@ -23,7 +23,7 @@ def draw_objective(axes, runs: dict, against: str) -> None:
 
 
 def draw_profile(axes, result: dict) -> None:
-    """Every face's magnetization along its arm, against the distance from the root, beside beam theory's."""
+    """Draw every face's magnetization along its arm against the distance from the root, with that of beam theory."""
     star = result["design"]
     _, s = arm_coordinates(star.mesh.face_barycenters)
     along = 1e-3 * np.einsum("fi,fi->f", result["magnetization"], star.frames[:, 0].numpy())

@@ -1,1 +1,1 @@
-"""What examples/humanoid.py is made of: the body, its four kinds of skeleton, measures, pictures."""
+"""The parts of examples/humanoid.py: the body, its four kinds of skeleton, measures, pictures."""

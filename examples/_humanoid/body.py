@@ -37,7 +37,10 @@ def shape() -> ms.shapes.Shape:
 
 @dataclass(frozen=True)
 class Body:
-    """mesh: four nodes a tetrahedron, feet at z = 0."""
+    """The tetrahedral mesh of the figure, with its bones.
+
+    mesh: four nodes a tetrahedron, feet at z = 0.
+    """
 
     mesh: ms.TetMesh
 
@@ -47,7 +50,7 @@ class Body:
 
     @cached_property
     def distances(self) -> np.ndarray:
-        """(5, n_v) m, of every vertex from each bone's segment."""
+        """The distances of every vertex from each bone's segment, (5, n_v) m."""
         points = self.mesh.rest_positions
         found = []
         for start, end, _ in SEGMENTS.values():
@@ -57,8 +60,8 @@ class Body:
         return np.array(found)
 
     @cached_property
-    def bones(self) -> dict[str, np.ndarray]:
-        """{bone: its vertices}."""
+    def link_vertices(self) -> dict[str, np.ndarray]:
+        """The vertices of each bone, by its name."""
         return {
             name: np.flatnonzero(distance < near)
             for (name, (_, _, near)), distance in zip(SEGMENTS.items(), self.distances, strict=True)
@@ -66,16 +69,16 @@ class Body:
 
     @cached_property
     def nearest(self) -> dict[str, np.ndarray]:
-        """{bone: the vertices that it is the nearest to}: all of the body."""
+        """The vertices nearest to each bone, by its name; together they are all vertices of the body."""
         closest = self.distances.argmin(axis=0)
         return {name: np.flatnonzero(closest == k) for k, name in enumerate(SEGMENTS)}
 
     @cached_property
     def ends(self) -> dict[str, np.ndarray]:
-        """{bone: two vertices of it, (2,), farthest apart}."""
+        """The two vertices of each bone that are farthest apart, (2,), by its name."""
         points = self.mesh.rest_positions
         found = {}
-        for name, vertices in self.bones.items():
+        for name, vertices in self.link_vertices.items():
             between = points[vertices][:, None] - points[vertices][None]
             a, b = np.unravel_index((between**2).sum(axis=-1).argmax(), (len(vertices),) * 2)
             found[name] = vertices[[a, b]]

@@ -1,4 +1,4 @@
-"""The figure falls on its feet, and lifts its arms."""
+"""The fall of the figure on its feet, while its arms are lifted."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ HEIGHT = 0.25  # m, above the ground, of the mean start
 
 @dataclass(frozen=True)
 class Start:
-    """height: m, of the soles; velocity: (3,) m/s."""
+    """The start of a fall. height: of the soles, m; velocity: (3,) m/s."""
 
     height: float
     velocity: np.ndarray
 
     @property
-    def landing(self) -> float:
-        """s, when the soles reach the ground."""
+    def impact_time(self) -> float:
+        """The time at which the soles reach the ground, s."""
         down = -self.velocity[2]
         return float((np.sqrt(down**2 + 2 * 9.81 * self.height) - down) / 9.81)
 
@@ -51,7 +51,7 @@ class Figure:
         self.joints: tuple[ms.Revolute, ...] = ()
         bodies: list = [self.flesh]
         if kind != "no skeleton":
-            vertices = body.nearest if kind == "rigid" else body.bones
+            vertices = body.nearest if kind == "rigid" else body.link_vertices
             self.links = {name: ms.Link(each, body=self.flesh) for name, each in vertices.items()}
             self.joints = tuple(self._joints())
             bodies.append(ms.Skeleton(list(self.links.values()), self.joints))
@@ -60,7 +60,7 @@ class Figure:
         self.scene = ms.Scene(bodies, gravity=(0, 0, -9.81), contacts=[touch], allow_rigid_motions=True)
 
     def _joints(self):
-        """Turning up is positive of the arms, outwards of the legs."""
+        """Yield the joints: rotation upwards is positive for the arms, outwards for the legs."""
         driven = {}
         if self.kind == "driven":
             driven = {"target_angle": RAISED, "servo_stiffness": GAIN, "torque_limit": TORQUES[0]}
@@ -75,11 +75,14 @@ class Figure:
                 )
 
     def limits(self, start: Start, steps: int = STEPS) -> np.ndarray:
-        """(steps,) N m, of a shoulder's torque: less in the air."""
-        return np.where(TIME_STEP * np.arange(steps) >= start.landing, *TORQUES[::-1])
+        """Return the torque limit of a shoulder in every step, (steps,) N m: smaller in the air."""
+        return np.where(TIME_STEP * np.arange(steps) >= start.impact_time, *TORQUES[::-1])
 
     def fall(self, start: Start, steps: int = STEPS, limits=None) -> ms.Trajectory:
-        """limits: two of (steps,) N m, of the shoulders; by default as `limits` has them."""
+        """Simulate the fall from a start.
+
+        limits: torque limits of the two shoulders, (steps,) N m each; by default those of `limits`.
+        """
         values = {}
         if self.kind == "driven":
             both = [self.limits(start, steps)] * 2 if limits is None else limits
@@ -101,9 +104,11 @@ class Figure:
 
 @dataclass(frozen=True)
 class Fall:
-    """Of one start, at its end. bone_error: the largest change of a bone's length, body_error: that of the distance from
-    soles to crown, both over what it is at rest; joint_error: rad, summed over four joints, from the Y pose.
-    milliseconds: of the processor, a step.
+    """The errors of one fall at its end.
+
+    bone_error: the largest change of a bone's length; body_error: that of the distance from soles to crown; both over
+    the values at rest. joint_error: rad, summed over four joints, from the Y pose. milliseconds: processor time of a
+    step.
     """
 
     kind: str
@@ -133,7 +138,9 @@ def fallen(figure: Figure, start: Start, steps: int = STEPS) -> Fall:
 
 
 def angles(body: Body, positions: np.ndarray) -> np.ndarray:
-    """(4,) rad, of shoulders and hips, as the bones' vertices stand: of any kind, with joints or without."""
+    """Return the angles of shoulders and hips from the positions of the bones' vertices, (4,) rad, with or without
+    joints.
+    """
     torso = _turned(body, positions, "torso")
     found = []
     for limb in ("arm", "leg"):
@@ -143,9 +150,9 @@ def angles(body: Body, positions: np.ndarray) -> np.ndarray:
     return np.array(found)
 
 
-def _turned(body: Body, positions: np.ndarray, bone: str) -> np.ndarray:
-    """The rotation (3, 3) that takes a bone at rest nearest to where it is."""
-    vertices = body.bones[bone]
+def _turned(body: Body, positions: np.ndarray, name: str) -> np.ndarray:
+    """Return the rotation (3, 3) that takes a bone from its reference positions closest to its present ones."""
+    vertices = body.link_vertices[name]
     rest, now = (x[vertices] - x[vertices].mean(axis=0) for x in (body.mesh.rest_positions, positions))
     u, _, v = np.linalg.svd(now.T @ rest)
     return u @ np.diag((1, 1, np.linalg.det(u @ v))) @ v
@@ -156,8 +163,11 @@ def _length(positions: np.ndarray, ends: np.ndarray) -> float:
 
 
 def slope_error(figure: Figure, start: Start, steps: int = STEPS, step: float = 1e-2) -> float:
-    """Of the mean height of both hands at the end by the torque limits of every step: the slope along the gradient
-    against central differences. step: N m."""
+    """Return the relative error of a directional derivative against central differences.
+
+    It is the derivative of the mean height of both hands at the end, along the gradient by the torque limits of every
+    step. step: of the differences, N m.
+    """
     import torch
 
     points = figure.body.mesh.rest_positions

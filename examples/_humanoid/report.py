@@ -22,7 +22,7 @@ VIEW = (10, -80)
 
 
 def table(falls: dict[str, list[Fall]]) -> dict[str, dict[str, tuple[float, float]]]:
-    """{kind: {measure: (mean, standard deviation)}} over the starts."""
+    """Return the means and standard deviations over the starts, {kind: {measure: (mean, standard deviation)}}."""
     return {
         kind: {
             name: (float(np.mean(values)), float(np.std(values)))
@@ -51,7 +51,7 @@ def summary(result: dict) -> str:
 
 
 def draw_angles(axes, result: dict) -> None:
-    """Of the right shoulder over time, every start."""
+    """Draw the angle of the right shoulder over time for every start."""
     body = result["body"]
     for kind, rows in result["falls"].items():
         for k, each in enumerate(rows):
@@ -64,7 +64,7 @@ def draw_angles(axes, result: dict) -> None:
 
 
 def draw_errors(axes, result: dict) -> None:
-    """Of joint angles, by kind."""
+    """Draw the errors of the joint angles by kind of skeleton."""
     rows = table(result["falls"])
     for k, kind in enumerate(rows):
         mean, spread = rows[kind]["joint_error"]

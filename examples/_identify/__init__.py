@@ -1,1 +1,1 @@
-"""What examples/identify.py is made of: the sheet and its measurement, the inverse problem, the report."""
+"""The parts of examples/identify.py: the sheet and its measurement, the inverse problem, the report."""

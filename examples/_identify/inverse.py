@@ -1,4 +1,4 @@
-"""From measured positions to Young's modulus and magnetization, as far as the noise allows."""
+"""The inverse problem: Young's modulus and magnetization from measured positions, as far as the noise allows."""
 
 from __future__ import annotations
 
@@ -18,8 +18,11 @@ ROUGH = ms.MixedNewton(tolerance=1e-5)  # one iteration from an equilibrium near
 
 
 class Problem:
-    """The unknowns p: log10 of Young's modulus at nodes 5 mm apart, bilinear between them, and three components of
-    the magnetization of each strip."""
+    """The inverse problem for measured positions.
+
+    The unknowns p are log10 of Young's modulus at nodes 5 mm apart, bilinear between them, and three components of the
+    magnetization of each strip.
+    """
 
     def __init__(self, sheet: Sheet, positions: np.ndarray, noise: float, nodes: tuple[int, int]):
         self.sheet, self.noise, self.nodes = sheet, noise, nodes
@@ -33,16 +36,16 @@ class Problem:
         return torch.cat([decades, torch.zeros(3 * self.sheet.n_regions, dtype=torch.float64)])
 
     def decades(self, p: torch.Tensor) -> torch.Tensor:
-        """(n_f,) log10 of Young's modulus in Pa."""
+        """Return log10 of Young's modulus in Pa, (n_f,)."""
         image = p[: self.n_nodes].reshape(self.nodes[1], self.nodes[0])
         return ms.objectives.bilinear(image, self._barycenters, (0.0, LENGTH, 0.0, WIDTH))
 
     def magnetization(self, p: torch.Tensor) -> torch.Tensor:
-        """(n_regions, 3) A/m."""
+        """Return the magnetization of each region, (n_regions, 3) A/m."""
         return UNIT * p[self.n_nodes :].reshape(-1, 3)
 
     def design(self, p: torch.Tensor) -> dict:
-        """What ms.equilibrium needs."""
+        """Return the keyword arguments of ms.equilibrium for the unknowns p."""
         return {
             "young_modulus": 10 ** self.decades(p),
             "remanent_magnetization": ms.parametrize.from_regions(self.magnetization(p), self.sheet.regions),
@@ -50,17 +53,17 @@ class Problem:
         }
 
     def misfit(self, p: torch.Tensor) -> torch.Tensor:
-        """Mean square of (model - data) / noise: 1 where the noise alone would put it."""
+        """Compute the mean square of (model - data) / noise; its expected value is 1 for the true parameters."""
         return (((self._warm(**self.design(p)).positions - self.positions) / self.noise) ** 2).mean()
 
     def variation(self, p: torch.Tensor) -> torch.Tensor:
-        """Total variation of log10 Y, in decades over the width of the sheet."""
+        """Compute the total variation of log10 Y, in decades over the width of the sheet."""
         mesh = self.sheet.mesh
         jumps = ms.objectives.total_variation(self.decades(p), mesh.edge_faces, mesh.edge_lengths, SMOOTHING)
         return jumps / WIDTH
 
     def sensitivity(self, p: torch.Tensor) -> np.ndarray:
-        """d((model - data) / noise) / dp by differences, a column a parameter."""
+        """Compute d((model - data) / noise) / dp by differences, one column for each parameter."""
         base = ms.equilibrium(self.sheet.scene, **self.design(p))
         columns = []
         for k in range(len(p)):
@@ -73,14 +76,14 @@ class Problem:
 
 
 def whitened(sensitivity: np.ndarray, floor: float = FLOOR) -> torch.Tensor:
-    """T such that the misfit is about as steep along every u in p = p0 + T u."""
+    """Return T such that the misfit has about the same curvature along every u in p = p0 + T u."""
     curvature = sensitivity.T @ sensitivity / len(sensitivity)
     values, vectors = np.linalg.eigh(curvature + floor * np.eye(len(curvature)))
     return torch.from_numpy(vectors / np.sqrt(values))
 
 
 def optimized(problem: Problem, p: torch.Tensor, price: float, optimizer, iterations: int) -> dict:
-    """The least misfit + price x variation from p on."""
+    """Minimize misfit + price x variation, starting from p."""
     basis = whitened(problem.sensitivity(p))
     u = torch.zeros(len(p), dtype=torch.float64, requires_grad=True)
 

@@ -1,4 +1,4 @@
-"""What positions cannot tell, however well they are measured."""
+"""The limits of identification: parameters that positions cannot determine, however well they are measured."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ from .model import FIELDS, NOISE, sheet, true_magnetization
 
 
 def scaled_together(cells, factor: float = 2.0) -> dict:
-    """How far vertices move [m] when modulus and magnetization are both multiplied, without weight and with it."""
+    """Return how far vertices move [m] when modulus and magnetization are both multiplied, without weight and with
+    it.
+    """
     moved = {}
     for name, weight in (("weightless", False), ("with weight", True)):
         whole = sheet(cells, weight=weight)
@@ -31,8 +33,10 @@ def scaled_together(cells, factor: float = 2.0) -> dict:
 
 
 def deviations(problem: Problem, p: torch.Tensor) -> dict:
-    """Standard deviations that the noise leaves, to first order and with nothing known beforehand: of log10 Y at each
-    node, of the magnetization [A/m], and of a factor common to Y and M."""
+    """Return the standard deviations that the noise leaves, to first order and without a prior.
+
+    They are those of log10 Y at each node, of the magnetization [A/m], and of a factor common to Y and M.
+    """
     sensitivity = problem.sensitivity(p)
     variances = np.diag(np.linalg.inv(sensitivity.T @ sensitivity))
     common = torch.cat([torch.ones(problem.n_nodes), np.log(10) * p[problem.n_nodes :]]).numpy()
@@ -44,8 +48,9 @@ def deviations(problem: Problem, p: torch.Tensor) -> dict:
 
 
 def of_finer_magnetizations(cells, divisions=((5, 1), (10, 1), (5, 3))) -> list[dict]:
-    """The largest standard deviation [A/m] of a component of M where the sheet is divided into more regions, Young's
-    modulus being known."""
+    """Return the largest standard deviation [A/m] of a component of M for finer divisions into regions, Y being
+    known.
+    """
     rows = []
     for strips in divisions:
         whole = sheet(cells, strips=strips)

@@ -1,4 +1,4 @@
-"""The sheet, what it truly is made of, and what is measured of it."""
+"""The sheet, its true properties, and the measurement of its shapes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ INCLUSION, EDGE = ((18e-3, 16e-3), 8e-3), 1.5e-3  # its center and radius, and h
 
 
 def true_young_modulus(points: np.ndarray) -> np.ndarray:
-    """(n,) Pa, at points (n, 3): 1 to 2.5 MPa, smooth, and a stiff inclusion of 10 MPa."""
+    """Return Young's modulus at points (n, 3) m, (n,) Pa: 1 to 2.5 MPa, smooth, and a stiff inclusion of 10 MPa."""
     x, y = points[:, 0] / LENGTH, points[:, 1] / WIDTH
     wave = 0.5 + 0.5 * np.cos(2 * np.pi * (x - 0.3 * y)) * np.cos(np.pi * y)
     center, radius = INCLUSION
@@ -30,7 +30,7 @@ def true_young_modulus(points: np.ndarray) -> np.ndarray:
 
 
 def true_magnetization() -> np.ndarray:
-    """(n_regions, 3) A/m: 35 to 45 kA/m, in directions that have nothing to do with each other."""
+    """Return the magnetization of each region, (n_regions, 3) A/m: 35 to 45 kA/m in independent random directions."""
     rng = np.random.default_rng(11)
     directions = rng.standard_normal((STRIPS[0] * STRIPS[1], 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
@@ -39,7 +39,7 @@ def true_magnetization() -> np.ndarray:
 
 @dataclass(frozen=True)
 class Sheet:
-    """regions: (n_f,) the region of each face."""
+    """The sheet and its regions. regions: the region of each face, (n_f,)."""
 
     scene: ms.Scene
     regions: np.ndarray
@@ -54,7 +54,7 @@ class Sheet:
 
 
 def sheet(cells, diagonals: str = "alternating", weight: bool = True, strips=STRIPS) -> Sheet:
-    """Clamped at x = 0, its faces as stiff as they truly are."""
+    """Build the sheet, clamped at x = 0, with the true Young's modulus."""
     mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells=cells, diagonals=diagonals)
     shell = ms.Shell(
         mesh,
@@ -74,10 +74,11 @@ def sheet(cells, diagonals: str = "alternating", weight: bool = True, strips=STR
 
 
 def measured(cells, noise: float, same_mesh: bool = False, seed: int = 7) -> np.ndarray:
-    """(4, n_v, 3) m: where the vertices of the sheet of so many cells are seen in the fields.
+    """Return the measured positions of the vertices in every field, (4, n_v, 3) m.
 
-    What is seen is another sheet, of four times as many cells of four faces each: the inverse problem is not solved
-    with the model that made its data, unless with `same_mesh`.
+    They are computed on another mesh, with four times as many cells of four faces each, so that the inverse problem is
+    not solved with the model that made its data; `same_mesh` computes them on the same mesh. Noise is added to every
+    coordinate.
     """
     exact = _exact(tuple(cells), same_mesh)
     return exact + noise * np.random.default_rng(seed).standard_normal(exact.shape)

@@ -14,7 +14,7 @@ BLUE, RED, GREEN, GREY = "#20639b", "#c8442d", "#3d9970", "#777777"
 
 
 def draw_modulus(axes, result: dict) -> None:
-    """Young's modulus, true and found, on the sheet as it hangs in the vertical field."""
+    """Draw Young's modulus, true and found, on the flat sheet."""
     from matplotlib import pyplot as plt
 
     problem = result["noisy"]["problem"]
@@ -34,7 +34,7 @@ def draw_modulus(axes, result: dict) -> None:
 
 
 def draw_history(axes, result: dict) -> None:
-    """The misfit against all equilibria solved until then, a stage for each price."""
+    """Draw the misfit against the number of equilibria solved so far, one stage for each price."""
     seen = 0
     for stage in result["noisy"]["stages"]:
         misfits = stage["misfits"]
@@ -55,7 +55,7 @@ def draw_history(axes, result: dict) -> None:
 
 
 def draw_magnetization(axes, result: dict) -> None:
-    """Each strip's components, with the standard deviations that the noise leaves."""
+    """Draw each strip's components, with the standard deviations that the noise leaves."""
     problem = result["noisy"]["problem"]
     p = result["noisy"]["stages"][result["noisy"]["chosen"]]["p"]
     found, true = problem.magnetization(p).numpy(), true_magnetization()
@@ -74,7 +74,7 @@ def draw_magnetization(axes, result: dict) -> None:
 
 
 def summary(result: dict) -> str:
-    """What a person would ask first."""
+    """Return the summary: errors of every stage, a comparison of optimizers, and the limits of identification."""
     lines = [
         f"Identification on {result['faces']} faces, {result['unknowns']} unknowns, {len(FIELDS)} load cases, "
         f"noise {1e3 * NOISE:g} mm",

@@ -1,1 +1,1 @@
-"""What examples/kirigami_tower.py is made of: the model, the design of its magnetization, the report."""
+"""The parts of examples/kirigami_tower.py: the model, the design of its magnetization, the report."""

@@ -1,4 +1,4 @@
-"""What tells how good a tower is: bounds, disturbances, the way up, a finer mesh."""
+"""Checks of a tower: bounds, disturbances, the rise as the field grows, a finer mesh."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .model import Kirigami, kirigami
 
 
 def checks(sheet: Kirigami, found: dict, trials: int = 30) -> dict:
-    """Of what a search found. Lengths in m, energies in J."""
+    """Check the result of a search. Lengths in m, energies in J."""
     magnetization = found["remanent_magnetization"]
     rest = solve(sheet, magnetization, start=found["positions"])
     volumes = sheet.scene.shell.face_volumes
@@ -24,7 +24,7 @@ def checks(sheet: Kirigami, found: dict, trials: int = 30) -> dict:
         "lowest": float(rest.positions[:, 2].min()),
         "off_axis": float(np.linalg.norm(rest.positions[sheet.center, :2])),
         "largest_magnetization": float(np.linalg.norm(magnetization, axis=1).max()),
-        "way": sheet.longest_way(),
+        "longest_path": sheet.longest_path(),
         "energies": rest.energies,
         "magnetic_at_most": float(lifted),
         "switched_on": switched_on(magnetization),
@@ -37,9 +37,9 @@ def checks(sheet: Kirigami, found: dict, trials: int = 30) -> dict:
     }
 
 
-def solve(sheet: Kirigami, magnetization, share: float = 1.0, **options) -> ms.Equilibrium:
-    """At rest in a share of the field."""
-    field = share * np.array(FIELD)
+def solve(sheet: Kirigami, magnetization, fraction: float = 1.0, **options) -> ms.Equilibrium:
+    """Find the equilibrium in a fraction of the field."""
+    field = fraction * np.array(FIELD)
     return ms.equilibrium(
         sheet.scene,
         remanent_magnetization=magnetization,
@@ -50,8 +50,8 @@ def solve(sheet: Kirigami, magnetization, share: float = 1.0, **options) -> ms.E
 
 
 def switched_on(magnetization: np.ndarray) -> dict:
-    """The sheet lies on the floor, on which parts of it stay while the field grows, and its rings pass each other."""
-    sheet = kirigami(touching=True)
+    """Raise the field over the sheet that lies on the floor, with contact between its rings and with the floor."""
+    sheet = kirigami(with_contact=True)
     floor, own = sheet.scene.contacts
     fields, rest = np.linspace(0.0, 1.0, 21), None
     heights, lowest, on_floor, on_itself = [], [], [], []
@@ -78,8 +78,10 @@ def switched_on(magnetization: np.ndarray) -> dict:
 def disturbed(
     sheet: Kirigami, rest, magnetization: np.ndarray, trials: int, size: float = 0.02
 ) -> np.ndarray:
-    """(trials,) m: by how much random changes of every magnetization, a share of the limit in size, raise the
-    center."""
+    """Return how much random changes of every magnetization raise the center, (trials,) m.
+
+    size: standard deviation of the changes, over the limit.
+    """
     rng, gains = np.random.default_rng(4), []
     for _ in range(trials):
         moved = magnetization + size * LIMIT * rng.standard_normal(magnetization.shape)
@@ -90,7 +92,7 @@ def disturbed(
 
 
 def to_first_order(sheet: Kirigami, magnetization: np.ndarray, start=None) -> float:
-    """By how much the best magnetization within the limit would raise the center if its height were linear [m]."""
+    """Return how much the best magnetization within the limit would raise the center if its height were linear [m]."""
     values = torch.from_numpy(magnetization).requires_grad_()
     sheet.height(solve(sheet, values, start=start).positions).backward()
     gradient = values.grad.numpy()
@@ -98,7 +100,7 @@ def to_first_order(sheet: Kirigami, magnetization: np.ndarray, start=None) -> fl
 
 
 def finer(sheet: Kirigami, magnetization: np.ndarray) -> dict:
-    """The same design on a mesh of four times as many faces."""
+    """Compute the height of the same design on a mesh of four times as many faces."""
     fine = kirigami(refined=2)
     nearest = cKDTree(sheet.mesh.face_barycenters).query(fine.mesh.face_barycenters)[1]
     rest = solve(fine, magnetization[nearest])

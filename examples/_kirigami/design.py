@@ -19,17 +19,17 @@ FARTHEST = 5.0  # of a design's numbers: one of them takes |M_r| to 0.98 of the 
 
 
 class Tower:
-    """The objective: minus the center's height [m]. Keeps the tallest tower of all that it was asked for.
+    """The objective: minus the center's height [m]. It stores the tallest tower of all evaluations.
 
-    A design is (n, 3) numbers u, three for each face; `threefold`, for each face of a third of the sheet, which the
-    others repeat turned. M_r = LIMIT u / sqrt(1 + |u|^2). Jumps are followed: a sheet without magnetization hangs
-    from its ring, and as it rises its rings turn over one by one.
+    A design is (n, 3) numbers u, three for each face; with `threefold`, for each face of a third of the sheet, and the
+    other thirds repeat it rotated. M_r = LIMIT u / sqrt(1 + |u|^2). Jumps between equilibria are accepted: a sheet
+    without magnetization hangs from its ring, and as it rises its rings snap over one by one.
     """
 
     def __init__(self, sheet: Kirigami, threefold: bool):
         self.sheet = sheet
         self.tallest: ms.Equilibrium | None = None
-        # Where designs lie far apart and near jumps, Newton's steps cost less than the mixed ones, which get lost.
+        # Between distant designs and near jumps standard Newton is cheaper than the mixed iteration, which diverges there.
         self._warm = ms.WarmStart(sheet.scene, solver=ms.Newton())
         self._twins, self._turns = (
             thirds(sheet.mesh) if threefold else (np.arange(sheet.mesh.n_faces), np.eye(3))
@@ -41,7 +41,7 @@ class Tower:
         return int(self._twins.max()) + 1
 
     def magnetization(self, design: torch.Tensor) -> torch.Tensor:
-        """(n_f, 3) A/m."""
+        """Return the magnetization of every face, (n_f, 3) A/m."""
         of_faces = ms.parametrize.softly_limited(LIMIT * design, LIMIT)[self._twins]
         return (self._turns @ of_faces[:, :, None])[:, :, 0]
 
@@ -56,7 +56,7 @@ class Tower:
 
 @dataclass(frozen=True)
 class Search:
-    """From a sheet without magnetization, or with a random one, to the tallest tower."""
+    """A search for the tallest tower, from a sheet without magnetization or with a random one."""
 
     name: str
     optimizer: type
@@ -65,7 +65,7 @@ class Search:
     seed: int | None = None
 
     def run(self, sheet: Kirigami, iterations: int) -> dict:
-        """The tallest tower, m and A/m, and of each iteration the time [s] and the height [m]."""
+        """Run the search and return the tallest tower, m and A/m, and the time [s] and height [m] of each iteration."""
         tower = Tower(sheet, self.threefold)
         design = torch.zeros(tower.n_triples, 3, dtype=torch.float64)
         if self.seed is not None:
@@ -101,7 +101,9 @@ SEARCHES = (
 
 
 def thirds(mesh: ms.TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
-    """For each face the number of its twin in the first third, (n_f,), and the rotation from there, (n_f, 3, 3)."""
+    """Return for each face the number of its twin in the first third, (n_f,), and the rotation from there, (n_f, 3,
+    3).
+    """
     angle = 2 * np.pi / SYMMETRY
     x, y, _ = mesh.face_barycenters.T
     first = np.flatnonzero(np.mod(np.arctan2(y, x), 2 * np.pi) < angle)

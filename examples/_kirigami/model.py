@@ -23,7 +23,10 @@ KERF = 0.4e-3  # m, the width of the cuts of a kirigami that touches itself; hal
 
 @dataclass(frozen=True)
 class Kirigami:
-    """rings: (n_f,) the ring of each face, 0 the disc in the middle. center: the vertex there."""
+    """The kirigami sheet in its scene.
+
+    rings: the ring of each face, (n_f,), 0 for the disc in the middle. center: the vertex there.
+    """
 
     scene: ms.Scene
     rings: np.ndarray
@@ -34,30 +37,33 @@ class Kirigami:
         return self.scene.mesh
 
     def height(self, positions):
-        """Of the center over the floor, m; positions: (n_v, 3), or (k, n_v, 3)."""
+        """Return the height of the center above the floor, m; positions: (n_v, 3), or (k, n_v, 3)."""
         return positions[..., self.center, 2]
 
-    def longest_way(self) -> float:
-        """From the center to the glued ring along the edges of the mesh, m: no tower can be higher, but for
-        what the sheet stretches and for what shorter ways there are between the edges."""
+    def longest_path(self) -> float:
+        """Return the length of the shortest path along mesh edges from the center to the glued ring, m.
+
+        No tower can be higher, except by stretching the sheet and by shorter paths across faces.
+        """
         mesh = self.mesh
         graph = coo_array((mesh.edge_lengths, tuple(mesh.edges.T)), shape=(mesh.n_vertices,) * 2)
         lengths = dijkstra(graph, directed=False, indices=self.center)
         return float(lengths[mesh.faces[self.rings == RINGS]].min())
 
 
-def kirigami(refined: int = 1, touching: bool = False) -> Kirigami:
-    """The sheet at rest in the plane z = 0, in a uniform field to be given, with its weight.
+def kirigami(refined: int = 1, with_contact: bool = False) -> Kirigami:
+    """Build the sheet in the plane z = 0, with its weight, in a uniform field that a solve prescribes.
 
-    refined: into how many parts the cells are divided each way; the cuts stay where they are. touching: it lies on a floor,
-    and its rings do not pass through each other, for which the cuts have a width; faces are the same ones.
+    refined: into how many parts the cells are divided each way; the cuts stay where they are. with_contact: the sheet
+    lies on a floor, and its rings are in contact with each other, for which the cuts have a width; the faces are the
+    same.
     """
     width = RADIUS / (RINGS + 1)
     cells = (refined * (RINGS + 1), refined * AROUND)
     disc = ms.meshes.sector(0.0, RADIUS, 2 * np.pi, cells)
     mesh = ms.meshes.cut(disc, _slits(disc, width))
     rings = np.floor(np.linalg.norm(mesh.face_barycenters, axis=1) / width).astype(np.int64)
-    if touching:
+    if with_contact:
         mesh = _opened(mesh, rings, width)
     shell = ms.Shell(
         mesh,
@@ -75,7 +81,7 @@ def kirigami(refined: int = 1, touching: bool = False) -> Kirigami:
     scene = ms.Scene(
         shell,
         supports=[ms.Clamp(glued)],
-        contacts=contacts if touching else (),
+        contacts=contacts if with_contact else (),
         field=ms.UniformField(),
         gravity=GRAVITY,
     )
@@ -83,7 +89,9 @@ def kirigami(refined: int = 1, touching: bool = False) -> Kirigami:
 
 
 def _opened(mesh: ms.TriangleMesh, rings: np.ndarray, width: float) -> ms.TriangleMesh:
-    """With cuts as wide as KERF: vertices at them, of which there are two at one place, go towards their own faces."""
+    """Return the mesh with cuts of width KERF: each of the two coincident vertices at a cut moves towards its own
+    faces.
+    """
     points = mesh.rest_positions.copy()
     _, place, count = np.unique(np.round(points, 9), axis=0, return_inverse=True, return_counts=True)
     at_cut = count[place.ravel()] > 1
@@ -96,7 +104,7 @@ def _opened(mesh: ms.TriangleMesh, rings: np.ndarray, width: float) -> ms.Triang
 
 
 def _slits(disc: ms.TriangleMesh, width: float) -> np.ndarray:
-    """The edges between rings, but for one cell of the coarsest mesh at each bridge."""
+    """Return the edges between rings, except for one cell of the coarsest mesh at each bridge."""
     radii = np.linalg.norm(disc.rest_positions[disc.edges], axis=2) / width
     circle = np.rint(radii[:, 0]).astype(np.int64)
     on_circle = np.isclose(radii, circle[:, None]).all(axis=1) & (circle > 0) & (circle <= RINGS)

@@ -1,4 +1,4 @@
-"""The task of examples/kirigami_reaching.py: targets one after another, and a field in time to reach them with."""
+"""The task of examples/kirigami_reaching.py: a sequence of targets, and a time-dependent field to reach them."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Tower:
         )
 
     def move(self, field, **options) -> ms.Trajectory:
-        """In a field a step, (steps, 3) T, from where it stands."""
+        """Simulate the motion in a field for each step, (steps, 3) T, from the tower's equilibrium."""
         return ms.simulate(
             self.sheet.scene,
             steps=len(field),
@@ -63,7 +63,7 @@ class Tower:
 
 
 def drawn_targets(tower: Tower, number: int, seed: int) -> np.ndarray:
-    """(number, 3) m, at random, each near where the center comes to rest in some field within the limit."""
+    """Draw random targets (number, 3) m, each near the equilibrium of the center in some field within the limit."""
     rng, targets = np.random.default_rng(seed), []
     for _ in range(number):
         leaning, around = rng.uniform(*LEANING), rng.uniform(0, 2 * np.pi)
@@ -96,7 +96,7 @@ class Reaching:
 
     @property
     def begin(self) -> np.ndarray:
-        """When each target appears, (k,) s."""
+        """The times at which the targets appear, (k,) s."""
         return self.each * np.arange(len(self.targets))
 
     @property
@@ -107,11 +107,11 @@ class Reaching:
 
     @property
     def control_times(self) -> torch.Tensor:
-        """Of the field that acts in each step: its end, (steps,) s."""
+        """The times of the field of each step: the end of the step, (steps,) s."""
         return TIME_STEP * torch.arange(1, self.steps + 1, dtype=torch.float64)
 
     def objective(self, field: torch.Tensor) -> dict[str, torch.Tensor]:
-        """field: (steps, 3) T."""
+        """Compute the terms of the objective. field: (steps, 3) T."""
         targets, counts = self.active
         track = self.tower.move(field).positions[:, self.tower.sheet.center]
         return {
@@ -120,7 +120,7 @@ class Reaching:
         }
 
     def pointing(self) -> torch.Tensor:
-        """(steps, 3) T: a field that points from the origin to the active target, after a smooth turn there."""
+        """Return a field that points from the origin to the active target, with smooth transitions, (steps, 3) T."""
         directions = self.targets / np.linalg.norm(self.targets, axis=1, keepdims=True)
         fields = np.vstack([FIELD, POINTING * directions])
         times = self.control_times.numpy()
@@ -130,17 +130,20 @@ class Reaching:
         return torch.tensor((1 - share) * fields[k] + share * fields[k + 1])
 
     def field(self, control_points: torch.Tensor) -> torch.Tensor:
-        """(steps, 3) T, a cubic spline, which stays within the bounds of its control points (n, 3) T."""
+        """Return the field of every step, (steps, 3) T.
+
+        It is a cubic spline, which stays within the bounds of its control points (n, 3) T.
+        """
         return ms.control.spline(self.control_times, control_points, self.steps * TIME_STEP)
 
     def first_control_points(self) -> torch.Tensor:
-        """Those of the field that points to the targets."""
+        """Return the control points of the field that points to the targets."""
         duration = self.steps * TIME_STEP
         number = round(duration / CONTROL_SPACING) + 1
         return ms.control.fit_spline(self.pointing(), self.control_times, number, duration, limit=FIELD_LIMIT)
 
     def solve(self, iterations: int, progress: bool = False) -> tuple[torch.Tensor, ms.MinimizeResult]:
-        """The control points found, and how."""
+        """Search for the control points by L-BFGS; return them and the result of the search."""
         points = self.first_control_points().requires_grad_()
         optimizer = ms.optim.LBFGS([points], lower=-FIELD_LIMIT, upper=FIELD_LIMIT, first_step=0.1)
         found = ms.minimize(

@@ -20,7 +20,7 @@ PAPER = {
 
 
 def draw_distances(axes, result: dict) -> None:
-    """To the active target; dots one delay after each appears, bands where it counts."""
+    """Draw the distance to the active target, with dots one delay after each appears and bands where it counts."""
     times = result["times"]
     for k, begin in enumerate(result["begin"]):
         end = begin + result["each"]
@@ -71,7 +71,7 @@ def draw_field(axes, result: dict) -> None:
 
 
 def draw_towers(axes, result: dict) -> None:
-    """Where it is one delay after each target appeared, with the center's height and the target's in the titles."""
+    """Draw the tower one delay after each target appeared, with the target's position in the titles."""
     from matplotlib import pyplot as plt
 
     frames, targets = result["marked_frames"], result["targets"]
@@ -93,7 +93,7 @@ def draw_towers(axes, result: dict) -> None:
 
 
 def movie(result: dict, path) -> None:
-    """The motion with the field's arrow, in real time."""
+    """Write the movie of the motion with the field's arrow, in real time."""
     frames = slice(None, None, 4)
     fields = np.vstack([result["found"]["field"][:1], result["found"]["field"]])
     ms.animate(
@@ -111,7 +111,7 @@ def movie(result: dict, path) -> None:
 
 
 def summary(result: dict) -> str:
-    """What a person would ask first."""
+    """Return the summary: distances from the targets, and the cost of the search."""
     rows = []
     for name in ("start", "found", "finer"):
         each = result[name]

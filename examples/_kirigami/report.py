@@ -17,17 +17,17 @@ PAPER = {"iterations": 95, "seconds": 3.9e2, "objective": -2.8}  # [Chen22] Tabl
 
 
 def draw_design(axes, found: dict) -> None:
-    """The flat sheet from above, each vertex in the colour of the height it comes to."""
+    """Draw the flat sheet from above, each vertex in the colour of its height in the tower."""
     mesh = kirigami().mesh
     style = ms.Style(arrows=mesh.n_faces, show_field=False)
     _paste(axes, _picture(mesh, found, rest=True, view=(90, -90), style=style))
 
 
-def draw_tower(axes, found: dict, standing: dict) -> None:
-    """On its floor."""
+def draw_tower(axes, found: dict, switched: dict) -> None:
+    """Draw the tower on its floor."""
     picture = _picture(
-        standing["mesh"],
-        {**found, **standing},
+        switched["mesh"],
+        {**found, **switched},
         rest=False,
         view=(12, -60),
         style=ms.Style(arrows=0),
@@ -60,7 +60,7 @@ def _paste(axes, picture: ms.Picture) -> None:
 
 
 def draw_convergence(axes, searches: list[dict]) -> None:
-    """Every design's height against time, and the tallest until then."""
+    """Draw the height of the tallest tower so far against time, for every search."""
     for found in searches:
         method = found["name"].split(",")[0]
         main = found["name"] == method
@@ -95,7 +95,7 @@ def draw_switching(axes, found: dict, switched: dict) -> None:
 
 
 def summary(result: dict) -> str:
-    """What a person would ask first."""
+    """Return the summary: the searches, and the checks of the first one's tower."""
     best, check = result["tower"], result["checks"]
     rows = [
         f"  {found['name']:<24}{1e3 * found['height']:8.2f}{found['height'] / RADIUS:9.3f}"
@@ -116,7 +116,8 @@ def summary(result: dict) -> str:
             "  for a kirigami of about as many faces; its size, cuts and field are not given either.",
             "The first one's tower",
             f"  without magnetization     hangs {-1e3 * result['hanging']:.2f} mm below its ring",
-            f"  way along the rings       {1e3 * check['way']:.2f} mm: {best['height'] / check['way']:.0%} of it upright",
+            f"  path along the rings      {1e3 * check['longest_path']:.2f} mm: "
+            f"{best['height'] / check['longest_path']:.0%} of it upright",
             f"  lowest and off the axis   {1e3 * check['lowest']:.2f} mm, {1e3 * check['off_axis']:.2f} mm",
             f"  elastic energy + weight   {1e6 * stored:.0f} uJ of {-1e6 * check['energies']['magnetic']:.0f} uJ the "
             f"field gives, {1e6 * check['magnetic_at_most']:.0f} uJ were all of it aligned",

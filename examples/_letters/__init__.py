@@ -1,1 +1,1 @@
-"""What examples/letters.py and examples/banner.py are made of: glyphs, the task, the designs, tiles, pictures."""
+"""The parts of examples/letters.py and examples/banner.py: glyphs, the task, the designs, tiles, pictures."""

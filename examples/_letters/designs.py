@@ -1,4 +1,4 @@
-"""What is designed: magnetization, then Young's modulus too, then how strongly every edge resists bending."""
+"""The design variables: magnetization, then also Young's modulus, then also the curvature scale of every edge."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from .task import LARGEST_MAGNETIZATION, RELIEF, YOUNG_MODULUS, Task
 
 VARIANTS = ("M", "M, Y", "M, Y, c")
 MODULI = (1e4, 1e8)  # Pa, [Chen22] Table 1
-# Of the curvature scale c. Bending energy goes with c squared: an edge bends as if its sheet were 0.22 to 4.6 times
-# as thick, from a scored line to a rib.
+# Range of the curvature scale c. Bending energy is proportional to c squared: an edge bends as if its sheet were 0.22 to
+# 4.6 times as thick, from a scored line to a rib.
 SCALES = (0.1, 10.0)
-# Shares of the cap at the start. Along the letter's slope: enough to see it. Along the field: it then stiffens the
-# flat sheet, h M_z B = 2 N/m of tension in all directions, where otherwise the letter's pull would wrinkle it.
+# Initial magnetization over its limit. Along the letter's slope: enough to emboss it visibly. Along the field: it stiffens
+# the flat sheet by a tension h M_z B = 2 N/m in all directions, without which the letter's pull would wrinkle it.
 UPHILL, UPWARDS = 0.1, 0.4
-STEEPNESS_PRICE = 4e-6  # of total variation, beside a mean square error over the height squared of 1e-3
-SCALE_PRICE = (
-    1e-4  # of the curvature scale's distance from 1, in its range: keeps it at 1 where it does nothing
+STEEPNESS_PRICE = (
+    4e-6  # weight of the total variation; the mean square error over the height squared is about 1e-3
 )
+SCALE_PRICE = 1e-4  # weight of the curvature scale's deviation from 1: keeps it at 1 where it has no effect
 
 
 @dataclass(frozen=True)
 class Design:
-    """An optimized sheet, in SI units, and how it came about.
+    """An optimized sheet, in SI units, with the history of its search.
 
-    history: an entry an iteration; `terms` holds the mismatch. error: rms distance over the letter's height.
+    history: one record for each iteration; `terms` holds the mismatch. error: rms distance over the letter's height.
     squares: sum of squared distances, m2, the objective of [Chen22].
     """
 
@@ -42,7 +42,7 @@ class Design:
 
     @property
     def errors(self) -> np.ndarray:
-        """At every iteration."""
+        """The rms distance over the letter's height at every iteration."""
         return np.sqrt([record.terms["mismatch"] for record in self.history])
 
     @property
@@ -85,14 +85,14 @@ class Search:
         self._edge_lengths = torch.tensor(np.array(mesh.edge_lengths)) / np.ptp(mesh.rest_positions)
 
     def optimizer(self) -> ms.optim.MMA:
-        """Steps of 0.03 of a variable's size first, of a fifth at most."""
+        """Return MMA with first steps of 0.03 of a variable's range and steps of at most a fifth of it."""
         groups = [{"params": self.variables[:1], "lower": -3.0, "upper": 3.0, "scale": 0.5}]
         if len(self.variables) > 1:
             groups.append({"params": self.variables[1:], "lower": 0.0, "upper": 1.0})
         return ms.optim.MMA(groups, move=0.2, asymptote_initial=0.03)
 
     def properties(self) -> dict[str, torch.Tensor]:
-        """The sheet's, from the variables as they stand."""
+        """Return the sheet's properties for the present variables."""
         given = {
             "remanent_magnetization": LARGEST_MAGNETIZATION
             * ms.parametrize.softly_limited(self.magnetization, 1.0)
@@ -104,7 +104,9 @@ class Search:
         return given
 
     def objective(self, *_) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
-        """The mismatch, and a small price on properties that change abruptly, as they could not be made."""
+        """Compute the mismatch, plus a small penalty on abrupt changes of the properties, which could not be
+        manufactured.
+        """
         rest = self.at_rest(applied_flux_density=self.task.flux_density, **self.properties())
         mismatch = self.task.mismatch(rest.positions)
         price = STEEPNESS_PRICE * sum(self._variation(values) for values in self.variables[:2])
@@ -113,7 +115,7 @@ class Search:
         return mismatch + price, {"mismatch": mismatch.detach()}
 
     def design(self, history: list) -> Design:
-        """The variables as they stand; where they are not designed, what the sheet has."""
+        """Build the design of the present variables; properties that are not designed are the sheet's own."""
         properties = {name: values.detach() for name, values in self.properties().items()}
         with self.at_rest.accept_jumps():
             rest = self.at_rest(applied_flux_density=self.task.flux_density, **properties)
@@ -133,7 +135,7 @@ class Search:
 
 
 def designed(task: Task, variant: str, iterations: int, progress: bool = True) -> Design:
-    """The best design after so many iterations of MMA."""
+    """Search for a design by MMA, and return the best one."""
     search = Search(task, variant)
     found = ms.minimize(
         search.objective, search.variables, search.optimizer(), max_iterations=iterations, progress=progress

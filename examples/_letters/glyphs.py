@@ -1,4 +1,4 @@
-"""Height maps of letters, from the font that matplotlib brings along."""
+"""Height maps of letters, from the font that matplotlib includes."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ FONT = FontProperties(family="DejaVu Sans", weight="bold")
 PIXELS = 257  # a side: four a cell of the finest sheet here
 
 
-def height_map(letter: str, side: float, share: float, smoothing: float) -> np.ndarray:
-    """(PIXELS, PIXELS) from 0 beside the letter to 1 on it, row 0 at y = side; pixels centerd on both edges.
+def height_map(letter: str, side: float, fraction: float, smoothing: float) -> np.ndarray:
+    """Return the height map of a letter, (PIXELS, PIXELS), from 0 outside the letter to 1 on it.
 
-    side: of the square, m. share: of it that the letter's own height takes. smoothing: standard deviation of the
-    Gaussian that its outline is blurred by, m.
+    Row 0 is at y = side; the outermost pixels are centered on the edges. side: of the square, m. fraction: height of
+    the letter over the side. smoothing: standard deviation of the Gaussian that blurs its outline, m.
     """
     outline = TextPath((0, 0), letter, size=1, prop=FONT)
     box = outline.get_extents()
-    scale = share * side / box.height
+    scale = fraction * side / box.height
     centerd = (outline.vertices - [box.x0 + box.width / 2, box.y0 + box.height / 2]) * scale + side / 2
     x = np.linspace(0.0, side, PIXELS)
     points = np.stack(np.meshgrid(x, x[::-1]), axis=-1).reshape(-1, 2)

@@ -1,4 +1,4 @@
-"""The figures of one letter and of several: what a sheet is made of, its shapes, and how the search went."""
+"""The figures of one letter and of several: properties of the sheet, its shapes, and the convergence of the search."""
 
 from __future__ import annotations
 
@@ -20,7 +20,9 @@ ARROWS = 24  # along a side
 
 
 def draw_designs(axes, result: dict) -> None:
-    """One row a letter: magnetization and modulus of the joint design, shapes of the variants, the target."""
+    """Draw one row for each letter: magnetization and modulus of the joint design, shapes of the variants, the
+    target.
+    """
     for row, entry in zip(axes, result.values(), strict=True):
         mesh, designs = entry["task"].mesh, entry["designs"]
         joint: Design = designs[VARIANTS[-1]]
@@ -43,7 +45,7 @@ def draw_designs(axes, result: dict) -> None:
 
 
 def draw_magnetization(axes, mesh: ms.TriangleMesh, magnetization: np.ndarray):
-    """The part along the field as colour, the part in the plane as arrows."""
+    """Draw the component along the field as colour and the component in the plane as arrows."""
     x, y, _ = 1e3 * mesh.rest_positions.T
     largest = 1e-3 * LARGEST_MAGNETIZATION
     colors = axes.tripcolor(
@@ -86,7 +88,7 @@ def draw_modulus(axes, mesh: ms.TriangleMesh, young_modulus: np.ndarray):
 
 
 def draw_convergence(axes, result: dict) -> None:
-    """The sum of squares against iterations and against time; at the right, the error it stands for."""
+    """Draw the sum of squares against iterations and against time; the right axis shows the corresponding error."""
     by_iteration, by_time = axes
     for (letter, entry), style in zip(result.items(), STYLES, strict=False):
         for variant, design in entry["designs"].items():

@@ -1,4 +1,4 @@
-"""A sheet from above, in slanting light."""
+"""A view of a sheet from above, in slanting light."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ BRIGHTNESS = Normalize(LIGHT[2] - 2 * (1 - LIGHT[2]), 1.0)
 
 
 def draw_relief(axes, mesh: ms.TriangleMesh, positions: np.ndarray) -> None:
-    """The sheet, smooth between vertices, in axes in mm."""
+    """Draw the sheet with smooth shading between vertices, in axes in mm."""
     x, y, _ = 1e3 * positions.T
     brightness = vertex_normals(mesh, positions) @ LIGHT
     axes.tripcolor(
@@ -27,7 +27,7 @@ def draw_relief(axes, mesh: ms.TriangleMesh, positions: np.ndarray) -> None:
 
 
 def vertex_normals(mesh: ms.TriangleMesh, positions: np.ndarray) -> np.ndarray:
-    """(n_v, 3): the mean of the faces around, by their areas."""
+    """Return the area-weighted mean of the unit normals of the faces around each vertex, (n_v, 3), normalized."""
     a, b, c = np.moveaxis(positions[mesh.faces], 1, 0)
     normals = np.zeros_like(positions)
     np.add.at(normals, mesh.faces.ravel(), np.repeat(np.cross(b - a, c - a), 3, axis=0))
@@ -35,7 +35,7 @@ def vertex_normals(mesh: ms.TriangleMesh, positions: np.ndarray) -> np.ndarray:
 
 
 def bare(axes) -> None:
-    """No frame, no ticks, equal scales."""
+    """Remove frame and ticks, and set equal scales."""
     axes.set_aspect("equal")
     axes.margins(0.005)
     axes.set(xticks=[], yticks=[])

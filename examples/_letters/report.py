@@ -12,7 +12,7 @@ from .task import LARGEST_MAGNETIZATION, RELIEF
 
 
 def summary(result: dict) -> str:
-    """Errors, times and bounds; of sheets as fine as the paper's, beside its row."""
+    """Return the summary: errors, times and bounds; for sheets as fine as the paper's, with its row for comparison."""
     lines = [
         "letter  variant    variables  rms error   over height   sum of squares   iterations   s/iteration"
     ]
@@ -27,11 +27,11 @@ def summary(result: dict) -> str:
             )
     lines += ["", *(comparison(letter, entry) for letter, entry in result.items())]
     if mesh.n_faces == FACES:
-        lines += ["", *beside_the_paper(result)]
+        lines += ["", *paper_comparison(result)]
     return "\n".join(lines)
 
 
-def beside_the_paper(result: dict) -> list[str]:
+def paper_comparison(result: dict) -> list[str]:
     seconds = [d.seconds_per_iteration for entry in result.values() for d in entry["designs"].values()]
     paper = TIME / ITERATIONS
     return [

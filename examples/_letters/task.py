@@ -1,7 +1,7 @@
-"""The sheet, how it is held, and the shape it should take.
+"""The sheet, its supports, and its target shape.
 
 [Chen22] gives the mesh, Young's modulus, Poisson's ratio, the thickness, the kind of support and the range of the
-field. Side, letter, cap and the range of the curvature scale are this example's own choice.
+field. Side, letter, limit of the magnetization and range of the curvature scale are this example's own choice.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ LARGEST_MAGNETIZATION = 1e5  # A/m: a residual flux density of 126 mT, as of pri
 
 
 def supported_points(letters: int = 1) -> np.ndarray:
-    """(k, 3) m: corners and mid-sides of each letter's square, in a row of squares."""
+    """Return the supported points (k, 3) m: corners and mid-sides of each letter's square, in a row of squares."""
     x = SIDE * np.arange(2 * letters + 1) / 2
     grid = [(x_, y_, 0.0) for x_ in x for y_ in (0.0, SIDE / 2, SIDE)]
     return np.array([(x_, y_, z) for x_, y_, z in grid if y_ != SIDE / 2 or round(2 * x_ / SIDE) % 2 == 0])
 
 
 def sheet_of(cells: int, letters: int = 1, bending: str = "midedge", **properties) -> ms.Scene:
-    """A row of square sheets in one piece, `cells` to a side of a square; properties as for ms.Shell."""
+    """Build a row of square sheets in one piece, `cells` to a side of a square; properties as for ms.Shell."""
     mesh = ms.meshes.rectangle(letters * SIDE, SIDE, cells=(letters * cells, cells))
     given = {"thickness": THICKNESS, "young_modulus": YOUNG_MODULUS, "poisson_ratio": 0.5} | properties
     held = [mesh.nearest_vertex(point) for point in supported_points(letters)]
@@ -65,13 +65,13 @@ class Task:
 
     @cached_property
     def target(self) -> torch.Tensor:
-        """(n_v, 3) m: every vertex above where it rests, as high as the height map is there."""
+        """The target positions, (n_v, 3) m: every vertex above its reference position, by the height map there."""
         rest = torch.tensor(np.array(self.mesh.rest_positions))
         heights = height_map(self.letter, SIDE, LETTER_SHARE, SMOOTHING)
         return torch.cat([rest[:, :2], RELIEF * _sampled(heights, rest)[:, None]], dim=1)
 
     def mismatch(self, positions: torch.Tensor) -> torch.Tensor:
-        """Mean square distance of the vertices from their targets, over the letter's height squared.
+        """Compute the mean square distance of the vertices from their targets, over the letter's height squared.
 
         [Chen22] (29) is the sum of the squares: this times n_v and the height squared.
         """
@@ -79,14 +79,14 @@ class Task:
         return squares / (self.mesh.n_vertices * RELIEF**2)
 
     def error(self, positions: np.ndarray) -> float:
-        """Root mean square distance from the targets, over the letter's height."""
+        """Compute the root mean square distance from the targets, over the letter's height."""
         return float(self.mismatch(torch.as_tensor(positions))) ** 0.5
 
     def uphill(self) -> torch.Tensor:
-        """(n_f, 3), up to 1 long: the slope of the letter, blurred once more.
+        """Return the slope of the letter, blurred once more, as vectors (n_f, 3) up to 1 long.
 
-        In a field along +z, E = -V (F_0 M) . B falls by h B M . grad z an area: magnetization that points uphill
-        lifts the sheet there. From zero magnetization the gradient by M says the same.
+        In a field along +z, E = -V (F_0 M) . B falls by h B M . grad z per area, so magnetization that points uphill
+        lifts the sheet there. The gradient by M at zero magnetization has the same direction.
         """
         heights = height_map(self.letter, SIDE, LETTER_SHARE, 2 * SMOOTHING)
         barycenters = torch.tensor(np.array(self.mesh.face_barycenters))

@@ -1,4 +1,4 @@
-"""Many letters in one sheet."""
+"""A row of letters in one sheet."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from .task import SIDE, sheet_of
 
 
 def one_sheet(designs: Sequence[Design], cells: int, bending: str = "midedge") -> tuple[ms.Scene, np.ndarray]:
-    """A row of squares in one piece, each with a letter's properties, and its magnetization, (n_f, 3) A/m.
+    """Build a row of squares in one piece, each with a letter's properties, and its magnetization, (n_f, 3) A/m.
 
-    The squares' common edges, free before, now bend like any other: with a curvature scale of 1, where the designs
-    left them. Each is held at its own eight points.
+    The common edges of the squares, which were free before, now bend like any other edge; their curvature scale is 1,
+    the initial value of the designs. Each square is held at its own eight points.
     """
     wide, single = sheet_of(cells, len(designs)).mesh, sheet_of(cells).mesh
     properties = {
@@ -35,7 +35,10 @@ def one_sheet(designs: Sequence[Design], cells: int, bending: str = "midedge") -
 
 
 def cut_out(positions: np.ndarray, wide: ms.TriangleMesh, single: ms.TriangleMesh, number: int) -> np.ndarray:
-    """(n_v, 3) m: square `number` of the row, its vertices as in the single sheet and where they would be there."""
+    """Return the positions of square `number` of the row, (n_v, 3) m.
+
+    Its vertices are numbered and translated as in the single sheet.
+    """
     offset = np.array([number * SIDE, 0.0, 0.0])
     _, vertices = cKDTree(wide.rest_positions).query(single.rest_positions + offset)
     return positions[vertices] - offset
@@ -50,7 +53,7 @@ def edge_centers(mesh: ms.TriangleMesh) -> np.ndarray:
 
 
 def _laid_out(values: Sequence[np.ndarray], single: np.ndarray, wide: np.ndarray) -> np.ndarray:
-    """Values at points of the wide sheet, from those at the same points of each square."""
+    """Return values at points of the wide sheet, from those at the same points of each square."""
     square = np.clip((wide[:, 0] // SIDE).astype(int), 0, len(values) - 1)
     _, places = cKDTree(single).query(wide - SIDE * np.outer(square, (1.0, 0.0, 0.0)))
     return np.stack(values)[square, places]

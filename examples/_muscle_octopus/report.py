@@ -1,4 +1,4 @@
-"""The activations found; what the octopus is looked at from."""
+"""The figure of the activations that were found, and the view of the octopus."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ VIEW = (110, -90)  # from above: y is up
 
 
 def draw_activations(axes, found: Found) -> None:
-    """The mean along each muscle, over time; upper and lower one of each leg beside each other."""
+    """Draw the mean along each muscle over time; the upper and the lower muscle of each leg are next to each other."""
     steps = len(found.controls)
     rows = torch.from_numpy(found.controls).reshape(steps, -1, NUMBERS)
     times = found.robot.time_step * np.arange(1, steps + 1)

@@ -41,13 +41,13 @@ def draw_swimming(axes, swims: dict) -> None:
 
 
 def on_faces(swims: dict, frame: int) -> np.ndarray:
-    """The activation behind each face of the strip."""
+    """Return the activation of the tetrahedron behind each face of the strip."""
     move = swims["move"]
     (body,) = move.scene.bodies
     return move[body].strains(frame).muscles["activation"][body.mesh.face_tetrahedra]
 
 
-def draw_way(axes, result: dict) -> None:
+def draw_path(axes, result: dict) -> None:
     for name, color in (("swims", BLUE), ("backwards", RED)):
         times = result[name]["move"].times
         axes.plot(times, -1e3 * result[name]["center"][:, 0], color=color, label=f"wave {LABELS[name]}")

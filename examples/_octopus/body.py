@@ -28,10 +28,10 @@ MAGNETIZATION = 4e4  # A/m, along every tentacle, to its tip
 
 @dataclass(frozen=True)
 class Octopus:
-    """At rest along +x, the middle of the head's rim in the origin.
+    """The octopus in its reference shape along +x, the middle of the head's rim in the origin.
 
     tentacle: (n_f,) which tentacle a face belongs to, -1 in the head. remanent_magnetization: (n_f, 3) A/m.
-    masses: (n_v,), a vertex's share of the whole mass.
+    masses: (n_v,), a vertex's fraction of the total mass.
     """
 
     shell: ms.Shell
@@ -60,7 +60,7 @@ def octopus() -> Octopus:
 
 
 def _sheet() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Vertices, faces, which tentacle a face belongs to, and along which unit vector its magnetization points."""
+    """Return vertices, faces, the tentacle of each face, and the unit vector of its magnetization."""
     points, faces, owner, rings = [np.array([NOSE * RADIUS, 0.0, 0.0])], [], [], []
     for k, cells in enumerate(RINGS):
         number = TENTACLES * cells
@@ -87,13 +87,15 @@ def _sheet() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _part(ring: np.ndarray, j: int) -> np.ndarray:
-    """The vertices of a ring over a tentacle's share of it, the first of the next share among them."""
+    """Return the vertices of a ring over one tentacle's fraction of it, including the first vertex of the next."""
     cells = len(ring) // TENTACLES
     return np.roll(ring, -j * cells)[np.arange(cells + 1) % len(ring)]
 
 
 def _band(before, after) -> list[tuple[int, int, int]]:
-    """Faces between two rows of vertices, each step on the row whose next vertex lies less far along it."""
+    """Return the faces between two rows of vertices; each face advances on the row whose next vertex is less far
+    along.
+    """
     faces, i, k = [], 0, 0
     n, m = len(before) - 1, len(after) - 1
     while i < n or k < m:
@@ -106,14 +108,16 @@ def _band(before, after) -> list[tuple[int, int, int]]:
     return faces
 
 
-def _head(share: float) -> tuple[float, float]:
-    """x and r [m] of half an ellipse, at a share of its parameter."""
-    return NOSE * RADIUS * np.cos(0.5 * np.pi * share), RADIUS * np.sin(0.5 * np.pi * share)
+def _head(fraction: float) -> tuple[float, float]:
+    """Return x and r [m] of half an ellipse, at a fraction of its parameter."""
+    return NOSE * RADIUS * np.cos(0.5 * np.pi * fraction), RADIUS * np.sin(0.5 * np.pi * fraction)
 
 
 def _row(k: int, azimuth: float) -> np.ndarray:
-    """The vertices of a tentacle's row k. Its middle line turns away from the axis, evenly; the root's curvature across
-    it fades."""
+    """Return the vertices of a tentacle's row k.
+
+    Its middle line bends away from the axis evenly; the curvature across it, that of the head at the root, fades.
+    """
     rows = len(ROWS) - 1
     turns = SPREAD * (np.arange(k) + 0.5) / rows
     x, r = -ROW * np.cos(turns).sum(), RADIUS + ROW * np.sin(turns).sum()
@@ -129,7 +133,9 @@ def _row(k: int, azimuth: float) -> np.ndarray:
 
 
 def _along(corners: np.ndarray, owner: np.ndarray) -> np.ndarray:
-    """(n_f, 3): in its face, the direction of its tentacle to the tip; zero in the head."""
+    """Return the direction towards the tip of each face's tentacle, in the plane of the face, (n_f, 3); zero in the
+    head.
+    """
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     azimuth = 2 * np.pi * owner / TENTACLES
     across = np.stack([np.zeros(len(owner)), -np.sin(azimuth), np.cos(azimuth)], axis=1)

@@ -1,4 +1,4 @@
-"""Where the octopus is to swim: three channels along x, each narrower in its middle than at its mouths."""
+"""The three channels of the octopus along x, each narrower in its middle than at its mouths."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from scipy.interpolate import PchipInterpolator
 
 import magshell as ms
 
-KNOTS = 17  # of a tube: all that its outline needs, and each costs time
+KNOTS = 17  # number of spline knots of a tube: enough for its outline; each costs time
 
 
 @dataclass(frozen=True)
 class Channel:
     """A tube with mouths. stations, radii: (k,) m, its outline.
 
-    end: m, where its narrow part ends: it is passed once all of the octopus is beyond.
-    goal: m, where along x the mass center is asked to be when the time set is over.
+    end: x of the end of its narrow part, m; the channel is passed once all of the octopus is beyond.
+    goal: x that the mass center should reach in the given time, m.
     """
 
     name: str
@@ -27,7 +27,7 @@ class Channel:
     goal: float
 
     def outline(self) -> np.ndarray:
-        """(2, n) m: x along the tube and its radius there."""
+        """Return x along the tube and its radius there, (2, n) m."""
         tube = self.tube()
         x = np.linspace(self.stations[0], self.stations[-1], 181)
         on_axis = np.stack([x, 0 * x, 0 * x], axis=1)
@@ -43,7 +43,7 @@ class Channel:
 
 
 def _channel(name: str, outline: dict[float, float], *, end: float, goal: float) -> Channel:
-    """From lengths in mm."""
+    """Build a channel from lengths in mm."""
     stations, radii = (tuple(1e-3 * length for length in each) for each in (outline, outline.values()))
     return Channel(name, stations, radii, 1e-3 * end, 1e-3 * goal)
 

@@ -17,7 +17,7 @@ PAPER = {"pipe I": (72, 3.6e4), "pipe II": (41, 2.2e4), "tunnel": (49, 4.4e4)}  
 
 
 def draw_swimmer(axes, result: dict, positions: np.ndarray) -> None:
-    """The octopus in its channel, (n_v, 3) m, seen across the axis through the translucent wall."""
+    """Draw the octopus at positions (n_v, 3) m in its channel, seen across the axis through the translucent wall."""
     turned = positions @ np.array([[1, 0, 0], [0, np.cos(EYE), np.sin(EYE)], [0, -np.sin(EYE), np.cos(EYE)]])
     corners = turned[result["body"].mesh.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -55,7 +55,7 @@ def draw_snapshot(axes, result: dict, time: float) -> None:
 
 
 def draw_path(axes, result: dict) -> None:
-    """Along the channel: the center of mass beside the sample points, and the last tip beside the channel's end."""
+    """Draw the position along the channel: center of mass and requested path, last tip and end of the channel."""
     for name in COLORS:
         motion = result[name]
         axes.plot(
@@ -84,7 +84,9 @@ def draw_field(axes, result: dict) -> None:
 
 
 def draw_search(axes, result: dict) -> None:
-    """Every horizon from its first step on: the objective with which its search began and ended."""
+    """Draw the objective at the start and end of every horizon's search, against the time at which the horizon
+    begins.
+    """
     for part, found in result["search"].searches:
         first, last = found.history[0].objective, found.objective
         begin = result["times"][part.first]
@@ -96,7 +98,7 @@ def draw_search(axes, result: dict) -> None:
 
 
 def movie(result: dict, path, fps: int = 25, slower: float = 2.0) -> None:
-    """The motion found, in slow motion, with the field's component along the channel."""
+    """Write the movie of the motion found, in slow motion, with the field's component along the channel."""
     from matplotlib import pyplot as plt
     from matplotlib.animation import PillowWriter
 
@@ -120,7 +122,7 @@ def movie(result: dict, path, fps: int = 25, slower: float = 2.0) -> None:
 
 
 def summary(results: dict[str, dict]) -> str:
-    """What a person would ask first."""
+    """Return the summary of every channel: passing times, cost of the search, and the paper's figures."""
     return "\n".join(_about(name, result) for name, result in results.items())
 
 

@@ -1,4 +1,4 @@
-"""The field of every step, so that the octopus passes a channel: [Chen22] 6.3."""
+"""The task of the octopus: a field for every step that takes it through a channel, [Chen22] 6.3."""
 
 from __future__ import annotations
 
@@ -19,9 +19,12 @@ CONTACT_STIFFNESS, FRICTION = 1e4, 0.6  # N/m and 1, the same
 SMOOTHING, STICKING_SPEED = 0.2e-3, 5e-3  # m and m/s
 WATER = 1e3  # kg/m3, [Chen22] 6.3: as heavy as the octopus, which therefore floats and needs no gravity
 
-HORIZON, STRIDE = 400, 200  # steps that are looked at, and that are then done
-TRIALS, ITERATIONS = 5, 2  # of every horizon: plans tried before its search, and steps of the search
-ONLY_TRIALS = 10  # where there is no search: as many motions in all, a gradient counted as one
+HORIZON, STRIDE = 400, 200  # steps of the prediction horizon and of the control horizon
+TRIALS, ITERATIONS = (
+    5,
+    2,
+)  # for every horizon: random plans tried before its search, and iterations of the search
+ONLY_TRIALS = 10  # without a search: as many motions in all, a gradient counted as one
 SWING, PERIODS = 12e-3, (100, 400)  # T, of Bx, and steps: the trials' swings
 
 EVEN, EVEN_FREQUENCY = 6e-3, 4.0  # T and Hz, of the swing that the field found is compared with
@@ -34,11 +37,11 @@ PRECISION = 1e-5  # of a step, relative: 0.3 s later all is within 5 um of where
 
 @dataclass
 class Swim:
-    """The octopus in a channel, or in open water (None), for so many steps.
+    """The octopus in a channel, or in open water (None), for a number of steps.
 
-    goal: m, where along x the mass center is asked to be at the end; its path leads there evenly.
-    noise: m, of every coordinate in the start, drawn with this seed.
-    gradients: whether there is a search, or trials only.
+    goal: x that the mass center should reach at the end, m; its requested path leads there evenly. noise: standard
+    deviation of every coordinate at the start, m, drawn with `seed`. gradients: whether there is a search by gradient,
+    or random trials only.
     """
 
     body: Octopus
@@ -80,11 +83,11 @@ class Swim:
 
     @property
     def times(self) -> np.ndarray:
-        """Of the field that acts in each step: its end, (steps,) s."""
+        """The times of the field of each step: the end of the step, (steps,) s."""
         return ms.control.step_times(self.steps, TIME_STEP)[1:].numpy()
 
     def move(self, field, start=None) -> ms.Trajectory:
-        """In a field a step, (steps, 3) T, from rest or from where another motion ended."""
+        """Simulate the motion in a field for each step, (steps, 3) T, from rest or from the end of another motion."""
         return ms.simulate(
             self.scene,
             steps=len(field),
@@ -99,27 +102,30 @@ class Swim:
         )
 
     def center(self, positions):
-        """Of mass, (n, 3) m; positions (n, n_v, 3) m."""
+        """Return the center of mass, (n, 3) m; positions (n, n_v, 3) m."""
         return ms.control.track(positions, np.arange(self.body.mesh.n_vertices), self.body.masses)
 
     def path(self, steps) -> np.ndarray:
-        """Where along x the center is to be after so many steps [m]: evenly on to the goal."""
+        """Return the requested x of the center after a number of steps [m], at constant speed to the goal."""
         begin = float(self.body.masses @ self.body.mesh.rest_positions[:, 0])
         return begin + (self.goal - begin) * np.asarray(steps) / self.steps
 
     def passed(self, positions) -> np.ndarray:
-        """The frames in which all of the octopus is beyond the channel's narrow part."""
+        """Return the frames in which all of the octopus is beyond the channel's narrow part."""
         return np.flatnonzero(positions[:, :, 0].min(axis=1) > self.channel.end)
 
     @staticmethod
     def positions(motion: ms.Trajectory) -> torch.Tensor:
-        """As a tensor; of an array a copy, because those of results are read-only."""
+        """Return the positions of a motion as a tensor; those of numpy results, which are read-only, are copied."""
         found = motion.positions
         return found if torch.is_tensor(found) else torch.tensor(found)
 
     def objective(self, field, horizon: ms.control.Horizon, before: ms.Trajectory | None) -> dict:
-        """Terms in m2, of the steps of a horizon: how late the center is, in the later half; how far the center and the
-        nose, which leads, are from the axis; what the field costs."""
+        """Compute the terms of the objective over a horizon, m2.
+
+        They are: the delay of the center, in the later half; the distances of the center and of the nose, which leads,
+        from the axis; the cost of the field.
+        """
         positions = self.positions(self.move(field, before))[1:]
         center, nose = self.center(positions), positions[:, NOSE]
         path = torch.from_numpy(self.path(np.arange(horizon.first + 1, horizon.end + 1)))
@@ -137,13 +143,13 @@ class Swim:
         return self.move(field.numpy(), before)
 
     def swing(self) -> np.ndarray:
-        """A field along x that opens and closes the tentacles evenly, to compare with."""
+        """Return a field along x that opens and closes the tentacles evenly, for comparison."""
         return np.stack(
             [-EVEN * np.sin(2 * np.pi * EVEN_FREQUENCY * self.times), *np.zeros((2, self.steps))], axis=1
         )
 
     def solve(self, progress: bool = False) -> ms.control.RecedingHorizonResult:
-        """The field of every step, from none, until the channel is passed."""
+        """Search for the field of every step, from zero, until the channel is passed."""
         return ms.control.receding_horizon(
             self.objective,
             self.advance,

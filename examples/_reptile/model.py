@@ -30,13 +30,13 @@ STICKING_SPEED = 5e-4  # m/s
 
 @dataclass(frozen=True)
 class Ground:
-    """An obstacle, and how it rises at the start: the sheet begins parallel to it."""
+    """An obstacle, and its slope at the start: the sheet begins parallel to it."""
 
     obstacle: ms.obstacles.Obstacle
     slope: float = 0.0  # rad
 
     def height(self, x: np.ndarray) -> np.ndarray:
-        """Of the ground, m, at x (...) m in the plane y = 0."""
+        """Return the height of the ground at x (...) m in the plane y = 0, m."""
         if isinstance(self.obstacle, ms.obstacles.HeightField):
             middle = len(self.obstacle.y) // 2
             return np.interp(x - self.obstacle.center[0], self.obstacle.x, self.obstacle.heights[:, middle])
@@ -48,7 +48,7 @@ def flat() -> Ground:
 
 
 def over_bump() -> Ground:
-    """A ridge across the way, two thirds as long as the crawler, higher than the sheet is thick."""
+    """Build a ridge across the path, two thirds as long as the crawler, higher than the sheet is thick."""
     return Ground(ms.obstacles.bump(BUMP_HEIGHT, BUMP_LENGTH, center=(BUMP_AT, 0.0, 0.0)))
 
 
@@ -69,9 +69,9 @@ class Crawler:
     ground: Ground | None
 
     def crawl(self, cycles: float, *, time_step=TIME_STEP, sense=1, frames=40, **options) -> ms.Trajectory:
-        """So many turns of the field, at least `frames` states of each recorded.
+        """Simulate a number of rotations of the field, and record at least `frames` states of each.
 
-        sense: -1 turns it the other way.
+        sense: -1 reverses the rotation.
         """
         a_cycle = round(1 / (FREQUENCY * time_step))
         every = max(n for n in range(1, max(a_cycle // frames, 1) + 1) if a_cycle % n == 0)
@@ -88,20 +88,23 @@ class Crawler:
         )
 
     def centers(self, motion: ms.Trajectory) -> np.ndarray:
-        """Of mass, (n, 3) m."""
+        """Return the center of mass, (n, 3) m."""
         masses = self.scene.shell.vertex_masses
         return np.einsum("v,tvi->ti", masses / masses.sum(), motion.positions)
 
 
 def turning_field(time: float, sense=1) -> tuple[float, float, float]:
-    """T. It turns about the y axis, from x downwards, and grows to its strength in the first quarter turn."""
+    """Return the field at a time [s], T.
+
+    It rotates about the y axis, from x downwards, and grows to its full strength in the first quarter of a rotation.
+    """
     angle = 2 * np.pi * FREQUENCY * time
     strength = FLUX_DENSITY * min(1.0, 4 * FREQUENCY * time)
     return strength * np.cos(angle), 0.0, -sense * strength * np.sin(angle)
 
 
 def crawler(ground: Ground | None, **contact) -> Crawler:
-    """On a ground; without one the sheet floats, and has no weight."""
+    """Build the crawler on a ground; without a ground it floats, and has no weight."""
     mesh = lizard()
     sheet = ms.Shell(
         mesh,
@@ -130,10 +133,10 @@ def crawler(ground: Ground | None, **contact) -> Crawler:
 
 
 def lizard() -> ms.TriangleMesh:
-    """A body with four pairs of legs: 496 faces and 326 vertices, mirrored left to right and front to back.
+    """Build a body with four pairs of legs: 496 faces and 326 vertices, symmetric left to right and front to back.
 
-    By Euler's formula a sheet of so many has 154 edges along its outline, and of rectangles cut in halves it
-    has 248. Bodies of whole cells with legs of one size that have both are few; this one has four pairs.
+    By Euler's formula a sheet with these counts has 154 edges along its outline, and one of rectangles cut in halves
+    has 248 rectangles. Few bodies of whole cells with legs of one size have both; this one has four pairs.
     """
     (columns, width), long = BODY, LEG[1]
     x, on_leg = across()
@@ -156,9 +159,9 @@ def lizard() -> ms.TriangleMesh:
 
 
 def across() -> tuple[np.ndarray, np.ndarray]:
-    """x of the lines between the columns of cells, m, zero in the middle, and which columns are of a leg.
+    """Return x of the lines between the columns of cells [m], zero in the middle, and whether each column is in a leg.
 
-    Gaps are as wide as each other, of however many columns.
+    All gaps have the same width, whatever their number of columns.
     """
     columns, thick = BODY[0], LEG[0]
     on_leg = np.zeros(columns, dtype=bool)
@@ -172,7 +175,10 @@ def across() -> tuple[np.ndarray, np.ndarray]:
 
 
 def magnetization(mesh: ms.TriangleMesh) -> np.ndarray:
-    """(n_f, 3) A/m: legs along themselves, outwards in one pair, inwards in the next; the body has none."""
+    """Return the magnetization of every face, (n_f, 3) A/m.
+
+    Legs are magnetized along themselves, outwards in one pair, inwards in the next; the body has none.
+    """
     x, y, _ = mesh.face_barycenters.T
     pair = np.searchsorted(across()[0][list(ROOTS)], x) - 1
     on_leg = np.abs(y) > CELL * BODY[1] / 2

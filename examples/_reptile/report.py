@@ -17,7 +17,7 @@ VIEW = (20, -65)
 
 
 def draw_side(axes, who: Crawler, motion: ms.Trajectory, name: str, shown: int = 3) -> None:
-    """Body and feet from the side at a few times, above the ground."""
+    """Draw body and feet from the side at a few times, above the ground."""
     mesh = who.scene.mesh
     x, y, _ = mesh.rest_positions.T
     spine = np.flatnonzero(np.isclose(np.abs(y), CELL / 2) & (y > 0))
@@ -48,7 +48,7 @@ def draw_side(axes, who: Crawler, motion: ms.Trajectory, name: str, shown: int =
 
 
 def _foot(mesh: ms.TriangleMesh, root: int) -> np.ndarray:
-    """Vertices along the middle of a leg, from the body to the tip, on the side of positive y."""
+    """Return the vertices along the middle of a leg, from the body to the tip, on the side of positive y."""
     x, y, _ = mesh.rest_positions.T
     leg = np.flatnonzero(np.isclose(x, across()[0][root + LEG[0] // 2]) & (y > 0))
     return leg[np.argsort(y[leg])]
@@ -63,7 +63,7 @@ def draw_progress(axes, walks: dict) -> None:
 
 
 def draw_paths(axes, walks: dict) -> None:
-    """The center above the ground it is over."""
+    """Draw the height of the center above the ground below it."""
     for name, (who, motion) in walks.items():
         x, _, z = who.centers(motion).T
         axes.plot(1e3 * x, 1e3 * (z - who.ground.height(x)), color=COLORS[name], label=name)
@@ -71,7 +71,7 @@ def draw_paths(axes, walks: dict) -> None:
 
 
 def picture(who: Crawler, motion: ms.Trajectory, shown: int = 9) -> ms.Picture:
-    """The last turn of the field."""
+    """Draw the last rotation of the field."""
     a_turn = round(1 / (FREQUENCY * (motion.times[1] - motion.times[0])))
     chosen = np.linspace(len(motion) - 1 - a_turn, len(motion) - 1, shown).round().astype(int)
     mesh, drawn = _on_the_floor(who, motion, chosen)
@@ -95,7 +95,7 @@ def movie(who: Crawler, motion: ms.Trajectory, path: Path, title: str, **options
 
 
 def _on_the_floor(who: Crawler, motion: ms.Trajectory, chosen: np.ndarray) -> tuple[ms.TriangleMesh, dict]:
-    """The ground as a second sheet without magnetization beside the crawler: a mesh, and its states."""
+    """Return one mesh of crawler and ground, the ground without magnetization, and the plot's states."""
     mesh = who.scene.mesh
     points, faces = _floor(who, motion)
     both = ms.TriangleMesh(
@@ -110,7 +110,7 @@ def _on_the_floor(who: Crawler, motion: ms.Trajectory, chosen: np.ndarray) -> tu
 
 
 def _floor(who: Crawler, motion: ms.Trajectory) -> tuple[np.ndarray, np.ndarray]:
-    """What is drawn of the ground, where the sheet's lower face touches: vertices (n, 3) m, faces (m, 3)."""
+    """Return the ground at the height of the sheet's lower side, for drawing: vertices (n, 3) m, faces (m, 3)."""
     low, high = motion.positions.min(axis=(0, 1)) - CELL, motion.positions.max(axis=(0, 1)) + CELL
     floor = ms.meshes.rectangle(high[0] - low[0], high[1] - low[1], cells=(40, 4))
     points = floor.rest_positions + np.array([low[0], low[1], 0.0])

@@ -1,4 +1,4 @@
-"""What the crawler's step depends on, and what it costs."""
+"""A study of the crawler's displacement per cycle, and of its cost."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ class Row:
 
 
 def advances(who: Crawler, motion: ms.Trajectory) -> np.ndarray:
-    """How far the center of mass came in each full cycle, (cycles, 3) m."""
+    """Return the displacement of the center of mass in each full cycle, (cycles, 3) m."""
     a_cycle = round(1 / (FREQUENCY * (motion.times[1] - motion.times[0])))
     return np.diff(who.centers(motion)[::a_cycle], axis=0)
 
 
 def study(steps=(2e-3, 1e-3, TIME_STEP), cycles=2) -> list[Row]:
-    """On flat ground, in steps [s]: friction exact, lagged and none; and floating, without contact."""
+    """Compare steps [s] and laws on flat ground: friction exact, lagged and none; and floating, without contact."""
     ground = flat()
     exact, lagged = crawler(ground), crawler(ground, lagged_friction=True)
     slippery, floating = crawler(ground, friction_coefficient=0.0), crawler(None)

@@ -1,1 +1,1 @@
-"""What the examples of robots that go to a target share: the search by gradient, from several starts, and its pictures."""
+"""The common parts of the examples in which a robot goes to a target: the search by gradient, and its pictures."""

@@ -23,35 +23,35 @@ def summary(result: dict, meshes) -> str:
     nodes, tetrahedra = (
         sum(getattr(each, name) for each in meshes) for name in ("n_vertices", "n_tetrahedra")
     )
-    way = np.array2string(first.robot.way(motion), precision=4)
+    moved = np.array2string(first.robot.displacement(motion), precision=4)
     halved = f", {len(motion.substeps)} of them in parts" if motion.substeps else ""
     lines = [
-        f"{nodes} nodes, {tetrahedra} tetrahedra, {first.controls.size} unknowns; way {way} m",
+        f"{nodes} nodes, {tetrahedra} tetrahedra, {first.controls.size} unknowns; displacement {moved} m",
         f"a step {result['forward']:.1f} ms of the processor, backwards {result['backward']:.1f}; "
         f"{motion.iterations / motion.steps_done:.1f} iterations{halved}",
         f"slope along the gradient over {result['slope_steps']} steps against differences: {result['slope']:.1e}, "
         f"at what was found {result['slope_found']:.1e}",
-        "start: episodes to 1 % of the way, seconds, least miss",
+        "start: episodes to 1 % of the distance, seconds, least distance over the initial one",
         *(
-            f"  {label(each)}: {each.episodes or f'not in {len(each.misses)}'}, {each.seconds[-1]:.0f} s, "
-            f"{each.misses.min():.4f}"
+            f"  {label(each)}: {each.episodes or f'not in {len(each.distances)}'}, {each.seconds[-1]:.0f} s, "
+            f"{each.distances.min():.4f}"
             for each in found
         ),
-        "episode   miss over the way   seconds",
+        "episode   relative distance   seconds",
     ]
-    rows = enumerate(zip(first.misses, first.seconds, strict=True), start=1)
-    return "\n".join(lines + [f"{k:7d}   {miss:17.4f}   {second:7.1f}" for k, (miss, second) in rows])
+    rows = enumerate(zip(first.distances, first.seconds, strict=True), start=1)
+    return "\n".join(lines + [f"{k:7d}   {distance:17.4f}   {second:7.1f}" for k, (distance, second) in rows])
 
 
 def draw_search(by_episode, by_time, found: list[Found]) -> None:
     for each, color in zip(found, COLORS, strict=False):
         by_episode.semilogy(
-            1 + np.arange(len(each.misses)), each.misses, "o-", ms=3, color=color, label=label(each)
+            1 + np.arange(len(each.distances)), each.distances, "o-", ms=3, color=color, label=label(each)
         )
-        by_time.semilogy(each.seconds, each.misses, "o-", ms=3, color=color)
+        by_time.semilogy(each.seconds, each.distances, "o-", ms=3, color=color)
     for axes, name in ((by_episode, "episode"), (by_time, "time [s]")):
         axes.axhline(REACHED, color="#999999", lw=0.8, ls=":")
-        axes.set(xlabel=name, ylabel="miss over the way")
+        axes.set(xlabel=name, ylabel="distance over the initial one")
     if len(found) > 1:
         by_episode.legend(frameon=False, fontsize=7)
 

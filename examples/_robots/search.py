@@ -12,25 +12,28 @@ from robots.robot import Robot
 
 import magshell as ms
 
-REACHED = 0.01  # of the way asked for
+REACHED = 0.01  # of the initial distance
 EPISODES = 40
 
 
 @dataclass(frozen=True)
 class Found:
-    """controls: (steps, numbers), from -1 to 1. misses: of every episode, a motion and its gradient, the distance from the
-    target over the way there; seconds: on the wall, until each. start: what its first controls were made of."""
+    """The result of one search.
+
+    controls: (steps, numbers), from -1 to 1. distances: from the target over the initial distance, for every episode (a
+    motion and its gradient); seconds: wall time until each. start: the arguments of its first controls.
+    """
 
     robot: Robot
     start: dict
     controls: np.ndarray
-    misses: np.ndarray
+    distances: np.ndarray
     seconds: np.ndarray
 
     @property
     def episodes(self) -> int | None:
-        """Until 1 % of the way; None where it was not reached."""
-        reached = np.flatnonzero(self.misses < REACHED)
+        """The number of episodes until the distance is 1 % of the initial one; None where it was not reached."""
+        reached = np.flatnonzero(self.distances < REACHED)
         return int(reached[0]) + 1 if len(reached) else None
 
 
@@ -43,9 +46,13 @@ def searched(
     slope_steps: int,
     difference: float,
 ) -> dict:
-    """{"found": Found of each start, arguments of the robot's first_controls; of the first one "motion" with its
-    controls, and "forward", "backward": ms of the processor, a step; "slope": error at the start, over so many steps;
-    "slope_found": at the controls found, over all steps}."""
+    """Run the searches and measure the first one.
+
+    Returns {"found": the Found of each start (keyword arguments of the robot's first_controls); for the first start
+    "motion" with its controls, "forward" and "backward": processor time of a step, ms; "slope": relative error of the
+    directional derivative at the start, over `slope_steps` steps; "slope_found": the same at the controls found, over
+    all steps}.
+    """
     found = [
         found_by_gradient(robot, start, robot.first_controls(steps, **start), target, episodes)
         for start in starts
@@ -54,7 +61,7 @@ def searched(
     began = time.process_time()
     motion = robot.motion(x)
     there = time.process_time()
-    (robot.miss(motion, target) ** 2).backward()
+    (robot.relative_distance(motion, target) ** 2).backward()
     back = time.process_time()
     return {
         "found": found,
@@ -70,41 +77,45 @@ def searched(
 def found_by_gradient(
     robot: Robot, start: dict, controls: np.ndarray, target=None, episodes: int = EPISODES
 ) -> Found:
-    """L-BFGS between the bounds, until 1 % of the way or so many episodes."""
+    """Search by L-BFGS within the bounds, until the distance is 1 % of the initial one, for at most `episodes`."""
     x = torch.tensor(controls, requires_grad=True)
     optimizer = ms.optim.LBFGS([x], lower=-1.0, upper=1.0)
-    misses, seconds, began = [], [], time.perf_counter()
+    distances, seconds, began = [], [], time.perf_counter()
     best = (np.inf, controls)
 
     def objective() -> torch.Tensor:
         nonlocal best
-        miss = robot.miss(robot.motion(x), target)
-        misses.append(float(miss.detach()))
+        distance = robot.relative_distance(robot.motion(x), target)
+        distances.append(float(distance.detach()))
         seconds.append(time.perf_counter() - began)
-        best = min(best, (misses[-1], x.detach().numpy().copy()), key=lambda each: each[0])
-        return miss**2
+        best = min(best, (distances[-1], x.detach().numpy().copy()), key=lambda each: each[0])
+        return distance**2
 
-    while len(misses) < episodes and best[0] >= REACHED:
-        before = len(misses)
+    while len(distances) < episodes and best[0] >= REACHED:
+        before = len(distances)
         optimizer.step(objective)
-        if len(misses) == before:  # it stands still
+        if len(distances) == before:  # it stands still
             break
-    return Found(robot, start, best[1], np.array(misses), np.array(seconds))
+    return Found(robot, start, best[1], np.array(distances), np.array(seconds))
 
 
 def gradient_at(robot: Robot, controls: np.ndarray, target=None) -> np.ndarray:
-    """Of the squared miss by all controls, of steps solved to round-off."""
+    """Compute the gradient of the squared distance by all controls, with steps solved to round-off."""
     x = torch.tensor(controls, requires_grad=True)
-    return torch.autograd.grad(robot.miss(robot.motion(x, ms.MixedNewton()), target) ** 2, x)[0].numpy()
+    return torch.autograd.grad(robot.relative_distance(robot.motion(x, ms.MixedNewton()), target) ** 2, x)[
+        0
+    ].numpy()
 
 
 def slope_error(robot: Robot, controls: np.ndarray, step: float, target=None) -> float:
-    """Of the squared miss by all controls: slope along its gradient against central differences. Controls at their bounds
-    stay."""
+    """Return the relative error of the slope of the squared distance along its gradient against central differences.
+
+    Controls at their bounds stay.
+    """
     gradient = np.where(np.abs(controls) <= 1.0 - step, gradient_at(robot, controls, target), 0.0)
     slope = float(np.linalg.norm(gradient))
     there, back = (
-        float(robot.miss(robot.motion(moved, ms.MixedNewton()), target)) ** 2
+        float(robot.relative_distance(robot.motion(moved, ms.MixedNewton()), target)) ** 2
         for moved in (controls + sign * step * gradient / slope for sign in (1, -1))
     )
     return abs((there - back) / (2 * step) - slope) / slope

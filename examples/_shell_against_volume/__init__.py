@@ -1,1 +1,1 @@
-"""What examples/shell_against_volume.py is made of: deformations, energies, tables and pictures."""
+"""The parts of examples/shell_against_volume.py: deformations, energies, tables and pictures."""

@@ -8,7 +8,7 @@ LENGTH, WIDTH, THICKNESS = 1.0, 0.25, 0.02
 
 
 def bent(points: np.ndarray, angle: float) -> np.ndarray:
-    """To an arc of this angle; straight normals of unit length."""
+    """Return the positions of the plate bent to an arc of this angle; normals stay straight and of unit length."""
     x, y, z = points.T
     radius = LENGTH / angle
     turn = x / radius
@@ -19,8 +19,11 @@ def bent(points: np.ndarray, angle: float) -> np.ndarray:
 
 
 def twisted(points: np.ndarray, angle: float) -> np.ndarray:
-    """The middle surface to a helicoid whose ends are turned by this angle; straight normals of unit length, of that
-    surface: (x, y cos a, y sin a) with a = angle x / LENGTH."""
+    """Return the positions of the plate with its middle surface twisted to a helicoid whose ends are rotated by this
+    angle.
+
+    Normals of that surface, (x, y cos a, y sin a) with a = angle x / LENGTH, stay straight and of unit length.
+    """
     x, y, z = points.T
     y = y - 0.5 * WIDTH
     rate = angle / LENGTH
@@ -31,7 +34,9 @@ def twisted(points: np.ndarray, angle: float) -> np.ndarray:
 
 
 def sheared_twist(points: np.ndarray, angle: float) -> np.ndarray:
-    """The same middle surface, its sections turned as they are: normals lean, as Kirchhoff's do not."""
+    """Return the positions with the same twist and rigidly rotated sections, so that normals incline, unlike
+    Kirchhoff's.
+    """
     x, y, z = points.T
     y = y - 0.5 * WIDTH
     turn = angle / LENGTH * x

@@ -1,4 +1,4 @@
-"""The same plate as a solid magnetized throughout and as a shell, and their magnetic energies where they are put."""
+"""A plate as a solid magnetized throughout and as a shell, with the magnetic energies of both in given positions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,10 @@ import magshell as ms
 
 
 class Plate:
-    """size: (3,) m. cells: along and across; layers: of the solid, each cell of a layer six tetrahedra."""
+    """A plate as a solid and as a shell.
+
+    size: (3,) m. cells: along and across; layers: of the solid, each cell of a layer six tetrahedra.
+    """
 
     def __init__(self, size, cells, layers: int):
         self.size, self.cells = size, cells
@@ -34,14 +37,14 @@ class Plate:
     def energies(
         self, volume: np.ndarray, shell: np.ndarray, magnetization, flux_density
     ) -> tuple[float, float]:
-        """Of the solid and the shell at these positions (n_v, 3) m, in J."""
+        """Return the magnetic energies of the solid and the shell at these positions (n_v, 3) m, in J."""
         return tuple(
             _magnetic_energy(scene, positions, magnetization, flux_density)
             for scene, positions in zip(self._scenes, (volume, shell), strict=True)
         )
 
     def of_cells(self, volume, shell, magnetization, flux_density) -> tuple[np.ndarray, np.ndarray]:
-        """J, of the tetrahedra in each column of cells and of the faces of the cell on the shell, by plain formulas."""
+        """Compute the energy of each column of tetrahedra and of the same cell of the shell, by plain formulas, J."""
         m, b = np.array(magnetization), np.array(flux_density)
         rest, nodes = self.solid.mesh.rest_positions, self.solid.mesh.tetrahedra
         edges = _edges(rest, nodes)
@@ -64,14 +67,14 @@ class Plate:
         )
 
     def _cell(self, points: np.ndarray) -> np.ndarray:
-        """(n,), the cell of the plan that each point is in."""
+        """Return the cell of the plan that each point is in, (n,)."""
         low = self.shell.mesh.rest_positions.min(axis=0)[:2]
         along, across = ((points[:, :2] - low) / self.size[:2] * self.cells).astype(int).T
         return along * self.cells[1] + across
 
 
 def _edges(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """(n, k - 1, 3), from the first node of each to the others."""
+    """Return the vectors from the first node of each element to the others, (n, k - 1, 3)."""
     return points[nodes[:, 1:]] - points[nodes[:, :1]]
 
 

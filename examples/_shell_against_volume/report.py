@@ -14,7 +14,7 @@ ROUND_OFF = 1e-16  # below it a logarithmic axis shows nothing
 
 
 def summary(result: dict) -> str:
-    """One line a deformation and magnetization, at the largest angle, for every number of layers."""
+    """Return one line for each deformation and magnetization, at the largest angle, for every number of layers."""
     rows = result["rows"]
     largest = max(row["angle"] for row in rows)
     lines = [
@@ -42,7 +42,7 @@ def summary(result: dict) -> str:
 
 
 def draw_differences(axes, result: dict) -> None:
-    """Accumulated, against the angle; one axis a deformation."""
+    """Draw the accumulated difference against the angle; one axis for each deformation."""
     for axis, deformation in zip(axes, DEFORMATIONS, strict=True):
         for magnetization, color in COLORS.items():
             for layers, marker in MARKERS.items():
@@ -68,7 +68,7 @@ def draw_differences(axes, result: dict) -> None:
 
 
 def draw_plates(result: dict) -> ms.Picture:
-    """The middle surface at the largest angle."""
+    """Draw the middle surface at the largest angle."""
     plate = next(iter(result["plates"].values()))
     largest = max(row["angle"] for row in result["rows"])
     shapes = [plate.shell_positions(DEFORMATIONS[name], largest) for name in ("bent", "twisted")]

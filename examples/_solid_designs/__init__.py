@@ -1,1 +1,3 @@
-"""What the designs of solids share: a magnetization carried from mesh to mesh, and the table of what it does there."""
+"""The common parts of the designs of solids: transfer of a magnetization between meshes, and the table of its
+effect.
+"""

@@ -1,4 +1,4 @@
-"""What a design does: on the mesh it was found with, on a converged one, and when it is found with better elements."""
+"""The effect of a design: on its own mesh, on a converged one, and when it is found with better elements."""
 
 from __future__ import annotations
 
@@ -18,17 +18,20 @@ class Outcome:
 
     what: str
     solid: ms.Solid
-    miss: float
+    error: float
     iterations: int | None = None
     seconds_per_iteration: float | None = None
 
 
-def table(outcomes: Iterable[Outcome], miss: str = "rms distance [mm]", scale: float = 1e3) -> str:
-    """miss: what the number of merit is called; scale: from its SI unit to that of its name."""
+def table(outcomes: Iterable[Outcome], label: str = "rms distance [mm]", scale: float = 1e3) -> str:
+    """Return the table of outcomes.
+
+    label: name of the figure of merit, with its unit; scale: from its SI unit to that of the label.
+    """
     outcomes = list(outcomes)
     wide = max(len(each.what) for each in outcomes)
     lines = [
-        f"{'':{wide}s}  element      tetrahedra    faces   unknowns   {miss}   iterations   s/iteration",
+        f"{'':{wide}s}  element      tetrahedra    faces   unknowns   {label}   iterations   s/iteration",
     ]
     for each in outcomes:
         searched = (
@@ -39,6 +42,6 @@ def table(outcomes: Iterable[Outcome], miss: str = "rms distance [mm]", scale: f
         lines.append(
             f"{each.what:{wide}s}  {each.solid.element:9s}    {each.solid.mesh.n_tetrahedra:10d}   "
             f"{len(each.solid.skin.faces):6d}   {3 * each.solid.mesh.n_vertices:8d}   "
-            f"{scale * each.miss:{len(miss)}.3f}{searched}"
+            f"{scale * each.error:{len(label)}.3f}{searched}"
         )
     return "\n".join(lines)

@@ -1,4 +1,4 @@
-"""A design's magnetization on another mesh of the same body."""
+"""The transfer of a design's magnetization to another mesh of the same body."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ import magshell as ms
 
 
 def face_centers(solid: ms.Solid) -> np.ndarray:
-    """(k, 3) m, at rest: of the faces of its skin, in the skin's order."""
+    """Return the reference centers of the faces of a solid's skin, in the skin's order, (k, 3) m."""
     return solid.mesh.surface.face_barycenters[solid.skin.faces]
 
 
 def transferred(values: np.ndarray, designed: ms.Solid, other: ms.Solid) -> np.ndarray:
-    """(m, ...) for the other solid's skin, from (k, ...) for the designed one's: of the nearest face's center.
+    """Return values for the other solid's skin, (m, ...), each taken from the nearest face of the designed one, (k,
+    ...).
 
-    Four triangles of a ten-node tetrahedron's face each have a row, as `solid.skin` has.
+    The four triangles on a face of a ten-node tetrahedron have a row each, as in `solid.skin`.
     """
     values = np.asarray(values)
     if len(values) != len(designed.skin.faces):

@@ -21,7 +21,7 @@ MAGNETIZATION = 1e5  # A/m, along every arm, to its tip
 
 
 def shape() -> ms.shapes.Shape:
-    """Its underside in the plane z = 0, its first arm along x."""
+    """Return the starfish, its underside in the plane z = 0, its first arm along x."""
     arms = []
     for angle in 2 * np.pi * np.arange(ARMS) / ARMS:
         along = np.array([np.cos(angle), np.sin(angle), 0.0])
@@ -31,7 +31,7 @@ def shape() -> ms.shapes.Shape:
 
 
 def starfish(mesh: ms.TetMesh, element: str, mass_density: float = MASS_DENSITY) -> ms.Solid:
-    """Of neo-Hookean material. mass_density: kg/m3."""
+    """Build the starfish of neo-Hookean material. mass_density: kg/m3."""
     skin = ms.Skin(thickness=SKIN_THICKNESS, remanent_magnetization=magnetization(mesh.face_barycenters))
     return ms.Solid(
         mesh,
@@ -43,7 +43,7 @@ def starfish(mesh: ms.TetMesh, element: str, mass_density: float = MASS_DENSITY)
 
 
 def magnetization(points: np.ndarray) -> np.ndarray:
-    """(n, 3) A/m at points (n, 3) m: of the arm that is nearest, to its tip; none in the middle."""
+    """Return the magnetization at points (n, 3) m, (n, 3) A/m: along the nearest arm to its tip; none in the middle."""
     x, y, _ = points.T
     each = 2 * np.pi / ARMS
     angle = each * np.round(np.arctan2(y, x) / each)

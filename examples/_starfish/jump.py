@@ -1,4 +1,4 @@
-"""The field of every step, so that the starfish jumps over a bar: [Chen22] 6.4."""
+"""The task of the starfish: a field for every step that makes it jump over a bar, [Chen22] 6.4."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ TOLERANCE = 1e-6  # of a step, relative
 
 @dataclass(frozen=True)
 class Design:
-    """What is asked for. mass_density: kg/m3. cost: m2/T2, of the field's mean square.
+    """A design task and its first guess.
 
-    rise, fall: s, how long the field of the guess points up, growing as a quarter of a sine, and down; strength,
-    forward: T, of its parts along z and x.
+    mass_density: kg/m3. cost: weight of the field's mean square, m2/T2. rise, fall: s, how long the field of the guess
+    points up, growing as a quarter of a sine, and down; strength, forward: T, its components along z and x.
     """
 
     mass_density: float
@@ -42,7 +42,7 @@ class Design:
     fall: float = 6e-3
 
     def guess(self, steps: int = STEPS) -> np.ndarray:
-        """(steps, 3) T."""
+        """Return the field that the search starts from, (steps, 3) T."""
         ends = TIME_STEP * np.arange(1, steps + 1)
         field = np.zeros((steps, 3))
         field[:, 2] = np.where(
@@ -88,7 +88,7 @@ class Jump:
         )
 
     def move(self, field, **options) -> ms.Trajectory:
-        """In a field a step, (steps, 3) T, from rest."""
+        """Simulate the motion from rest in a field for each step, (steps, 3) T."""
         return ms.simulate(
             self.scene,
             steps=self.steps,
@@ -101,7 +101,7 @@ class Jump:
         )
 
     def center(self, positions):
-        """Of mass, (n, 3) m; positions (n, n_v, 3) m."""
+        """Return the center of mass, (n, 3) m; positions (n, n_v, 3) m."""
         return ms.control.track(positions, np.arange(self.solid.mesh.n_vertices), self.solid.vertex_masses)
 
     @cached_property
@@ -111,23 +111,25 @@ class Jump:
         within = frames <= self.steps
         return frames[within], torch.tensor([OVER, DOWN], dtype=torch.float64)[within]
 
-    def miss(self, center):
-        """How far the center (n, 3) m is from these places, mean square, m2."""
+    def mean_square_distance(self, center):
+        """Compute the mean square distance of the center (n, 3) m from the requested positions, m2."""
         frames, places = self.asked
         return ms.control.path_following(center[frames], places) / len(frames)
 
     def objective(self, unknowns: torch.Tensor) -> dict[str, torch.Tensor]:
-        """Terms in m2."""
+        """Compute the terms of the objective, m2."""
         field = blurred(unknowns)
         return {
-            "miss": self.miss(self.center(self.move(field, adjoint_storage="stages").positions)),
+            "distance": self.mean_square_distance(
+                self.center(self.move(field, adjoint_storage="stages").positions)
+            ),
             "strength": self.design.cost * ms.control.field_strength(field),
         }
 
     def solve(
         self, start: np.ndarray, iterations: int, progress: bool = False
     ) -> tuple[np.ndarray, ms.MinimizeResult]:
-        """Unknowns to begin with, and found, (steps, 3) T; and how."""
+        """Search for the unknowns (steps, 3) T by L-BFGS from `start`; return them and the result of the search."""
         unknowns = torch.tensor(start, requires_grad=True)
         optimizer = ms.optim.LBFGS(
             [unknowns],
@@ -144,9 +146,10 @@ class Jump:
 
 
 def blurred(unknowns: torch.Tensor) -> torch.Tensor:
-    """The field (steps, 3) T: a mean of the unknowns (steps, 3) T around each step, so that the bounds of these hold.
+    """Return the field (steps, 3) T as a weighted mean of the unknowns (steps, 3) T around each step.
 
-    What a search by gradients changes is then smooth in time; steps by themselves make it stop early.
+    The bounds of the unknowns hold for the field. Changes made by the search are then smooth in time; with the field of
+    single steps as unknowns the search stops early.
     """
     steps = np.arange(len(unknowns))
     weights = np.exp(-0.5 * ((steps[:, None] - steps) / BLUR) ** 2)

@@ -25,7 +25,7 @@ PAPER = {"heavy": (42, 2.5e4), "light": (111, 4.5e4), "light, cheap field": (77,
 
 
 def seen(points: np.ndarray) -> np.ndarray:
-    """(..., 2) mm, right and up in the picture, of (..., 3) m."""
+    """Return the coordinates of points (..., 3) m in the picture, to the right and up, (..., 2) mm."""
     x, y, z = np.moveaxis(1e3 * np.asarray(points), -1, 0)
     return np.stack([x, np.cos(RISE) * z + np.sin(RISE) * y], axis=-1)
 
@@ -46,7 +46,7 @@ def draw_starfish(axes, motion: dict, frame: int, color: str, alpha: float = 1.0
 
 
 def draw_ground(axes, low: float = -17.0, high: float = 47.0, top: float = 30.0) -> None:
-    """low, high, top: mm, of the picture. The bar lies across the way, as wide as the starfish."""
+    """Draw the ground and the bar, which is as wide as the starfish. low, high, top: limits of the picture, mm."""
     axes.fill_between([low, high], -14 * np.sin(RISE), 14 * np.sin(RISE), color=EARTH, lw=0, zorder=0)
     sides = BAR + 0.5 * BAR_WIDTH * np.array([-1.0, 1.0])
     for y0, z0, y1, z1, shade in (
@@ -61,7 +61,7 @@ def draw_ground(axes, low: float = -17.0, high: float = 47.0, top: float = 30.0)
 
 
 def draw_jump(axes, result: dict, name: str, which: str = "found") -> None:
-    """The whole jump in one picture, with the way of its center."""
+    """Draw the whole jump in one picture, with the path of its center."""
     motion = result[which]
     draw_ground(axes)
     times = (0.0, 0.45 * OVER_TIME, OVER_TIME, 0.135, 0.2)
@@ -96,7 +96,7 @@ def draw_height(axes, result: dict, name: str) -> None:
 
 
 def draw_field(axes, motion: dict, until: int | None = None) -> None:
-    """The field found, of the first steps only where until says how many: [Chen22] Fig. 17."""
+    """Draw the field found, of the first `until` steps or of all: [Chen22] Fig. 17."""
     field = 1e3 * motion["field"][:until]
     times = 1e3 * motion["times"][1 : 1 + len(field)]
     for k, label in ((1, "y"), (0, "x"), (2, "z")):
@@ -107,7 +107,7 @@ def draw_field(axes, motion: dict, until: int | None = None) -> None:
 
 
 def draw_take_off(axes, motion: dict, color: str, frame: int, letter: str) -> None:
-    """One picture of the taking off."""
+    """Draw one picture of the take-off."""
     draw_ground(axes, -17, 22, 16)
     draw_starfish(axes, motion, frame, color)
     axes.set_title(f"({letter}) {1e3 * motion['times'][frame]:.1f} ms", fontsize=8)
@@ -130,7 +130,7 @@ def draw_convergence(axes, result: dict, name: str) -> None:
 
 
 def movie(result: dict, name: str, path, which: str = "found", fps: int = 20, slower: float = 25.0) -> None:
-    """The jump, in slow motion, with the field as an arrow."""
+    """Write the movie of the jump, in slow motion, with the field as an arrow."""
     from matplotlib import pyplot as plt
     from matplotlib.animation import PillowWriter
 
@@ -159,7 +159,7 @@ def movie(result: dict, name: str, path, which: str = "found", fps: int = 20, sl
 
 
 def summary(results: dict[str, dict]) -> str:
-    """What a person would ask first."""
+    """Return the summary of every design: distances from the requested positions, and the cost of the search."""
     return "\n\n".join(_about(name, result) for name, result in results.items())
 
 
@@ -172,7 +172,7 @@ def _about(name: str, result: dict) -> str:
         f"{name}: {result['design'].mass_density:g} kg/m3, {1e3 * found['jump'].solid.vertex_masses.sum():.2f} g; "
         f"{found['unknowns'].size} unknowns",
         *(_about_motion(LABELS[which], result[which]) for which in motions),
-        table([_outcome(LABELS[which], result[which]) for which in motions], "miss [mm]"),
+        table([_outcome(LABELS[which], result[which]) for which in motions], "rms distance [mm]"),
         f"  linear: {found['processor_time'] / max(found['evaluations'], 1):.1f} s a motion with its gradient, a motion "
         f"{each:.1f} ms a step in {found['newton']:.1f} iterations",
         f"  [Chen22] Table 1: {theirs} iterations, {seconds / theirs:.0f} s each on six cores",
@@ -182,10 +182,14 @@ def _about(name: str, result: dict) -> str:
 
 def _outcome(what: str, motion: dict) -> Outcome:
     if "iterations" not in motion:
-        return Outcome(what, motion["jump"].solid, motion["miss"])
+        return Outcome(what, motion["jump"].solid, motion["rms_distance"])
     iterations = motion["iterations"]
     return Outcome(
-        what, motion["jump"].solid, motion["miss"], iterations, motion["processor_time"] / max(iterations, 1)
+        what,
+        motion["jump"].solid,
+        motion["rms_distance"],
+        iterations,
+        motion["processor_time"] / max(iterations, 1),
     )
 
 

@@ -1,4 +1,4 @@
-"""Fields in time that lead the tip along a curve, by several methods; and what the strip does in them."""
+"""Fields that lead the tip along a curve, found by several methods, and the resulting motions of the strip."""
 
 from __future__ import annotations
 
@@ -45,9 +45,12 @@ METHODS = {
 
 @dataclass(frozen=True)
 class Fit:
-    """What a method found. field: (steps, 3), one a step, or (steps + 1, 3), at the ends of all steps, T.
-    positions: (steps + 1, n_v, 3) m, of the strip in it. track: (steps + 1, 3) m, of the tip. replayed: the track
-    in the same field, by an integrator whose errors are far smaller."""
+    """The result of one method.
+
+    field: (steps, 3), one a step, or (steps + 1, 3), at the ends of all steps, T. positions: (steps + 1, n_v, 3) m, of
+    the strip in it. track: (steps + 1, 3) m, of the tip. replayed: the track in the same field, by an integrator whose
+    errors are far smaller.
+    """
 
     method: Method
     task: Task
@@ -63,17 +66,17 @@ class Fit:
 
     @property
     def time_error(self) -> float:
-        """How far the track is from the replayed one at most, m."""
+        """The largest distance between the track and the replayed one, m."""
         return np.linalg.norm(self.track - self.replayed, axis=1).max()
 
     @property
     def seconds(self) -> float:
-        """Of an iteration."""
+        """The wall time of an iteration, s."""
         return self.history[-1].seconds / max(1, self.history[-1].iteration)
 
 
 def fitted(strip: Strip, task: Task, method: Method, *, iterations: int, progress: bool = False) -> Fit:
-    """The field that is zero at first, improved."""
+    """Search for the field from zero by one method."""
     rows = task.steps if method.unknowns == "steps" else CONTROL_POINTS
     unknowns = torch.zeros(rows, 3, dtype=torch.float64, requires_grad=True)
 
@@ -103,9 +106,12 @@ def _field(method: Method, unknowns, task: Task):
 
 
 def figures(track: np.ndarray, task: Task) -> dict[str, float]:
-    """squares: the objective [m2]. mean, largest: distances of the frames that count from the curve; missed: of the
-    point of the curve that the track passes furthest away; start, end: how far the tip is from these points when it
-    should be there, m."""
+    """Return the figures of merit of a track.
+
+    squares: the objective [m2]. mean, largest: distances from the curve over the frames that count; missed: largest
+    distance of a point of the curve from the track; start, end: distance of the tip from these points at the requested
+    times, m.
+    """
     counts = track[task.first :]
     distances = task.curve.squared_distance(counts).numpy() ** 0.5
     passed = control.Polyline(counts).squared_distance(task.curve.at(np.linspace(0, 1, 201))).numpy() ** 0.5
@@ -120,7 +126,7 @@ def figures(track: np.ndarray, task: Task) -> dict[str, float]:
 
 
 def replayed(strip: Strip, task: Task, flux_density: np.ndarray, parts: int = 2) -> np.ndarray:
-    """The track in the same field, by the third-order integrator in shorter steps."""
+    """Simulate the track in the same field, by the third-order integrator in shorter steps."""
     if len(flux_density) == task.steps:
         finer = np.repeat(flux_density, parts, axis=0)
     else:
@@ -137,7 +143,7 @@ def replayed(strip: Strip, task: Task, flux_density: np.ndarray, parts: int = 2)
 
 
 def cost(strip: Strip, fit: Fit) -> dict[str, float]:
-    """ms of processor time that a step takes: forward, and backward for the gradient by the field."""
+    """Measure the processor time of a step [ms]: forward, and backward for the gradient by the field."""
     flux_density = torch.tensor(fit.field, requires_grad=True)
     began = time.process_time()
     move = strip.move(flux_density, fit.task.steps, integrator=fit.method.integrator)

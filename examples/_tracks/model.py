@@ -24,7 +24,7 @@ PAPER = {  # steps (a third of the table's unknowns m), residual (without a unit
 LENGTH, WIDTH, THICKNESS = 30e-3, 10e-3, 1e-3  # m
 MASS_DENSITY = 1.1e3  # kg/m3, silicone's
 RESIDUAL_FLUX_DENSITY = 25e-3  # T
-# Of the terms: with less, a tip that starts millimetres along the curve costs too little.
+# Weights of the three terms; with smaller ones a tip that starts millimetres along the curve costs too little.
 WEIGHTS = (10.0, 10.0, 1.0)
 
 
@@ -38,7 +38,7 @@ class Strip:
     damping: float
 
     def move(self, field, steps: int, *, integrator, time_step=TIME_STEP, **options) -> ms.Trajectory:
-        """From rest, in a field [T] that varies in time."""
+        """Simulate the motion from rest, in a field [T] that varies in time."""
         return ms.simulate(
             self.scene,
             steps=steps,
@@ -60,9 +60,10 @@ class Strip:
 
 
 def strip(cells=CELLS) -> Strip:
-    """Clamped at its left end; the half there is magnetized along the strip, the free half through its thickness.
+    """Build the strip, clamped at its left end.
 
-    Of cells along x and y, their number along y even. The damping of the whole is the same on every mesh.
+    The clamped half is magnetized along the strip, the free half through its thickness. cells: along x and y, an even
+    number along y. The total damping is the same on every mesh.
     """
     mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells=cells, diagonals="crossed")
     sheet = ms.Shell(
@@ -90,7 +91,7 @@ class Task:
     first: int
 
     def squares(self, track) -> dict:
-        """The three terms of the objective [m2], of a track (steps + 1, 3) m."""
+        """Compute the three terms of the objective [m2] for a track (steps + 1, 3) m."""
         return control.track_fitting(track, self.curve, self.first, self.steps, weights=WEIGHTS)
 
 

@@ -17,7 +17,7 @@ COMPONENTS = {"x": "#20639b", "y": "#999999", "z": "#d98a1f"}
 
 
 def draw_track(axes, strip: Strip, fit: Fit) -> None:
-    """The strip from its side at a few frames, and its tip at every one."""
+    """Draw the strip from its side at a few frames, and its tip at every one."""
     strobe = np.linspace(fit.task.first, fit.task.steps, 7).round().astype(int)
     for number, frame in enumerate((0, *strobe)):
         x, _, z = 1e3 * fit.positions[frame, strip.midline].T
@@ -52,7 +52,7 @@ def draw_convergence(axes, fits: dict[str, Fit], name: str) -> None:
 
 
 def draw_field(axes, fits: dict[str, Fit]) -> None:
-    """Of the last method in full lines; of the first, faintly."""
+    """Draw the field of the last method in full lines, and that of the first faintly."""
     *_, smooth = fits.values()
     first = next(iter(fits.values()))
     for fit, style in ((first, {"lw": 0.9, "alpha": 0.35}), (smooth, {"lw": 1.8})):
@@ -103,7 +103,7 @@ def _row(fit: Fit, cost: dict[str, float]) -> str:
 
 
 def states(strip: Strip, fit: Fit) -> ms.Picture:
-    """In space: at rest, at the curve's start, halfway, at its end."""
+    """Draw the strip in space: at rest, at the curve's start, halfway, at its end."""
     frames = [0, fit.task.first, (fit.task.first + fit.task.steps) // 2, fit.task.steps]
     times = ("at rest", "at the curve's start", "halfway", "at its end")
     return ms.plot(
@@ -121,7 +121,7 @@ def states(strip: Strip, fit: Fit) -> ms.Picture:
 
 
 def movie(strip: Strip, fit: Fit, path: Path) -> Path:
-    """The strip on its way, fifty times slower."""
+    """Write the movie of the motion, fifty times slower."""
     flux_density = fit.field[-fit.task.steps :]
     return ms.animate(
         strip.scene.mesh,

@@ -86,7 +86,7 @@ class CellGripper(Robot):
         )
 
     def values(self, controls: torch.Tensor | np.ndarray) -> dict[Any, Any]:
-        """controls: (steps, 59)."""
+        """Return the values of the scene's objects for controls (steps, 59)."""
         ago = np.subtract.outer(np.arange(len(controls)), np.arange(len(controls)))
         filling = np.where(ago >= 0, RESPONSE * (1.0 - RESPONSE) ** np.maximum(ago, 0), 0.0)
         moving = SPEED * TIME_STEP * np.tri(len(controls) + 1, len(controls), -1)
@@ -97,14 +97,17 @@ class CellGripper(Robot):
 
     @staticmethod
     def filled(numbers: np.ndarray, before: np.ndarray) -> np.ndarray:
-        """What is there of volumes asked for, over those at rest, after a step."""
+        """Return the volumes of the cells after a step, over those at rest, for the requested ones."""
         return before + RESPONSE * (1.0 + 0.5 * (INFLATED - 1.0) * (numbers + 1.0) - before)
 
     def first_controls(
         self, steps: int, inflated: float = 0.5, closed: int = 10, speed: float = 0.2
     ) -> np.ndarray:
-        """Cells inflated to a share of the most, all alike; after `closed` steps the drone goes up, at a share of SPEED: not
-        far enough."""
+        """Return controls to start a search from.
+
+        All cells are inflated to the same fraction of the largest volume; after `closed` steps the drone rises at a
+        fraction of SPEED, which is not far enough.
+        """
         step = np.arange(steps)
         controls = np.zeros((steps, self.numbers))
         controls[:, :-3] = -1.0 + 2.0 * inflated
@@ -113,8 +116,10 @@ class CellGripper(Robot):
 
 
 def gripper_mesh(levels: int = LEVELS) -> tuple[TetMesh, np.ndarray]:
-    """Four arms that hang from a cross, of cubes: two thick and three wide. Also (n_t,) the pneumatic cell of each
-    tetrahedron, -1 for none: the outer half of an arm, level by level."""
+    """Build four arms that hang from a cross, of cubes: two thick and three wide.
+
+    Also returns the pneumatic cell of each tetrahedron, (n_t,), -1 for none: the outer half of an arm, level by level.
+    """
     block = meshes.box(CUBE * np.array([ACROSS, levels + 1, ACROSS]), cells=(ACROSS, levels + 1, ACROSS))
     i, level, k = np.floor(block.tetrahedron_barycenters / CUBE).astype(int).T
     x, z = np.abs(i - ACROSS // 2), np.abs(k - ACROSS // 2)

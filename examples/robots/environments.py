@@ -29,9 +29,11 @@ def fish(
     render_mode: str | None = None,
     disturbed: bool = True,
 ) -> Environment:
-    """A soft fish with six bones in water; torques in its neck, back, tail and two fins are to take its center of mass to a
-    target, (3,) m from where it was. An action lasts 20 ms, an episode 2 s: [Qiao21] Figure 4c. Observed: way and velocity
-    of the center of mass, angles and rates of the joints. Rewarded: what an action comes nearer, over the way there.
+    """Build the environment of a soft fish with six bones in water, [Qiao21] Figure 4c.
+
+    Torques in its neck, back, tail and two fins are to take its center of mass to a target, (3,) m from its start. An
+    action lasts 20 ms, an episode 2 s. Observed: displacement and velocity of the center of mass, angles and rates of
+    the joints. Reward: the decrease of the distance to the target in an action, over the initial distance.
     n_tetrahedra: about how many. disturbed: whether it starts with a small velocity.
 
     render_mode: as in Environment.
@@ -58,10 +60,12 @@ def muscle_octopus(
     render_mode: str | None = None,
     disturbed: bool = True,
 ) -> Environment:
-    """A soft octopus with two muscles in each of eight legs in water, whose center of mass is to go to a target, (3,) m from
-    where it was. An action, 64 numbers, four of the wave along each muscle, lasts 5 ms, an episode 2 s: [Qiao21] Figure
-    4b. Observed: way and velocity of the center of mass, where the tips of the legs are from it, and the phase of the
-    waves. Rewarded and disturbed as the fish. cells: along a leg.
+    """Build the environment of a soft octopus with two muscles in each of eight legs in water, [Qiao21] Figure 4b.
+
+    Its center of mass is to go to a target, (3,) m from its start. An action has 64 numbers, four of the wave along
+    each muscle, and lasts 5 ms, an episode 2 s. Observed: displacement and velocity of the center of mass, the tips of
+    the legs relative to it, and the phase of the waves. Reward and disturbance are those of the fish. cells: along a
+    leg.
 
     target: (3,) m. render_mode: as in Environment. disturbed: as of fish.
 
@@ -89,11 +93,13 @@ def cell_gripper(
     disturbed: bool = True,
     **changes: Any,
 ) -> Environment:
-    """Four arms of 56 pneumatic cells under a drone, to grip a ball on a table and to carry it to a target, (3,) m from
-    where it was. An action, the volumes of all cells and the speed of the drone, lasts 10 ms, an episode 0.5 s: [Qiao21]
-    Figure 4a. Observed: way and velocity of the ball, way of the drone, where the ends of the arms are from the ball.
-    Rewarded: what the ball comes nearer, over its way; where a motion fails, the episode ends with -1. Disturbed as the
-    fish. changes: of CellGripper's own arguments.
+    """Build the environment of four arms of 56 pneumatic cells under a drone, [Qiao21] Figure 4a.
+
+    They are to grip a ball on a table and to carry it to a target, (3,) m from its start. An action, the volumes of
+    all cells and the speed of the drone, lasts 10 ms, an episode 0.5 s. Observed: displacement and velocity of the
+    ball, displacement of the drone, the ends of the arms relative to the ball. Reward: the decrease of the ball's
+    distance to the target, over the initial one; where a motion fails, the episode ends with -1. Disturbance as of the
+    fish. changes: keyword arguments of CellGripper.
 
     target: (3,) m. render_mode: as in Environment. disturbed: as of fish.
 
@@ -130,7 +136,7 @@ class _Waves:
 
 
 class _Speed:
-    """Of a support, in m a step."""
+    """The action that moves a support, by at most `most` [m] a step."""
 
     def __init__(self, most: float):
         self._most = most
@@ -146,19 +152,23 @@ def _filled(numbers: np.ndarray, time: float, before: np.ndarray) -> np.ndarray:
 def _to_target(
     robot: Robot, target, actuators, further, render_mode, disturbed: bool, **options
 ) -> Environment:
-    """Way and velocity of the traveller's center of mass are observed, and what `further` returns of a Snapshot."""
+    """Build the environment of a robot that goes to a target.
+
+    Displacement and velocity of the traveller's center of mass are observed, and the values that `further` returns for
+    a Snapshot.
+    """
     goal = np.array(target, dtype=float)
     rest = robot.traveller.mesh.rest_positions
 
-    def way(now):
+    def displacement(now):
         return robot.weights @ (now[robot.traveller].positions - rest)
 
     def away(now):
-        return np.linalg.norm(way(now) - goal)
+        return np.linalg.norm(displacement(now) - goal)
 
     def seen(now):
         return np.concatenate(
-            [way(now), robot.weights @ now[robot.traveller].velocities, np.ravel(further(now))]
+            [displacement(now), robot.weights @ now[robot.traveller].velocities, np.ravel(further(now))]
         )
 
     return Environment(

@@ -45,7 +45,7 @@ _JOINTS = (  # child, parent, where and about what: the spine bends sideways, th
 
 
 def body_shape() -> shapes.Shape:
-    """Nose towards z, back towards y: 0.40 m long, 0.09 m high, 0.22 m from fin to fin."""
+    """Return the shape, nose towards z, back towards y: 0.40 m long, 0.09 m high, 0.22 m from fin to fin."""
     trunk = shapes.ellipsoid((0.035, 0.045, 0.13), center=(0, 0, 0.07))
     stem = shapes.capsule((0, 0, 0.0), (0, 0, -0.12), 0.03, 0.02)
     blade = shapes.box((0.024, 0.09, 0.09), center=(0, 0, -0.155), rounding=0.01)
@@ -86,14 +86,14 @@ class Fish(Robot):
         self.scene: Scene = Scene([self.flesh, skeleton], water=water(), allow_rigid_motions=True)
 
     def _near(self, start, end, distance: float) -> np.ndarray:
-        """Vertices that are near a segment."""
+        """Return the vertices near a segment."""
         points = self.flesh.mesh.rest_positions
         a, b = np.array(start, dtype=float), np.array(end, dtype=float)
         share = np.clip((points - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
         return np.flatnonzero(np.linalg.norm(points - a - share[:, None] * (b - a), axis=1) < distance)
 
     def values(self, controls: torch.Tensor | np.ndarray) -> dict[Any, Any]:
-        """controls: torques over the largest."""
+        """Return the values of the scene's objects for controls: torques over the largest."""
         return {
             joint: {"torque": most * controls[:, k]}
             for k, (joint, most) in enumerate(zip(self.joints, TORQUES, strict=True))
@@ -102,8 +102,11 @@ class Fish(Robot):
     def first_controls(
         self, steps: int, amplitude: float = 0.5, frequency: float = 2.0, lag: float = 1.0
     ) -> np.ndarray:
-        """A wave of so many Hz along the spine, `lag` rad later from joint to joint, fins at rest. Without any motion the
-        gradient would be zero: water pushes with the square of the speed."""
+        """Return controls to start a search from: a wave of `frequency` Hz along the spine, with the fins at rest.
+
+        lag: rad, phase lag from joint to joint. Without any motion the gradient would be zero, because the water's
+        force grows with the square of the speed.
+        """
         phase = 2 * np.pi * frequency * TIME_STEP * np.arange(steps)
         spine = amplitude * np.sin(phase[:, None] - lag * np.arange(3))
         return np.concatenate([spine, np.zeros((steps, 2))], axis=1)

@@ -1,4 +1,4 @@
-"""An octopus that sixteen muscles drive through water."""
+"""An octopus in water, with sixteen muscles."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from magshell.model.scene.scene import Scene
 from magshell.model.solids.fibres import fibres_along
 from magshell.model.solids.materials import NeoHookean
 from magshell.model.solids.solid import Solid
-from robots.octopus_shape import HEAD, LEG, LEGS, around, octopus_mesh, placed
+from robots.octopus_shape import HEAD, LEG, LEGS, around, curved_leg, octopus_mesh
 from robots.robot import Robot
 from robots.water import water
 
@@ -66,18 +66,18 @@ class MuscleOctopus(Robot):
             for leg in range(LEGS)
             for above, height in ((True, 0.75), (False, 0.25))
         )
-        ends = around(placed(np.array([(HEAD + LEG, 0.0, 0.5)] * LEGS)), np.arange(LEGS))
+        ends = around(curved_leg(np.array([(HEAD + LEG, 0.0, 0.5)] * LEGS)), np.arange(LEGS))
         self.tips: Any = np.linalg.norm(mesh.rest_positions - ends[:, None], axis=2).argmin(axis=1)
         self.scene: Scene = Scene(self.flesh, actuators=self.muscles, water=water(), allow_rigid_motions=True)
 
     def _muscle(self, leg: int, height: float, elements: np.ndarray) -> Muscle:
         outwards = np.linspace(HEAD, HEAD + LEG, 13)
         flat = np.column_stack([outwards, np.zeros_like(outwards), np.full_like(outwards, height)])
-        fibres = fibres_along(around(placed(flat), leg), self.flesh, reach=REACH, elements=elements)
+        fibres = fibres_along(around(curved_leg(flat), leg), self.flesh, reach=REACH, elements=elements)
         return Muscle(self.flesh, fibres, peak_stress=PEAK_STRESS, segments=SEGMENTS)
 
     def activations(self, controls: torch.Tensor | np.ndarray, times: Numbers) -> torch.Tensor:
-        """(n, 16, SEGMENTS), a tensor. controls: (n, 16, 4), a tensor; times: (n,) s."""
+        """Return the activations (n, 16, SEGMENTS) of controls (n, 16, 4) at times (n,) s, all as tensors."""
         strength, depth, delay, waves = controls.unbind(-1)
         along = WAVES[0] + (WAVES[1] - WAVES[0]) * 0.5 * (waves + 1.0)
         later = delay.new_tensor([0.0, 0.5] * LEGS)
@@ -93,7 +93,7 @@ class MuscleOctopus(Robot):
         )
 
     def values(self, controls: torch.Tensor | np.ndarray) -> dict[Any, Any]:
-        """controls: (steps, 64), of one muscle after another."""
+        """Return the values of the scene's objects for controls (steps, 64), ordered by muscle."""
         import torch
 
         rows = torch.as_tensor(controls).reshape(len(controls), -1, NUMBERS)
@@ -105,5 +105,5 @@ class MuscleOctopus(Robot):
     def first_controls(
         self, steps: int, strength: float = 0.6, depth: float = -0.95, waves: float = -0.4
     ) -> np.ndarray:
-        """The same wave in all legs, over and over: it beats upwards."""
+        """Return controls to start a search from: the same repeated wave in all legs, which beats upwards."""
         return np.tile([strength, depth, 0.0, waves], (steps, 2 * LEGS))

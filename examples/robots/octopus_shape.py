@@ -28,15 +28,17 @@ _SHARES = np.linspace(0.0, 1.0, 201)
 
 
 def _profile() -> np.ndarray:
-    """(201, 2) m, outwards and up: the middle line of a leg."""
+    """Return the middle line of a leg, outwards and up, (201, 2) m."""
     down = BEND * _SHARES**EARLY
     steps = np.stack([np.cos(down), -np.sin(down)], axis=1)[:-1] * LEG / (len(_SHARES) - 1)
     return np.add((HEAD, 0.0), np.cumsum(np.concatenate([np.zeros((1, 2)), steps]), axis=0))
 
 
-def placed(points: np.ndarray) -> np.ndarray:
-    """Of one leg and its eighth of the head. points: (n, 3) of the flat one: m outwards, m across, and height from 0 to 1.
-    Returns m outwards, m across, m up."""
+def curved_leg(points: np.ndarray) -> np.ndarray:
+    """Map points of the flat leg, with its eighth of the head, to its curved shape: m outwards, across and up.
+
+    points: (n, 3) of the flat one: m outwards, m across, and height from 0 to 1.
+    """
     outwards, across, height = points.T
     share = np.clip((outwards - HEAD) / LEG, 0.0, 1.0)
     x, y = (np.interp(share, _SHARES, each) for each in _profile().T)
@@ -48,7 +50,10 @@ def placed(points: np.ndarray) -> np.ndarray:
 
 
 def around(points: np.ndarray, leg: Numbers) -> np.ndarray:
-    """As `placed` returns them, in the world: y up, the legs around it. leg: of all, or of each."""
+    """Rotate points, as `curved_leg` returns them, to their leg in the world: y up, the legs around it.
+
+    leg: one number for all points, or one for each.
+    """
     angle = 2.0 * np.pi * leg / LEGS
     outwards, across, up = points.T
     x = np.cos(angle) * outwards - np.sin(angle) * across
@@ -57,7 +62,10 @@ def around(points: np.ndarray, leg: Numbers) -> np.ndarray:
 
 
 def octopus_mesh(cells: int) -> tuple[TetMesh, np.ndarray, np.ndarray]:
-    """cells: along a leg. Also (n_t,) the leg of each tetrahedron, -1 in the head, and whether it is in the upper half."""
+    """Build the mesh; cells: along a leg.
+
+    Also returns the leg of each tetrahedron, (n_t,), -1 in the head, and whether it is in the upper half.
+    """
     points, faces = _eighth(cells)
     star = np.concatenate([around(points, leg) for leg in range(LEGS)])
     first = coincident(star, 1e-6)
@@ -67,7 +75,7 @@ def octopus_mesh(cells: int) -> tuple[TetMesh, np.ndarray, np.ndarray]:
     flat = meshes.extruded(sheet, 1.0, LAYERS)
     leg, vertex = np.divmod(np.tile(used, LAYERS + 1), len(points))
     local = np.column_stack([points[vertex, :2], flat.rest_positions[:, 2]])
-    mesh = TetMesh(around(placed(local), leg), flat.tetrahedra)
+    mesh = TetMesh(around(curved_leg(local), leg), flat.tetrahedra)
     in_arm = (local[:, 0] > HEAD - 1e-9)[mesh.tetrahedra].all(axis=1)
     directions = np.arctan2(-mesh.tetrahedron_barycenters[:, 2], mesh.tetrahedron_barycenters[:, 0])
     nearest = np.round(directions * LEGS / (2.0 * np.pi)).astype(int) % LEGS
@@ -75,7 +83,10 @@ def octopus_mesh(cells: int) -> tuple[TetMesh, np.ndarray, np.ndarray]:
 
 
 def _eighth(cells: int) -> tuple[np.ndarray, np.ndarray]:
-    """One flat leg and its triangle of the head, (n, 3) m as `placed` has them and (n_f, 3); some points are there twice."""
+    """Return one flat leg and its triangle of the head.
+
+    Points are (n, 3) m in the coordinates of `curved_leg`, some of them twice; faces (n_f, 3).
+    """
     width = 2.0 * HEAD * np.tan(np.pi / LEGS)
     arm = meshes.rectangle(LEG, width, cells=(cells, ACROSS)).transformed(translation=(HEAD, -width / 2, 0))
     corners = np.array([(0, 0, 0), (HEAD, -width / 2, 0), (HEAD, width / 2, 0)])

@@ -1,4 +1,4 @@
-"""What the robots that swim or carry to a target share, [Qiao21] Figure 4."""
+"""The common base of the robots that swim or carry to a target, [Qiao21] Figure 4."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 
 class Robot:
-    """A scene that a few numbers a step drive, and the way of one body's center of mass.
+    """A scene controlled by a few numbers a step, in which one body's center of mass is to reach a target.
 
-    scene; traveller: the Solid whose center of mass is to reach a target. Classes of robots say how many `numbers` a step
-    takes, each from -1 to 1, how many `steps` of which `time_step` [s] the way takes, and where `target` [m] is. Controls
-    are (steps, numbers), a tensor where gradients are wanted.
+    scene; traveller: the Solid whose center of mass is to reach a target. Classes of robots say how many `numbers` a
+    step takes, each from -1 to 1, how many `steps` of which `time_step` [s] the way takes, and where `target` [m] is.
+    Controls are (steps, numbers), a tensor where gradients are wanted.
     """
 
     numbers: ClassVar[int]
@@ -39,15 +39,15 @@ class Robot:
     traveller: Solid
 
     def values(self, controls: torch.Tensor | np.ndarray) -> dict[Any, Any]:
-        """Of the scene's objects over the time of a motion, as ms.simulate takes them."""
+        """Return the values of the scene's objects over the time of a motion, as ms.simulate takes them."""
         raise TypeError(f"{type(self).__name__} does not say what its controls are")
 
     def first_controls(self, steps: int) -> np.ndarray:
-        """Where a search begins."""
+        """Return the controls that a search starts from."""
         raise TypeError(f"{type(self).__name__} does not say where a search begins")
 
     def motion(self, controls: torch.Tensor | np.ndarray, solver: MixedNewton | None = None) -> Trajectory:
-        """From rest, of as many steps as controls has rows."""
+        """Simulate the motion from rest, of as many steps as controls has rows."""
         return simulate(
             self.scene,
             steps=len(controls),
@@ -62,20 +62,22 @@ class Robot:
 
     @cached_property
     def weights(self) -> np.ndarray:
-        """(n_v,), the share of each of the traveller's vertices in its mass."""
+        """The fraction of the traveller's mass at each of its vertices, (n_v,)."""
         masses = self.traveller.vertex_masses
         return masses / masses.sum()
 
-    def way(self, motion: Trajectory) -> Computed:
-        """(3,) m, of the center of mass until the end."""
+    def displacement(self, motion: Trajectory) -> Computed:
+        """Return the displacement of the center of mass until the end, (3,) m."""
         moved = motion[self.traveller].displacements[-1]
         weights = self.weights if isinstance(moved, np.ndarray) else moved.new_tensor(self.weights)
         return weights @ moved
 
-    def miss(self, motion: Trajectory, target: Numbers | None = None) -> Computed:
-        """How far from the target, (3,) m, the center of mass ends, over the way there. By gradient minimize its square,
-        which has no kink at the target."""
+    def relative_distance(self, motion: Trajectory, target: Numbers | None = None) -> Computed:
+        """Return the final distance of the center of mass from the target, (3,) m, over the initial one.
+
+        For gradients minimize its square, which is differentiable at the target.
+        """
         goal = np.array(self.target if target is None else target, dtype=float)
-        way = self.way(motion)
-        away = way - (goal if isinstance(way, np.ndarray) else way.new_tensor(goal))
+        moved = self.displacement(motion)
+        away = moved - (goal if isinstance(moved, np.ndarray) else moved.new_tensor(goal))
         return (away**2).sum() ** 0.5 / float(np.linalg.norm(goal))

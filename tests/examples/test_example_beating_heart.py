@@ -44,8 +44,8 @@ def test_the_field_contracts_the_heart(heart) -> None:
     found = heart["hearts"]["lower_half"]
     for name in ("linear", "quadratic"):
         design = found[name]
-        assert design.miss < 0.85 * design.task.way
-        assert design.misses[0] == pytest.approx(design.task.way)
+        assert design.rms_error < 0.85 * design.task.target_distance
+        assert design.errors[0] == pytest.approx(design.task.target_distance)
         assert np.linalg.norm(design.remanent_magnetization, axis=1).max() < 4e5
         assert design.rest.stable
     assert max(found["volumes"]) < 0.99

@@ -45,8 +45,8 @@ def test_cells_are_the_outer_half_of_each_arm() -> None:
 
 def test_ball_is_carried_to_the_target(carried) -> None:
     for found in carried["found"]:
-        assert found.misses[0] > 0.4 and found.episodes is not None
-    way = carried["found"][0].robot.way(carried["motion"])
+        assert found.distances[0] > 0.4 and found.episodes is not None
+    way = carried["found"][0].robot.displacement(carried["motion"])
     np.testing.assert_allclose(way, TARGET, atol=0.01 * 0.05)
 
 
@@ -83,7 +83,7 @@ def test_the_environment_moves_as_the_motion_does(carried) -> None:
     one = environment(levels=7, ball_cells=2, disturbed=False)
     one.reset(seed=0)
     seen = [one.step(action)[0] for action in controls]
-    np.testing.assert_allclose(seen[-1][:3], gripper.way(gripper.motion(controls)), atol=1e-12)
+    np.testing.assert_allclose(seen[-1][:3], gripper.displacement(gripper.motion(controls)), atol=1e-12)
 
 
 def test_pictures_of_the_gripper(carried, tmp_path, monkeypatch) -> None:

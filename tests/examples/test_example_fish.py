@@ -26,9 +26,9 @@ def test_the_fish_has_the_papers_size() -> None:
 def test_torques_are_found_that_take_it_to_the_target(swum) -> None:
     [found] = swum["found"]
     assert found.controls.size == 75 and np.abs(found.controls).max() <= 1
-    assert found.misses[0] > 0.5 and found.episodes is not None
-    assert found.misses.min() < 0.01
-    way = found.robot.way(swum["motion"])
+    assert found.distances[0] > 0.5 and found.episodes is not None
+    assert found.distances.min() < 0.01
+    way = found.robot.displacement(swum["motion"])
     np.testing.assert_allclose(way, (0, 0, 1e-3), atol=1e-5)
 
 
@@ -60,8 +60,8 @@ def test_the_environment_moves_as_the_motion_does(swum) -> None:
     seen, rewards = zip(*[one.step(action)[:2] for action in controls], strict=True)
     fish = swum["found"][0].robot
     motion = fish.motion(controls)
-    np.testing.assert_allclose(seen[-1][:3], fish.way(motion), atol=1e-15)
-    assert sum(rewards) == pytest.approx(1 - fish.miss(motion), abs=1e-9)
+    np.testing.assert_allclose(seen[-1][:3], fish.displacement(motion), atol=1e-15)
+    assert sum(rewards) == pytest.approx(1 - fish.relative_distance(motion), abs=1e-9)
 
 
 def test_pictures_of_the_fish(swum, tmp_path, monkeypatch) -> None:
@@ -72,4 +72,4 @@ def test_pictures_of_the_fish(swum, tmp_path, monkeypatch) -> None:
     options = {"speed": 1.0, "fps": 10.0, "width": 400, "progress": False}
     path = example.report.movie(swum["motion"], tmp_path / "a.gif", example.VIEW, **options)
     assert path.stat().st_size > 5_000
-    assert "to 1 % of the way" in example.summary(swum)
+    assert "to 1 % of the distance" in example.summary(swum)

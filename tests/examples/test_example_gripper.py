@@ -28,7 +28,7 @@ def test_six_printable_directions_meet_the_target(example, result) -> None:
     assert printed.not_printable == 0
     m = np.sort(np.abs(printed.remanent_magnetization.numpy()), axis=1)
     np.testing.assert_allclose(m, np.tile([0, 0, example.LIMIT], (len(m), 1)), atol=1e-6)
-    again = example.Miss(result["gripper"])(printed.remanent_magnetization)  # from the rest shape
+    again = example.Mismatch(result["gripper"])(printed.remanent_magnetization)  # from the rest shape
     assert again.item() ** 0.5 < 0.3
 
 

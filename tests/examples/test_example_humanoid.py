@@ -16,7 +16,7 @@ def test_the_body_has_the_papers_size(figure) -> None:
     np.testing.assert_allclose(extents, (4.1, 1.3, 2.9), rtol=0.02)
     assert body.mesh.n_tetrahedra == pytest.approx(3078, rel=0.05) and body.mesh.n_components == 1
     assert sum(map(len, body.nearest.values())) == body.mesh.n_vertices
-    assert all(len(vertices) > 3 for vertices in body.bones.values())
+    assert all(len(vertices) > 3 for vertices in body.link_vertices.values())
 
 
 def test_bones_keep_their_length_where_there_are_any(figure) -> None:

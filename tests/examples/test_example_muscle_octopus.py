@@ -43,9 +43,9 @@ def test_its_legs_are_alike() -> None:
 def test_waves_are_found_that_take_it_to_the_target(swum) -> None:
     found = swum["found"][0]
     assert found.controls.size == 30 * 64 and np.abs(found.controls).max() <= 1
-    assert found.misses[0] > 0.3 and found.episodes is not None
-    np.testing.assert_allclose(found.robot.way(swum["motion"]), (-4e-4, 2e-3, -4e-4), atol=2.1e-5)
-    assert swum["found"][1].misses.min() < 0.5 * swum["found"][1].misses[0]
+    assert found.distances[0] > 0.3 and found.episodes is not None
+    np.testing.assert_allclose(found.robot.displacement(swum["motion"]), (-4e-4, 2e-3, -4e-4), atol=2.1e-5)
+    assert swum["found"][1].distances.min() < 0.5 * swum["found"][1].distances[0]
 
 
 def test_every_unknown_has_a_gradient_and_it_is_that_of_differences(swum) -> None:
@@ -76,8 +76,8 @@ def test_the_environment_moves_as_the_motion_does(swum) -> None:
     one.reset(seed=0)
     seen, rewards = zip(*[one.step(action)[:2] for action in controls], strict=True)
     motion = octopus.motion(controls)
-    np.testing.assert_allclose(seen[-1][:3], octopus.way(motion), atol=1e-14)
-    assert sum(rewards) == pytest.approx(1 - octopus.miss(motion), abs=1e-9)
+    np.testing.assert_allclose(seen[-1][:3], octopus.displacement(motion), atol=1e-14)
+    assert sum(rewards) == pytest.approx(1 - octopus.relative_distance(motion), abs=1e-9)
 
 
 def test_pictures_of_the_octopus(swum, tmp_path, monkeypatch) -> None:

@@ -22,7 +22,7 @@ def test_small_swings_are_those_of_the_first_mode(result) -> None:
 
 
 def test_bones_keep_their_lengths_and_the_elbow_bends(result) -> None:
-    assert result["bone_error"] < 1e-12
+    assert result["link_length_error"] < 1e-12
     assert 0.4 < result["elbow"] < 0.7
 
 
