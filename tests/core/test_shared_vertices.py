@@ -5,7 +5,7 @@ import pytest
 import torch
 
 import magshell as ms
-from magshell.model.supports.constraints import Hold, _frame
+from magshell.model.supports.constraints import VertexConstraint, _frame
 from magshell.model.supports.supports import RigidMove
 
 MESH = ms.meshes.rectangle(0.1, 0.02, cells=(4, 1))
@@ -55,7 +55,13 @@ def test_oblique_directions_keep_their_moves():
     slant = np.array([[0.0, 0.6, 0.8]])
     moves = [RigidMove(np.zeros(3), np.zeros(3), by, None) for by in (np.eye(3)[0], np.array([0, -0.8, 0.6]))]
     along = [np.eye(3)[:1], np.array([[0.0, -0.8, 0.6]])]
-    frame, count, by = _frame([Hold(slant, None), Hold(along[0], moves[0]), Hold(along[1], moves[1])])
+    frame, count, by = _frame(
+        [
+            VertexConstraint(slant, None),
+            VertexConstraint(along[0], moves[0]),
+            VertexConstraint(along[1], moves[1]),
+        ]
+    )
     assert count == 3 and np.allclose(frame.T @ frame, np.eye(3))
     for direction, move in zip([along[0][0], along[1][0], slant[0]], [*moves, None], strict=True):
         column = int(np.argmax(np.abs(frame.T @ direction)))

@@ -1,4 +1,4 @@
-"""Defines contact of bodies with each other and with themselves."""
+"""Contact of bodies with each other and with themselves."""
 
 from __future__ import annotations
 
@@ -20,56 +20,57 @@ if TYPE_CHECKING:
 
 
 def width_of(mesh: MeshBase) -> float:
-    """m, of a mesh at rest: twice the way from the middle of its surface to the vertex that is farthest from it. Of a
-    rectangle and a box that is the diagonal."""
+    """Return a mesh's width in the rest shape, m: twice the largest distance of a vertex from the center of the
+    surface.
+
+    For a rectangle and a box that is the diagonal.
+    """
     corners = mesh.rest_positions[mesh.faces]
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     middle = areas @ corners.mean(axis=1) / areas.sum()
     return 2.0 * float(np.linalg.norm(mesh.rest_positions - middle, axis=1).max())
 
 
-_REACH_OF_SHEETS = 0.1  # of the thickness
-_REACH_OF_SOLIDS = 0.05  # of the mean edge on the surface
-_STICKING = 1e-2  # of the larger body's extent, a second
-_SMOOTHING = 0.1  # of the activation distance
+_REACH_OF_SHEETS = 0.1  # [-] default activation distance over the thickness
+_REACH_OF_SOLIDS = 0.05  # [-] default activation distance over the mean edge on the surface
+_STICKING = 1e-2  # [1/s] default sticking speed over the larger body's width
+_SMOOTHING = 0.1  # [-] default smoothing over the activation distance
 LAWS = ("barrier", "penalty")
 
 
 class BodyContact(Owner):
-    """Two bodies that do not pass through each other: what ms.Contact(a, b, ...) makes.
+    """Contact of two bodies, which cannot pass through each other; ms.Contact(a, b, ...) makes it.
 
-    a, b: a Shell, a Solid, or a RigidBody: of one with a shape, that touches; of others with vertices and a body, the faces
-        between these.
-    min_distance: m, that is always left between them, as sheets are thick: by default half the largest thickness of
-        each. Solids have none.
-    activation_distance: m, beyond the minimal distance, from which on they push each other apart; by default a
-        tenth of the thickness, or
-        a twentieth of the mean edge on the surface of solids, the smaller of the two bodies'. What touches lightly rests at
-        nearly all of it.
-    contact_stiffness: Pa, the pressure with which they push at about half the activation distance; by default
-        Young's modulus, the smaller
-        of the two bodies'. Forces do not depend on a time step.
-    law: "barrier", which grows without bound: nothing ever passes, whatever presses; or "penalty", softer and cheaper,
-        which `contact_stiffness` bounds: what presses more is let into the minimal distance, and steps still do not pass.
-    smoothing: m, of a penalty, as of contacts with obstacles; by default a tenth of the activation distance.
+    a, b: a Shell, a Solid, or a RigidBody. The contact surface of a RigidBody is its shape, or, of one made of vertices of
+        a body, the faces between these.
+    min_distance: m, that always remains between the surfaces, because sheets are thick; by default half the largest
+        thickness of each sheet, and zero for solids.
+    activation_distance: m, beyond the minimal distance, at which contact forces begin; by default a tenth of the thickness
+        of a sheet, or a twentieth of the mean edge on the surface of a solid, the smaller of the two bodies'. A lightly
+        pressed body rests at nearly this distance.
+    contact_stiffness: Pa, the contact pressure at about half the activation distance; by default the smaller Young's
+        modulus of the two bodies. Forces do not depend on the time step.
+    law: "barrier", whose force grows without bound, so that the minimal distance is kept under any load; or "penalty",
+        softer and cheaper, whose force `contact_stiffness` limits: a larger load enters the minimal distance, but no step
+        of a solve passes through the other surface.
+    smoothing: m, of the penalty, as for contacts with obstacles; by default a tenth of the activation distance.
     friction_coefficient: Coulomb's, or None for contact without friction. It acts in ms.simulate only.
-    static_friction_coefficient: of what sticks, where it is larger; by default there is but one.
-    sticking_speed: m/s, below which friction holds, as of contacts with obstacles.
-    lagged_friction: as there.
+    static_friction_coefficient: that of sticking, if it is larger; by default the same.
+    sticking_speed: m/s, below which contacts stick, as for contacts with obstacles.
+    lagged_friction: as for contacts with obstacles.
 
-    Pairs are vertices and faces, and edges and edges, whatever side they come from. At a given gap what lies flat bears 1.0
-    to 3.5 times that pressure, by how its edges cross those below: most where two meshes coincide; and where single edges
-    cross, the force goes with the area of their faces. So meshes change the gap at which a load rests, within
-    the activation distance,
-    and not the load. Friction acts at the middle surfaces of sheets. No step of a solve passes a pair; a
-    start in which faces intersect, or are nearer than the minimal distance, is refused with their numbers. Defaults are
-    taken from the bodies as they are here: a solve with another thickness or modulus keeps them.
+    Pairs are a vertex and a face, or two edges; they act on either side of a surface. At a given gap, a flat contact bears
+    1.0 to 3.5 times the pressure of the law, depending on how the edges of the two meshes cross, most where the meshes
+    coincide; where single edges cross, the force is proportional to the area of their faces. So a mesh changes the gap at
+    which a load rests, within the activation distance, but not the load. Friction acts at the middle surfaces of sheets. No
+    step of a solve passes through a pair; a start in which faces intersect, or are nearer than the minimal distance, is
+    refused with their numbers. Defaults come from the bodies at construction: a solve with another thickness or modulus
+    does not change them.
 
-    Gradients go through impacts, exactly of the motion as its steps have it. The stiffer the contact and the longer the
-    step, the shorter is the way on which they hold: a barrier turns a body around within a fraction of the
-    activation distance, and where
-    a small change moves an impact by a whole step, a loss is rough. Take steps that resolve the impact, a longer reach, or
-    the penalty, for a smooth loss.
+    Gradients through impacts are exact for the computed motion. But the stiffer the contact and the longer the step, the
+    smaller is the range of parameters in which they predict the loss: a barrier reverses a body within a fraction of the
+    activation distance, and if a small change shifts an impact by a whole step, the loss is rough. For a smooth loss use
+    steps that resolve the impact, a longer activation distance, or the penalty.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.02, 0.02, cells=(4, 4))
@@ -182,12 +183,12 @@ class BodyContact(Owner):
 
     @property
     def _numbers(self) -> dict[Any, Any]:
-        """What `replaced` begins with."""
+        """The arguments that `replaced` starts from."""
         own = {name: getattr(self, name) for name in self._replaceable}
         return {**own, "law": self.law, "lagged_friction": self.lagged_friction}
 
     def _checked_names(self, values: dict[Any, Any]) -> dict[Any, Any]:
-        """Of `replaced`: what a contact was made without, no solve gives it."""
+        """Return the arguments of `replaced`. Raises ValueError for friction if the contact was made without."""
         for name in ("friction_coefficient", "static_friction_coefficient"):
             if getattr(self, name) is None and name in values:
                 raise ValueError(
@@ -196,7 +197,7 @@ class BodyContact(Owner):
         return values
 
     def replaced(self, **values: Any) -> BodyContact:
-        """The same contact with other numbers of its law."""
+        """Return the same contact with other parameters of its law."""
         return BodyContact(self.a, self.b, **{**self._numbers, **self._checked_names(values)})
 
     @property
@@ -226,14 +227,18 @@ class BodyContact(Owner):
 
 
 class SelfContact(BodyContact):
-    """A body that does not pass through itself.
+    """Contact of a body with itself.
 
-    a: a Shell or a Solid. The others are as in BodyContact, which ms.Contact(a, b, ...) makes, but that by default a sheet
-    keeps its whole thickness from itself. Neighbours along the surface that are nearer at rest than twice minimal distance
-    and activation distance keep half of what they have there, in the proportion of the two. Where that is less
-    than the minimal distance
-    itself, a scene refuses one that was given, naming faces and the largest possible, and warns of a thickness
-    (ms.MeshQualityWarning). A mesh that passes through itself at rest is refused.
+    a: a Shell or a Solid. The other arguments are as in BodyContact, which ms.Contact(a, b, ...) makes, except that the
+    default min_distance of a sheet is its whole thickness. Faces that are neighbours along the surface may be nearer at
+    rest
+    than twice the minimal and the activation distance; they keep half of their rest distance, divided in the proportion
+    of the
+    two. If that is less than the minimal distance itself, a scene refuses a min_distance that was given, naming faces
+    and the
+    largest possible one, and warns (ms.MeshQualityWarning) if it comes from the thickness. A mesh that passes through
+    itself
+    at rest is refused.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -283,23 +288,24 @@ class SelfContact(BodyContact):
         return (self.a,)
 
     def replaced(self, **values: Any) -> SelfContact:
-        """The same contact with other numbers of its law."""
+        """Return the same contact with other parameters of its law."""
         return SelfContact(self.a, **{**self._numbers, **self._checked_names(values)})
 
 
 class RigidShape(NamedTuple):
-    """What a RigidBody with a shape touches with."""
+    """The contact surface of a RigidBody that has a shape."""
 
     mesh: TriangleMesh
 
 
-def touches_with_shape(side: Shell | Solid | RigidBody) -> bool:
+def has_contact_shape(side: Shell | Solid | RigidBody) -> bool:
+    """Return whether the contact surface of a body is the shape of a RigidBody."""
     return isinstance(side, RigidBody) and side.shape is not None
 
 
 def checked_side(name: str, side: Shell | Solid | RigidBody) -> Shell | Solid | RigidBody:
-    """A body in contact, as it was given."""
-    if isinstance(side, BODIES) or touches_with_shape(side):
+    """Return a body of a contact as it was given. Raises ValueError if it has no contact surface."""
+    if isinstance(side, BODIES) or has_contact_shape(side):
         return side
     if not isinstance(side, RigidBody):
         raise ValueError(f"{name} must be a Shell, a Solid or a RigidBody of the scene, got {side!r:.60}")
@@ -324,8 +330,8 @@ def _check_does_not_cross(body) -> None:
 
 
 def side_of(side: Shell | Solid | RigidBody) -> Shell | Solid | RigidShape:
-    """What it touches with."""
-    if touches_with_shape(side):
+    """Return the body or shape that has the contact surface."""
+    if has_contact_shape(side):
         return RigidShape(side.shape)
     return side.body if isinstance(side, RigidBody) else side
 

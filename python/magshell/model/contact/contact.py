@@ -1,4 +1,4 @@
-"""Frictional contact of a sheet with obstacles."""
+"""Frictional contact of bodies with obstacles."""
 
 from __future__ import annotations
 
@@ -29,30 +29,30 @@ _FACE_POINTS = {  # barycentric coordinates of the points on a face
     1: np.full((1, 3), 1.0 / 3.0),
     3: np.array([[4.0, 1.0, 1.0], [1.0, 4.0, 1.0], [1.0, 1.0, 4.0]]) / 6.0,
 }
-_SMOOTHING = 1e-2  # of the mean thickness
-_SMOOTHING_OF_SOLIDS = 1e-4  # of the extent
-_STICKING = 1e-2  # of the largest sheet's extent, a second
+_SMOOTHING = 1e-2  # [-] default smoothing over the mean thickness of sheets
+_SMOOTHING_OF_SOLIDS = 1e-4  # [-] default smoothing over the width, for solids alone
+_STICKING = 1e-2  # [1/s] default sticking speed over the largest body's width
 
 
 class Contact(Owner):
     """Keeps points of a sheet out of obstacles, with friction if wanted [Chen22, 6.1; Geilinger et al. 2020].
 
-    Of two bodies, ms.Contact(a, b, ...) makes a BodyContact, which keeps them out of each other.
+    For two bodies, ms.Contact(a, b, ...) makes a BodyContact, which keeps them out of each other.
 
     obstacles: one of ms.obstacles, or several.
-    contact_stiffness: N/m, of every point: a force that grows with the depth, from a short parabola on.
+    contact_stiffness: N/m, of every point: the force grows linearly with the depth, after a short parabola.
     friction_coefficient: Coulomb's, or None for contact without friction. It acts in ms.simulate only.
-    sticking_speed: m/s. Below it friction holds: a point that carries a share r of its greatest friction creeps at
-        sticking_speed (1 - sqrt(1 - r)). By default a hundredth of the sheet's extent in a second
-        (of the largest where there are several).
-    smoothing: m, the length of the parabola; by default a hundredth of the thickness, of solids alone 1e-4 of the extent.
-    offset: m, the distance from the obstacle at which the force begins; half the thickness lets the face of the sheet
-        touch instead of its middle surface.
+    sticking_speed: m/s, the speed bound of static friction (eps_v of IPC). Below it a point sticks: with a fraction r of
+        its largest friction force it creeps at sticking_speed (1 - sqrt(1 - r)). By default a hundredth of the sheet's
+        width per second (of the largest sheet's).
+    smoothing: m, the length of the parabola; by default a hundredth of the thickness, for solids alone 1e-4 of the width.
+    offset: m, the distance from the obstacle at which the force begins; with half the thickness the face of the sheet is
+        in contact, not its middle surface.
     lagged_friction: take normal forces and normals of friction from the beginning of each step. The matrix stays
         symmetric; the friction is late by a step.
-    vertices: those that touch; by default all, of a solid those on its surface.
-    body: the Shell or Solid that touches; by default all, where no vertices are given.
-    face_samples: points on every face that touch too: 0, 1 or 3, for meshes that are coarse beside the obstacle.
+    vertices: those in contact; by default all, for a solid those on its surface.
+    body: the Shell or Solid in contact; by default all, if no vertices are given.
+    face_samples: further contact points on every face, 0, 1 or 3, for meshes that are coarse compared to the obstacle.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.02, 0.02, cells=(2, 2))
@@ -121,7 +121,7 @@ class Contact(Owner):
         self.face_samples: int = int(face_samples)
 
     def replaced(self, **values: Any) -> Contact:
-        """The same contact with other numbers of its law."""
+        """Return the same contact with other parameters of its law."""
         if "friction_coefficient" in values and self.friction_coefficient is None:
             raise ValueError(
                 "a Contact without friction cannot get some in a solve: give it some, zero will do"
@@ -144,11 +144,13 @@ class Contact(Owner):
 
     @property
     def _for_all(self) -> bool:
-        """Whether it is about all bodies where it names none."""
+        """Return whether a contact without a `body` acts on all bodies."""
         return self.vertices is None
 
     def points(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
-        """What of a body touches: vertices (k, 3), -1 where there are fewer, and weights (k, 3); those on faces last."""
+        """Return the contact points on a mesh: their vertices (k, 3), padded with -1, and weights (k, 3); points on
+        faces last.
+        """
         if self.vertices is not None:
             chosen = indices("Contact vertices", self.vertices, mesh.n_vertices)
         else:
@@ -165,7 +167,7 @@ class Contact(Owner):
         )
 
     def _law(self, *sheets: Shell) -> tuple[float, ...]:
-        """The numbers of `_replaceable` for the sheets that touch: N/m, m, m, 1, m/s."""
+        """Return the values of `_replaceable` for these bodies: N/m, m, m, 1, m/s."""
         extent = max(width_of(sheet.mesh) for sheet in sheets)
         thick = [sheet.thickness for sheet in sheets if isinstance(sheet, Shell)]
         smoothing = _SMOOTHING * float(np.mean(joined(thick))) if thick else _SMOOTHING_OF_SOLIDS * extent
@@ -182,7 +184,9 @@ class Contact(Owner):
             numbers[label, name] = number
 
     def _by_thickness(self, label: str, sheets: Sequence[Shell | Solid], gradient: Gradient) -> float:
-        """By the thickness of each face of the sheets that touch, which a default in `law` is made from."""
+        """Return the gradient by the thickness of each face of the sheets, on which the default smoothing in `_law`
+        depends.
+        """
         by_smoothing = gradient.value(label, "smoothing")[0] if self.smoothing is None else 0.0
         return (
             _SMOOTHING

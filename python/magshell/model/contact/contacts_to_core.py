@@ -1,4 +1,4 @@
-"""Contacts of a scene as the core takes them."""
+"""Translates the contacts of a scene to the input of the core, and checks them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ...errors import MeshQualityWarning
 from ..bodies.words import called
 from ..rigid.rigid import RigidBody
 from ..solids.solid import Solid
-from .body_contact import BodyContact, side_of, touches_with_shape
+from .body_contact import BodyContact, has_contact_shape, side_of
 
 if TYPE_CHECKING:
     from ..bodies.bodies import Bodies
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 
 
 def obstacles_of(contacts: Sequence[Contact | BodyContact]) -> tuple[Any, ...]:
-    """Every obstacle once, in the order in which contacts name them."""
+    """Return every obstacle once, in the order in which the contacts name them."""
     return tuple({id(each): each for contact in contacts for each in contact.obstacles}.values())
 
 
 def split_contacts(contacts: Sequence[Contact | BodyContact]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-    """Those with obstacles, and those of bodies."""
+    """Return the contacts with obstacles, and those between bodies."""
     of_bodies = tuple(each for each in contacts if isinstance(each, BodyContact))
     return tuple(each for each in contacts if not isinstance(each, BodyContact)), of_bodies
 
@@ -40,7 +40,7 @@ def split_contacts(contacts: Sequence[Contact | BodyContact]) -> tuple[tuple[Any
 def body_contact_inputs(
     contacts: Sequence[Contact | BodyContact], bodies: Bodies
 ) -> tuple[list[dict[Any, Any]], list[dict[Any, Any]]]:
-    """What of the contacts of bodies no solve can change: surfaces, and which of them touch."""
+    """Return the input of contacts between bodies, as far as no solve can change it: the surfaces and the contacts."""
     _check_each_pair_once(contacts)
     sides = list({id(side): side for contact in contacts for side in contact._sides}.values())
     numbers = {id(side): k for k, side in enumerate(sides)}
@@ -57,7 +57,7 @@ def body_contact_inputs(
 
 
 def _check_each_pair_once(contacts) -> None:
-    """Two of the same sides would push, and rub, twice."""
+    """Raise ValueError if two contacts have the same sides: their forces would count twice."""
     sides = [frozenset(map(id, contact._sides)) for contact in contacts]
     for k, contact in enumerate(contacts):
         if sides[k] in sides[:k]:
@@ -66,18 +66,21 @@ def _check_each_pair_once(contacts) -> None:
             )
 
 
-def shapes_that_touch(contacts: Sequence[Contact | BodyContact]) -> tuple[RigidBody, ...]:
-    """rigid bodies that contacts are about with their shapes, each once."""
-    sides = [side for contact in contacts for side in contact._sides if touches_with_shape(side)]
+def rigid_bodies_in_contact(contacts: Sequence[Contact | BodyContact]) -> tuple[RigidBody, ...]:
+    """Return the rigid bodies whose shapes are in contacts, each once."""
+    sides = [side for contact in contacts for side in contact._sides if has_contact_shape(side)]
     return tuple({id(side): side for side in sides}.values())
 
 
 def _surface(side, bodies) -> dict[Any, Any]:
-    """The faces of a body, of a rigid part's shape, or those between its vertices: (k, 3), the scene's vertices."""
+    """Return the contact surface of a body, of a rigid body's shape, or the faces between a rigid body's vertices.
+
+    Faces are (k, 3), with the scene's numbers of vertices.
+    """
     body = side_of(side)
     try:
         rigid = bodies.rigid_number(side) if isinstance(side, RigidBody) else -1
-        number = -1 if touches_with_shape(side) else bodies.number(body)
+        number = -1 if has_contact_shape(side) else bodies.number(body)
     except ValueError:
         raise ValueError(f"a Contact is about a body that is not in the scene: {side!r}") from None
     faces, chosen = body.mesh.faces, np.arange(body.mesh.n_faces)
@@ -100,46 +103,55 @@ def _surface(side, bodies) -> dict[Any, Any]:
 
 
 def check_neighbours(scene: Scene, warns: bool = False) -> None:
-    """Neighbours along a surface cannot keep more from each other than they have at rest: a minimal distance that was asked
-    for is refused where they do not, and one that a thickness gave is told, if it warns."""
+    """Raise ValueError or warn if a minimal distance is larger than the rest distance of neighbours along a surface.
+
+    Neighbours cannot keep a larger distance. It is an error if the minimal distance was given; if it comes from a
+    thickness,
+    this warns if `warns` is true.
+    """
     for k, contact in enumerate(scene._body_contacts):
         wanted = scene._in_core.current(contact).min_distance
         nearest, faces = _core.nearest_neighbours(scene._model, k)
         if wanted <= nearest:
             continue
         kind = type(contact).__name__.removeprefix("Body")
-        told = (
+        reason = (
             f"the min_distance of a {kind}, {wanted:g} m, is larger than what neighbours along a surface have at rest: "
             f"{faces} are {nearest:g} m apart"
         )
         if contact._distance_given or wanted != contact.min_distance:
-            raise ValueError(f"{told}. Give it at most {nearest:g} m, or a mesh with longer edges")
+            raise ValueError(f"{reason}. Give it at most {nearest:g} m, or a mesh with longer edges")
         if warns:
-            kept = 0.5 * nearest * wanted / (wanted + contact.activation_distance)
+            left = 0.5 * nearest * wanted / (wanted + contact.activation_distance)
             warnings.warn(
-                f"{told}, and keep {kept:g} m of it. All that are not neighbours keep it. A mesh with edges longer than the "
-                "thickness needs no such exception, nor does a smaller min_distance=",
+                f"{reason}, and keep {left:g} m of it. All that are not neighbours keep it. A mesh with edges longer than "
+                "the thickness needs no such exception, nor does a smaller min_distance=",
                 MeshQualityWarning,
                 stacklevel=callers_level(),
             )
 
 
 def check_apart(scene: Scene, state: np.ndarray) -> None:
-    """Bodies in contact that intersect, or are nearer than they may be, cannot start so."""
+    """Raise ValueError if bodies in contact intersect in the start of a solve, or are nearer than their minimal
+    distance.
+    """
     check_neighbours(scene)
     if scene._body_contacts and (reason := scene._model.refusal(state)):
         raise ValueError(f"the start cannot be: {reason}")
 
 
 def check_shapes(
-    contacts: Sequence[Contact | BodyContact], parts: Sequence[RigidBody], places: list[RigidBodyPoints]
+    contacts: Sequence[Contact | BodyContact], parts: Sequence[RigidBody], points: list[RigidBodyPoints]
 ) -> None:
-    """Obstacles keep out vertices of sheets and solids: a contact that would seem to be about the shape of a rigid part
-    that has none of these has to say what it is about."""
+    """Raise ValueError for a contact with obstacles that seems to act on the shape of a rigid body.
+
+    Obstacles keep out vertices of sheets and solids only. If there is a rigid body with a shape but without vertices, a
+    contact must name its body or vertices.
+    """
     bare = [
         k
-        for k, (part, place) in enumerate(zip(parts, places, strict=True))
-        if part.shape is not None and not len(place.vertices)
+        for k, (part, own) in enumerate(zip(parts, points, strict=True))
+        if part.shape is not None and not len(own.vertices)
     ]
     for contact in contacts:
         if bare and contact.body is None and contact.vertices is None:
@@ -151,7 +163,7 @@ def check_shapes(
 
 
 def contact_inputs(contacts: Sequence[Contact | BodyContact], bodies: Bodies) -> list[dict[Any, Any]]:
-    """What of the contacts no solve can change."""
+    """Return the input of contacts with obstacles, as far as no solve can change it."""
     numbers = {id(each): k for k, each in enumerate(obstacles_of(contacts))}
     inputs = []
     for contact in contacts:
@@ -173,13 +185,14 @@ def contact_inputs(contacts: Sequence[Contact | BodyContact], bodies: Bodies) ->
 
 
 def poses(obstacle: Obstacle, times: np.ndarray) -> np.ndarray:
-    """Displacements, rotation vectors, velocities and spins of a moving one at these times, (len(times), 4, 3)."""
+    """Return an obstacle's displacements, rotation vectors, velocities and angular velocities at times, (n_times, 4,
+    3).
+    """
     return np.array([(*obstacle.pose(time), *obstacle.rates(time)) for time in times]).reshape(-1, 4, 3)
 
 
-LARGEST_SMOOTH_TURN = (
-    0.3  # rad, by which normals of smooth bodies do not turn within the smoothing of a contact
-)
+# [rad] Largest rotation of the normal of a smooth surface within the smoothing of a contact; a larger one is a kink.
+LARGEST_SMOOTH_TURN = 0.3
 
 
 def near_kinks(
@@ -190,27 +203,30 @@ def near_kinks(
     positions: np.ndarray,
     time: float,
 ) -> np.ndarray:
-    """Vertices (k,) of points that touch one of the obstacles closer than the smoothing to a kink of its distance.
+    """Return the vertices (k,) of contact points that are closer than the smoothing to a kink of an obstacle's
+    distance.
 
-    sheets: those that touch, as they are in this solve.
+    sheets: the bodies in contact, as they are in this solve.
     """
     vertices, weights = bodies.contact_points(contact)
-    places = np.einsum("pk,pkc->pc", weights, positions[vertices])
-    reach = contact._law(*sheets)[1] * np.concatenate([np.eye(3), -np.eye(3)])
+    points = np.einsum("pk,pkc->pc", weights, positions[vertices])
+    offsets = contact._law(*sheets)[1] * np.concatenate([np.eye(3), -np.eye(3)])
     found = [np.zeros(0, dtype=vertices.dtype)]
     for obstacle in obstacles:
-        touching = obstacle.signed_distance(places, time) < contact.offset
-        here = places[touching]
-        around = obstacle.normals(here[:, None, :] + reach, time)
-        turn = np.einsum("pc,pkc->pk", obstacle.normals(here, time), around).min(axis=1, initial=1.0)
-        found.append(vertices[touching][turn < np.cos(LARGEST_SMOOTH_TURN)].ravel())
+        active = obstacle.signed_distance(points, time) < contact.offset
+        here = points[active]
+        around = obstacle.normals(here[:, None, :] + offsets, time)
+        cosines = np.einsum("pc,pkc->pk", obstacle.normals(here, time), around).min(axis=1, initial=1.0)
+        found.append(vertices[active][cosines < np.cos(LARGEST_SMOOTH_TURN)].ravel())
     every = np.unique(np.concatenate(found))
     return every[every >= 0]
 
 
 def check_outside(scene: Scene, values: Any, positions: np.ndarray, time: float) -> None:
-    """A sheet that starts deeper in an obstacle than half its thickness would be shot out of it, or a solid that starts
-    deeper than a hundredth of its size."""
+    """Raise ValueError if a body starts too deep in an obstacle, whose force would then shoot it out.
+
+    The limit is half the thickness for a sheet, and a hundredth of its size for a solid.
+    """
     if not scene._obstacle_contacts:
         return
     allowed = np.empty(scene.mesh.n_vertices)

@@ -1,4 +1,4 @@
-"""Energies of the faces of a body beside its elastic and magnetic ones, given by numbers a face."""
+"""Energies of the faces of a body in addition to its elastic and magnetic ones, such as surface tension."""
 
 from __future__ import annotations
 
@@ -19,11 +19,12 @@ if TYPE_CHECKING:
 
 
 class FaceEnergy(Owner):
-    """An energy that the core adds up over faces; it is a load, so the load factor scales it.
+    """An energy that the core sums over faces. It is a load, so the load factor scales it.
 
-    A kind of it names its numbers in `_replaceable`, their units in `_units`, and the core's energy in `_energy`; the
-    core's kernel has the same names. Each number is one for all of the faces, or one a face.
-    faces: where it acts; by default on the whole body.
+    A subclass names its values in `_replaceable`, their units in `_units`, and the core's energy in `_energy`; the
+    core's
+    kernel has the same names. Each value is one number for all faces, or one per face.
+    faces: those with the energy; by default all of the body.
     body: the Shell or Solid that it acts on, in a scene of several.
     """
 
@@ -82,12 +83,12 @@ class FaceEnergy(Owner):
 class SurfaceTension(FaceEnergy):
     """Surface tension: an energy of `surface_tension` [J/m2 = N/m] times the current area of the faces.
 
-    surface_tension: one for all, or one a face. A liquid film that wets both sides of a sheet has two surfaces: give the
+    surface_tension: one for all, or one per face. A liquid film that wets both sides of a sheet has two surfaces: give the
         sum of both. It is a load: the load factor scales it.
-    faces: where there is liquid; by default on the whole body.
+    faces: those with liquid; by default all of the body.
     body: the Shell or Solid that it acts on, in a scene of several.
 
-    A free sheet under a surface tension gamma shrinks by gamma (1 - nu) / (Y h) each way:
+    A free sheet under a surface tension gamma shrinks by gamma (1 - nu) / (Y h) in each direction:
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.02, 0.01, cells=(4, 2))

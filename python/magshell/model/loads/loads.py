@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 
 
 class DeadLoad(Owner):
-    """Forces that keep size and direction, given by one value: so much of it on each of some parts of the mesh.
+    """Forces that keep their size and direction: a value times the length, area or number of some parts of the mesh.
 
     body: the Shell that they act on, or None. Meshes are that body's, and so are indices.
     """
 
     body: Shell | Solid | None
 
-    _for_all = False  # whether it acts on all bodies where it names none
+    _for_all = False  # whether a load without a `body` acts on all bodies
 
     def __init__(self, label: str, values: Any, body: Shell | Solid | None):
         """label: the name and unit of the value."""
@@ -36,10 +36,10 @@ class DeadLoad(Owner):
         setattr(self, self._replaceable[0], _vectors(*label.rstrip("]").split(" [", 1), values))
 
     def vertex_forces(self, mesh: TriangleMesh) -> np.ndarray:
-        """(n_v, 3), N."""
-        vertices, weights = self._shares(mesh)
+        """Return the forces on the vertices, (n_v, 3) N."""
+        vertices, weights = self._nodal_weights(mesh)
         rows = _rows(self._label, getattr(self, self._replaceable[0]), len(vertices))
-        return _spread(mesh, vertices, rows[:, None] * weights[..., None])
+        return _assemble(mesh, vertices, rows[:, None] * weights[..., None])
 
     def _add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         key = ("loads", "forces")
@@ -50,12 +50,12 @@ class DeadLoad(Owner):
 
     def _gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
         part = values.scene._bodies.of(self)
-        vertices, weights = self._shares(part.mesh)
+        vertices, weights = self._nodal_weights(part.mesh)
         by_forces = gradient.value("loads", "forces")[part.vertices]
         return {self._replaceable[0]: (by_forces[vertices] * weights[..., None]).sum(axis=1)}
 
-    def _shares(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
-        """The vertices of each part (k, m), and how much of the value each of them feels (k, 1) or (k, m)."""
+    def _nodal_weights(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
+        """Return the vertices of each part (k, m), and the weights of the value there, (k, 1) or (k, m)."""
         raise TypeError(f"{type(self).__name__} is no load of its own")
 
 
@@ -79,18 +79,16 @@ class PointLoad(DeadLoad):
         """Returns the same load with another force [N]."""
         return PointLoad(self.vertices, force, self.body)
 
-    def _shares(self, mesh: TriangleMesh):
+    def _nodal_weights(self, mesh: TriangleMesh):
         vertices = indices("PointLoad vertices", self.vertices, mesh.n_vertices)
         return vertices[:, None], np.ones((len(vertices), 1))
 
 
 class EdgeLoad(DeadLoad):
-    """A force per rest length [N/m] along some edges, half to each end (of six-node elements by their shapes): (3,) or
-    (k, 3), one an edge.
+    """A force per rest length [N/m] along some edges, half at each end (of six-node elements by their shape functions).
 
+    edges: (k,). force_per_length: N/m, by rest length: (3,), or (k, 3) with one per edge.
     body: the Shell whose edges they are, in a scene of several.
-
-    edges: (k,). force_per_length: N/m, by rest length.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -109,17 +107,17 @@ class EdgeLoad(DeadLoad):
         """Returns the same load with another force per length [N/m]."""
         return EdgeLoad(self.edges, force_per_length, self.body)
 
-    def _shares(self, mesh: TriangleMesh):
+    def _nodal_weights(self, mesh: TriangleMesh):
         return nodal_lengths(mesh, indices("EdgeLoad edges", self.edges, mesh.n_edges))
 
 
 class AreaLoad(DeadLoad):
-    """A force per rest area [N/m2] on the sheet, or on some faces only: (3,) or (k, 3), one a face. Faces of quadratic
-    elements are curved, and share it out by their shapes.
+    """A force per rest area [N/m2] on the sheet, or on some faces only.
 
-    body: the Shell or Solid that it acts on; by default all, where no faces are given.
+    Faces of quadratic elements are curved; their shape functions distribute the force to their nodes.
 
-    force_per_area: N/m2, by rest area. faces: (k,), by default all.
+    force_per_area: N/m2, by rest area: (3,), or (k, 3) with one per face. faces: (k,), by default all.
+    body: the Shell or Solid that it acts on; by default all, if no faces are given.
 
     >>> import magshell as ms
     >>> ms.AreaLoad((0, 0, -10.0)).force_per_area
@@ -139,7 +137,7 @@ class AreaLoad(DeadLoad):
         """Returns the same load with another force per area [N/m2]."""
         return AreaLoad(force_per_area, self.faces, self.body)
 
-    def _shares(self, mesh: TriangleMesh):
+    def _nodal_weights(self, mesh: TriangleMesh):
         faces = (
             np.arange(mesh.n_faces)
             if self.faces is None
@@ -148,12 +146,12 @@ class AreaLoad(DeadLoad):
         return nodal_areas(mesh, faces)
 
 
-class EdgeCouple(Owner):
-    """A couple per rest length [N] turning the director of free boundary edges about the edge itself.
+class EdgeCouple(Owner):  # plain-words: ok
+    """A moment per rest length [N] that turns the director of free boundary edges about the edge itself.
 
-    couple_per_length: a number, about the edge's direction with the sheet on its left (seen from the side its normals
-        point to); positive lifts nothing but turns as a right hand along that direction does. Or a vector (3,), of which
-        the part along each rest edge counts. The axis follows the edge.
+    couple_per_length: a number, about the edge's direction with the sheet on its left (seen from the side to which its
+        normals point), positive by the right-hand rule; or a vector (3,), of which the component along each rest edge
+        acts. There is no force, and the axis follows the edge.
     body: the Shell whose edges they are, in a scene of several.
 
     >>> import magshell as ms
@@ -168,6 +166,7 @@ class EdgeCouple(Owner):
     _replaceable = ("couple_per_length",)
     _for_all = False
 
+    # plain-words: ok
     def __init__(self, edges: Numbers, couple_per_length: Numbers, body: Shell | Solid | None = None):
         self.body: Shell | None = checked_body(body)
         self.edges: np.ndarray = selection("EdgeCouple edges", edges)
@@ -177,7 +176,10 @@ class EdgeCouple(Owner):
         self.couple_per_length: np.ndarray = quantity("couple_per_length", "N", array, array.shape)
 
     def _edge_moments(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
-        """The edges (k,) and their couples (k,), N m. Raises ValueError for a solid, whose edges do not turn."""
+        """Return the edges (k,) and their moments (k,), N m.
+
+        Raises ValueError for a solid, whose edges have no rotations.
+        """
         if not isinstance(mesh, TriangleMesh | QuadraticTriangleMesh):
             raise ValueError(
                 "an EdgeCouple turns edges of a shell: a couple on a solid is one of PointLoads on its face"
@@ -186,12 +188,12 @@ class EdgeCouple(Owner):
         return edges, along @ np.atleast_1d(self.couple_per_length)
 
     def _add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
-        key, turned = ("couples", "couples"), values.scene._moment_edges
+        key, loaded = ("couples", "couples"), values.scene._moment_edges
         part = values.scene._bodies.of(self)
-        edges, couples = self._edge_moments(part.mesh)
+        edges, moments = self._edge_moments(part.mesh)
         n_edges = values.scene.mesh.n_edges
-        by_edge = np.bincount(part.first_edge + edges, weights=couples, minlength=n_edges)
-        numbers[key] = numbers.get(key, 0.0) + by_edge[turned]
+        by_edge = np.bincount(part.first_edge + edges, weights=moments, minlength=n_edges)
+        numbers[key] = numbers.get(key, 0.0) + by_edge[loaded]
 
     def _gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
         part = values.scene._bodies.of(self)
@@ -199,8 +201,8 @@ class EdgeCouple(Owner):
         of_edges = np.searchsorted(values.scene._moment_edges, part.first_edge + edges)
         return {"couple_per_length": gradient.value("couples", "couples")[of_edges] @ along}
 
-    def replaced(self, *, couple_per_length: Numbers) -> EdgeCouple:
-        """Returns the same load with another couple per length [N], of the same shape."""
+    def replaced(self, *, couple_per_length: Numbers) -> EdgeCouple:  # plain-words: ok
+        """Returns the same load with another moment per length [N], of the same shape."""
         changed = EdgeCouple(self.edges, couple_per_length, self.body)
         if changed.couple_per_length.shape != self.couple_per_length.shape:
             raise ValueError(
@@ -210,7 +212,9 @@ class EdgeCouple(Owner):
         return changed
 
     def _along(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
-        """The edges and what a couple per length is multiplied by: lengths (k, 1), or edge vectors (k, 3)."""
+        """Return the edges and the factors of a moment per length: lengths (k, 1) for a number, edge vectors (k, 3) for
+        a vector.
+        """
         edges = indices("EdgeCouple edges", self.edges, mesh.n_edges)
         inside = np.setdiff1d(edges, mesh.boundary_edges)
         if inside.size:
@@ -237,8 +241,8 @@ def _rows(label: str, vectors: np.ndarray, count: int) -> np.ndarray:
     return np.broadcast_to(vectors, (count, 3))
 
 
-def _spread(mesh: TriangleMesh, vertices: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    """The forces (k, 1, 3) or (k, m, 3) of each row on its vertices (k, m)."""
+def _assemble(mesh: TriangleMesh, vertices: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    """Sum forces (k, 1, 3) or (k, m, 3) on vertices (k, m) to those on all vertices, (n_v, 3)."""
     at_vertices = np.zeros((mesh.n_vertices, 3))
     np.add.at(at_vertices, vertices, forces)
     return at_vertices

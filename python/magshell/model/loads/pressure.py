@@ -1,4 +1,4 @@
-"""Pressure that follows the faces that it acts on."""
+"""Pressures that follow the faces on which they act."""
 
 from __future__ import annotations
 
@@ -19,20 +19,21 @@ if TYPE_CHECKING:
 
 
 class Pressure(Owner):
-    """A pressure [Pa] that pushes against the normals of faces, wherever they are and however large: f = - p n da.
+    """A pressure [Pa] against the normals of deformed faces, a follower load: f = - p n da with the current area.
 
-    pressure: a number, or one a face, (k,); negative ones pull. What a solve puts in its place has the same shape. It is a
+    pressure: a number, or one per face, (k,); negative ones pull. A solve can replace it by one of the same shape. It is a
         load: the load factor scales it, and in ms.simulate it may change in time, as (steps + 1, ...) or a function of it.
-    faces: where it acts; by default on the whole body. Normals of a solid's faces point outwards, those of a shell to the
-        side from which its faces run counter-clockwise: inside a balloon is a negative pressure, or faces turned round.
+    faces: those it acts on; by default all of the body. Normals of a solid's faces point outwards, those of a shell to the
+        side from which its faces run counter-clockwise: a balloon is inflated by a negative pressure, or by a positive one
+        with its faces flipped.
     body: the Shell or Solid that it acts on, in a scene of several.
 
-    Faces of quadratic elements are curved, and exact. Where the surface is closed, or its border held or on symmetry
-    planes, and the pressure one for all of it, it has a potential: p times the volume that it displaces. Where it has
-    none, equilibria, motions, linear response and gradients are exact all the same, with an unsymmetric stiffness;
-    `stable` says then that the symmetric part of that is positive definite: nothing gives way slowly, but the energy is
-    only the work on the straight way from the rest shape, and flutter is not looked for. ms.follow_path, ms.linear_buckling
-    and ms.vibration_modes, which need more, refuse.
+    Faces of quadratic elements are curved, and integrated exactly. The pressure has a potential, p times the displaced
+    volume, if it is uniform and the surface is closed, or its border is held or on symmetry planes. Without a potential
+    equilibria, motions, linear response and gradients are exact, too, with an unsymmetric stiffness. Then `stable` says
+    that the symmetric part of the stiffness is positive definite, which excludes slow instability but not flutter, and the
+    energy is only the work on the straight path from the rest shape. ms.follow_path, ms.linear_buckling and
+    ms.vibration_modes need a potential and refuse.
 
     A cube under a pressure all around, p = 0.03 of a modulus of 1 at a Poisson's ratio of 0.25, shrinks by p (1 - 2 nu) to
     first order:
@@ -71,7 +72,9 @@ class Pressure(Owner):
         numbers[label, "pressure"] = np.atleast_1d(self.pressure)
 
     def _core_input(self, label: str, bodies: Bodies) -> dict[Any, Any]:
-        """As the core takes it: the nodes of sides, and which of its numbers acts on each of their parts."""
+        """Return the input of the core: the nodes of the loaded faces, and the row of the pressure for each of their
+        parts.
+        """
         part = bodies.of(self)
         count = part.mesh.n_faces
         chosen = np.arange(count) if self.faces is None else indices("Pressure faces", self.faces, count)

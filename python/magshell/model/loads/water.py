@@ -1,4 +1,4 @@
-"""Water around a sheet: drag, thrust, and the water that the sheet carries along."""
+"""Water around a sheet: drag, thrust, and added mass."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
 
 _HEAD_ON = 0.5 * np.pi
-_NONE = 1e-9  # what of a table counts as zero, over its largest value; and how far its angles may miss the ends [rad]
+# [-] Entries of a table below this fraction of its largest one count as zero; [rad] tolerance of its first and last angle.
+_NONE = 1e-9
 
 
 class Water(Owner):
@@ -29,8 +30,8 @@ class Water(Owner):
     a third of it on each corner. The unit normal n is the one against the flow, n . u <= 0, so the two sides of a face
     are alike (the paper leaves that open); phi in [0, pi/2] is the attack angle, sin phi = |n . d|: 0 where the water
     runs along the face, pi/2 where it meets it head on. C_d = drag_coefficient C(phi), and C_t likewise with a C of its
-    own if there is one; C(phi) = 2 sin^2(phi) unless a table says otherwise. Every face feels the whole flow: nothing
-    is in the lee of anything. There is no buoyancy: where it matters, reduce the scene's gravity g by the factor
+    own if there is one; C(phi) = 2 sin^2(phi) unless a table says otherwise. The undisturbed flow acts on every face:
+    faces do not shield each other. There is no buoyancy: if it matters, reduce the scene's gravity g by the factor
     1 - fluid_density / mass_density.
 
     A plate of areal mass s (mass_density * thickness) that falls face-on from rest thus has, with C_d and C_t head on
@@ -48,11 +49,11 @@ class Water(Owner):
     added_mass: m, kg/m2, not negative: the water that a face has to accelerate when it moves along its normal, in
         proportion to its current area. A disk of radius a in open water carries 8 a / (3 pi) rho on average.
 
-    Tables decide how smooth the force is, and a solve wants its derivatives. Faces are alike on both sides, so C is
-    taken as even about 0 and pi/2 (for the thrust: odd about 0): the force is continuously differentiable if the drag's
+    Tables decide how smooth the force is, and solves need its derivatives. Faces are equal on both sides, so C is
+    even about 0 and pi/2 (for the thrust: odd about 0): the force is continuously differentiable if the drag's
     C has slope zero at both ends, and the thrust's C is zero at 0 and has slope zero at pi/2. Otherwise the force has a
     kink there; a thrust that is not zero at 0 jumps from one side of the face to the other where the flow is
-    tangential. None of this is refused; `is_smooth` tells.
+    tangential. No table is refused for that; `is_smooth` tells whether the force is smooth.
 
     Raises ValueError on negative or non-finite numbers, and on tables that do not ascend from 0 to pi/2.
 
@@ -88,7 +89,7 @@ class Water(Owner):
         )
 
     def replaced(self, **values: Any) -> Water:
-        """The same water with other numbers: any of those that a solve may replace, and differentiate by."""
+        """Return the same water with other values, of those that a solve may replace and differentiate by."""
         if unknown := sorted(set(values) - set(self._replaceable)):
             raise ValueError(
                 f"Water has no value {unknown[0]!r} to be replaced: it has {', '.join(self._replaceable)}"
@@ -96,7 +97,7 @@ class Water(Owner):
         return Water(**{**self.__getstate__(), **values})
 
     def coefficients(self, attack_angle: Numbers) -> tuple[np.ndarray, np.ndarray]:
-        """C_d and C_t, each (...), at attack angles [rad] in [0, pi/2], (...)."""
+        """Return C_d and C_t, each (...), at attack angles [rad] in [0, pi/2], (...)."""
         angles = quantity("attack_angle", "rad", attack_angle, ("...",))
         if (bad := (angles < 0) | (angles > _HEAD_ON)).any():
             raise ValueError(f"attack_angle [rad] must lie in [0, pi/2], got {angles[bad].flat[0]:g}")
@@ -109,10 +110,10 @@ class Water(Owner):
     def force(
         self, positions: Numbers, velocities: Numbers, accelerations: Numbers | None = None
     ) -> np.ndarray:
-        """The force on each face, (n_f, 3), N; a third of it acts on each corner.
+        """Return the force on each face, (n_f, 3) N; a third of it acts on each corner.
 
-        positions, velocities, accelerations: of the corners of the faces, (n_f, 3, 3), a row a corner; m, m/s, m/s2.
-            `mesh.rest_positions[mesh.faces]` has that shape. No accelerations are zero ones.
+        positions, velocities, accelerations: of the corners of the faces, (n_f, 3, 3), a row per corner; m, m/s, m/s2.
+            `mesh.rest_positions[mesh.faces]` has that shape. Accelerations are zero by default.
 
         >>> Water().force([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], np.broadcast_to([0, 0, -0.1], (1, 3, 3))).round(9)
         array([[ 0.,  0., 10.]])
@@ -126,7 +127,7 @@ class Water(Owner):
 
     @property
     def is_smooth(self) -> bool:
-        """Whether the force is continuously differentiable in the motion of a face: a matter of the tables."""
+        """Return whether the force is continuously differentiable in the motion of a face, as the tables decide."""
         _, drag_slopes = _ends(self._drag_curve)
         thrust, thrust_slopes = _ends(self._thrust_curve)
         drag_is = self.drag_coefficient == 0 or not drag_slopes.any()
@@ -158,7 +159,7 @@ class Water(Owner):
 
 
 def _table(name: str, table) -> tuple[np.ndarray, ...] | None:
-    """Checked: angles, values and, where given, the two slopes."""
+    """Return a checked table: angles, values and, if given, the two slopes. Raises ValueError."""
     if table is None:
         return None
     if not isinstance(table, tuple | list) or len(table) not in (2, 3):
@@ -191,7 +192,7 @@ def _curve(table: tuple[np.ndarray, ...] | None) -> _core.AttackCurve:
 
 
 def _ends(curve: _core.AttackCurve) -> tuple[np.ndarray, np.ndarray]:
-    """Values and slopes at 0 and pi/2, set to zero where they are rounding."""
+    """Return the values and slopes at 0 and pi/2, with round-off set to zero."""
     samples = curve.samples(np.linspace(0.0, _HEAD_ON, 65))
     samples[np.abs(samples) <= _NONE * np.abs(samples[:, 0]).max()] = 0.0
     return samples[[0, -1], 0], samples[[0, -1], 1]

@@ -28,7 +28,7 @@ from ..contact.contacts_to_core import (
     check_shapes,
     contact_inputs,
     obstacles_of,
-    shapes_that_touch,
+    rigid_bodies_in_contact,
     split_contacts,
 )
 from ..fields.field import FIELDS, AppliedField, UniformField
@@ -124,7 +124,7 @@ class Scene(PlotMixin):
             "contacts", contacts, (Contact, BodyContact)
         )
         self._obstacle_contacts, self._body_contacts = split_contacts(self.contacts)
-        self._bodies = Bodies(bodies, ties, shapes_that_touch(self._body_contacts))
+        self._bodies = Bodies(bodies, ties, rigid_bodies_in_contact(self._body_contacts))
         self.supports: tuple[Pin | Clamp | SymmetryPlane, ...] = checked_list("supports", supports, _SUPPORTS)
         self.loads: tuple[Any, ...] = checked_list("loads", loads, _LOADS)
         self.actuators: tuple[Actuator, ...] = checked_list("actuators", actuators, (Actuator,), _ACTUATORS)

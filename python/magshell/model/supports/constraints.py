@@ -1,4 +1,4 @@
-"""Supports put together: which nodes are held along which directions, and whether anything can still move freely."""
+"""Combines the supports of a scene: the directions in which nodes are held, and rigid motions that remain free."""
 
 from __future__ import annotations
 
@@ -17,35 +17,42 @@ if TYPE_CHECKING:
     from .supports import Support
 
 
-class Hold(NamedTuple):
-    """What one support does to a vertex: directions (m, 3), and its move, or None where it stays."""
+class VertexConstraint(NamedTuple):
+    """The constraint of one support on a vertex: the held directions (m, 3), and the move, or None if it is fixed."""
 
     along: np.ndarray
     move: RigidMove | None
 
 
-_LOOKED_AT = (0.37, 1.0)  # a full turn ends where it began, but is elsewhere on its way
+# Load fractions at which moves are compared: a rotation by a full turn agrees with rest at 1, but not at 0.37.
+_COMPARED_AT = (0.37, 1.0)
 
 
 @dataclass(frozen=True)
 class Constraints:
-    """What the core takes. Nodes are vertices, followed by directions."""
+    """The constraints of all supports, as the core takes them. Nodes are vertices, followed by directions."""
 
     directed_edges: np.ndarray  # (k, 2): the scene's edge, direction
     directions: np.ndarray  # (n_d, 3)
-    held_nodes: np.ndarray  # (m, 5): node, how many directions, of each the move or -1
+    held_nodes: (
+        np.ndarray
+    )  # (m, 5): node, number of held directions, and for each the number of its move or -1
     held_frames: np.ndarray  # (m, 3, 3): columns, the held directions first
     moves: tuple[RigidMove, ...]
     direction_owners: tuple[Any, ...]  # (n_d,), the support that holds each direction, or None
 
 
 def gather(bodies: Bodies, supports: Sequence[Support], free_directions: np.ndarray) -> Constraints:
-    """All supports of a scene as one. `free_directions` (k, 3) are appended to the directions, held and still."""
+    """Combine all supports of a scene.
+
+    free_directions: (k, 3), appended to the fixed directions; they do not move.
+    """
     moves: list[RigidMove] = []
-    mesh, places = bodies.mesh, [(s, bodies.of(s)) for s in supports]
-    nodes, frames = _held_vertices(bodies, [h for s, span in places for h in held_by(s, span, bodies)], moves)
+    mesh, pairs_of = bodies.mesh, [(s, bodies.of(s)) for s in supports]
+    held = [h for s, span in pairs_of for h in held_by(s, span, bodies)]
+    nodes, frames = _held_vertices(bodies, held, moves)
     pairs, directions, direction_moves, owners = _directed_edges(
-        [(s, d) for s, span in places for d in _directed(s, span)], moves
+        [(s, d) for s, span in pairs_of for d in _directed(s, span)], moves
     )
     directions = np.concatenate([directions, free_directions])
     direction_moves += [-1] * len(free_directions)
@@ -63,7 +70,7 @@ def gather(bodies: Bodies, supports: Sequence[Support], free_directions: np.ndar
 
 
 def check_shared(bodies: Bodies, supports: Sequence[Support], vertices: np.ndarray) -> None:
-    """Raises ValueError where supports disagree on where one of these vertices of the scene is."""
+    """Raise ValueError if supports disagree on the position of one of these vertices of the scene."""
     found = []
     for held in (h for s in supports for h in held_by(s, bodies.of(s), bodies)):
         some = np.isin(held.vertices, vertices)
@@ -72,7 +79,7 @@ def check_shared(bodies: Bodies, supports: Sequence[Support], vertices: np.ndarr
 
 
 def held_by(support: Support, span: Span, bodies: Bodies) -> list[Held]:
-    """With the scene's vertices."""
+    """Return the vertices that a support holds, with the scene's numbers."""
     return [
         held._replace(vertices=bodies.original[held.vertices + span.first_vertex])
         for held in support._held(span.mesh)
@@ -80,8 +87,10 @@ def held_by(support: Support, span: Span, bodies: Bodies) -> list[Held]:
 
 
 def held_directions(bodies: Bodies, supports: Sequence[Support]) -> list[tuple[object, int, np.ndarray]]:
-    """(support, vertex of the scene, (m, 3) orthonormal) of all that they hold; what an earlier support holds of a vertex is
-    left out of the later ones'."""
+    """Return (support, vertex of the scene, held directions (m, 3), orthonormal) for all supports and vertices.
+
+    Directions of a vertex that an earlier support holds are left out of those of later ones.
+    """
     found = []
     taken: dict[int, np.ndarray] = {}
     for support in supports:
@@ -97,16 +106,16 @@ def held_directions(bodies: Bodies, supports: Sequence[Support]) -> list[tuple[o
 
 
 def _directed(support, span: Span) -> list[DirectedEdges]:
-    """With the scene's edges."""
+    """Return the edges whose direction a support holds, with the scene's numbers."""
     return [each._replace(edges=each.edges + span.first_edge) for each in support._directed(span.mesh)]
 
 
 def free_rigid_motions(
     bodies: Bodies, constraints: Constraints, on_joints: Sequence[Joint] = ()
 ) -> list[str]:
-    """The rigid motions that no support prevents, in words; of every connected part.
+    """Return words for the rigid motions that no support prevents, of every connected component.
 
-    on_joints: vertices that a skeleton holds, as far as its joints do: their parts are not asked.
+    on_joints: vertices that a skeleton holds as far as its joints do; their components are left out.
     """
     found, mesh, size, components = [], bodies.mesh, bodies.size, bodies.components
     for part in range(components.max(initial=-1) + 1):
@@ -123,13 +132,13 @@ def free_rigid_motions(
 
 
 def _held_vertices(bodies: Bodies, held: list[Held], moves: list[RigidMove]):
-    holds: dict[int, list[Hold]] = {}
+    constraints: dict[int, list[VertexConstraint]] = {}
     for support in held:
         for vertex, along in zip(support.vertices.tolist(), support.directions, strict=True):
-            holds.setdefault(vertex, []).append(Hold(along, support.move))
+            constraints.setdefault(vertex, []).append(VertexConstraint(along, support.move))
     numbers: dict[int, int] = {}
     nodes, frames = [], []
-    for vertex, some in sorted(holds.items()):
+    for vertex, some in sorted(constraints.items()):
         _check_agree(bodies, vertex, some)
         frame, count, by = _frame(some)
         nodes.append((vertex, count, *(_number(move, moves, numbers) for move in by)))
@@ -146,20 +155,22 @@ def _number(move: RigidMove | None, moves: list[RigidMove], numbers: dict[int, i
     return numbers[id(move)]
 
 
-def _check_agree(bodies, vertex: int, holds: list[Hold]) -> None:
-    """Supports may share a vertex where they hold it along directions at right angles, or have it at the same place along
-    those that are not. One that stays may hold it beside one that moves, as long as that does not move it along what it
-    holds."""
+def _check_agree(bodies, vertex: int, constraints: list[VertexConstraint]) -> None:
+    """Raise ValueError if supports that share a vertex disagree on its position.
+
+    They may hold it along directions at right angles, or along others if they move it to the same position. A fixed support
+    and a moving one may share a vertex if the move has no component along the directions of the fixed one.
+    """
     point = bodies.mesh.rest_positions[[vertex]]
 
-    def places(move: RigidMove | None) -> np.ndarray:
-        return np.concatenate([point if move is None else move.moved(point, at) for at in _LOOKED_AT])
+    def positions(move: RigidMove | None) -> np.ndarray:
+        return np.concatenate([point if move is None else move.moved(point, at) for at in _COMPARED_AT])
 
-    for k, a in enumerate(holds):
-        for b in holds[:k]:
+    for k, a in enumerate(constraints):
+        for b in constraints[:k]:
             if a.move is b.move:
                 continue
-            apart = places(a.move) - places(b.move)
+            apart = positions(a.move) - positions(b.move)
             if a.move is None or b.move is None:
                 still = a if a.move is None else b
                 if np.abs(apart @ still.along.T).max() > 1e-9 * bodies.size:
@@ -176,33 +187,41 @@ def _check_agree(bodies, vertex: int, holds: list[Hold]) -> None:
                 raise ValueError(f"two supports move vertex {vertex} to different places")
 
 
-def _frame(holds: list[Hold]) -> tuple[np.ndarray, int, list[RigidMove | None]]:
-    """Orthonormal columns, the held ones first, their number, and whose each is; of what moves and what stays along the
-    same direction, that of what moves. World axes where the directions are world axes."""
-    directions = np.concatenate([hold.along for hold in holds])
-    moving = [hold for hold in holds if hold.move is not None]
-    movers = list({id(hold.move): hold.move for hold in moving}.values())
+def _frame(constraints: list[VertexConstraint]) -> tuple[np.ndarray, int, list[RigidMove | None]]:
+    """Return an orthonormal frame (columns) of a vertex, the number of its held directions, and their moves.
+
+    The held directions come first. Where a fixed support and a moving one hold the same direction, the move counts.
+    Held world
+    axes stay world axes.
+    """
+    directions = np.concatenate([each.along for each in constraints])
+    moving = [each for each in constraints if each.move is not None]
+    moves = list({id(each.move): each.move for each in moving}.values())
     axes = np.unique(np.argmax(np.abs(directions), axis=1))
     if np.all(np.abs(directions).max(axis=1) == 1.0):
         frame = np.eye(3)[:, [*axes, *np.setdiff1d(np.arange(3), axes)]]
-        return frame, len(axes), [_mover(frame[:, k], moving) if k < len(axes) else None for k in range(3)]
-    if len(movers) <= 1:
+        return (
+            frame,
+            len(axes),
+            [_move_along(frame[:, k], moving) if k < len(axes) else None for k in range(3)],
+        )
+    if len(moves) <= 1:
         _, values, rows = np.linalg.svd(directions)
         count = int(np.sum(values > 1e-9))
-        return (np.eye(3) if count == 3 else rows.T), count, [*movers, None][:1] * 3
+        return (np.eye(3) if count == 3 else rows.T), count, [*moves, None][:1] * 3
     columns, by = np.zeros((3, 0)), []
-    for hold in [*moving, *(hold for hold in holds if hold.move is None)]:
-        for along in hold.along:
-            rest = along - columns @ (columns.T @ along)
-            if np.linalg.norm(rest) > 1e-9:
-                columns = np.column_stack([columns, rest / np.linalg.norm(rest)])
-                by.append(hold.move)
+    for each in [*moving, *(fixed for fixed in constraints if fixed.move is None)]:
+        for along in each.along:
+            remaining = along - columns @ (columns.T @ along)
+            if np.linalg.norm(remaining) > 1e-9:
+                columns = np.column_stack([columns, remaining / np.linalg.norm(remaining)])
+                by.append(each.move)
     free = np.linalg.svd(columns.T)[2][len(by) :].T
     return np.column_stack([columns, free]), len(by), [*by, None, None, None][:3]
 
 
-def _mover(axis: np.ndarray, moving: list[Hold]) -> RigidMove | None:
-    return next((hold.move for hold in moving if (np.abs(hold.along @ axis) == 1.0).any()), None)
+def _move_along(axis: np.ndarray, moving: list[VertexConstraint]) -> RigidMove | None:
+    return next((each.move for each in moving if (np.abs(each.along @ axis) == 1.0).any()), None)
 
 
 def _directed_edges(directed: list[tuple[object, DirectedEdges]], moves: list[RigidMove]):
@@ -228,7 +247,7 @@ def _directed_edges(directed: list[tuple[object, DirectedEdges]], moves: list[Ri
 
 
 def _prevented(bodies, constraints: Constraints, in_part: np.ndarray, center: np.ndarray) -> np.ndarray:
-    """Rows (k, 6) of the infinitesimal rigid motions (translation, size-scaled rotation) that supports see."""
+    """Return the infinitesimal rigid motions that supports prevent, rows (k, 6): translation, size-scaled rotation."""
     rows, mesh, size = [np.zeros((1, 6))], bodies.mesh, bodies.size
     for (node, count, *_), frame in zip(constraints.held_nodes, constraints.held_frames, strict=True):
         if node < mesh.n_vertices and in_part[node]:

@@ -1,4 +1,4 @@
-"""What holds a sheet: pins, clamps, symmetry planes, and how they move."""
+"""Supports of bodies: pins, clamps, symmetry planes, and their prescribed motions."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ _ORDERS = {"".join(axes) for n in (1, 2, 3) for axes in permutations(_AXES, n)}
 
 
 class RigidMove(NamedTuple):
-    """x -> center + R(rotation) (x - center) + translation; gone through evenly as the move progresses.
+    """A rigid motion x -> center + R(rotation) (x - center) + translation, applied in proportion to the load fraction.
 
-    support: whose move it is.
+    support: the support that prescribes it.
     """
 
     center: np.ndarray
@@ -38,13 +38,13 @@ class RigidMove(NamedTuple):
     support: object
 
     def moved(self, points: np.ndarray, progress: float = 1.0) -> np.ndarray:
-        """Where points (k, 3) are at this progress, 1 at the end."""
-        turned = (points - self.center) @ rotation_matrix(progress * self.rotation).T
-        return self.center + turned + progress * self.translation
+        """Return the positions of points (k, 3) at this fraction of the motion, 1 at the end."""
+        rotated = (points - self.center) @ rotation_matrix(progress * self.rotation).T
+        return self.center + rotated + progress * self.translation
 
 
 class Held(NamedTuple):
-    """Vertices held along directions: normals (k, m, 3) of vertices (k,), m directions each."""
+    """Vertices (k,) held along directions (k, m, 3), m each, with their common move, or None if they are fixed."""
 
     vertices: np.ndarray
     directions: np.ndarray
@@ -52,7 +52,7 @@ class Held(NamedTuple):
 
 
 class DirectedEdges(NamedTuple):
-    """Edges (k,) whose faces keep their angle to directions (k, 3)."""
+    """Edges (k,) across which the sheet keeps its angle to directions (k, 3)."""
 
     edges: np.ndarray
     directions: np.ndarray
@@ -60,12 +60,12 @@ class DirectedEdges(NamedTuple):
 
 
 class Support(Owner):
-    """What moves of a support are the rigid moves of the nodes that it holds, all alike.
+    """The base class of supports. Its values are those of the rigid motion that it prescribes to its nodes.
 
     body: the Shell that it holds, or None. Meshes are that body's, and so are indices.
     """
 
-    _for_all = False  # whether it holds all bodies where it names none
+    _for_all = False  # whether a support without a `body` holds all bodies
 
     def _add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         for owner, move in self._moves(values):
@@ -81,16 +81,16 @@ class Support(Owner):
         }
 
     def _moves(self, values) -> list[tuple[str, RigidMove]]:
-        """With the labels that the core has for them."""
+        """Return the support's moves, each with the core's name of its values."""
         moves = enumerate(values.constraints.moves)
         return [(f"move {k}", move) for k, move in moves if move.support is self]
 
 
 class Pin(Support):
-    """Holds positions of vertices: `components` any of "x", "y", "z", together by default.
+    """Holds positions of vertices: `components` any of "x", "y", "z", all of them by default.
 
-    displacement: (3,) m, where the pinned vertices are moved to while the solve goes on.
-    rotation: (3,) rad, a rotation vector by which they are turned about `center` (3,) m, by default their mean.
+    displacement: (3,) m, by which the solve moves the pinned vertices.
+    rotation: (3,) rad, a rotation vector by which it rotates them about `center` (3,) m, by default their mean.
     body: the Shell whose vertices they are, in a scene of several.
 
     >>> import magshell as ms
@@ -135,7 +135,7 @@ class Pin(Support):
         return []
 
     def replaced(self, **values: Any) -> Pin:
-        """The same Pin with another displacement, rotation or center."""
+        """Return the same Pin with another displacement, rotation or center."""
         return Pin(self.vertices, self.components, body=self.body, **{**self._move.as_arguments(), **values})
 
     def __repr__(self) -> str:
@@ -146,7 +146,7 @@ class Pin(Support):
 class Clamp(Support):
     """Holds edges: the positions of their vertices and the direction of the sheet across them.
 
-    displacement, rotation, center: as for Pin; the direction turns along.
+    displacement, rotation, center: as for Pin; the direction rotates with the edges.
     body: the Shell whose edges they are, in a scene of several.
 
     >>> import magshell as ms
@@ -178,11 +178,11 @@ class Clamp(Support):
 
     def _directed(self, mesh: TriangleMesh) -> list[DirectedEdges]:
         edges = self._checked(mesh)
-        # Continues the face in its own plane, so that a clamped flat sheet has no fold at its clamp.
+        # The direction continues the face in its own plane, so that a clamped flat sheet is not bent at its clamp.
         return [DirectedEdges(edges, continuations(mesh, edges), self._move_on(mesh))]
 
     def replaced(self, **values: Any) -> Clamp:
-        """The same Clamp with another displacement, rotation or center."""
+        """Return the same Clamp with another displacement, rotation or center."""
         return Clamp(self.edges, body=self.body, **{**self._move.as_arguments(), **values})
 
     def _checked(self, mesh: TriangleMesh) -> np.ndarray:
@@ -198,11 +198,11 @@ class Clamp(Support):
 
 
 class SymmetryPlane(Support):
-    """The sheet goes on as its own mirror image behind a plane: vertices stay in it, and the angle across it stays.
+    """A plane behind which the body continues as its mirror image: vertices stay in it, and a sheet keeps its angle to it.
 
     normal: (3,), of the plane; any length but zero.
     point: (3,) m, in the plane.
-    tolerance: m, how far off a vertex may be; by default 1e-9 of the mesh's size.
+    tolerance: m, largest distance of a vertex that counts as in the plane; by default 1e-9 of the mesh's size.
     body: the Shell that it holds; by default all.
 
     >>> import magshell as ms
@@ -277,8 +277,11 @@ class SymmetryPlane(Support):
 
 
 def _refuse_corners_alone(mesh, vertices: np.ndarray) -> None:
-    """What was selected on a mesh of four nodes would hold a face of a quadratic solid by its corners, and the middle nodes
-    would stay free, in silence."""
+    """Raise ValueError if a Pin holds all corners of a face of a quadratic solid, but none of its middle nodes.
+
+    So it is with vertices that were selected on a mesh of four-node tetrahedra: the middle nodes would silently stay
+    free.
+    """
     if mesh.order == 1:
         return
     held = np.zeros(mesh.n_vertices, dtype=bool)
@@ -294,7 +297,12 @@ def _refuse_corners_alone(mesh, vertices: np.ndarray) -> None:
 
 
 def _refuse_ends_alone(mesh: QuadraticTriangleMesh, vertices: np.ndarray) -> None:
-    """What was selected on the mesh of three nodes would hold a row of edges by their ends, and let the nodes between go."""
+    """Raise ValueError if a Pin holds a row of edges of six-node elements by their ends, but none of the nodes between
+    them.
+
+    So it is with vertices that were selected on a mesh of three-node triangles: the middle nodes would silently stay
+    free.
+    """
     held = np.zeros(mesh.n_vertices, dtype=bool)
     held[vertices] = True
     edges = mesh.edges[held[mesh.edges].all(axis=1)]
@@ -307,7 +315,7 @@ def _refuse_ends_alone(mesh: QuadraticTriangleMesh, vertices: np.ndarray) -> Non
 
 
 def rotation_matrix(vector: np.ndarray) -> np.ndarray:
-    """R of a rotation vector [rad], by Rodrigues' formula."""
+    """Return the rotation matrix of a rotation vector [rad], by Rodrigues' formula."""
     angle = np.linalg.norm(vector)
     if angle == 0.0:
         return np.eye(3)
@@ -317,7 +325,7 @@ def rotation_matrix(vector: np.ndarray) -> np.ndarray:
 
 
 class _Move:
-    """A displacement and a rotation as a caller gives them."""
+    """A displacement and a rotation as they were given."""
 
     def __init__(self, displacement: Numbers, rotation: Numbers, center: Numbers):
         self.displacement = (
@@ -349,7 +357,7 @@ class _Move:
 
 
 def continuations(mesh: TriangleMesh, edges: np.ndarray) -> np.ndarray:
-    """Unit vectors across edges, in the plane of their first face and away from it, (k, 3)."""
+    """Return unit vectors across edges, in the plane of their first face and away from it, (k, 3)."""
     flat = mesh.corners if isinstance(mesh, QuadraticTriangleMesh) else mesh
     faces = np.where(flat.edge_faces[edges, 0] >= 0, flat.edge_faces[edges, 0], flat.edge_faces[edges, 1])
     ends = mesh.rest_positions[mesh.edges[edges]]
@@ -364,7 +372,7 @@ def _numbers(vector: np.ndarray) -> str:
 
 
 def _called(mesh: Any) -> str:
-    """Say what a mesh is of."""
+    """Return words for the body that a mesh belongs to."""
     if isinstance(mesh, TetMesh):
         return "the solid"
     return "the sheet" if isinstance(mesh, TriangleMesh | QuadraticTriangleMesh) else "the scene"

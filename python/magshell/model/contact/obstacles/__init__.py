@@ -1,7 +1,7 @@
-"""Bodies that sheets touch: planes and slopes, ground, round bodies, tubes, closed meshes; at rest or moving.
+"""Obstacles: planes and slopes, ground, round bodies, tubes, closed meshes; at rest or moving.
 
-Each has a frame of its own, placed by `center` (3,) m and `rotation`, a rotation vector (3,) rad about the center, and
-moved by `motion`, a function of the time. Contact is what a scene adds.
+Each has a frame of its own with the origin `center` (3,) m and the orientation `rotation`, a rotation vector (3,) rad
+about the center; `motion`, a function of the time, moves it. A Contact lets it act on a scene's bodies.
 """
 
 from .ground import HeightField, bump

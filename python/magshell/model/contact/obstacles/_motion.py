@@ -1,4 +1,4 @@
-"""What the function that moves an obstacle returns, and how fast that changes."""
+"""Evaluates the function that moves an obstacle, and differentiates it by the time."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import scipy
 
 from ...._input.quantity import quantity
 
-STEP = 1e-4  # s, between the times that derivatives are taken from
-# Fourth-order derivatives: from both sides, and from one side near time 0, before which nobody asked for the motion.
+STEP = 1e-4  # [s] step of the differences
+# Weights of fourth-order differences: central, and forward near time 0, before which the motion need not be defined.
 CENTRAL = {-2: 1 / 12, -1: -2 / 3, 1: 2 / 3, 2: -1 / 12}
 FORWARD = {0: -25 / 12, 1: 4.0, 2: -3.0, 3: 4 / 3, 4: -1 / 4}
 
@@ -19,12 +19,15 @@ _RETURNS = "a displacement (3,) [m], or a pair of it and a rotation vector (3,) 
 
 
 def matrix(rotation_vector: np.ndarray) -> np.ndarray:
-    """(3, 3) of a rotation vector (3,) rad."""
+    """Return the rotation matrix (3, 3) of a rotation vector (3,) rad."""
     return scipy.spatial.transform.Rotation.from_rotvec(np.array(rotation_vector)).as_matrix()
 
 
 def pose(motion: Callable[..., Any] | None, time: float) -> tuple[np.ndarray, np.ndarray]:
-    """Displacement (3,) m and rotation vector (3,) rad at a time [s], (,). Raises ValueError on anything else."""
+    """Return the displacement (3,) m and the rotation vector (3,) rad at a time [s].
+
+    Raises ValueError if the function returns anything else.
+    """
     time = float(quantity("time", "s", time, ()))
     if motion is None:
         return np.zeros(3), np.zeros(3)
@@ -46,7 +49,10 @@ def pose(motion: Callable[..., Any] | None, time: float) -> tuple[np.ndarray, np
 
 
 def rates(motion: Callable[..., Any] | None, time: float) -> tuple[np.ndarray, np.ndarray]:
-    """Velocity (3,) m/s and spin omega (3,) rad/s in world axes, with dR/dt = [omega] R, at a time [s]."""
+    """Return the velocity (3,) m/s and the angular velocity omega (3,) rad/s in world axes at a time [s].
+
+    The rotation matrix changes by dR/dt = [omega] R.
+    """
     time = float(quantity("time", "s", time, ()))
     if motion is None:
         return np.zeros(3), np.zeros(3)

@@ -15,12 +15,16 @@ FINE = 8  # rings from one point of a curve to the next
 
 
 def sphere_surface(radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the surface of a ball around the origin."""
     mesh = meshes.spherical_cap(radius, 0.0, np.pi, cells=(AROUND, AROUND // 2))
     return mesh.rest_positions, mesh.faces
 
 
 def box_surface(size: np.ndarray, rounding: float) -> tuple[np.ndarray, np.ndarray]:
-    """Grids on the six sides of the sharp box, drawn in to the rounded one, and joined."""
+    """Return the surface of a box with rounded edges.
+
+    The grids on the six sides of the sharp box are joined, then projected onto the rounded one.
+    """
     half = size / 2
     inner = half - rounding
     steps = np.linspace(0, rounding, ROUNDED + 1) if rounding else np.zeros(1)
@@ -46,10 +50,11 @@ def box_surface(size: np.ndarray, rounding: float) -> tuple[np.ndarray, np.ndarr
 
 
 def swept_surface(points: np.ndarray, radii: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndarray]:
-    """The envelope of balls whose centers go through points (k, 3) m as their radii (k,) m change.
+    """Return the envelope of balls whose centers move through points (k, 3) m while their radii (k,) m change.
 
-    A ball of the curve c and the radius r touches it where the normal n has n . c' = - r'. The radius of an open one
-    levels off towards its ends.
+    A ball of the curve c and the radius r touches the envelope where the normal n has n . c' = - r'. The radius of an
+    open one
+    becomes constant towards its ends.
     """
     from scipy.interpolate import CubicSpline  # when needed, as loading it takes long
 
@@ -89,29 +94,31 @@ def swept_surface(points: np.ndarray, radii: np.ndarray, closed: bool) -> tuple[
 
 
 def grid_faces(n_u: int, n_v: int) -> np.ndarray:
-    """Of a grid of points in C order; the normal is u x v."""
+    """Return the triangles of a grid of points in C order, whose normal is u x v."""
     a = (n_v * np.arange(n_u - 1)[:, None] + np.arange(n_v - 1)).ravel()
     b, c, d = a + n_v, a + n_v + 1, a + 1
     return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
 
 
 def _frames(tangents: np.ndarray) -> np.ndarray:
-    """(n, 3, 3), rows: the tangent, and two normals that turn about it no more than they must."""
+    """Return orthonormal frames along a curve, (n, 3, 3); rows are the tangent and two normals that rotate as little as
+    possible.
+    """
     normal = np.cross(tangents[0], np.eye(3)[np.argmin(np.abs(tangents[0]))])
     normal /= np.linalg.norm(normal)
     frames = [np.stack([tangents[0], normal, np.cross(tangents[0], normal)])]
     for before, after in pairwise(tangents):
         axis = np.cross(before, after)
         sine = np.linalg.norm(axis)
-        turn = scipy.spatial.transform.Rotation.from_rotvec(
+        rotation = scipy.spatial.transform.Rotation.from_rotvec(
             axis / sine * np.arctan2(sine, before @ after) if sine > 0 else axis
         )
-        frames.append(turn.apply(frames[-1]))
+        frames.append(rotation.apply(frames[-1]))
     return np.array(frames)
 
 
 def _joined(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices in the same place as one."""
+    """Merge vertices at equal positions."""
     digits = np.round(vertices / np.abs(vertices).max(), 9)
     _, first, number = np.unique(digits, axis=0, return_index=True, return_inverse=True)
     return vertices[first], number.ravel()[faces]

@@ -1,4 +1,4 @@
-"""Uneven ground."""
+"""Uneven ground: height fields, ridges and mounds."""
 
 from __future__ import annotations
 
@@ -17,15 +17,14 @@ if TYPE_CHECKING:
     from ...._input.kinds import Numbers
 
 
-LARGEST_UNEVENNESS = 1e-6  # of a spacing: how far coordinates may be from equal ones
+LARGEST_UNEVENNESS = 1e-6  # [-] of the spacing: largest deviation of a step of coordinates from equal steps
 
 
 class HeightField(Obstacle):
-    """All that lies below z = h(x, y), through heights on a regular grid.
+    """The ground below a surface z = h(x, y) that interpolates heights on a regular grid.
 
-    h is a bicubic spline, twice continuously differentiable. Beyond the border it is constant along the axis that leaves
-    the grid, after two cells in which it settles. The distance is that to the nearest point of the surface, not the
-    height above it.
+    h is a bicubic spline, twice continuously differentiable. Within two cells beyond the border it becomes constant along
+    the axis that leaves the grid. The distance is that to the nearest point of the surface, not the height above it.
 
     Args:
         x, y: (n_x,), (n_y,) m, at least two each, rising in equal steps.
@@ -77,11 +76,11 @@ def bump(
     rotation: Numbers = (0.0, 0.0, 0.0),
     motion: Callable[..., Any] | None = None,
 ) -> HeightField:
-    """A floor z = 0 with a ridge along y, without end, or a round mound around the center.
+    """Make a floor z = 0 with an endless ridge along y, or with a round mound around the center.
 
         z = height (1 - (2 r / length)^2)^3 within r < length / 2,        r = |x|, or sqrt(x^2 + y^2) of a mound
 
-    sampled with 64 cells along the length, to about 1e-5 of its height.
+    It is sampled with 64 cells along the length, which is accurate to about 1e-5 of its height.
 
     Args:
         height: m; negative for a ditch or a hollow.

@@ -1,4 +1,4 @@
-"""Any body with a closed triangle mesh."""
+"""Obstacles bounded by closed triangle meshes."""
 
 from __future__ import annotations
 
@@ -19,19 +19,20 @@ if TYPE_CHECKING:
     from ....mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 
 
-MOST_CELLS = 256  # cells; 140 MB of samples
-SAME_PLACE = 1e-9  # of the mesh's size: vertices so near are in one place
+MOST_CELLS = 256  # largest resolution; 140 MB of samples
+SAME_PLACE = 1e-9  # [-] of the mesh's size: vertices nearer to each other have the same position
 
 
 class MeshObstacle(Obstacle):
-    """The body inside a closed triangle mesh, its normals outwards.
+    """The body inside a closed triangle mesh whose normals point outwards.
 
-    Its exact signed distance is sampled on a regular grid around it and interpolated by tricubic splines; the obstacle is
-    bounded by the zero surface of that, and the distance to it is exact. It follows the mesh to a small part of a cell
-    where the mesh is smooth, rounds edges and corners within about a cell, and loses what is thinner than two. A cell is
-    the longest side of the mesh over the resolution: 64 takes a second and 3 MB, and both grow with its cube.
+    The exact signed distance to the mesh is sampled on a regular grid and interpolated by tricubic splines. The obstacle is
+    bounded by the zero surface of the interpolation, and the distance to that is exact. Where the mesh is smooth, it is
+    reproduced to a small fraction of a cell; edges and corners are rounded within about a cell, and parts thinner than two
+    cells are lost. A cell is the longest side of the mesh over the resolution: 64 takes a second and 3 MB, and both grow
+    with its cube.
 
-    Farther than 4 cells from the mesh the distance is that to the box around it, which is never more.
+    Farther than 4 cells from the mesh the distance is that to its bounding box, which is never larger.
 
     Args:
         mesh: a TriangleMesh, a file that `read_mesh` reads, or vertices (n_v, 3) m of `faces`.
@@ -116,7 +117,7 @@ def _check_closed(mesh: TriangleMesh) -> None:
 
 
 def _check_orientation(mesh: TriangleMesh) -> None:
-    """Parts outwards, except hollows inside others."""
+    """Raise ValueError if a part is inside out, or lies inside another without being a hollow, or has no volume."""
     x = mesh.rest_positions
     part = mesh.components[mesh.faces[:, 0]]
     for k in range(mesh.n_components):
@@ -126,25 +127,28 @@ def _check_orientation(mesh: TriangleMesh) -> None:
         if abs(volume) <= 1e-9 * np.linalg.norm(np.ptp(x[faces.ravel()], axis=0)) ** 3:
             raise ValueError(f"{which} encloses no volume: {volume:.3g} m3, near {_at(x[faces[0, 0]])}")
         around = _winding_number(x[mesh.faces[part != k]] - x[faces[0, 0]])
-        place = f"near vertex {faces[0, 0]} at {_at(x[faces[0, 0]])}"
+        where = f"near vertex {faces[0, 0]} at {_at(x[faces[0, 0]])}"
         if volume < 0 and around < 0.5:
             raise ValueError(
-                f"{which} is inside out, {place}: its normals point inwards; turn it with .flipped()"
+                f"{which} is inside out, {where}: its normals point inwards; turn it with .flipped()"
             )
         if volume > 0 and around > 0.5:
             raise ValueError(
-                f"{which} lies inside another part, {place}: leave it out, or turn it with .flipped() to make it a hollow"
+                f"{which} lies inside another part, {where}: leave it out, or turn it with .flipped() to make it a hollow"
             )
 
 
 def _volume(corners: np.ndarray) -> float:
-    """m3, enclosed by triangles (m, 3, 3) m."""
+    """Return the volume enclosed by triangles (m, 3, 3) m, m3."""
     relative = corners - corners.mean(axis=(0, 1))
     return float(np.linalg.det(relative).sum() / 6)
 
 
 def _winding_number(corners: np.ndarray) -> float:
-    """How often closed triangles (m, 3, 3) m go around the origin: solid angles (van Oosterom and Strackee 1983)."""
+    """Return the winding number of closed triangles (m, 3, 3) m about the origin.
+
+    It is the sum of solid angles (van Oosterom and Strackee 1983).
+    """
     if not len(corners):
         return 0.0
     a, b, c = np.moveaxis(corners, 1, 0)

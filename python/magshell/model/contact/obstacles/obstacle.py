@@ -1,4 +1,4 @@
-"""What all obstacles share: a shape, a place, and a motion."""
+"""The base class of obstacles: their pose, their motion, and their distance from points."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ Surface = tuple[np.ndarray, np.ndarray]
 
 
 class Obstacle(Owner, ABC):
-    """A rigid body that sheets touch; make one of its subclasses.
+    """A rigid body with which a scene's bodies can be in contact; the base class of obstacles.
 
     A point x of the world is R^T (x - center) in the body's own frame, R = exp(rotation). At a time t the motion moves
-    the center by its displacement, and turns the body further about it.
+    the center by its displacement, and rotates the body further about it.
 
     Args:
         center: (3,) m.
         rotation: rotation vector (3,) rad, about the center.
         motion: None, or a function of the time [s] that returns a displacement (3,) m, or (displacement (3,) m,
-            rotation vector (3,) rad), in world axes. It must be smooth: its derivatives are taken from its values
-            within 2e-4 s before and after a time (4e-4 s after it at the start, never before time 0). With gradients
-            by where it goes: center and rotation over time among the values of ms.simulate instead.
+            rotation vector (3,) rad), in world axes. It must be smooth: it is differentiated by its values within
+            2e-4 s before and after a time (4e-4 s after it at the start, never before time 0). For gradients by the
+            path, give center and rotation over time among the values of ms.simulate instead.
 
-    `_core` is the shape in the C++ core; `_made_from` are the arguments a copy or another process makes it from again.
+    `_core` is the shape in the C++ core; `_made_from` has the arguments from which a copy or another process makes it.
     """
 
     _core: core.Obstacle
@@ -58,19 +58,23 @@ class Obstacle(Owner, ABC):
         self.pose(0.0)
 
     def _of(self, shape: core.Obstacle, **arguments) -> None:
-        """Keeps the shape and what it was made from."""
+        """Store the shape and the arguments that it was made from."""
         self._core = shape
         self._made_from = arguments
 
     def __getstate__(self) -> dict[Any, Any]:
-        place = {"center": self.center, "rotation": self.rotation, "motion": self.motion}
-        return {**self._made_from, **place}
+        return {
+            **self._made_from,
+            "center": self.center,
+            "rotation": self.rotation,
+            "motion": self.motion,
+        }
 
     def __setstate__(self, arguments: dict[Any, Any]) -> None:
         self.__init__(**arguments)
 
     def replaced(self, **values: Any) -> Obstacle:
-        """The same body with another center or rotation."""
+        """Return the same body with another center or rotation."""
         unknown = sorted(set(values) - set(self._replaceable))
         if unknown:
             raise ValueError(f"of an obstacle center and rotation can be replaced, not {', '.join(unknown)}")
@@ -82,23 +86,23 @@ class Obstacle(Owner, ABC):
         return other
 
     def _on(self, path: Callable[..., Any]) -> Obstacle:
-        """The same body as its path has it: at a time, its center and its rotation."""
+        """Return the same body on a path, a function that gives its center and rotation at a time."""
         return variant(self, center=np.zeros(3), rotation=np.zeros(3), motion=path)
 
     def pose(self, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """What the motion adds at a time [s]: displacement (3,) m, rotation vector (3,) rad about the center."""
+        """Return the motion at a time [s]: displacement (3,) m, and rotation vector (3,) rad about the center."""
         return _motion.pose(self.motion, time)
 
     def rates(self, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """Of the pose: velocity (3,) m/s of the center, and spin omega (3,) rad/s in world axes, dR/dt = [omega] R.
+        """Return the velocity (3,) m/s of the center and the angular velocity omega (3,) rad/s at a time [s].
 
-        Differences of fourth order over steps of 1e-4 s: of a motion with the angular frequency w, relative errors of
-        (w 1e-4 s)^4 / 30, which is 3e-8 at 50 Hz.
+        omega is in world axes, dR/dt = [omega] R. Both are fourth-order differences with steps of 1e-4 s: for a motion
+        with the angular frequency w their relative error is (w 1e-4 s)^4 / 30, which is 3e-8 at 50 Hz.
         """
         return _motion.rates(self.motion, time)
 
     def signed_distance(self, points: Numbers, time: float = 0.0) -> np.ndarray:
-        """(...) m, negative inside the body, of points (..., 3) m at a time [s].
+        """Return the distances of points (..., 3) m from the body at a time [s], (...) m, negative inside.
 
         >>> from magshell.obstacles import Sphere
         >>> float(Sphere(radius=0.5, center=(0, 0, 1)).signed_distance([0, 0, 3]))
@@ -107,33 +111,36 @@ class Obstacle(Owner, ABC):
         return self._distances(points, time)[0]
 
     def normals(self, points: Numbers, time: float = 0.0) -> np.ndarray:
-        """(..., 3) unit vectors away from the body, the gradient of the distance, at points (..., 3) m."""
+        """Return unit vectors that point away from the body at points (..., 3) m, (..., 3): the gradient of the
+        distance.
+        """
         return self._distances(points, time)[1] @ self._frame(time)[0].T
 
     def surface(self, time: float = 0.0, extent: float = 1.0, around: Numbers | None = None) -> Surface:
-        """A triangle mesh for pictures: vertices (n, 3) m in world coordinates, faces (m, 3).
+        """Return a triangle mesh for pictures: vertices (n, 3) m in world coordinates, faces (m, 3).
 
         extent: m, the side of the square that stands for a plane. around: (3,) m, the point that the square is nearest
         to; by default the center.
         """
-        turn, origin = self._frame(time)
+        rotation, origin = self._frame(time)
         middle = origin if around is None else quantity("around", "m", around, (3,))
-        vertices, faces = self._surface(float(quantity("extent", "m", extent, ())), (middle - origin) @ turn)
-        return vertices @ turn.T + origin, faces
+        side = float(quantity("extent", "m", extent, ()))
+        vertices, faces = self._surface(side, (middle - origin) @ rotation)
+        return vertices @ rotation.T + origin, faces
 
     @abstractmethod
     def _surface(self, extent: float, around: np.ndarray) -> Surface:
-        """In the body's own frame."""
+        """Return the mesh of `surface` in the body's own frame."""
 
     def _frame(self, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """Rotation matrix (3, 3) and origin (3,) m of the body's own frame at a time [s]."""
+        """Return the rotation matrix (3, 3) and the origin (3,) m of the body's own frame at a time [s]."""
         displacement, rotation = self.pose(time)
         return _motion.matrix(rotation) @ _motion.matrix(self.rotation), self.center + displacement
 
     def _distances(self, points, time: float) -> tuple[np.ndarray, np.ndarray]:
         points = quantity("points", "m", points, ("...", 3))
-        turn, origin = self._frame(time)
-        values, normals, _ = core.distances(self._core, (points.reshape(-1, 3) - origin) @ turn)
+        rotation, origin = self._frame(time)
+        values, normals, _ = core.distances(self._core, (points.reshape(-1, 3) - origin) @ rotation)
         return values.reshape(points.shape[:-1]), normals.reshape(points.shape)
 
     def __repr__(self) -> str:
@@ -148,4 +155,4 @@ class Obstacle(Owner, ABC):
 
     @abstractmethod
     def _summary(self) -> str:
-        """The shape in a few words."""
+        """Return the shape in a few words."""

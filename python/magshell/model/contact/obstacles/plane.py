@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from ...._input.kinds import Numbers
 
 
-CELLS = 16  # of the square that stands for a plane: painters sort small triangles well
+CELLS = 16  # per side of the square that stands for a plane; small triangles are sorted better in pictures
 
 
 class Plane(Obstacle):
-    """All that lies below a plane through the center, on the side its normal does not point to.
+    """The half-space below a plane through the center, on the side opposite to its normal.
 
     Args:
         normal: (3,), of any length but zero, in the body's own frame.
@@ -51,8 +51,8 @@ class Plane(Obstacle):
         first = np.cross(axis, self.normal)
         first /= np.linalg.norm(first)
         second = np.cross(self.normal, first)
-        places = extent * np.linspace(-0.5, 0.5, CELLS + 1)
-        u, v = np.meshgrid(places, places, indexing="ij")
+        coordinates = extent * np.linspace(-0.5, 0.5, CELLS + 1)
+        u, v = np.meshgrid(coordinates, coordinates, indexing="ij")
         middle = around - (around @ self.normal) * self.normal
         vertices = middle + u.reshape(-1, 1) * first + v.reshape(-1, 1) * second
         return vertices, grid_faces(CELLS + 1, CELLS + 1)
@@ -69,7 +69,7 @@ def slope(
     rotation: Numbers = (0.0, 0.0, 0.0),
     motion: Callable[..., Any] | None = None,
 ) -> Plane:
-    """A plane that rises.
+    """Make an inclined plane through the center.
 
     Args:
         angle: rad from the horizontal, within a quarter turn.

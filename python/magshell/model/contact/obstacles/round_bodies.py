@@ -1,4 +1,4 @@
-"""Sphere, box and capsule: bodies, or rooms with the sheet inside."""
+"""Spheres, boxes and capsules: solid bodies, or hollow ones with the sheet inside."""
 
 from __future__ import annotations
 

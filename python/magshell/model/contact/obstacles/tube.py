@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 class Tube(Obstacle):
     """A ball swept along a smooth curve while its radius changes; by default the sheet is inside.
 
-    Curve and radius are cubic splines with one knot a point: twice continuously differentiable, through all the points,
-    which should be about equally far from each other. An open tube goes on straight and without end at both ends, with
-    the radius of its last point, to which it levels off; a closed one ends in its last balls.
+    Curve and radius are cubic splines with one knot per point, twice continuously differentiable, through all the points,
+    which should have about equal distances. An open tube continues straight beyond both ends, without end and with the
+    radius of its last point, which it reaches smoothly; a closed one ends in its last balls.
 
     Args:
         points: (k, 3) m, along the curve, in the body's own frame.
