@@ -154,10 +154,16 @@ def test_trials_begin_where_the_gradient_says_nothing() -> None:
     still = ms.control.receding_horizon(squared_swim, nothing, zeros(40, 2), **options)
     assert not still.controls.any()
     tried = ms.control.receding_horizon(
-        squared_swim, nothing, zeros(40, 2), trials=4, spread=(0.5, 0.0), periods=(4, 8), **options
+        squared_swim,
+        nothing,
+        zeros(40, 2),
+        trials=4,
+        trial_amplitude=(0.5, 0.0),
+        trial_periods=(4, 8),
+        **options,
     )
     assert float(squared_swim(tried.controls)) < -1.0 and tried.trials == 4 * 5
-    assert not tried.controls[:, 1].any()  # an entry without a spread, and its gradient is zero too
+    assert not tried.controls[:, 1].any()  # an entry with zero amplitude, and its gradient is zero too
     assert tried.controls.abs().max() <= 1.0
 
 
@@ -174,8 +180,8 @@ def test_without_iterations_the_best_trial_is_done_and_no_gradient_asked_for() -
         control_horizon=10,
         max_iterations=0,
         trials=8,
-        spread=0.5,
-        periods=(4, 8),
+        trial_amplitude=0.5,
+        trial_periods=(4, 8),
         **QUIET,
     )
     assert float(squared_swim(found.controls)) < 0 and found.trials == 4 * 9
@@ -197,8 +203,8 @@ def test_what_is_tried_is_as_planned_then_swings_or_repeats_within_bounds() -> N
         prediction_horizon=20,
         control_horizon=20,
         trials=6,
-        spread=0.7,
-        periods=(5, 5),
+        trial_amplitude=0.7,
+        trial_periods=(5, 5),
         upper=1.5,
         lower=0.0,
         **QUIET,
@@ -255,8 +261,8 @@ def test_trials_that_cannot_be_evaluated_are_not_taken() -> None:
         "prediction_horizon": 2,
         "control_horizon": 2,
         "trials": 3,
-        "spread": 1.0,
-        "periods": (2, 3),
+        "trial_amplitude": 1.0,
+        "trial_periods": (2, 3),
         **QUIET,
     }
     found = ms.control.receding_horizon(fragile, lambda *_: None, zeros(2, 1), **options)
@@ -305,11 +311,23 @@ def test_errors_and_interrupts_hand_back_what_was_settled(where) -> None:
     [
         ({"prediction_horizon": 0}, "prediction_horizon must be an integer"),
         ({"control_horizon": 5}, "control_horizon must be no more than the prediction_horizon"),
-        ({"trials": 2}, "2 trials need a spread and periods"),
-        ({"trials": 2, "spread": 0.0, "periods": (2, 3)}, "spread must be finite, not negative"),
-        ({"trials": 2, "spread": -1.0, "periods": (2, 3)}, "spread must be finite, not negative"),
-        ({"trials": 2, "spread": 1.0, "periods": (3, 2)}, "periods must be two numbers of rows"),
-        ({"trials": 2, "spread": 1.0, "periods": (2.5, 3.5)}, "periods must hold integer"),
+        ({"trials": 2}, "2 trials need a trial_amplitude and trial_periods"),
+        (
+            {"trials": 2, "trial_amplitude": 0.0, "trial_periods": (2, 3)},
+            "trial_amplitude must be finite, not negative",
+        ),
+        (
+            {"trials": 2, "trial_amplitude": -1.0, "trial_periods": (2, 3)},
+            "trial_amplitude must be finite, not negative",
+        ),
+        (
+            {"trials": 2, "trial_amplitude": 1.0, "trial_periods": (3, 2)},
+            "trial_periods must be two numbers of rows",
+        ),
+        (
+            {"trials": 2, "trial_amplitude": 1.0, "trial_periods": (2.5, 3.5)},
+            "trial_periods must hold integer",
+        ),
         ({"trials": -1}, "trials must be an integer"),
         ({"lower": np.nan}, "lower must be numbers"),
         ({"upper": (1.0, 2.0)}, "upper must be a number or have the shape of a row"),

@@ -68,5 +68,5 @@ __all__ = [
 
 
 def __dir__() -> list[str]:
-    """Returns what is public, for tab completion."""
+    """Return the public names, for tab completion."""
     return sorted(__all__)

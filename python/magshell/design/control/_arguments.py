@@ -1,4 +1,4 @@
-"""Arguments of this package: checked once, as torch tensors that keep their graph."""
+"""Checks arguments of this package and converts them to torch tensors in their graph."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from ..._input.tensors import detached, is_tensor, require_torch
 
 
 def tensor(name: str, unit: str, value: Any, shape: tuple[int | str, ...]):
-    """Finite numbers of this shape, in which letters stand for any size, as a float64 tensor."""
+    """Return finite numbers of this shape as a float64 tensor; letters in the shape stand for any size."""
     torch = require_torch("ms.control")
     numbers = quantity(name, unit, detached(value), shape)
     return value.to("cpu", torch.float64) if is_tensor(value) else torch.tensor(numbers)
 
 
 def indices(name: str, value: Any, size: int):
-    """Integers within -size ... size - 1, one or a row, as a tensor; those below zero count from the end."""
+    """Return integers within -size ... size - 1, one or a row, as a tensor; negative ones count from the end."""
     torch = require_torch("ms.control")
     given = array_of(name, value, "be an integer or a row of them")
     if given.ndim > 1 or given.size == 0 or not np.issubdtype(given.dtype, np.integer):

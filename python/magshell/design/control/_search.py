@@ -1,4 +1,4 @@
-"""Searches controls, from one start or from random ones."""
+"""Searches for controls, from one start or from random ones."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def given_controls(controls):
-    """(steps, ...), finite, a copy without history."""
+    """Return the controls (steps, ...) as a copy without graph. Raises ValueError if a number is not finite."""
     torch = require_torch("ms.control")
     now = real_tensor("controls", controls, ("...", "k")).detach().clone()
     if not torch.isfinite(now).all():
@@ -29,7 +29,7 @@ def given_controls(controls):
 
 
 def row_bound(name: str, value: Any, controls):
-    """Of every entry; infinite where there is none."""
+    """Return a bound for every entry of the controls, from a number or a row; infinite means no bound."""
     shape, array = tuple(controls.shape[1:]), real_numbers(name, value)
     if np.isnan(array).any():
         raise ValueError(f"{name} must be numbers, got nan")
@@ -39,6 +39,7 @@ def row_bound(name: str, value: Any, controls):
 
 
 def check_functions(**functions: Any) -> None:
+    """Raise ValueError if one of these arguments is no function."""
     for name, function in functions.items():
         if not callable(function):
             raise ValueError(f"{name} must be a function, got {function!r:.60}")
@@ -52,7 +53,7 @@ def search_rows(
     make: Callable[..., Any] | None,
     **options: Any,
 ) -> tuple[MinimizeResult | None, DesignRejected | None]:
-    """The best rows, or None; and why a search ended early that met a design that cannot be evaluated.
+    """Return the best rows, or None, and the error that ended the search early at a design that cannot be evaluated.
 
     make: function (parameters, lower, upper) -> optimizer; None: ms.optim.LBFGS. options: of ms.minimize.
     """
@@ -75,49 +76,55 @@ def _lbfgs(parameters, lower, upper):
 
 @dataclass(frozen=True)
 class Trials:
-    """number: of each part. spread: (steps, ...), how far from the control given an oscillation goes. shortest, longest:
-    rows of a period."""
+    """Random controls to begin a search with.
+
+    number: how many. amplitude: (steps, ...), largest deviation of an oscillation from the given control.
+    shortest, longest: limits of its period, rows.
+    """
 
     number: int
-    spread: np.ndarray
+    amplitude: np.ndarray
     shortest: int
     longest: int
 
     @classmethod
-    def of(cls, number: int, spread: Numbers, periods: Numbers, controls) -> Trials:
-        """Raises ValueError where something is to be tried and it is not said how."""
+    def of(cls, number: int, amplitude: Numbers, periods: Numbers, controls) -> Trials:
+        """Check the options of the trials. Raises ValueError if there are trials without amplitude or periods."""
         if number == 0:
             return cls(0, np.zeros(controls.shape), 1, 1)
-        if spread is None or periods is None:
-            raise ValueError(f"{number} trials need a spread and periods")
-        sizes = row_bound("spread", spread, controls).numpy()
+        if amplitude is None or periods is None:
+            raise ValueError(f"{number} trials need a trial_amplitude and trial_periods")
+        sizes = row_bound("trial_amplitude", amplitude, controls).numpy()
         if not (np.isfinite(sizes).all() and (sizes >= 0).all() and sizes.any()):
             raise ValueError(
-                f"spread must be finite, not negative and somewhere positive, got {spread!r:.60}"
+                f"trial_amplitude must be finite, not negative and somewhere positive, got {amplitude!r:.60}"
             )
-        limits = index_array("periods", periods).tolist()
+        limits = index_array("trial_periods", periods).tolist()
         if np.shape(limits) != (2,) or not 2 <= limits[0] <= limits[1]:
             raise ValueError(
-                f"periods must be two numbers of rows, 2 at least, that rise, got {periods!r:.60}"
+                f"trial_periods must be two numbers of rows, 2 at least, that rise, got {periods!r:.60}"
             )
         return cls(number, sizes, *limits)
 
     def drawn(
         self, planned, given: Any, first: int, known: int, end: int, lower: Numbers, upper: Numbers, rng
     ) -> Iterator[Any]:
-        """Rows first ... end, each as planned until a random row before `known`, and then something else, every other one
-        of them a repetition if enough is known; entries without a spread stay as planned."""
+        """Yield random rows first ... end of the controls.
+
+        Each is as planned until a random row before `known`. From there, every second one repeats what was done one period
+        before, if that is known; the others oscillate about the given control. Entries with zero amplitude stay as planned.
+        """
         for number in range(self.number):
             begin = int(rng.integers(first, max(known, first + 1)))
             period = round(np.exp(rng.uniform(*np.log([self.shortest, self.longest]))))
-            rows, live = planned.clone(), planned.new_tensor(self.spread[begin]) > 0
+            rows, live = planned.clone(), planned.new_tensor(self.amplitude[begin]) > 0
             if number % 2 and period <= begin:
                 for row in range(begin, end):
                     rows[row] = rows[row].where(~live, rows[row - period])
             else:
                 shape = (1,) * (planned.ndim - 1)
                 phases = rng.uniform(0.0, 2 * np.pi) + 2 * np.pi * np.arange(end - begin) / period
-                waves = rng.uniform(0.0, 1.0) * np.sin(phases).reshape(-1, *shape) * self.spread[begin:end]
+                waves = rng.uniform(0.0, 1.0) * np.sin(phases).reshape(-1, *shape) * self.amplitude[begin:end]
                 other = given[begin:end] + given.new_tensor(waves)
                 rows[begin:end] = rows[begin:end].where(~live, other)
             yield rows[first:end].clamp(lower[first:end], upper[first:end])

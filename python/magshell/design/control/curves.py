@@ -1,8 +1,9 @@
 """Curves in space for the track of a point to follow: polylines, arcs, and chains of both.
 
-A curve knows the nearest of its points and how far that is, exactly, with derivatives of every order wherever the
-nearest point is unique; the curve itself is fixed. Its squared distance is smooth on the curve and around its ends, and
-has a kink only where two of its points are equally near: inside a corner, on the axis of an arc.
+A curve computes its point nearest to a given one, and the distance, exactly and with derivatives of every order
+wherever the nearest point is unique. The curve itself is fixed. Its squared distance is smooth on the curve and
+around its ends; it has a kink only where two points of the curve are equally near: inside a corner, on the axis of
+an arc.
 """
 
 from __future__ import annotations
@@ -29,36 +30,36 @@ _TURN = 2 * np.pi
 
 
 class Curve(Frozen, ABC):
-    """length: m. start, end: its end points, (3,) m."""
+    """A curve in space with a start, an end and a length. length: m. start, end: its end points, (3,) m."""
 
     length: float
 
     @abstractmethod
     def nearest(self, points: Numbers) -> torch.Tensor:
-        """The point of the curve nearest to each of the points: (n, 3) m to (n, 3) m."""
+        """Return the point of the curve nearest to each of the points (n, 3) m, as (n, 3) m."""
 
     @abstractmethod
-    def at(self, shares: Numbers) -> torch.Tensor:
-        """Points (n, 3) m of the curve at shares (n,) of its length, from 0, its start, to 1, its end."""
+    def at(self, fractions: Numbers) -> torch.Tensor:
+        """Return points (n, 3) m of the curve at fractions (n,) of its length, from 0, its start, to 1, its end."""
 
     def squared_distance(self, points: Numbers) -> torch.Tensor:
-        """(n,) m2, of points (n, 3) m from the curve."""
+        """Return the squared distances of points (n, 3) m from the curve, (n,) m2."""
         points = tensor("points", "m", points, ("n", 3))
         return ((points - self.nearest(points)) ** 2).sum(-1)
 
     @property
     def start(self) -> torch.Tensor:
-        """(3,) m, where it begins."""
+        """The start of the curve, (3,) m."""
         return self.at([0.0])[0]
 
     @property
     def end(self) -> torch.Tensor:
-        """(3,) m, where it ends."""
+        """The end of the curve, (3,) m."""
         return self.at([1.0])[0]
 
 
 class Polyline(Curve):
-    """Straight from each point to the next: a segment, a polygon (its first point repeated), or a sampled curve.
+    """A curve of straight segments: one segment, a polygon (its first point repeated), or a sampled curve.
 
     points: (k, 3) m, at least two, no point the same as the next.
 
@@ -76,21 +77,21 @@ class Polyline(Curve):
             k = int(np.argmin(lengths))
             raise ValueError(f"points[{k}] and points[{k + 1}] are the same point")
         self.length: float = float(lengths.sum())
-        self._corners, self._knots = tensor("points", "m", corners, ("k", 3)), _knots(lengths)
+        self._corners, self._limits = tensor("points", "m", corners, ("k", 3)), _piece_limits(lengths)
 
     def nearest(self, points: Numbers) -> torch.Tensor:
         points = tensor("points", "m", points, ("n", 3))
         begin, along = self._corners[:-1], self._corners.diff(dim=0)
-        shares = ((points[:, None] - begin) * along).sum(-1) / (along**2).sum(-1)
-        return _nearest_of(points, begin + shares.clamp(0, 1)[..., None] * along)
+        fractions = ((points[:, None] - begin) * along).sum(-1) / (along**2).sum(-1)
+        return _nearest_of(points, begin + fractions.clamp(0, 1)[..., None] * along)
 
-    def at(self, shares: Numbers) -> torch.Tensor:
-        piece, share = _located(shares, self._knots)
-        return self._corners[piece] + share[:, None] * self._corners.diff(dim=0)[piece]
+    def at(self, fractions: Numbers) -> torch.Tensor:
+        piece, within = _located(fractions, self._limits)
+        return self._corners[piece] + within[:, None] * self._corners.diff(dim=0)[piece]
 
 
 class Arc(Curve):
-    """Part of a circle, or all of it.
+    """An arc of a circle, or all of it.
 
     center: (3,) m. start: (3,) m, where it begins. axis: (3,), perpendicular to start - center, of any length but zero.
     angle: rad, counter-clockwise about the axis, up to a full turn; clockwise if negative.
@@ -128,7 +129,8 @@ class Arc(Curve):
         center, plane = self._center, self._plane
         flat = (points - center) @ plane.T
         squares = (flat**2).sum(-1, keepdim=True)
-        # On the axis all of the circle is equally near: there its start stands for it, and no root is taken of zero.
+        # For a point on the axis the whole circle is equally near. Then its start is taken, and the root of zero, which
+        # has no derivative, is avoided.
         off_axis = squares > 0
         direction = torch.where(off_axis, flat, flat.new_tensor([1.0, 0.0]))
         direction = direction / torch.where(off_axis, squares, torch.ones_like(squares)) ** 0.5
@@ -137,13 +139,13 @@ class Arc(Curve):
         ends = torch.stack([self.start, self.end]).expand(len(points), 2, 3)
         return torch.where((angles <= self._angle)[:, None], on_circle, _nearest_of(points, ends))
 
-    def at(self, shares: Numbers) -> torch.Tensor:
-        angles = _shares(shares)[:, None] * self._angle
+    def at(self, fractions: Numbers) -> torch.Tensor:
+        angles = _checked_fractions(fractions)[:, None] * self._angle
         return self._center + self._radius * (angles.cos() * self._plane[0] + angles.sin() * self._plane[1])
 
 
 class Chain(Curve):
-    """Curves one after another, each starting where the one before ends.
+    """A curve of several curves one after another, each starting where the one before ends.
 
     pieces: curves of ms.control.
 
@@ -161,7 +163,7 @@ class Chain(Curve):
         if not self._pieces or not all(isinstance(piece, Curve) for piece in self._pieces):
             raise ValueError("pieces must be curves of ms.control, at least one")
         lengths = np.array([piece.length for piece in self._pieces])
-        self.length, self._knots = float(lengths.sum()), _knots(lengths)
+        self.length, self._limits = float(lengths.sum()), _piece_limits(lengths)
         for k in range(1, len(lengths)):
             gap = float((self._pieces[k].start - self._pieces[k - 1].end).norm())
             if gap > 1e-6 * self.length:
@@ -172,38 +174,39 @@ class Chain(Curve):
         points = tensor("points", "m", points, ("n", 3))
         return _nearest_of(points, torch.stack([piece.nearest(points) for piece in self._pieces], dim=1))
 
-    def at(self, shares: Numbers) -> torch.Tensor:
+    def at(self, fractions: Numbers) -> torch.Tensor:
         torch = require_torch("ms.control.Chain")
-        piece, share = _located(shares, self._knots)
-        return _picked(torch.stack([each.at(share) for each in self._pieces], dim=1), piece)
+        piece, within = _located(fractions, self._limits)
+        return _picked(torch.stack([each.at(within) for each in self._pieces], dim=1), piece)
 
 
-def _knots(lengths: np.ndarray) -> np.ndarray:
-    """Shares of the whole length at which the pieces begin and end: (k + 1,)."""
+def _piece_limits(lengths: np.ndarray) -> np.ndarray:
+    """Return the fractions of the total length at which the pieces begin and end, (k + 1,)."""
     return np.append(0.0, np.cumsum(lengths)) / lengths.sum()
 
 
-def _shares(shares):
-    shares = tensor("shares", "1", shares, ("n",))
-    outside = (shares.detach() < 0) | (shares.detach() > 1)
+def _checked_fractions(fractions):
+    """Return fractions of a length as a tensor. Raises ValueError if one is not in 0 ... 1."""
+    fractions = tensor("fractions", "1", fractions, ("n",))
+    outside = (fractions.detach() < 0) | (fractions.detach() > 1)
     if outside.any():
-        raise ValueError(f"shares must lie in 0 ... 1, got {shares.detach()[outside][0].item():g}")
-    return shares
+        raise ValueError(f"fractions must lie in 0 ... 1, got {fractions.detach()[outside][0].item():g}")
+    return fractions
 
 
-def _located(shares, knots: np.ndarray):
-    """In which piece each of the shares lies, and at which share of that piece."""
-    shares = _shares(shares)
-    piece = np.searchsorted(knots[1:-1], shares.detach().numpy(), side="right")
-    begin, end = shares.new_tensor(knots[piece]), shares.new_tensor(knots[piece + 1])
-    return shares.new_tensor(piece).long(), ((shares - begin) / (end - begin)).clamp(0, 1)
+def _located(fractions, limits: np.ndarray):
+    """Return the piece in which each fraction of the total length lies, and the fraction of that piece's length."""
+    fractions = _checked_fractions(fractions)
+    piece = np.searchsorted(limits[1:-1], fractions.detach().numpy(), side="right")
+    begin, end = fractions.new_tensor(limits[piece]), fractions.new_tensor(limits[piece + 1])
+    return fractions.new_tensor(piece).long(), ((fractions - begin) / (end - begin)).clamp(0, 1)
 
 
 def _nearest_of(points, candidates):
-    """For each of the points (n, 3) the nearest of its candidates (n, k, 3)."""
+    """Return for each of the points (n, 3) the nearest of its candidates (n, k, 3)."""
     return _picked(candidates, ((points.detach()[:, None] - candidates.detach()) ** 2).sum(-1).argmin(1))
 
 
 def _picked(candidates, which):
-    """candidates[i, which[i]]: (n, k, 3) and (n,) to (n, 3)."""
+    """Return candidates[i, which[i]]: (n, 3) from candidates (n, k, 3) and which (n,)."""
     return candidates.gather(1, which[:, None, None].expand(-1, 1, 3))[:, 0]

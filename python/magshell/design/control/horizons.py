@@ -1,4 +1,4 @@
-"""A long control found along a horizon that recedes: what was found is done, and the search goes on from where it led."""
+"""Receding horizon control: a long control is searched piece by piece, each from the state to which the last one led."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 @immutable
 @dataclass(frozen=True)
 class Horizon:
-    """Rows first ... end of the control are searched, and those up to `settled` are kept and done."""
+    """One search: rows first ... end of the control are optimized, and those up to `settled` are then applied."""
 
     first: int
     settled: int
@@ -37,11 +37,11 @@ class Horizon:
 @immutable
 @dataclass(frozen=True)
 class RecedingHorizonResult:
-    """What `receding` found.
+    """The result of `receding_horizon`.
 
-    controls: (steps, ...), a tensor. reached: how many rows are settled; those behind are as planned last, or as given.
-    state: what `advance` returned last. searches: [(Horizon, Minimum)], in their order; failures: [(Horizon, why)], of those
-    whose search ended early. trials: controls that were tried without gradient.
+    controls: (steps, ...), a tensor. reached: number of rows that are settled; later rows are as planned last, or as given.
+    state: the last return value of `advance`. searches: [(Horizon, MinimizeResult)], in their order; failures: [(Horizon,
+    why)], of those whose search ended early. trials: number of controls that were tried without gradient.
     """
 
     _as_given: ClassVar = ("state",)
@@ -55,7 +55,7 @@ class RecedingHorizonResult:
 
     @property
     def evaluations(self) -> int:
-        """Of the objective with its gradient, in all searches."""
+        """The number of evaluations of the objective with its gradient, in all searches."""
         return sum(found.history[-1].evaluations for _, found in self.searches)
 
 
@@ -70,8 +70,8 @@ def receding_horizon(
     lower: Numbers = -np.inf,
     upper: Numbers = np.inf,
     trials: int = 0,
-    spread: Numbers | None = None,
-    periods: Numbers | None = None,
+    trial_amplitude: Numbers | None = None,
+    trial_periods: Numbers | None = None,
     seed: int = 0,
     optimizer: Callable[..., Any] | None = None,
     max_iterations: int = 5,
@@ -79,40 +79,41 @@ def receding_horizon(
     until: Callable[..., Any] | None = None,
     progress: bool = True,
 ) -> RecedingHorizonResult:
-    """Minimizes over a control in time, `prediction_horizon` rows at once, of which the first
-    `control_horizon` are then done for good.
+    """Minimize over a control in time, `prediction_horizon` rows at once, of which the first `control_horizon` are
+    then applied.
 
-    For motions that are unstable: what a little noise in the start becomes grows with time, until gradients of the whole
-    motion say nothing that a search can use, and the motion found depends on rounding. Over a horizon in which noise grows
-    little, gradients are good; and as every search begins where the motion really is, it also corrects what has gone astray
-    until there: this is feedback, computed beforehand. Stable motions are better searched at once, to their end. Done
-    again from the same start, the control found moves everything with the same bits, if `advance` does (ms.simulate, from
-    a MotionState, does).
+    This is for unstable motions: a small perturbation of the start grows with time, until gradients of the whole motion
+    are useless for a search, and the motion found depends on rounding. Over a horizon in which perturbations grow little,
+    gradients are good. Each search begins at the state that the motion has really reached, and so corrects deviations up
+    to there: this is feedback, computed beforehand. Stable motions are better optimized at once, to their end. Applied
+    again from the same start, the control found gives the same motion to the bit, if `advance` does (ms.simulate, from a
+    MotionState, does).
 
     objective: function of rows (end - first, ...) of the control, a tensor; of the Horizon; and of the state in which row
         `first` begins. It returns what an objective of ms.minimize does.
     advance: function of the rows (settled - first, ...), a tensor; of the Horizon; and of that state. It returns the state
-        in which row `settled` begins, Trajectory.end say.
+        in which row `settled` begins, such as Trajectory.end.
     controls: (steps, ...), where every row starts until it is planned.
     prediction_horizon, control_horizon: rows. The last horizons end with the control, and are shorter.
-    start: the state in which row 0 begins, handed to the first calls as it is.
+    start: the state in which row 0 begins, passed to the first calls as it is.
     lower, upper: bounds, numbers or of the shape of a row.
-    trials: before every search, so many other plans are tried, by the objective without its gradient, and the search
-        begins with the lowest. Half are as planned until a random row and from there swing about `controls`, with a random
-        period, phase and amplitude; half do from there on what was done a random period before. Where a control does
-        nothing to first order, as from rest in water, there is no beginning without.
-    spread: largest amplitude of the trials' swings, a number or of the shape of a row; entries with zero are as planned.
-    periods: (shortest, longest) of the trials' periods, rows. seed: of their random numbers.
+    trials: number of random plans before every search. The objective is evaluated for each without its gradient, and the
+        search begins with the lowest. All are as planned until a random row; from there half of them oscillate about
+        `controls`, with a random period, phase and amplitude, and half repeat what was done a random period before. If a
+        control has no effect to first order, as from rest in water, a search cannot begin without trials.
+    trial_amplitude: largest amplitude of these oscillations, a number or of the shape of a row; entries with zero stay as
+        planned.
+    trial_periods: (shortest, longest) period of the trials, rows. seed: of their random numbers.
     optimizer: function (parameters, lower, upper) -> optimizer; ms.optim.LBFGS by default, with first_step=0.1 and at most 5
         evaluations in a line search.
-    max_iterations, tolerance: of every search, as in ms.minimize. No iterations: no search, the best of the trials is done;
-        no gradient is asked for then.
+    max_iterations, tolerance: of every search, as in ms.minimize. With 0 iterations there is no search: the best of the
+        trials is applied, and no gradient is computed.
     until: function of the state; ends where it returns True.
     progress: show a bar of the rows settled.
 
-    A search that meets a control that cannot be evaluated, and cannot go around it, ends with the best that it had, and that
-    is done: `failures` says so. Once a first stretch is settled, Ctrl-C raises Interrupted and any other error
-    ObjectiveFailed, with the Receding until then as `last_good`; before, the error itself comes through.
+    A search that meets a control that cannot be evaluated, and cannot go around it, ends with the best control so far,
+    which is then applied, and `failures` says so. Once the first rows are settled, Ctrl-C raises Interrupted and any other
+    error ObjectiveFailed, with the RecedingHorizonResult so far as `last_good`; before, the error itself is raised.
 
     >>> import torch, magshell as ms
     >>> def fallen(push, state):  # a stick that balances: angle and rate, 50 times a second
@@ -136,15 +137,15 @@ def receding_horizon(
     low, high = row_bound("lower", lower, given), row_bound("upper", upper, given)
     named = {"optimizer": optimizer, "until": until}
     check_functions(objective=objective, advance=advance, **{k: v for k, v in named.items() if v is not None})
-    horizon, stride = (
+    horizon, applied = (
         count("prediction_horizon", prediction_horizon),
         count("control_horizon", control_horizon),
     )
-    if stride > horizon:
+    if applied > horizon:
         raise ValueError(
-            f"control_horizon must be no more than the prediction_horizon, got {stride} of {horizon} rows"
+            f"control_horizon must be no more than the prediction_horizon, got {applied} of {horizon} rows"
         )
-    to_try = Trials.of(count("trials", trials, least=0), spread, periods, given)
+    to_try = Trials.of(count("trials", trials, least=0), trial_amplitude, trial_periods, given)
     options = {
         "max_iterations": count("max_iterations", max_iterations, least=0),
         "tolerance": not_negative("tolerance", "", tolerance),
@@ -170,7 +171,7 @@ def receding_horizon(
 
     with progress_bar("receding", steps, shown=progress) as bar:
         while reached < steps:
-            part = Horizon(reached, min(reached + stride, steps), min(reached + horizon, steps))
+            part = Horizon(reached, min(reached + applied, steps), min(reached + horizon, steps))
             rows = slice(part.first, part.end)
             try:
                 if to_try.number:
@@ -208,6 +209,6 @@ def receding_horizon(
             except Exception as error:
                 if not reached:
                     raise
-                told = f"the control failed after {reached} of {steps} rows: {error}"
-                raise ObjectiveFailed(told, until_now()) from error
+                message = f"the control failed after {reached} of {steps} rows: {error}"
+                raise ObjectiveFailed(message, until_now()) from error
     return until_now()

@@ -1,7 +1,7 @@
-"""Objectives of motions: where which vertices should be when. Functions of positions (n, n_v, 3) m, as
-`ms.simulate(...).positions` holds them, or of the track (n, 3) m of one point.
+"""Objectives of motions: distances of vertices from where they should be at given times.
 
-A frame is an index into the recorded states, 0 the start, -1 the last. [Chen22] 5.2 and 6.1 to 6.3.
+They are functions of positions (n, n_v, 3) m, as `ms.simulate(...).positions` holds them, or of the track (n, 3) m
+of one point. A frame is an index into the recorded states, 0 the start, -1 the last. [Chen22] 5.2 and 6.1 to 6.3.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def frames_at(times: Numbers, wanted: Numbers) -> Any:
-    """The frames at wanted times [s], (k,) or one.
+    """Return the frames nearest to the wanted times [s], (k,) or one.
 
     times: (n,) s, of the frames, ascending. Raises ValueError if the nearest frame is further off than half a step.
 
@@ -47,7 +47,7 @@ def frames_at(times: Numbers, wanted: Numbers) -> Any:
 
 
 def track(positions: Numbers, vertices: Numbers, weights: Numbers | None = None) -> torch.Tensor:
-    """The track (n, 3) m of a vertex, or of the mean of some.
+    """Return the track (n, 3) m of a vertex, or of the mean of several.
 
     positions: (n, n_v, 3) m. vertices: an index, or (m,). weights: (m,), for example masses; by default equal.
 
@@ -73,7 +73,7 @@ def key_frames(
     vertices: Numbers | None = None,
     weights: Numbers | None = None,
 ) -> torch.Tensor:
-    """Sum of squared distances of vertices from their targets at some frames [m2]; [Chen22] (34).
+    """Return the sum of squared distances of vertices from their targets at some frames [m2]; [Chen22] (34).
 
     positions: (n, n_v, 3) m. frames: (k,). targets: (k, m, 3) m. vertices: (m,) indices, by default all.
     weights: (k, m), by default 1.
@@ -95,7 +95,7 @@ def key_frames(
 
 
 def path_following(track: Numbers, targets: Numbers, weights: Numbers | None = None) -> torch.Tensor:
-    """Sum of squared distances of a track from a target a frame [m2].
+    """Return the sum of squared distances of a track from one target for each frame [m2].
 
     track: (n, 3) m. targets: (n, 3) m. weights: (n,), by default 1; 0 where it does not matter.
 
@@ -114,8 +114,9 @@ def path_following(track: Numbers, targets: Numbers, weights: Numbers | None = N
 def successive_targets(
     targets: Numbers, begin: Numbers, times: Numbers, delay: float = 0.0
 ) -> tuple[torch.Tensor, torch.Tensor]:
-    """Targets (n, 3) m and weights (n,), a frame, for `path_following`: each target holds until the next appears, and
-    counts once the delay has passed, as in [Chen22] Figure 13.
+    """Return targets (n, 3) m and weights (n,) of each frame, for `path_following`.
+
+    Each target holds until the next appears, and counts once the delay has passed, as in [Chen22] Figure 13.
 
     targets: (k, 3) m. begin: (k,) s, ascending: when each appears. times: (n,) s, of the frames. delay: s.
 
@@ -139,13 +140,14 @@ def successive_targets(
 
 
 def _checked_curve(curve) -> Curve:
+    """Return the curve. Raises ValueError if it is not one of ms.control."""
     if not isinstance(curve, Curve):
         raise ValueError(f"curve must be one of ms.control, got {type(curve).__name__}")
     return curve
 
 
 def curve_distance(track: Numbers, curve: Curve, smoothing: float | None = None) -> torch.Tensor:
-    """Sum over the frames of a track of its squared distance from a curve [m2].
+    """Return the sum over the frames of a track of its squared distance from a curve [m2].
 
     track: (n, 3) m. smoothing: m; with it the distances themselves are summed [m], smooth at zero:
     sqrt(d^2 + eps^2) - eps. They count small misses more, and large ones less.
@@ -170,7 +172,7 @@ def track_fitting(
     weights: Sequence[Numbers] = (1.0, 1.0, 1.0),
     smoothing: Numbers | None = None,
 ) -> dict[str, torch.Tensor]:
-    """The three terms of [Chen22] 6.1, "Track Fitting", for `ms.minimize`: {"start", "end", "curve"}.
+    """Return the three terms of [Chen22] 6.1, "Track Fitting", for `ms.minimize`: {"start", "end", "curve"}.
 
     The squared distances [m2] from the curve's start at one frame and from its end at another, and `curve_distance` of
     all frames from the one to the other. Frames before do not count: the sheet needs time to get there.

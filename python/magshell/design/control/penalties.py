@@ -1,5 +1,7 @@
-"""Penalties on fields in time: functions of the values (n, 3) T of a series. Means over the series, so that they do not
-depend on its number of steps."""
+"""Penalties on fields in time: functions of the values (n, 3) T of a series.
+
+They are means over the series, so that they do not depend on its number of steps.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def field_strength(flux_density: Numbers) -> torch.Tensor:
-    """Mean of |B|^2 [T2]. flux_density: (n, 3) T.
+    """Return the mean of |B|^2 [T2]. flux_density: (n, 3) T.
 
     >>> import magshell as ms
     >>> import numpy as np
@@ -29,7 +31,9 @@ def field_strength(flux_density: Numbers) -> torch.Tensor:
 
 
 def field_rate(flux_density: Numbers, time_step: Numbers) -> torch.Tensor:
-    """Mean of |dB/dt|^2 [T2/s2], from the differences of neighbours. flux_density: (n, 3) T, n > 1. time_step: s.
+    """Return the mean of |dB/dt|^2 [T2/s2], from differences of successive values.
+
+    flux_density: (n, 3) T, n > 1. time_step: s.
 
     >>> import magshell as ms
     >>> import numpy as np
@@ -44,9 +48,9 @@ def field_rate(flux_density: Numbers, time_step: Numbers) -> torch.Tensor:
 
 
 def field_excess(flux_density: Numbers, limit: float) -> torch.Tensor:
-    """Mean of sum_i max(|B_i| - limit, 0)^2 [T2]: zero within the limit, with a continuous derivative.
+    """Return the mean of sum_i max(|B_i| - limit, 0)^2 [T2]: zero within the limit, with a continuous derivative.
 
-    For optimizers without bounds; those of ms.optim hold them exactly. flux_density: (n, 3) T. limit: T.
+    It is meant for optimizers without bounds; those of ms.optim satisfy bounds exactly. flux_density: (n, 3) T. limit: T.
 
     >>> import magshell as ms
     >>> import numpy as np
@@ -59,11 +63,11 @@ def field_excess(flux_density: Numbers, limit: float) -> torch.Tensor:
 
 
 def field_limit(flux_density: Numbers, limit: float, sharpness: float | None = None) -> torch.Tensor:
-    """Constraints g <= 0 that keep all components within a limit: (B_i / limit)^2 - 1.
+    """Return constraints g <= 0 that keep all components within a limit: (B_i / limit)^2 - 1.
 
-    For MMA and GCMMA, with fields that are not bounded by their parameters: Fourier series. flux_density: (n, 3) T.
-    limit: T. One constraint a component, (3 n,); with a sharpness, a single one, as in `ms.objectives.limit`, which itself
-    limits |B|.
+    They are meant for MMA and GCMMA, with fields that are not bounded by their parameters, such as Fourier series.
+    flux_density: (n, 3) T. limit: T. There is one constraint for each component, (3 n,), or with a sharpness a single one,
+    as in `ms.objectives.limit`, which limits the norm instead of each component.
 
     >>> import magshell as ms
     >>> import numpy as np
@@ -82,8 +86,10 @@ def low_frequency_penalty(
     cosine_amplitudes: Numbers,
     sine_amplitudes: Numbers,
 ) -> torch.Tensor:
-    """How far a field is from a sum of a few oscillations: the regulariser of [Chen22] 6.3, there after Pan and Manocha
-    2018. It draws a field to a low-frequency one; all its arguments may be optimized. The mean over the times [T2] of
+    """Return the mean squared distance of a field from a sum of a few oscillations: F_DMP of [Chen22] 6.3.
+
+    This regulariser, there after Pan and Manocha 2018, draws a field to a low-frequency one; all its arguments may
+    be optimized. The mean over the times [T2] is of
 
         F_DMP(B, t) = sum_i (B_i - sum_j (alpha_j cos(w_j t) + beta_j sin(w_j t)))^2,     i = 1 ... 3, j = 1 ... J
 

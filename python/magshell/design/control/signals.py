@@ -1,8 +1,8 @@
-"""Fields in time, from the few numbers that are optimized: values for `ms.simulate(applied_flux_density=...)`.
+"""Fields in time as functions of a few optimized numbers: values for `ms.simulate(applied_flux_density=...)`.
 
-Those that take times give values (n, 3) T at times (n,) s, as of `step_times`, and (3,) T at one time, so that
-`lambda t: fourier(t, ...)` is a function of the time as well. Differentiable in every argument that is continuous, the
-times among them.
+Functions that take times give values (n, 3) T at times (n,) s, as of `step_times`, and (3,) T at one time, so that
+`lambda t: fourier(t, ...)` is a function of the time as well. They are differentiable in every continuous
+argument, including the times.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
 
 def step_times(steps: int, time_step: Numbers, start: Trajectory | MotionState | None = None) -> torch.Tensor:
-    """The times of the ends of all steps, the start first: (steps + 1,) s.
+    """Return the times of the ends of all steps, the start first: (steps + 1,) s.
 
-    time_step: s. start: the motion that goes on with these steps, and whose times do; by default they begin at 0.
+    time_step: s. start: the motion that these steps continue, with its times; by default times begin at 0.
 
     >>> import magshell as ms
     >>> ms.control.step_times(3, 0.5)
@@ -44,8 +44,9 @@ def step_times(steps: int, time_step: Numbers, start: Trajectory | MotionState |
     return clock.moment(torch.arange(steps + 1, dtype=torch.float64), 0.0, time_step)
 
 
+# plain-words: ok (the field's term)
 def zero_order_hold(values: Any, steps: int) -> torch.Tensor:
-    """A value a step, (steps, 3) T, from fewer: each is held equally long, to within one step.
+    """Return a value for each step, (steps, 3) T, from fewer values: each is held equally long, to within one step.
 
     values: (k, 3) T, k <= steps. Bounds of the values are bounds of the field.
 
@@ -60,7 +61,7 @@ def zero_order_hold(values: Any, steps: int) -> torch.Tensor:
 
 
 def harmonics(number: int, duration: Numbers) -> torch.Tensor:
-    """The angular frequencies 2 pi j / duration, j = 1 ... number: (number,) rad/s. duration: s.
+    """Return the angular frequencies 2 pi j / duration, j = 1 ... number: (number,) rad/s. duration: s.
 
     >>> import magshell as ms
     >>> import numpy as np
@@ -75,7 +76,8 @@ def harmonics(number: int, duration: Numbers) -> torch.Tensor:
 def oscillation(
     times: Numbers, angular_frequencies: Numbers, cosine_amplitudes: Numbers, sine_amplitudes: Numbers
 ) -> torch.Tensor:
-    """sum_j (alpha_j cos(w_j t) + beta_j sin(w_j t)), with alpha and beta both (J,) or both (J, 3) [T]; as `fourier`."""
+    """Return sum_j (alpha_j cos(w_j t) + beta_j sin(w_j t)), with alpha and beta both (J,) or both (J, 3) [T]; as
+    `fourier`."""
     frequencies = tensor("angular_frequencies", "rad/s", angular_frequencies, ("J",))
     one = len(shape_of("cosine_amplitudes [T]", cosine_amplitudes)) == 1
     shape = (len(frequencies),) if one else (len(frequencies), 3)
@@ -92,10 +94,10 @@ def fourier(
     sine_amplitudes: Numbers,
     mean: Numbers = (0.0, 0.0, 0.0),
 ) -> torch.Tensor:
-    """B(t) = mean + sum_j (alpha_j cos(w_j t) + beta_j sin(w_j t)), T.
+    """Return the Fourier series B(t) = mean + sum_j (alpha_j cos(w_j t) + beta_j sin(w_j t)), T.
 
     times: (n,) or one, s. angular_frequencies w: (J,) rad/s. cosine_amplitudes alpha, sine_amplitudes beta: (J, 3) T.
-    mean: (3,) T. Frequencies are numbers far larger than fields: tell the optimizer the scale of each. Bounds of the
+    mean: (3,) T. Frequencies are far larger numbers than fields: give the optimizer the scale of each. Bounds of the
     parameters do not bound the field tightly; `field_limit` does.
 
     >>> import magshell as ms
@@ -111,10 +113,10 @@ def fourier(
 def fit_fourier(
     values: Any, times: Numbers, angular_frequencies: Numbers
 ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-    """The mean (3,) T and amplitudes (J, 3), (J, 3) T whose `fourier` is nearest to a series in the least squares.
+    """Fit a Fourier series to values by least squares: its mean (3,) T and amplitudes (J, 3), (J, 3) T for `fourier`.
 
-    values: (n, 3) T at times (n,) s. angular_frequencies: (J,) rad/s, positive. Raises ValueError where the series does
-    not determine them. A start for `fourier` or `dmp`: no gradient goes through it.
+    values: (n, 3) T at times (n,) s. angular_frequencies: (J,) rad/s, positive. Raises ValueError if the series does not
+    determine them. The result is a start for `fourier` or `low_frequency_penalty`; it has no gradient.
 
     >>> import magshell as ms
     >>> import numpy as np
@@ -143,7 +145,7 @@ def fit_fourier(
 def rotating(
     times: Numbers, magnitude: Numbers, axis: Numbers, angular_frequency: Numbers, start: Numbers
 ) -> torch.Tensor:
-    """A field of given magnitude that turns about an axis, perpendicular to it, T.
+    """Return a field of given magnitude that rotates about an axis, perpendicular to it, T.
 
     times: (n,) or one, s. magnitude: T, a number or, as times, one a time. axis: (3,), of any length but zero; seen
     against it the field turns counter-clockwise. angular_frequency: rad/s. start: (3,), the direction at the time zero,
@@ -173,5 +175,5 @@ def rotating(
 
 
 def at_times(times: Numbers) -> torch.Tensor:
-    """One time or a row of them, s."""
+    """Return one time or a row of them as a tensor, s."""
     return tensor("times", "s", times, ("n",) if shape_of("times [s]", times) else ())

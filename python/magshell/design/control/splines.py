@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def spline(
     times: Numbers, control_points: Numbers, duration: Numbers, degree: int = 3, periodic: bool = False
 ) -> torch.Tensor:
-    """B(t) = sum_i N_i(t) P_i, T, with the B-splines N_i of a degree on evenly spaced knots; C2 for cubic ones.
+    """Return B(t) = sum_i N_i(t) P_i, T, with B-splines N_i of a degree on evenly spaced knots; C2 for cubic ones.
 
     The N_i are not negative and their sum is 1, so each component stays within the bounds of the control points', and
     |B| below the largest |P_i|: bounds of an optimizer on P hold for the field at all times. The spline begins at
@@ -40,21 +40,22 @@ def spline(
 def spline_weights(
     times: Numbers, number: int, duration: Numbers, degree: int = 3, periodic: bool = False
 ) -> torch.Tensor:
-    """The weights N_i(t) of the control points: (n, number), or (number,) at one time. Arguments as in `spline`."""
+    """Return the weights N_i(t) of the control points: (n, number), or (number,) at one time. Arguments as in
+    `spline`."""
     torch = require_torch("ms.control.spline")
     degree = count("degree", degree)
     number = count("the number of control points", number, least=degree + 1)
-    shares = at_times(times) / positive_number("duration", "s", duration)
+    fractions = at_times(times) / positive_number("duration", "s", duration)
     if periodic:
-        shares = shares - shares.detach().floor()
+        fractions = fractions - fractions.detach().floor()
         knots = (np.arange(number + 2 * degree + 1) - degree) / number
-        basis = _basis(shares, knots, degree)
-        # The last ones are the first ones, a period later.
+        basis = _basis(fractions, knots, degree)
+        # The last basis functions are the first ones, one period later.
         wrapped = basis[..., :degree] + basis[..., number:]
         return torch.cat([wrapped, basis[..., degree:number]], dim=-1)
-    _require_within(shares.detach())
+    _require_within(fractions.detach())
     inner = np.linspace(0, 1, number - degree + 1)
-    return _basis(shares, np.concatenate([np.zeros(degree), inner, np.ones(degree)]), degree)
+    return _basis(fractions, np.concatenate([np.zeros(degree), inner, np.ones(degree)]), degree)
 
 
 def fit_spline(
@@ -66,11 +67,11 @@ def fit_spline(
     periodic: bool = False,
     limit: float | None = None,
 ) -> torch.Tensor:
-    """The control points (number, 3) T whose spline is nearest to a series in the least squares.
+    """Return the control points (number, 3) T of the spline that fits a series best, by least squares.
 
     values: (n, 3) T at times (n,) s. limit: T, that no component of a control point may exceed; by default none. Raises
     ValueError where the series does not determine them: too few values, or none in a part of the duration.
-    A start for an optimization: no gradient goes through it.
+    The result is a start for an optimization; it has no gradient.
 
     number: how many control points. duration, degree, periodic: as in `spline`.
 
@@ -100,25 +101,26 @@ def fit_spline(
     return torch.tensor(bound * np.stack(columns, axis=1))
 
 
-def _basis(shares, knots: np.ndarray, degree: int):
-    """All B-splines of the knots at shares between 0 and 1, by the recursion of Cox and de Boor."""
+def _basis(fractions, knots: np.ndarray, degree: int):  # plain-words: ok (B-splines have knots)
+    """Evaluate all B-splines of the knots at fractions of the duration, 0 to 1, by the recursion of Cox and de Boor."""
     torch = require_torch("ms.control.spline")
     last = len(knots) - degree - 2
-    span = np.clip(np.searchsorted(knots, shares.detach().numpy(), side="right") - 1, degree, last)
-    basis = torch.nn.functional.one_hot(torch.as_tensor(span), len(knots) - 1).to(shares)
-    knots = shares.new_tensor(knots)
+    span = np.clip(np.searchsorted(knots, fractions.detach().numpy(), side="right") - 1, degree, last)
+    basis = torch.nn.functional.one_hot(torch.as_tensor(span), len(knots) - 1).to(fractions)
+    knots = fractions.new_tensor(knots)
     for d in range(1, degree + 1):
         widths = knots[d:] - knots[:-d]
-        inverse = torch.where(widths > 0, 1 / widths, 0.0)  # of no width: 0 / 0 counts as 0
-        rising = (shares[..., None] - knots[: -d - 1]) * inverse[:-1]
-        falling = (knots[d + 1 :] - shares[..., None]) * inverse[1:]
+        inverse = torch.where(widths > 0, 1 / widths, 0.0)  # repeated knots: 0 / 0 counts as 0
+        rising = (fractions[..., None] - knots[: -d - 1]) * inverse[:-1]
+        falling = (knots[d + 1 :] - fractions[..., None]) * inverse[1:]
         basis = rising * basis[..., :-1] + falling * basis[..., 1:]
     return basis
 
 
-def _require_within(shares) -> None:
-    rounding = 1e-9
-    if shares.numel() and not -rounding <= float(shares.min()) <= float(shares.max()) <= 1 + rounding:
-        raise ValueError(
-            f"times [s] must lie within 0 ... duration, got {float(shares.min()):g} ... {float(shares.max()):g} of it"
-        )
+def _require_within(fractions) -> None:
+    """Raise ValueError unless all fractions of the duration are in 0 ... 1, to rounding."""
+    if not fractions.numel():
+        return
+    rounding, low, high = 1e-9, float(fractions.min()), float(fractions.max())
+    if not -rounding <= low <= high <= 1 + rounding:
+        raise ValueError(f"times [s] must lie within 0 ... duration, got {low:g} ... {high:g} of it")

@@ -1,4 +1,4 @@
-"""Waves of activation that travel along a muscle, from the few numbers that are optimized."""
+"""Waves of activation that travel along a muscle, as functions of a few optimized numbers."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from ..._input.kinds import Numbers
 
 
-_STEEP = 4.0  # the exponent of a pulse: exp(-4) a width from its middle
+_STEEP = 4.0  # [-] exponent of a pulse: it has decayed to exp(-4) at one width from its middle
 
 
 def wave(
     times: Numbers,
-    places: Numbers,
+    places: Numbers,  # plain-words: ok (public name, that of Muscle.places)
     *,
     speed: Numbers,
     wavelength: Numbers,
@@ -30,7 +30,7 @@ def wave(
     delay: Numbers = 0.0,
     ramp: Numbers | None = None,
 ) -> torch.Tensor:
-    """A harmonic wave along a muscle, of one activation a segment:
+    """Return a harmonic wave along a muscle, with one activation for each segment:
 
         a(s, t) = R(t) (mean + amplitude sin(2 pi (speed (t - delay) - s) / wavelength)).
 
@@ -51,14 +51,14 @@ def wave(
         speed=speed, wavelength=wavelength, amplitude=amplitude, mean=mean, delay=delay,
     )  # fmt: skip
     _positive("wavelength", numbers["wavelength"])
-    way = numbers["speed"] * (late - numbers["delay"]) - places
-    signal = numbers["mean"] + numbers["amplitude"] * (2.0 * math.pi * way / numbers["wavelength"]).sin()
+    ahead = numbers["speed"] * (late - numbers["delay"]) - places
+    signal = numbers["mean"] + numbers["amplitude"] * (2.0 * math.pi * ahead / numbers["wavelength"]).sin()
     return signal if ramp is None else _risen(late, ramp) * signal
 
 
 def pulse(
     times: Numbers,
-    places: Numbers,
+    places: Numbers,  # plain-words: ok (public name, that of Muscle.places)
     *,
     speed: Numbers,
     width: Numbers,
@@ -66,7 +66,7 @@ def pulse(
     delay: Numbers = 0.0,
     period: Numbers | None = None,
 ) -> torch.Tensor:
-    """A bump of activation that runs along a muscle:
+    """Return a bump of activation that travels along a muscle:
 
         a(s, t) = amplitude exp(-4 (s - speed (t - delay))^2 / width^2).
 
@@ -88,14 +88,14 @@ def pulse(
     if period is None:
         return numbers["amplitude"] * (-_STEEP * ahead**2).exp()
     _positive("period", numbers["period"])
-    apart = 2.0 * math.pi / (numbers["period"] * numbers["speed"]) * numbers["width"]  # widths, in turns
+    apart = 2.0 * math.pi / (numbers["period"] * numbers["speed"]) * numbers["width"]  # radians per width
     if not bool((numbers["speed"].detach() != 0).all()):
         raise ValueError("speed [m/s] of pulses that follow each other must not be zero")
     return numbers["amplitude"] * (2.0 * _STEEP / apart**2 * ((apart * ahead).cos() - 1.0)).exp()
 
 
-def _checked(times, places, units, **given):
-    """The arguments as tensors, with axes for times, muscles where there are several, and places."""
+def _checked(times, places, units, **given):  # plain-words: ok (as the public argument)
+    """Return the arguments as tensors that broadcast over times, muscles (if there are several), and places."""
     times, places = at_times(times), tensor("places", "m", places, ("m",))
     shapes = {name: shape_of(f"{name} [{units[name]}]", value) for name, value in given.items()}
     several = [name for name, shape in shapes.items() if shape]
@@ -116,9 +116,9 @@ def _positive(name: str, value) -> None:
 
 
 def _risen(late, ramp):
-    """3 s^2 - 2 s^3 of s = t/ramp, from 0 to 1."""
+    """Return the ramp 3 s^2 - 2 s^3 of s = t/ramp, from 0 to 1."""
     torch = require_torch("ms.control.wave")
     ramp = tensor("ramp", "s", ramp, ())
     _positive("ramp", ramp)
-    share = torch.clamp(late / ramp, 0.0, 1.0)
-    return share**2 * (3.0 - 2.0 * share)
+    fraction = torch.clamp(late / ramp, 0.0, 1.0)
+    return fraction**2 * (3.0 - 2.0 * fraction)

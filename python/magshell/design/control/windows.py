@@ -1,4 +1,4 @@
-"""A long control found in windows, each begun from what the one before found."""
+"""A long control found in time windows, each begun with what the one before found."""
 
 from __future__ import annotations
 
@@ -25,8 +25,11 @@ if TYPE_CHECKING:
 @immutable
 @dataclass(frozen=True)
 class Window:
-    """steps: how many rows of the control it has. first: before it they are what earlier windows found. smoothing: as
-    given, of the objective's contact, say."""
+    """One window of a control.
+
+    steps: number of rows up to its end. first: rows before this one stay as earlier windows found them. smoothing:
+    the value given, of the objective's contact for example.
+    """
 
     steps: int
     first: int
@@ -36,8 +39,11 @@ class Window:
 @immutable
 @dataclass(frozen=True)
 class Windows:
-    """What `time_windows` found. controls: (steps, ...), a tensor. searches: [(Window, Minimum)], in their order; failures:
-    [(Window, why)], of those whose search ended early, which left what was best until then."""
+    """The result of `time_windows`.
+
+    controls: (steps, ...), a tensor. searches: [(Window, MinimizeResult)], in their order; failures: [(Window, why)], of
+    those whose search ended early, with the best rows until then.
+    """
 
     controls: object
     searches: Sequence[tuple[Window, MinimizeResult]] = field(repr=False)
@@ -45,7 +51,7 @@ class Windows:
 
     @property
     def evaluations(self) -> int:
-        """Of the objective, in all windows."""
+        """The number of evaluations of the objective, in all windows."""
         return sum(found.history[-1].evaluations for _, found in self.searches)
 
 
@@ -58,34 +64,36 @@ def time_windows(
     upper: Numbers = np.inf,
     smoothings: Sequence[float] = (1.0,),
     depth: int | None = None,
-    hold: bool = True,
+    hold: bool = True,  # plain-words: ok (public name)
     optimizer: Callable[..., Any] | None = None,
     max_iterations: int = 20,
     tolerance: float = 1e-3,
     progress: bool = True,
 ) -> Windows:
-    """Minimizes over a control in time, window by window, so that what comes first is settled before what it leads to.
+    """Minimize over a control in time, window by window, so that its early part is optimized before what depends on
+    it.
 
-    The gradient of a long motion with contact points where it falls only within a distance that shrinks with every
-    impact; that of a short one reaches far. So first the first rows are searched, then more of them, from what was found.
-    A magnetised strip that walks 80 steps by the friction of its ends comes 1.56 lengths far with windows of 20, 40, 60 and
-    80 steps and contact smoothed fourfold first, where one search of as many simulated steps and more ends at 1.04.
+    The gradient of a long motion with contact is a descent direction only within a distance that shrinks with every
+    impact; that of a short motion is valid much farther. So the first rows are searched first, then more of them, starting
+    from what was found. A magnetised strip that walks 80 steps by the friction of its ends moves by 1.56 lengths with
+    windows of 20, 40, 60 and 80 steps and contact smoothed fourfold first; one search with at least as many simulated
+    steps ends at 1.04.
 
-    objective: function of controls (k, ...), a tensor with the first k rows, and of the Window; a motion of so many steps,
-        say, whose contact has this smoothing. It returns what an objective of ms.minimize does.
+    objective: function of controls (k, ...), a tensor with the first k rows, and of the Window; for example of a motion of
+        k steps whose contact has this smoothing. It returns what an objective of ms.minimize does.
     controls: (steps, ...), where the search starts.
     lengths: rows of each window, rising; the last one is `steps`.
     lower, upper: bounds, numbers or of the shape of a row.
     smoothings: positive numbers, falling; each window is searched with each of them in turn.
-    depth: how many rows back from its end a window changes, a horizon that recedes; None: all, windows that grow.
+    depth: number of rows, back from its end, that a window changes (a receding horizon); None: all (growing windows).
     hold: a window's new rows start from the last one of the window before; False: from `controls`.
     optimizer: function (parameters, lower, upper) -> optimizer; ms.optim.LBFGS by default, with first_step=0.1 and at most 5
         evaluations in a line search.
     max_iterations, tolerance, progress: of every search, as in ms.minimize.
 
-    A search that meets a design that cannot be evaluated, and cannot go around it, ends with the best that it had, and the
-    next one goes on from there: `failures` says so. Raises DesignRejected where the very first design cannot be; Interrupted
-    with what was found until then as `last_good`; ObjectiveFailed as ms.minimize does.
+    A search that meets a design that cannot be evaluated, and cannot go around it, ends with the best one so far, and the
+    next one continues from there: `failures` says so. Raises DesignRejected if the very first design cannot be evaluated;
+    Interrupted with the result so far as `last_good`; ObjectiveFailed as ms.minimize does.
 
     >>> import torch, magshell as ms
     >>> def miss(push, window):  # a mass on ice is to be a meter away at the end of every window
@@ -107,11 +115,11 @@ def time_windows(
         if hold and window.steps > reached:
             now[reached : window.steps] = now[reached - 1]
         reached = max(reached, window.steps)
-        kept = now[: window.first].clone()
+        earlier = now[: window.first].clone()
         rows = slice(window.first, window.steps)
 
-        def of_window(changed, kept=kept, window=window):
-            return objective(torch.cat([kept, changed]), window)
+        def of_window(changed, earlier=earlier, window=window):
+            return objective(torch.cat([earlier, changed]), window)
 
         try:
             found, failure = search_rows(
@@ -127,8 +135,8 @@ def time_windows(
         except Interrupted as error:
             if error.last_good is not None:
                 now[rows] = error.last_good.parameters[0].detach()
-            told = f"interrupted in window {len(searches) + 1} of {len(windows)}"
-            raise Interrupted(told, Windows(now, searches, failures)) from error
+            message = f"interrupted in window {len(searches) + 1} of {len(windows)}"
+            raise Interrupted(message, Windows(now, searches, failures)) from error
         if failure is not None:
             if found is None and not searches:
                 raise failure
@@ -141,6 +149,7 @@ def time_windows(
 
 
 def _windows(steps: int, lengths, smoothings, depth) -> list[Window]:
+    """Return the windows in the order of their searches. Raises ValueError on bad lengths, smoothings or depth."""
     ends = index_array("lengths", lengths).ravel().tolist()
     if not ends or ends[0] < 1 or ends[-1] != steps or any(b <= a for a, b in pairwise(ends)):
         raise ValueError(f"lengths must rise to the {steps} rows of the controls, got {lengths!r:.60}")

@@ -1,4 +1,7 @@
-"""Results as data: plain values in JSON, and arrays beside it. Reading them makes nothing else, whoever wrote them."""
+"""Converts results to plain values for JSON, with a list of arrays, and back.
+
+Reading a file creates data only and runs no code, whoever wrote the file.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +27,10 @@ _ADVICE = "return numbers, arrays and tensors, such as (minimum, equilibrium.pos
 
 
 def to_plain(value: Any, arrays: list[np.ndarray], label: str) -> Any:
-    """What JSON can hold, with the arrays appended to a list. Raises TypeError, with the label, on what is not data."""
+    """Convert a value to what JSON can hold, and append its arrays to a list.
+
+    label: the value's name in messages. Raises TypeError on anything that is not data.
+    """
     if value is None or type(value) in (bool, int, float, str):
         return value
     if type(value) in (list, tuple):
@@ -51,7 +57,8 @@ def to_plain(value: Any, arrays: list[np.ndarray], label: str) -> Any:
 
 
 def from_plain(held: Any, array: Callable[[int], np.ndarray]) -> Any:
-    """What was given to `to_plain`; array: the one of a number. Raises an error on anything else."""
+    """Convert back what `to_plain` returned; array: a function that returns the array of a number. Raises an error on
+    anything else."""
     if not isinstance(held, dict):
         return held
     ((kind, content),) = held.items()
@@ -72,16 +79,17 @@ def from_plain(held: Any, array: Callable[[int], np.ndarray]) -> Any:
         return _tensor(array(content[0]), **content[1], requires_grad=bool(content[2]))
     if kind in _RECORDS:
         return _RECORDS[kind](**{name: from_plain(each, array) for name, each in content.items()})
-    raise ValueError(f"it holds something of the unknown kind {kind!r}")
+    raise ValueError(f"the file has an entry of the unknown kind {kind!r}")
 
 
 def _bits(tensor) -> np.ndarray:
-    """(n,) uint8: numpy has no word for some of torch's numbers."""
+    """Return the bytes of a tensor, (n,) uint8, because numpy lacks some of torch's number types."""
     flat = tensor.detach().cpu().contiguous().reshape(-1)
     return flat.view(require_torch("a result").uint8).numpy() if flat.numel() else np.zeros(0, np.uint8)
 
 
 def _tensor(bits: np.ndarray, dtype: str, shape: list[int], requires_grad: bool):
+    """Return the tensor with these bytes, dtype and shape."""
     torch = require_torch("a tensor in a checkpoint")
     kind = getattr(torch, dtype)
     if not isinstance(kind, torch.dtype):

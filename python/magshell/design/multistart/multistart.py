@@ -1,4 +1,4 @@
-"""The same optimization from many starts, side by side: ms.multistart."""
+"""Runs the same optimization from many starts in parallel: ms.multistart."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def multistart(
     resume: bool = False,
     progress: bool = True,
 ) -> MultistartResult:
-    """Calls run(start) for every start, several at a time, and orders what they return: the best one first.
+    """Call run(start) for every start, several at a time, and order the results, the best one first.
 
     run: returns an ms.MinimizeResult (or anything with an `objective`), a number, or a tuple that begins with one of these
         and holds whatever else is to be kept, such as (minimum, equilibrium.positions). It gets a copy of its start.
@@ -52,16 +52,16 @@ def multistart(
     feasibility: how far a MinimizeResult may break its constraints and still come before all that break theirs by more.
     checkpoint: a folder that gets a file for every start that has finished. The files hold data only: run must return
         numbers, arrays, tensors, ms.MinimizeResult, or containers of these, and reading them runs nothing.
-    resume: take from it what is there, and run the rest and what failed. What is taken is told by the bar, by the result
-        and by its `resumed`. Another start under the same number is refused, and so is a run that is another one: by its
-        name, its code, the arguments bound to it, what it holds, and what it looks up in its module and in others that
-        are not installed. (Results of another release of magshell or of a package are taken: name another folder.)
+    resume: take the results that are there, and run the other starts and those that failed. The bar, the result and its
+        `resumed` say which were taken. A file is refused if its start differs, or if its run differs in name, code, bound
+        arguments, closure, or in what it looks up in its module and in others that are not installed. (Results of another
+        release of magshell or of a package are not recognized: use another folder.)
     progress: show a bar. The bars of the runs themselves are not shown.
 
-    Every start has one thread, magshell's, torch's and in processes made here the BLAS's too, so that results are the
-    same bits on any executor and any number of workers. An error in one start is kept in `failed`, and the others go
-    on. Ctrl-C raises `ms.Interrupted`, and an executor that breaks, or no start that finishes, `ms.MultistartFailed`:
-    both hold what has finished, a MultistartResult, in `last_good`.
+    Every start runs on one thread (of magshell, of torch, and in processes made here of the BLAS), so that results are the
+    same bits on any executor and any number of workers. An error in one start is stored in `failed`, and the others go
+    on. Ctrl-C raises `ms.Interrupted`; a broken executor, or no start that finishes, raises `ms.MultistartFailed`. Both
+    hold the results so far, a MultistartResult, in `last_good`.
 
     A script calls this under `if __name__ == "__main__":`, as its processes import the script. In a notebook
     cloudpickle must be installed, or `run` come from a module.
@@ -101,9 +101,10 @@ def multistart(
 
 
 def _drive(state: _State, executor: Executor, task: Callable[..., Any], bar) -> None:
-    """Has every unfinished start run, and takes the outcomes as they come.
+    """Run every unfinished start, and store the outcomes as they come.
 
-    Ctrl-C comes at any moment, between the end of a start and its outcome being taken too: what has finished is kept.
+    Ctrl-C may come at any moment, also between the end of a start and the storing of its outcome: finished starts
+    are not lost.
     """
     done: queue.SimpleQueue[tuple[int, Future]] = queue.SimpleQueue()
     running: dict[int, Future] = {}
@@ -132,7 +133,8 @@ def _drive(state: _State, executor: Executor, task: Callable[..., Any], bar) -> 
 
 
 def _next(done: queue.SimpleQueue[tuple[int, Future]]) -> tuple[int, Future]:
-    """The next one that ends. A Ctrl-C that comes just as a wait begins is seen at its end only, so waits are short."""
+    """Return the next future that ends. The waits are short, because Ctrl-C at the beginning of a wait is noticed
+    only at its end."""
     while True:
         try:
             return done.get(timeout=0.2)
@@ -141,7 +143,7 @@ def _next(done: queue.SimpleQueue[tuple[int, Future]]) -> tuple[int, Future]:
 
 
 class _State:
-    """What is known of each start."""
+    """The starts and their outcomes so far."""
 
     def __init__(self, starts: list[Any], feasibility: float, files: StartFiles | None):
         self.starts, self._feasibility, self._files = starts, feasibility, files
@@ -151,16 +153,19 @@ class _State:
 
     @property
     def unfinished(self) -> list[int]:
+        """The numbers of the starts without an outcome."""
         return [number for number in range(len(self.starts)) if number not in self.outcomes]
 
     def take(self, number: int, outcome: Outcome) -> None:
+        """Store the outcome of a start, in a file too if it succeeded."""
         self.outcomes[number] = outcome
-        told = outcome.error or f"objective {outcome.objective:.6g}"
-        log.info("multistart: start %d: %s, %.3g s", number, told, outcome.seconds)
+        summary = outcome.error or f"objective {outcome.objective:.6g}"
+        log.info("multistart: start %d: %s, %.3g s", number, summary, outcome.seconds)
         if self._files and not outcome.failed:
             self._files.write(number, outcome)
 
     def result(self) -> MultistartResult:
+        """Return the result so far, the finished starts ordered from the best."""
         finished, failed = [], []
         for number, outcome in sorted(self.outcomes.items()):
             start, seconds = self.starts[number], outcome.seconds
@@ -175,7 +180,7 @@ class _State:
         return MultistartResult(tuple(finished), tuple(failed), tuple(self.unfinished), seconds, self.resumed)
 
     def _rank(self, found: FinishedStart) -> tuple[float, float]:
-        """Feasible designs by their objective, before all others by how far they are from it."""
+        """Return a sort key: feasible designs first, by their objective; then the others, by their violation."""
         if found.violation <= self._feasibility:
             return 0.0, found.objective
         return found.violation, found.objective
@@ -193,7 +198,10 @@ class _State:
 
 
 def _tasks(run, starts: list[Any], executor) -> Callable[[int, CallOff], tuple[Any, ...]]:
-    """What is submitted for each start. Whatever cannot go to another process is refused here, before any work."""
+    """Return a function that gives what to submit for each start.
+
+    Raises ValueError, before any work, if the run or a start cannot be sent to another process.
+    """
     if executor is not None and not isinstance(executor, futures.ProcessPoolExecutor):
         return lambda number, call_off: (attempt_sent, run, starts[number], this_process(), call_off)
     run = packed("run", run)
@@ -203,7 +211,7 @@ def _tasks(run, starts: list[Any], executor) -> Callable[[int, CallOff], tuple[A
 
 
 def _outcome(future: Future) -> Outcome:
-    """What came back. Raises where the executor is to blame, and not the start."""
+    """Return the outcome of a start. Raises the error if the executor caused it, and not the start."""
     try:
         outcome = future.result()
         return pickle.loads(outcome) if isinstance(outcome, bytes) else outcome
@@ -238,7 +246,7 @@ def _listed(starts) -> list[Any]:
     if is_tensor(starts):
         starts = starts.detach()
     try:
-        # A row of a tensor would take the whole tensor along to every worker.
+        # Rows are copied: pickling a row that is a view would send the whole tensor to every worker.
         listed = [start.clone() if is_tensor(starts) else start for start in starts]
     except TypeError as error:
         raise ValueError(f"starts must be several, such as a list of arrays: {error}") from None
@@ -269,5 +277,5 @@ def _check(run, executor, workers, attempts, feasibility, checkpoint, resume) ->
 
 
 def _processors() -> int:
-    """Those that this process may use."""
+    """Return the number of processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,4 +1,4 @@
-"""What a function of a start would do, in words and digests: whether an earlier call's results are also this one's."""
+"""Describes a run by names and hashes, to decide whether results of an earlier call are also those of this one."""
 
 from __future__ import annotations
 
@@ -13,43 +13,46 @@ import numpy as np
 from ..._input.tensors import is_tensor
 from ..content_hash import closure, content_hash, is_own_function, used_globals
 
-_LONGEST_TOLD = 60  # characters of a value that is told in full
+_LONGEST_IN_FULL = 60  # characters of a value that is described in full, not by its hash
 
 
 def described(run: Callable[..., Any]) -> dict[str, str]:
-    """{what: its value in words, or its digest} of a function, with the arguments that are bound to it, what it holds
-    and what it looks up. Raises ValueError where something bound to it neither is plain nor can be pickled."""
-    told: dict[str, str] = {}
+    """Describe a run: {name of a part: its value as text, or its hash}.
+
+    The parts are its code, the arguments bound to it, its closure and the globals it uses. Raises ValueError if
+    something bound to it neither is plain nor can be pickled.
+    """
+    parts: dict[str, str] = {}
     while isinstance(run, functools.partial):
-        told |= {f"argument {k}": told_apart(f"argument {k}", each) for k, each in enumerate(run.args)}
-        told |= {name: told_apart(name, each) for name, each in run.keywords.items()}
+        parts |= {f"argument {k}": describe_part(f"argument {k}", each) for k, each in enumerate(run.args)}
+        parts |= {name: describe_part(name, each) for name, each in run.keywords.items()}
         run = run.func
     if isinstance(run, types.MethodType):
-        told["its object"] = told_apart("its object", run.__self__)
+        parts["its object"] = describe_part("its object", run.__self__)
         run = run.__func__
     if not is_own_function(run):
         if not isinstance(run, type | types.BuiltinFunctionType | types.FunctionType):
-            told["its object"] = told_apart("its object", run)
+            parts["its object"] = describe_part("its object", run)
             run = type(run)
-        return told | {"run": f"{run.__module__}.{run.__qualname__}"}
-    told["run"] = f"{run.__module__}.{run.__qualname__}"
-    told["its code"] = told_apart("its code", run.__code__)
+        return parts | {"run": f"{run.__module__}.{run.__qualname__}"}
+    parts["run"] = f"{run.__module__}.{run.__qualname__}"
+    parts["its code"] = describe_part("its code", run.__code__)
     for name, parameter in inspect.signature(run).parameters.items():
         if parameter.default is not parameter.empty:
-            told[f"the default of {name}"] = told_apart(f"the default of {name}", parameter.default)
-    told |= {
-        f"{name} around it": told_apart(f"{name} around it", each) for name, each in closure(run).items()
+            parts[f"the default of {name}"] = describe_part(f"the default of {name}", parameter.default)
+    parts |= {
+        f"{name} around it": describe_part(f"{name} around it", each) for name, each in closure(run).items()
     }
     for name, each in used_globals(run):
         try:
-            told[f"the module's {name}"] = _in_words(each)
+            parts[f"the module's {name}"] = _in_words(each)
         except TypeError:  # such as a lock: a module may hold anything
-            told[f"the module's {name}"] = f"a {type(each).__qualname__}"
-    return told
+            parts[f"the module's {name}"] = f"a {type(each).__qualname__}"
+    return parts
 
 
 def differences(known: dict[str, str], now: dict[str, str]) -> list[str]:
-    """What is another one now, in words."""
+    """Describe the parts that differ between two runs."""
     if known.get("run") != now["run"]:
         return [f"it was written by {known.get('run')}, and this one is {now['run']}"]
     changed = [name for name in {**known, **now} if known.get(name) != now.get(name)]
@@ -58,8 +61,8 @@ def differences(known: dict[str, str], now: dict[str, str]) -> list[str]:
     ]
 
 
-def told_apart(name: str, value: Any) -> str:
-    """The value in words or its digest. Raises ValueError, naming it, where it has none."""
+def describe_part(name: str, value: Any) -> str:
+    """Return a value as text, or its hash. Raises ValueError with its name if it cannot be hashed."""
     try:
         return _in_words(value)
     except TypeError as error:
@@ -69,7 +72,7 @@ def told_apart(name: str, value: Any) -> str:
 
 
 def _in_words(value) -> str:
-    if value is None or (type(value) in (bool, int, float, str) and len(repr(value)) <= _LONGEST_TOLD):
+    if value is None or (type(value) in (bool, int, float, str) and len(repr(value)) <= _LONGEST_IN_FULL):
         return repr(value)
     found = content_hash(value)[:16]
     if is_tensor(value) or isinstance(value, np.ndarray):

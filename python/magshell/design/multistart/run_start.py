@@ -1,4 +1,4 @@
-"""One start, run to its end wherever that is: what every executor is given to do."""
+"""Runs one start to its end: the function that every executor is given."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .single_thread import one_thread
 
 @dataclass
 class Outcome:
-    """What became of a start: a result with its objective, or an error in words. Passes between processes."""
+    """The outcome of a start: a result with its objective, or an error message. It is sent between processes."""
 
     result: Any = None
     objective: float = math.nan
@@ -34,11 +34,13 @@ class Outcome:
 
     @property
     def failed(self) -> bool:
+        """Return whether the start ended with an error."""
         return bool(self.error)
 
 
 def attempt(run: Callable[..., Any], start: Any) -> Outcome:
-    """run(start) on one thread and without progress bars. The start is copied, as a minimization moves it in place."""
+    """Call run(start) on one thread and without progress bars. The start is copied, as a minimization changes it in
+    place."""
     began = time.perf_counter()
     try:
         with one_thread(), no_bars():
@@ -53,10 +55,11 @@ def attempt(run: Callable[..., Any], start: Any) -> Outcome:
 
 
 def attempt_packed(run: bytes, start: bytes) -> bytes:
-    """`attempt` with everything pickled: for processes, which otherwise would share torch's tensors by open files."""
+    """Call `attempt` with pickled arguments and result. Unpickled tensors would be shared between processes by open
+    files."""
     try:
         outcome = attempt(pickle.loads(run), pickle.loads(start))
-    except Exception as error:  # the worker lacks a module, say
+    except Exception as error:  # for example, the worker lacks a module
         return pickle.dumps(failure(error))
     try:
         return pickle.dumps(outcome)
@@ -65,7 +68,7 @@ def attempt_packed(run: bytes, start: bytes) -> bytes:
 
 
 class CallOff:
-    """Says to starts that wait in this process that they are not to begin. In others nobody hears it."""
+    """A flag that keeps starts that wait in this process from beginning. Copies in other processes do not see it."""
 
     def __init__(self):
         self.done = False
@@ -75,10 +78,10 @@ class CallOff:
 
 
 def attempt_sent(run: Callable[..., Any], start: Any, sender: str, call_off: CallOff) -> Outcome:
-    """`attempt` for executors that send things in a way of their own. Some wait forever for what cannot be sent."""
-    if (
-        call_off.done
-    ):  # its future may be unknown to who wanted to cancel it, if Ctrl-C came as it was handed out
+    """Call `attempt` for executors that pickle by themselves; some of them wait forever for a result that cannot be
+    pickled."""
+    # Ctrl-C during the submission may leave a future that nobody has stored, and so nobody cancels.
+    if call_off.done:
         return Outcome(error="called off before it began")
     outcome = attempt(run, start)
     if sender == this_process():
@@ -91,11 +94,12 @@ def attempt_sent(run: Callable[..., Any], start: Any, sender: str, call_off: Cal
 
 
 def this_process() -> str:
+    """Return a text that identifies this process on this computer."""
     return f"{platform.node()} {os.getpid()}"
 
 
 def _dumps(value) -> bytes:
-    """Pickled, by cloudpickle where pickle alone cannot: so does dask."""
+    """Return a value pickled, by cloudpickle if pickle fails and cloudpickle is loaded, as dask does."""
     try:
         return pickle.dumps(value)
     except Exception:
@@ -105,6 +109,7 @@ def _dumps(value) -> bytes:
 
 
 def _cannot_be_sent(outcome: Outcome, error: Exception) -> Outcome:
+    """Return the outcome of a start whose result cannot be pickled."""
     return Outcome(
         error=f"what run returned cannot be pickled ({error}): return an ms.MinimizeResult, or numbers and arrays, such as "
         "(objective, equilibrium.positions)",
@@ -113,7 +118,7 @@ def _cannot_be_sent(outcome: Outcome, error: Exception) -> Outcome:
 
 
 def failure(error: BaseException) -> Outcome:
-    """An error as a record that passes between processes; what it held of value goes along if it can."""
+    """Return an error as an outcome, with its `last_good` if that can be pickled."""
     return Outcome(
         error=f"{type(error).__name__}: {error}",
         traceback="".join(traceback.format_exception(error)),
@@ -122,7 +127,7 @@ def failure(error: BaseException) -> Outcome:
 
 
 def _objective(result) -> tuple[float, float]:
-    """The objective and by how much constraints are broken, of what a run returned."""
+    """Return the objective and the violation of constraints from the return value of a run."""
     value = result[0] if isinstance(result, tuple) and result else result
     value = getattr(value, "objective", value)
     try:

@@ -1,4 +1,4 @@
-"""Random places in a box to start from."""
+"""Random starting points in a box."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ if TYPE_CHECKING:
     from ..._input.kinds import Numbers
 
 
-# Sobol's directions end here. Where a start is as long as that, evenly spread points are far apart in any case.
+# scipy's table of Sobol directions ends here. In so many dimensions, low-discrepancy points have no advantage anyway.
 _LONGEST_SOBOL = 21201
 
 
 def random_starts(count: int, lower: Numbers, upper: Numbers, seed: int = 0) -> np.ndarray:
-    """Starts spread evenly over a box, (count, ...): the rest of the shape is that of the bounds.
+    """Return starting points that fill a box evenly, (count, ...): the rest of the shape is that of the bounds.
 
-    lower, upper: numbers or arrays that fit each other. seed: another one gives other starts; the same one the same,
-    and more of them begin with the fewer.
+    lower, upper: numbers or arrays that fit each other. seed: the same seed gives the same starts, and a larger count
+    adds starts behind them.
 
     The points are of a scrambled Sobol sequence; beyond 21201 numbers a start, independent ones.
 
@@ -42,15 +42,15 @@ def random_starts(count: int, lower: Numbers, upper: Numbers, seed: int = 0) -> 
         ) from None
     if not (np.isfinite(lower) & np.isfinite(upper) & (lower <= upper)).all():
         raise ValueError("lower must be finite and nowhere above upper, which must be finite too")
-    shares = _shares(int(count), lower.size, int(seed)).reshape(count, *lower.shape)
-    return lower + shares * (upper - lower)
+    fractions = _unit_points(int(count), lower.size, int(seed)).reshape(count, *lower.shape)
+    return lower + fractions * (upper - lower)
 
 
-def _shares(count: int, size: int, seed: int) -> np.ndarray:
-    """Points of the unit cube, (count, size)."""
+def _unit_points(count: int, size: int, seed: int) -> np.ndarray:
+    """Return points of the unit cube, (count, size)."""
     if 0 < size <= _LONGEST_SOBOL:
         from scipy.stats import qmc  # takes longer to load than all of magshell
 
-        # Whole powers of two are what the sequence is balanced for.
+        # The sequence is balanced for powers of two only.
         return qmc.Sobol(size, seed=seed).random_base2(math.ceil(math.log2(count)))[:count]
     return np.stack([np.random.default_rng([seed, number]).random(size) for number in range(count)])

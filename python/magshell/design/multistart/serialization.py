@@ -1,4 +1,4 @@
-"""What goes to another process must pickle, and be found again there: said before any work is done."""
+"""Pickles what goes to worker processes, and refuses, before any work, what they could not unpickle."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ _REMEDY = (
 
 
 def packed(name: str, value: Any) -> bytes:
-    """The pickled value. Raises ValueError, naming it, where it does not pickle or could not be unpickled."""
+    """Return the pickled value. Raises ValueError with its name if it cannot be pickled, or not be unpickled in a
+    worker."""
     try:
         contents = pickle.dumps(value)
     except Exception as error:
@@ -26,7 +27,7 @@ def packed(name: str, value: Any) -> bytes:
 
 
 def refuse_while_importing(function: str) -> None:
-    """Raises RuntimeError in a worker process that is just importing the script it was started from."""
+    """Raise RuntimeError in a worker process that is importing the script it was started from."""
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         raise RuntimeError(
             f"{function} was called while a worker process imports this script, which begins with the script's own "
@@ -35,7 +36,7 @@ def refuse_while_importing(function: str) -> None:
 
 
 def _main_can_be_imported() -> bool:
-    """Whether a spawned process finds what `__main__` defines: not what a notebook or a prompt does."""
+    """Return whether a spawned process can import `__main__`: False in a notebook and at a prompt."""
     main = sys.modules["__main__"]
     if getattr(main, "__spec__", None) is not None:
         return True
@@ -43,6 +44,8 @@ def _main_can_be_imported() -> bool:
 
 
 def _packed_by_value(name: str, value) -> bytes:
+    """Return the value pickled by cloudpickle, which includes the code of `__main__`. Raises ValueError without
+    cloudpickle."""
     try:
         import cloudpickle
     except ImportError:

@@ -1,4 +1,4 @@
-"""One thread for each start: the processors are shared out by starts, and sums keep their order and so their bits."""
+"""Restricts each start to one thread: starts run in parallel instead, and sums keep their order and so their bits."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from contextlib import contextmanager
 
 from ... import _core
 
-# What a library reads when a new process loads it; afterwards most of them cannot be asked any more.
+# Environment variables that libraries read once, when a new process loads them.
 _VARIABLES = (
     "MAGSHELL_NUM_THREADS",
     "OMP_NUM_THREADS",
@@ -26,7 +26,7 @@ _restore: Callable[[], None] | None = None
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """While any thread of this process is inside, magshell and torch run on one thread."""
+    """Run magshell and torch on one thread while any thread of this process is inside the block."""
     global _inside, _restore
     with _lock:
         if _inside == 0:
@@ -34,7 +34,9 @@ def one_thread() -> Iterator[None]:
         _inside += 1
         _core.set_num_threads(1)
         if "torch" in sys.modules:
-            sys.modules["torch"].set_num_threads(1)  # its OpenMP keeps a number for each calling thread
+            sys.modules["torch"].set_num_threads(
+                1
+            )  # its OpenMP has a number of threads for each calling thread
     try:
         yield
     finally:
@@ -45,6 +47,7 @@ def one_thread() -> Iterator[None]:
 
 
 def _restorer() -> Callable[[], None]:
+    """Return a function that sets the present numbers of threads again."""
     threads = _core.num_threads()
     torch = sys.modules.get("torch")
     torch_threads = torch.get_num_threads() if torch else 0
@@ -59,7 +62,10 @@ def _restorer() -> Callable[[], None]:
 
 @contextmanager
 def one_thread_in_children() -> Iterator[None]:
-    """Processes that are started inside have one thread a library. Not for long: it is the environment of all."""
+    """Give processes that are started inside the block one thread for each library.
+
+    The block must be short: it changes the environment variables of the whole process.
+    """
     with _lock:
         before = {name: os.environ.get(name) for name in _VARIABLES}
         os.environ.update(dict.fromkeys(_VARIABLES, "1"))

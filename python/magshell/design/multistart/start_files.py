@@ -1,4 +1,4 @@
-"""A folder with a file for every start that has finished, so that a second run does only the rest."""
+"""Stores each finished start in a file of a folder, so that a second call runs only the rest."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ import numpy as np
 from ..._runtime.files import replace_file
 from ..._runtime.npz import open_npz
 from .json_data import from_plain, to_plain
-from .run_description import described, differences, told_apart
+from .run_description import describe_part, described, differences
 from .run_start import Outcome
 
 _NUMBERS = ("objective", "violation", "seconds")
 
 
 class StartFiles:
-    """The files of one multistart. They hold data only: reading one runs nothing, whoever wrote it.
+    """The files of one multistart. They hold data only: reading one runs no code, whoever wrote it.
 
-    run, starts: as in ms.multistart. Each file says of which they were, and others are refused.
-    resume: take what is there; otherwise the folder must hold no start.
-    Raises ValueError where run or a start cannot be told from another.
+    run, starts: as in ms.multistart. Each file describes its run and start, and is refused for others.
+    resume: take the files that are there; otherwise the folder must hold no finished start.
+    Raises ValueError if run or a start cannot be described.
     """
 
     def __init__(self, folder: str | Path, run: Callable[..., Any], starts: list[Any], resume: bool):
@@ -32,7 +32,7 @@ class StartFiles:
         if self.folder.exists() and not self.folder.is_dir():
             raise ValueError(f"checkpoint must be a folder, and {folder} is a file")
         self._run = described(run)
-        self._starts = [told_apart(f"start {number}", start) for number, start in enumerate(starts)]
+        self._starts = [describe_part(f"start {number}", start) for number, start in enumerate(starts)]
         self.folder.mkdir(parents=True, exist_ok=True)
         if not resume and (found := self._numbers()):
             raise ValueError(
@@ -41,11 +41,11 @@ class StartFiles:
             )
 
     def finished(self) -> dict[int, Outcome]:
-        """Number -> outcome of the starts that need not run again."""
+        """Return {number: outcome} of the starts that need not run again."""
         return {n: self._read(n) for n in self._numbers() if n < len(self._starts)}
 
     def write(self, number: int, outcome: Outcome) -> None:
-        """Raises TypeError where the result is not data."""
+        """Write the file of a finished start. Raises TypeError if the result is not data."""
         arrays: list[np.ndarray] = []
         result = to_plain(outcome.result, arrays, f"the result of start {number}")
         known = {"number": number, "run": self._run, "start": self._starts[number], "result": result}
@@ -55,6 +55,7 @@ class StartFiles:
         replace_file(self._path(number), lambda file: np.savez(file, contents=text, **held))
 
     def _read(self, number: int) -> Outcome:
+        """Read the outcome of a start. Raises ValueError if the file is damaged, or of another run or start."""
         path = self._path(number)
         try:
             with open_npz(path) as file:

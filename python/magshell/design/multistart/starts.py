@@ -1,4 +1,4 @@
-"""What became of many starts: the finished ones, best first, and the others."""
+"""Results of many starts: the finished ones, best first, and the failed ones."""
 
 from __future__ import annotations
 
@@ -10,14 +10,17 @@ import numpy as np
 
 from ..._runtime.frozen import immutable
 
-_MOST_SHOWN = 5  # starts in a printed Multistart
+_MOST_SHOWN = 5  # starts in a printed MultistartResult
 
 
 @immutable
 @dataclass(frozen=True, eq=False)
 class FinishedStart:
-    """number: of the start in the list. result: what run returned, its objective and by how much constraints are
-    broken. seconds: that it took."""
+    """A start that has finished.
+
+    number: its position in the list of starts. result: the return value of run; objective, violation: its
+    objective, and by how much constraints are broken. seconds: its duration.
+    """
 
     _as_given: ClassVar = ("start", "result")
 
@@ -32,8 +35,11 @@ class FinishedStart:
 @immutable
 @dataclass(frozen=True, eq=False)
 class FailedStart:
-    """error: in words, with the traceback where there is one. last_good: what the error held, such as the best
-    Minimum until then."""
+    """A start that has failed.
+
+    error: the message; traceback: where it was raised, if known. last_good: the `last_good` of the error, such as
+    the best MinimizeResult until then.
+    """
 
     _as_given: ClassVar = ("start", "last_good")
 
@@ -48,8 +54,11 @@ class FailedStart:
 @immutable
 @dataclass(frozen=True, eq=False, repr=False)
 class MultistartResult(Sequence[Any]):
-    """The finished starts as a sequence, best first. failed: FailedStarts, by number. unfinished: numbers of the starts
-    that an interruption left. seconds: in all. resumed: numbers of the starts whose results came from the checkpoint."""
+    """The finished starts as a sequence, best first.
+
+    failed: FailedStarts, by number. unfinished: numbers of the starts that an interruption left. seconds: in all.
+    resumed: numbers of the starts whose results came from the checkpoint.
+    """
 
     finished: tuple[FinishedStart, ...]
     failed: tuple[FailedStart, ...]
@@ -65,7 +74,7 @@ class MultistartResult(Sequence[Any]):
 
     @property
     def best(self) -> FinishedStart:
-        """The start that came out best."""
+        """The start with the best result. Raises ValueError if none has finished."""
         if not self.finished:
             raise ValueError(
                 f"no start has finished: {len(self.failed)} failed, {len(self.unfinished)} were left"
@@ -74,7 +83,7 @@ class MultistartResult(Sequence[Any]):
 
     @property
     def objectives(self) -> np.ndarray:
-        """(n,), in the order of the sequence."""
+        """The objectives of the finished starts, (n,), best first."""
         return np.array([found.objective for found in self.finished])
 
     def __repr__(self) -> str:

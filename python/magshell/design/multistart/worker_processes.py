@@ -1,4 +1,4 @@
-"""Processes made for a multistart. A start that brings its process down takes no other start along."""
+"""Worker processes of a multistart: a start that crashes its process leaves the other starts alone."""
 
 from __future__ import annotations
 
@@ -16,20 +16,22 @@ from .single_thread import one_thread_in_children
 if TYPE_CHECKING:
     from types import TracebackType
 
-_TIME_TO_LEAVE = 1.0  # s, that an idle process may take to end
+_TIME_TO_LEAVE = 1.0  # [s] time that an idle process has to end
 
 
 class WorkerDied(RuntimeError):
-    """A start's process came to an end, every time the start was tried."""
+    """An error raised if the process of a start ended early, every time the start was tried."""
 
 
 class WorkerProcesses(Executor):
-    """At most `count` fresh processes (spawned, so that no thread or lock is inherited), each with one thread.
+    """An executor of at most `count` fresh processes, each with one thread.
 
-    A process that dies is replaced, and its start is tried again in the new one, `attempts` times in all.
-    Calls must be of functions of a module, from bytes to bytes.
+    They are spawned, so that no thread or lock is inherited. A process that dies is replaced, and its start is
+    tried again in the new one, `attempts` times in all. Calls must be of functions of a module, from bytes to
+    bytes.
 
-    Entered, it starts a first process, and raises WorkerDied if that cannot begin. Left by an error, it kills them all.
+    On entering the `with` block it starts a first process, and raises WorkerDied if that cannot begin. If an error
+    ends the block, it kills all processes.
     """
 
     def __init__(self, count: int, attempts: int):
@@ -51,10 +53,11 @@ class WorkerProcesses(Executor):
         self.shutdown(cancel_futures=error is not None)
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
+        """Submit a call of a module's function with bytes as arguments."""
         return self._threads.submit(self._call, function, arguments)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Lets what was submitted come to its end first, or with cancel_futures kills every process at once."""
+        """Wait until all submitted calls have ended, or with cancel_futures kill every process at once."""
         if cancel_futures:
             self._killed.set()
             for worker in list(self._workers):
@@ -67,6 +70,8 @@ class WorkerProcesses(Executor):
                 worker.leave()
 
     def _call(self, function, arguments: tuple[Any, ...]) -> bytes:
+        """Call the function in an idle process, again in a new one if the process dies. Raises WorkerDied after the
+        last attempt."""
         worker = self._idle.get()
         try:
             for _ in range(self._attempts):
@@ -83,14 +88,15 @@ class WorkerProcesses(Executor):
             self._idle.put(worker)
 
     def _buried(self, worker: _Worker) -> str:
-        """Forgets a worker that has died, and says how."""
+        """Remove a worker that has died, and say how it ended."""
         self._workers.discard(worker)
         return worker.how_it_ended()
 
     def _started(self) -> _Worker:
+        """Return a new worker that is ready. Raises WorkerDied if it ended before that."""
         worker = _Worker()
         self._workers.add(worker)
-        if self._killed.is_set():  # who did that may not have seen this one
+        if self._killed.is_set():  # shutdown may not have seen this new worker
             worker.kill()
         try:
             ready = worker.is_ready()
@@ -115,14 +121,14 @@ class _Worker:
         theirs.close()
 
     def is_ready(self) -> bool:
-        """Waits until the process has imported what it needs; False if that brought it down."""
+        """Wait until the process has imported what it needs; returns False if it ended."""
         try:
             return self._connection.recv_bytes() == b"ready"
         except (EOFError, OSError):
             return False
 
     def call(self, function, arguments: tuple[Any, ...]) -> bytes:
-        """Raises EOFError if the process dies of it."""
+        """Call the function in the process. Raises EOFError if the process dies."""
         try:
             self._connection.send_bytes(pickle.dumps((function, arguments)))
             return self._connection.recv_bytes()
@@ -130,6 +136,7 @@ class _Worker:
             raise EOFError from error
 
     def how_it_ended(self) -> str:
+        """Return the signal or the exit code with which the process ended, as text."""
         self._process.join()
         code = self._process.exitcode
         if code is not None and code < 0:
@@ -144,14 +151,14 @@ class _Worker:
         self._connection.close()
 
     def leave(self) -> None:
-        """Gives the process a moment to end in order."""
+        """Wait a moment for the process to end by itself, then kill it."""
         self._process.join(_TIME_TO_LEAVE)
         self._process.kill()
 
 
 def _serve(connection) -> None:
-    """What a worker process does, until its parent hangs up."""
-    # Ctrl-C reaches every process of a terminal; what it means here is for the parent to say.
+    """Run calls in the worker process, until its parent closes the connection."""
+    # Ctrl-C reaches every process of a terminal; only the parent handles it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         connection.send_bytes(b"ready")

@@ -5,7 +5,7 @@ Written in steps t = (x' - x) / scale, with asymptotes at -s and s:
     f~(t) = f(x) + sum_j p_j / (s_j - t_j) + q_j / (s_j + t_j) - (p_j + q_j) / s_j
     p_j = s_j^2 (1.001 [g_j]+ + 0.001 [g_j]- + rho),    q_j = s_j^2 (0.001 [g_j]+ + 1.001 [g_j]- + rho)
 
-g is the gradient in units of the sizes, rho >= 0 a convexity of its own for each function.
+g is the gradient in units of the sizes, and rho >= 0 a convexity of each function.
 K. Svanberg, A class of globally convergent optimization methods ..., SIAM J. Optim. 12 (2002), (4.4)-(4.7).
 """
 
@@ -19,9 +19,10 @@ from .box import Box
 from .sample import Sample
 from .subproblem import Subproblem
 
-# Of an asymptote, in sizes. Svanberg's notes keep 0.01: MMA then swings about a minimum inside the box for ever.
+# Smallest and largest distance of an asymptote, in sizes. Svanberg's notes take 0.01 as the smallest: MMA then oscillates
+# about a minimum inside the box without end.
 _CLOSEST, _FARTHEST = 1e-6, 10.0
-_GAP = 0.9  # of the way to an asymptote that a step may go
+_GAP = 0.9  # [-] largest step, as a fraction of the distance to an asymptote
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,8 @@ class Asymptotes:
     grow: np.ndarray
 
     def distance(self, last: np.ndarray, step: np.ndarray, step_before: np.ndarray) -> np.ndarray:
-        """Distances s, (n,): drawn in where the last two steps differ in sign, pushed out where they agree."""
+        """Return the distances s of the asymptotes, (n,): smaller if the last two steps differ in sign, larger if
+        they agree."""
         agreement = step * step_before
         factor = np.where(agreement > 0, self.grow, np.where(agreement < 0, self.shrink, 1.0))
         return np.clip(factor * last, _CLOSEST, _FARTHEST)
@@ -41,7 +43,10 @@ class Asymptotes:
 
 @dataclass(frozen=True)
 class Approximation:
-    """values: (1 + m,), the objective first. p, q: (1 + m, n) over the free entries. distance s: (n,)."""
+    """Convex approximations of all functions around a design.
+
+    values: (1 + m,), the objective first. p, q: (1 + m, n) over the free entries. distance s: (n,).
+    """
 
     values: np.ndarray
     p: np.ndarray
@@ -52,14 +57,17 @@ class Approximation:
     def of(
         values: np.ndarray, slopes: np.ndarray, distance: np.ndarray, convexity: np.ndarray
     ) -> Approximation:
-        """slopes g: (1 + m, n). convexity rho: (1 + m,)."""
+        """Compute p and q from the slopes g (1 + m, n) and the convexity rho (1 + m,)."""
         up, down = np.maximum(slopes, 0.0), np.maximum(-slopes, 0.0)
         p = distance**2 * (1.001 * up + 0.001 * down + convexity[:, None])
         q = distance**2 * (0.001 * up + 1.001 * down + convexity[:, None])
         return Approximation(values, p, q, distance)
 
     def at(self, t: np.ndarray) -> np.ndarray:
-        """(1 + m,) approximate values at the step t; each term as its difference from t = 0, to keep small steps."""
+        """Return the approximate values at the step t, (1 + m,).
+
+        Each term is computed as its difference from t = 0, which is accurate for small steps.
+        """
         return (
             self.values
             + self.p @ (t / (self.distance * (self.distance - t)))
@@ -69,18 +77,18 @@ class Approximation:
     def subproblem(
         self, lower: np.ndarray, upper: np.ndarray, sizes: np.ndarray, penalty: float
     ) -> Subproblem:
-        """The subproblem with each function in units of its size, (1 + m,), and steps within the bounds."""
+        """Return the subproblem with each function in units of its size, (1 + m,), and steps within the bounds."""
         p, q = self.p / sizes[:, None], self.q / sizes[:, None]
         limits = ((p + q) @ (1 / self.distance))[1:] - self.values[1:] / sizes[1:]
         return Subproblem(p, q, limits, self.distance, lower, upper, penalty)
 
 
 @dataclass(frozen=True)
-class Surroundings:
-    """All that approximations around a design are made of; slopes, distances and steps t in units of scale.
+class ApproximationData:
+    """The data of which approximations around a design are made; slopes, distances and steps t in units of scale.
 
-    values: (1 + m,). slopes g: (1 + m, n), over the free entries. sizes: (1 + m,) what a large slope of each function
-    is. distance s, scale: (n,). lower, upper: (n,) the interval of t.
+    values: (1 + m,). slopes g: (1 + m, n), over the free entries. sizes: (1 + m,), the largest slope of each
+    function. distance s, scale: (n,). lower, upper: (n,), the interval of t.
     """
 
     values: np.ndarray
@@ -94,10 +102,10 @@ class Surroundings:
     @staticmethod
     def of(
         sample: Sample, box: Box, x: np.ndarray, distance: np.ndarray, move: np.ndarray, steepest: float
-    ) -> Surroundings:
-        """steepest: slope of the objective in the designs before, for at a minimum its own vanishes.
+    ) -> ApproximationData:
+        """Collect the data at a design x. The steps are limited to the box, to `move`, and by the asymptotes.
 
-        A step stays in the box, short of the asymptotes, and no longer than move.
+        steepest: slope of the objective in earlier designs, used because the slope vanishes at a minimum.
         """
         free = box.free
         scale, distance = box.scale[free], distance[free]
@@ -108,15 +116,17 @@ class Surroundings:
         lower = np.maximum((box.lower - x)[free] / scale, -reach)
         upper = np.minimum((box.upper - x)[free] / scale, reach)
         values = np.concatenate([[sample.objective], sample.constraints])
-        return Surroundings(values, slopes, np.where(sizes > 0, sizes, 1.0), distance, scale, lower, upper)
+        return ApproximationData(
+            values, slopes, np.where(sizes > 0, sizes, 1.0), distance, scale, lower, upper
+        )
 
     @property
     def size(self) -> float:
-        """The objective's steepest slope, here or in the designs before."""
+        """The objective's steepest slope, here or in earlier designs."""
         return float(self.sizes[0])
 
     def step(self, convexity: np.ndarray, penalty: float) -> tuple[Approximation, np.ndarray]:
-        """The approximations with the convexities rho, (1 + m,), and the step t that is best for them."""
+        """Return the approximations with the convexities rho (1 + m,), and the step t that solves their subproblem."""
         approximation = Approximation.of(self.values, self.slopes, self.distance, convexity)
         sizes = np.maximum(self.sizes, convexity)
         return approximation, approximation.subproblem(self.lower, self.upper, sizes, penalty).solve()

@@ -1,4 +1,4 @@
-"""What the optimizers share: a box for each parameter group, and a state that survives a restart."""
+"""Base class of the optimizers: bounds of each parameter group, and a state that survives a restart."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from .stagnation import STAGNATION
 class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
     """A torch optimizer whose groups have bounds. `step(closure)` moves the parameters and returns the new objective.
 
-    The closure returns the objective (or the objective and constraints) of the parameters as they stand and does
-    not call backward. What it says of the design that a step ends at is kept for the next step; another closure
-    object, or parameters that were changed in between, make the next step ask again.
+    The closure returns the objective (or the objective and constraints) at the current parameters and does not call
+    backward. Its result at the end of a step is stored for the next step; with another closure object, or parameters
+    that were changed in between, the next step calls the closure again.
 
-    A closure may raise `ms.DesignRejected`: the step then goes less far, up to `max_backtracks` times, before the
-    last rejection comes through. A step that raises leaves parameters and state as they were.
+    A closure may raise `ms.DesignRejected`: the step is then shortened, up to `max_backtracks` times, before the last
+    rejection is raised. A step that raises leaves parameters and state as they were.
     """
 
     _copied = (
@@ -34,9 +34,9 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
         "_sample",
         "_sample_x",
         "max_backtracks",
-    )  # what a copy takes along, beyond torch's own
+    )  # attributes that a copy takes along, beyond torch's own
 
-    stagnation = STAGNATION  # what it means when a step moves nothing
+    stagnation = STAGNATION  # the reason to give if a step changes nothing
 
     def __init__(self, params: Iterable[Any], defaults: dict[Any, Any], max_backtracks: int):
         if not (isinstance(max_backtracks, int) and max_backtracks >= 0):
@@ -47,11 +47,11 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
         torch.optim.Optimizer.__init__(self, listed("params", params, is_tensor), defaults)
 
     def step(self, closure: Callable[..., Any]) -> float:
-        """Moves the parameters by one step, within their box, and returns the objective there.
+        """Move the parameters by one step, within their box, and return the objective there.
 
-        closure: a function without arguments that returns the objective of the parameters as they stand, a scalar tensor,
-        or (objective, constraints), each of which is to be at most zero; it does not call backward. Raises what it raises,
-        with parameters and state as they were; ValueError where its answer is not such.
+        closure: a function without arguments that returns the objective at the current parameters, a scalar tensor, or
+        (objective, constraints), with constraints <= 0 if satisfied; it does not call backward. Its errors are raised with
+        parameters and state as they were; ValueError if it returns anything else.
         """
         sample = self.evaluate(closure)
         self._check_sample(sample)
@@ -60,9 +60,9 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
         return self._sample.objective
 
     def full_step(self, closure: Callable[..., Any]) -> float:
-        """Takes the step that `step` would try first, whatever the objective is there; returns it.
+        """Take the step that `step` would try first, whatever the objective is there, and return the objective.
 
-        For a design beyond a jump of the equilibrium, which no shorter step reaches.
+        It reaches a design beyond a jump of the equilibrium, which no shorter step reaches.
         """
         sample = self.evaluate(closure)
         self._check_sample(sample)
@@ -71,9 +71,9 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
         return self._sample.objective
 
     def add_param_group(self, param_group: dict[Any, Any]) -> None:
-        """Adds a group, {"params": tensors, "lower": ..., "upper": ..., "scale": ...}, before the first step.
+        """Add a group, {"params": tensors, "lower": ..., "upper": ..., "scale": ...}, before the first step.
 
-        Raises ValueError after that, and for options that there are not.
+        Raises ValueError after the first step, and for unknown options.
         """
         if self._run:
             raise ValueError("a parameter group cannot join a run that has begun: make a new optimizer")
@@ -96,12 +96,12 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
             raise
 
     def state_dict(self) -> dict[Any, Any]:
-        """torch's state dict, with the run's own numbers under "run"; safe to load with `weights_only`."""
+        """Return torch's state dict, with the state of the run under "run"; safe to load with `weights_only`."""
         run = {name: as_tensor(value) for name, value in self._run.items()}
         return {**super().state_dict(), "run": {**run, **self._sample_state()}}
 
     def load_state_dict(self, state_dict: dict[Any, Any]) -> None:
-        """Goes on where the optimizer was whose `state_dict` this is: the same steps from there, to the bit.
+        """Continue from the `state_dict` of another optimizer, with the same steps to the bit.
 
         Raises ValueError for the state of another kind of optimizer, or of other parameters.
         """
@@ -114,32 +114,32 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
         self._run = {name: as_array(value) for name, value in state_dict["run"].items() if name not in sample}
 
     def configuration(self) -> dict[Any, Any]:
-        """{name: number or array} of all that decides where a run goes: the box, the groups' options and the method's."""
+        """Return {name: number or array} of all options: the box, the groups' options and the method's."""
         box = self._box()
-        told = {
+        options = {
             name: getattr(box, name) + 0.0 for name in ("lower", "upper", "scale")
-        }  # -0.0 is no other bound
-        told |= {name: getattr(self, name) for name in self._copied if not name.startswith("_")}
-        return told | group_options(self.param_groups, set(told))
+        }  # adding 0.0 turns -0.0, which is the same bound, into 0.0
+        options |= {name: getattr(self, name) for name in self._copied if not name.startswith("_")}
+        return options | group_options(self.param_groups, set(options))
 
     def __getstate__(self) -> dict[Any, Any]:
-        """What a copy or pickle takes along; not the closure."""
-        kept = {name: getattr(self, name) for name in self._copied}
-        return {**super().__getstate__(), **kept, "_closure": None}
+        """Return what a copy or pickle takes along, all but the closure."""
+        copied = {name: getattr(self, name) for name in self._copied}
+        return {**super().__getstate__(), **copied, "_closure": None}
 
     @abstractmethod
     def _advance(self, sample: Sample, box: Box, x: np.ndarray) -> None:
-        """One step from the design x."""
+        """Take one step from the design x."""
 
     @abstractmethod
     def _full_step(self, sample: Sample, box: Box, x: np.ndarray) -> None:
-        """The first step that `_advance` would try, and no other."""
+        """Take the first step that `_advance` would try, whatever its objective is."""
 
     def _check_group(self, group: dict[Any, Any], box: Box) -> None:
-        """What a method asks of a group's options beyond its bounds."""
+        """Check a group's options beyond its bounds. Raises ValueError."""
 
     def _check_sample(self, sample: Sample) -> None:
-        """What a method asks of the closure's answer."""
+        """Check the closure's return value for this method. Raises ValueError."""
 
     def _check_design(self, x: np.ndarray) -> None:
         self._box().check_inside(x)
@@ -148,30 +148,31 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
         return boxes.join([boxes.group_box(number, group) for number, group in enumerate(self.param_groups)])
 
     def _option(self, name: str) -> np.ndarray:
-        """A group's number, (n,): one entry for each entry of its parameters."""
+        """Return a group's option, (n,): one entry for each entry of its parameters."""
         sizes = [sum(parameter.numel() for parameter in group["params"]) for group in self.param_groups]
         return np.repeat([float(group[name]) for group in self.param_groups], sizes)
 
 
 def group_options(groups: list[dict[Any, Any]], without: set[str]) -> dict[Any, Any]:
-    """The options of parameter groups, by names of their own."""
-    kept = {"params", "param_names", *without}
+    """Return the options of parameter groups, {"name of group number": value}."""
+    left_out = {"params", "param_names", *without}
     return {
         f"{name} of group {number}": value
         for number, group in enumerate(groups)
         for name, value in group.items()
-        if name not in kept
+        if name not in left_out
     }
 
 
 def require_range(group: dict[Any, Any], name: str, low: float, high: float) -> None:
-    """A group's option that must lie strictly between two numbers."""
+    """Check that a group's option lies strictly between two numbers. Raises ValueError."""
     value = group[name]
     if not (isinstance(value, int | float) and low < value < high):
         raise ValueError(f"{name} must be a number between {low:g} and {high:g}, got {value!r}")
 
 
 def check_parameter(parameter: torch.Tensor) -> None:
+    """Check that a parameter is real and requires a gradient. Raises ValueError."""
     if not parameter.is_floating_point():
         raise ValueError(f"a parameter must be real, got dtype {parameter.dtype}")
     if not parameter.requires_grad:

@@ -1,4 +1,4 @@
-"""The box that a design lives in: bounds and typical sizes of all parameters, as one vector each."""
+"""Bounds and typical sizes of all parameters, as one vector each."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ from ..._input.tensors import detached
 
 @dataclass(frozen=True)
 class Box:
-    """lower, upper, scale: (n,), over the entries of all parameters in the order of the groups.
+    """The bounds and typical sizes of a design.
 
-    A bound is the last number within it that the parameter's own dtype can hold, so that a float32
-    parameter written at its bound does not round across it.
+    lower, upper, scale: (n,), over the entries of all parameters in the order of the groups. Each bound is rounded
+    inwards to a number of the parameter's own dtype, so that a float32 parameter written at its bound does not
+    round across it.
     """
 
     lower: np.ndarray
@@ -29,16 +30,17 @@ class Box:
 
     @property
     def free(self) -> np.ndarray:
-        """(n,) bool: the entries whose bounds leave them room."""
+        """Return which entries can change, (n,) bool: those whose bounds differ."""
         return self.upper > self.lower
 
     def moved(self, x: np.ndarray, change: np.ndarray) -> np.ndarray:
-        """The design after a change of its free entries, (n free,); never outside the box by a rounding."""
+        """Return the design after a change of its free entries, (n free,), clipped to the box."""
         moved = x.copy()
         moved[self.free] += change
         return np.clip(moved, self.lower, self.upper)
 
     def name_of(self, entry: int) -> str:
+        """Return the name of the parameter that an entry of the vector belongs to, with the entry's number there."""
         for name, size in zip(self.names, self.sizes, strict=True):
             if entry < size:
                 return f"{name}, entry {entry}"
@@ -46,6 +48,7 @@ class Box:
         raise IndexError(entry)
 
     def check_inside(self, x: np.ndarray) -> None:
+        """Raise ValueError if the design x is outside the box."""
         outside = ~((x >= self.lower) & (x <= self.upper))
         if outside.any():
             entry = int(outside.argmax())
@@ -56,7 +59,8 @@ class Box:
 
 
 def option_tensors(label: str, value: Any, parameters: list[torch.Tensor]) -> list[torch.Tensor]:
-    """A bound or a scale as one float64 tensor a parameter: a number, a tensor, or a list with one of these each."""
+    """Convert a bound or a scale to one float64 tensor for each parameter: from a number, a tensor, or a list of
+    these."""
     values = value if isinstance(value, list | tuple) else [value] * len(parameters)
     if len(values) != len(parameters):
         raise ValueError(f"{label} has {len(values)} entries for {len(parameters)} parameters")
@@ -79,7 +83,7 @@ def option_tensors(label: str, value: Any, parameters: list[torch.Tensor]) -> li
 
 
 def group_box(number: int, group: dict[Any, Any]) -> Box:
-    """The box of one parameter group. Bounds that cross, and sizes that are not positive, are refused."""
+    """Return the box of one parameter group. Raises ValueError if bounds cross or sizes are not positive."""
     lowers, uppers, scales, names, sizes = [], [], [], [], []
     bounds = zip(
         group["params"],
@@ -113,7 +117,7 @@ def group_box(number: int, group: dict[Any, Any]) -> Box:
 
 
 def join(boxes: list[Box]) -> Box:
-    """The box of all groups."""
+    """Join the boxes of all groups."""
     return Box(
         *(np.concatenate([getattr(box, name) for box in boxes]) for name in ("lower", "upper", "scale")),
         names=sum((box.names for box in boxes), ()),
@@ -126,7 +130,7 @@ def _entries(value: torch.Tensor, parameter: torch.Tensor) -> np.ndarray:
 
 
 def _inward(bound: torch.Tensor, parameter: torch.Tensor, inside: float) -> np.ndarray:
-    """The bound in the parameter's dtype, rounded into the box; float64."""
+    """Return the bound rounded inwards to the parameter's dtype, as float64."""
     exact = torch.broadcast_to(bound, parameter.shape).reshape(-1)
     rounded = exact.to(parameter.dtype)
     beyond = rounded.double() < exact if inside > 0 else rounded.double() > exact

@@ -1,27 +1,27 @@
-"""The globally convergent form of the method of moving asymptotes."""
+"""The globally convergent method of moving asymptotes."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ...errors import DesignRejected
-from .approximation import Surroundings
+from .approximation import ApproximationData
 from .box import Box
 from .mma import MMA
 from .sample import Sample
 
 _INNER_LIMIT = 15
-_ROUNDING = 1e-12  # of a function's values, and ten times that of its slope: below, a difference says nothing
-_SMALLEST_CONVEXITY = 1e-6  # of a function's steepest slope
+_ROUNDING = 1e-12  # [-] round-off of a function relative to its values and to ten times its slope
+_SMALLEST_CONVEXITY = 1e-6  # [-] relative to a function's steepest slope
 
 
 class GCMMA(MMA):
-    """MMA that takes a step only where its approximations lie above the functions; options as `ms.optim.MMA`.
+    """MMA that takes a step only if its approximations lie above the functions there; options as `ms.optim.MMA`.
 
-    Where one does not, it is made more convex and the subproblem solved again: each such inner iteration costs one
-    evaluation without gradients. Where the closure rejects a design, all of them are made so much more convex that
-    the step is half as long. At a minimum, to rounding, a step stays where it is. From a design that keeps the
-    constraints every step keeps them and lowers the objective.
+    If an approximation does not, it is made more convex and the subproblem is solved again: each such inner iteration
+    costs one evaluation without gradients. If the closure rejects a design, all approximations are made so much more
+    convex that the step is half as long. At a minimum, to rounding, the parameters stay. From a design that satisfies the
+    constraints, every step satisfies them and lowers the objective.
 
     K. Svanberg, A class of globally convergent optimization methods ..., SIAM J. Optim. 12 (2002).
 
@@ -63,20 +63,21 @@ class GCMMA(MMA):
                 return
             convexity = _more_convex(convexity, missing, t, around.distance)
             approximation, t = around.step(convexity, self.penalty)
-        self._write(x)  # the functions' own rounding is all that is left: a minimum
+        self._write(x)  # the differences are round-off of the functions: a minimum
         self._leave_gradients(sample.gradient)
 
-    def _first_convexity(self, around: Surroundings) -> np.ndarray:
-        """[Svanberg 2002] (4.8)"""
+    def _first_convexity(self, around: ApproximationData) -> np.ndarray:
+        """Return the first convexities rho, (1 + m,). [Svanberg 2002] (4.8)"""
         return np.maximum(0.1 * np.abs(around.slopes).mean(axis=1), _SMALLEST_CONVEXITY * around.sizes)
 
 
 def _more_convex(
     convexity: np.ndarray, missing: np.ndarray, t: np.ndarray, distance: np.ndarray
 ) -> np.ndarray:
-    """[Svanberg 2002] (4.9): enough to close the gap at t, with a tenth to spare, and at most ten times what it was."""
+    """Return convexities that close the gap at t, with a tenth to spare, at most ten times the old ones. [Svanberg
+    2002] (4.9)"""
     gain = 2 * float(
         (distance * t**2 / (distance**2 - t**2)).sum()
-    )  # of the approximation, a unit of convexity
+    )  # increase of the approximation per unit of convexity
     needed = missing / gain if gain > 0 else np.full_like(missing, np.inf)
     return np.where(missing > 0, np.minimum(10 * convexity, 1.1 * (convexity + needed)), convexity)

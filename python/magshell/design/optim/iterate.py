@@ -1,4 +1,4 @@
-"""Where an optimizer stands: its parameters as one vector, and what the closure says of them."""
+"""The current design of an optimizer: its parameters as one vector, and the closure's result there."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ _SAMPLE = "sample_"
 
 
 class Iterate:
-    """The design of an optimizer with `param_groups`, and the sample of it, asked for once a design.
+    """The design of an optimizer with `param_groups`, and its sample, which is computed once.
 
-    Another closure object, or parameters that were changed in between, make `evaluate` ask again.
+    With another closure object, or parameters that were changed in between, `evaluate` calls the closure again.
     """
 
     def __init__(self):
@@ -26,11 +26,11 @@ class Iterate:
 
     @property
     def parameters(self) -> list[torch.Tensor]:
-        """Every parameter, group by group."""
+        """The parameters of all groups, group by group."""
         return [parameter for group in self.param_groups for parameter in group["params"]]
 
     def evaluate(self, closure: Callable[..., Any]) -> Sample:
-        """The sample of the parameters as they stand; asks the closure only if it is not known yet."""
+        """Return the sample at the current parameters; calls the closure only if it is not known yet."""
         if not callable(closure):
             raise ValueError(
                 f"{type(self).__name__}.step needs a closure that returns the objective, got {closure!r:.60}"
@@ -39,18 +39,19 @@ class Iterate:
         self._check_design(x)
         known = self._sample is not None and np.array_equal(x, self._sample_x)
         if not (known and self._closure in (None, closure)):
-            self._keep(x, Trial(closure, self.parameters).differentiate())
+            self._store(x, Trial(closure, self.parameters).differentiate())
         self._closure = closure
         return self._sample
 
     def _check_design(self, x: np.ndarray) -> None:
-        """Refuses a design to begin a step at."""
+        """Check a design at which a step is to begin. Raises ValueError."""
 
     def _read(self) -> np.ndarray:
+        """Return the parameters as one vector, (n,) float64."""
         return torch.cat([p.detach().reshape(-1).double().cpu() for p in self.parameters]).numpy()
 
     def _write(self, x: np.ndarray) -> np.ndarray:
-        """Sets the parameters; returns what they hold now, which their dtype may have rounded."""
+        """Set the parameters; returns their values, which their dtype may have rounded."""
         chunks = torch.from_numpy(x).split([parameter.numel() for parameter in self.parameters])
         with torch.no_grad():
             for parameter, chunk in zip(self.parameters, chunks, strict=True):
@@ -58,21 +59,21 @@ class Iterate:
         return self._read()
 
     def _leave_gradients(self, gradient: np.ndarray) -> None:
-        """Sets the parameters' `.grad`, (n,)."""
+        """Set the parameters' `.grad` from a vector (n,)."""
         chunks = torch.from_numpy(gradient).split([parameter.numel() for parameter in self.parameters])
         for parameter, chunk in zip(self.parameters, chunks, strict=True):
             parameter.grad = chunk.reshape(parameter.shape).to(parameter)
 
     def _trial(self, x: np.ndarray) -> tuple[np.ndarray, Trial]:
-        """The design x as the parameters hold it, and the closure's values there."""
+        """Return the design x as the parameters store it, and the closure's values there."""
         x = self._write(x)
         return x, Trial(self._closure, self.parameters)
 
-    def _keep(self, x: np.ndarray, sample: Sample) -> None:
+    def _store(self, x: np.ndarray, sample: Sample) -> None:
         self._sample_x, self._sample = x, sample
 
     def _sample_state(self) -> dict[Any, Any]:
-        """What is known of the design, as tensors and numbers."""
+        """Return the design and its sample as tensors and numbers."""
         if self._sample is None:
             return {}
         state = {_SAMPLE + name: as_tensor(value) for name, value in vars(self._sample).items()}
@@ -90,7 +91,7 @@ class Iterate:
 
 
 class Restoring:
-    """Puts the parameters and their gradients back where they were if the block raises."""
+    """A context manager that restores the parameters and their gradients if the block raises."""
 
     def __init__(self, iterate: Iterate):
         self._iterate = iterate

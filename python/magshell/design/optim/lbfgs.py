@@ -1,4 +1,4 @@
-"""Limited-memory BFGS within bounds."""
+"""Limited-memory BFGS with bounds."""
 
 from __future__ import annotations
 
@@ -22,22 +22,24 @@ if TYPE_CHECKING:
     from ..._input.kinds import Numbers
 
 
-_ROUNDING = 4 * np.finfo(float).eps  # of the objective: a smaller decrease cannot be seen
+_ROUNDING = 4 * np.finfo(float).eps  # [-] a relative decrease of the objective below this is round-off
 
 
 class LBFGS(BoxOptimizer):
-    """L-BFGS-B: the generalized Cauchy point of a limited-memory model, its minimum over the free variables, and a
-    line search for the strong Wolfe conditions within the box. It has no other constraints.
+    """L-BFGS-B: a quasi-Newton method with bounds and no other constraints.
+
+    A step goes to the generalized Cauchy point of a limited-memory model, then to the model's minimum over the
+    free variables, with a line search for the strong Wolfe conditions within the box.
 
     lower, upper: bounds of a group: a number, a tensor that fits each parameter, or a list with one of these each.
     scale: the typical size of a variable, in the same forms; by default upper - lower where both are finite, else 1.
-    memory: how many steps the model is made from. Before them it is a diagonal, learned from all steps so far, so that
-    variables whose sizes were guessed badly still move together.
-    first_step: how far the steepest variable is tried to move at first, in sizes. Less costs a few iterations more;
-    where an objective is dear and known only nearby, 0.1 is safer.
-    max_evaluations: of the closure in one line search; the lowest design of a search cut short is taken. Where each is dear
-    and the objective kinked, as of a sheet near a snap, 5 will do.
-    max_backtracks: how often a line search may meet a design that the closure rejects; it counts as higher than any.
+    memory: number of steps that the model is made from. The model before these steps is a diagonal, learned from all steps
+    so far, so that variables with badly guessed sizes still move together.
+    first_step: length of the first trial step of the steepest variable, in sizes. A smaller one costs a few iterations
+    more; if an objective is expensive and can be evaluated only nearby, 0.1 is safer.
+    max_evaluations: of the closure in one line search; if the search is cut short, its lowest design is taken. If
+    evaluations are expensive and the objective has kinks, as for a sheet near a snap, 5 is enough.
+    max_backtracks: how often a line search may meet a design that the closure rejects; it counts as higher than any other.
 
     R. H. Byrd, P. Lu, J. Nocedal, C. Zhu, A limited memory algorithm for bound constrained optimization,
     SIAM J. Sci. Comput. 16 (1995).
@@ -83,7 +85,7 @@ class LBFGS(BoxOptimizer):
 
     def _advance(self, sample: Sample, box: Box, x: np.ndarray) -> None:
         self.stagnation = STAGNATION
-        # A model may be stale: once more along the gradient then.
+        # If the model finds no descent, it may be outdated: then try again along the gradient.
         for run in (self._run, {}) if self._run else ({},):
             line = self._line(sample, box, x, run)
             found = None if line is None else self._search(line, sample.objective)
@@ -92,7 +94,7 @@ class LBFGS(BoxOptimizer):
                 self._write(moved)
                 self._leave_gradients(reached.gradient)
                 self._run = self._learned(run, box, moved - x, reached.gradient - sample.gradient)
-                self._keep(moved, reached)
+                self._store(moved, reached)
                 return
         self._write(x)
         self._leave_gradients(sample.gradient)
@@ -100,12 +102,12 @@ class LBFGS(BoxOptimizer):
     def _full_step(self, sample: Sample, box: Box, x: np.ndarray) -> None:
         line = self._line(sample, box, x, self._run)
         if line is not None:
-            # The gradient's change across a jump is no curvature: nothing is learned from it.
+            # The gradient's change across a jump is no curvature: the model is not updated with it.
             moved, trial = self._trial(line.at(1.0))
-            self._keep(moved, trial.differentiate())
+            self._store(moved, trial.differentiate())
 
     def _line(self, sample: Sample, box: Box, x: np.ndarray, run: dict[Any, Any]) -> _Line | None:
-        """The line to the minimum of the model; None where the model falls nowhere within the box."""
+        """Return the line to the minimum of the model; None if the model does not decrease within the box."""
         stretch = np.sqrt(run["diagonal"]) if run else 1.0
         unit = _sizes(box) / stretch
         gradient = sample.gradient[box.free] * unit
@@ -126,7 +128,8 @@ class LBFGS(BoxOptimizer):
         return _Line(x, step * unit, slope, _longest(step, lower, upper), box)
 
     def _search(self, line: _Line, objective: float) -> tuple[np.ndarray, Sample] | None:
-        """A lower design on the line and its sample. The last rejection, if nothing short enough was accepted."""
+        """Return a lower design on the line with its sample, or None. Raises the last rejection if all trial designs
+        were rejected."""
         rejections = []
         probes = 0
 
@@ -143,7 +146,10 @@ class LBFGS(BoxOptimizer):
             return Probe(length, sample.objective, slope, (moved, sample))
 
         start = Probe(0.0, objective, line.slope)
-        limits = {"limit": self.max_evaluations - 1, "max_rejected": self.max_backtracks}  # beside the first
+        limits = {
+            "limit": self.max_evaluations - 1,
+            "max_rejected": self.max_backtracks,
+        }  # after the first one
         best = strong_wolfe(probe, start, 1.0, line.longest, **limits)
         if best is not None:
             return best.found
@@ -156,7 +162,8 @@ class LBFGS(BoxOptimizer):
         return None
 
     def _learned(self, run: dict[Any, Any], box: Box, step: np.ndarray, change: np.ndarray) -> dict[Any, Any]:
-        """The last steps and changes of the gradient, (k, n) in units of the sizes, and the model before them."""
+        """Return the updated model: the last steps and changes of the gradient, (k, n) in units of the sizes, and the
+        diagonal."""
         size = _sizes(box)
         step, change = step[box.free] / size, change[box.free] * size
         if not shows_curvature(step, change):
@@ -170,7 +177,7 @@ class LBFGS(BoxOptimizer):
 
 @dataclass(frozen=True)
 class _Line:
-    """x + a change within the box, 0 <= a <= longest; slope: of the objective at a = 0."""
+    """The designs x + a change within the box, 0 <= a <= longest; slope: that of the objective at a = 0."""
 
     x: np.ndarray
     change: np.ndarray
@@ -183,12 +190,12 @@ class _Line:
 
 
 def _sizes(box: Box) -> np.ndarray:
-    """(n free,)"""
+    """Return the sizes of the free entries, (n free,)."""
     return np.where(np.isnan(box.scale), 1.0, box.scale)[box.free]
 
 
 def _longest(step: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> float:
-    """How often the step fits into the box; at least once, for it ends inside."""
+    """Return how often the step fits into the box; at least once, since it ends inside."""
     with np.errstate(divide="ignore", invalid="ignore"):
         fits = np.where(step > 0, upper / step, np.where(step < 0, lower / step, np.inf))
     return max(1.0, float(fits.min(initial=np.inf)))

@@ -1,9 +1,9 @@
-"""A line search for the strong Wolfe conditions on an interval.
+"""Line search for the strong Wolfe conditions on an interval:
 
     f(a) <= f(0) + c1 a f'(0),     |f'(a)| <= c2 |f'(0)|
 
-Nocedal and Wright, Numerical Optimization (2006), algorithms 3.5 and 3.6, with the interval's end accepted where f
-still falls.
+Nocedal and Wright, Numerical Optimization (2006), algorithms 3.5 and 3.6; the interval's end is accepted if f still
+decreases there.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ import numpy as np
 
 _DECREASE, _CURVATURE = 1e-4, 0.9
 _EXPANSION = 4.0
-_SAFEGUARD = 0.1  # of a bracket, kept from its ends
+_SAFEGUARD = 0.1  # [-] smallest distance from a bracket's ends, relative to its length
 
 
 @dataclass(frozen=True)
 class Probe:
-    """Value and slope of the objective at a step length, and whatever else the evaluation brought.
+    """The value and slope of the objective at a step length, and other results of the evaluation.
 
-    A value of infinity says that the design there was rejected.
+    An infinite value means that the design was rejected.
     """
 
     length: float
@@ -40,8 +40,11 @@ def strong_wolfe(
     limit: int = 20,
     max_rejected: int = 6,
 ) -> Probe | None:
-    """The probe of an acceptable length in (0, longest]; the lowest of a search cut short, by `limit` steps or by
-    more than `max_rejected` rejections; None if none is below the start."""
+    """Return the probe of an acceptable length in (0, longest].
+
+    If the search is cut short, by `limit` steps or by more than `max_rejected` rejections, it is the lowest probe;
+    None if none is below the start.
+    """
 
     def falls_short(at: Probe) -> bool:
         return at.value > start.value + _DECREASE * at.length * start.slope
@@ -74,14 +77,15 @@ def strong_wolfe(
 
 
 def _between(low: Probe, high: Probe) -> float:
-    """The minimum of the cubic through both ends' values and slopes, kept off the ends. [NW06] (3.59)"""
+    """Return the minimum of the cubic through both ends' values and slopes, at a distance from the ends. [NW06]
+    (3.59)"""
     width = high.length - low.length
     d1 = low.slope + high.slope - 3 * (low.value - high.value) / (low.length - high.length)
     discriminant = d1 * d1 - low.slope * high.slope
     if np.isfinite(discriminant) and discriminant >= 0:
         d2 = np.copysign(np.sqrt(discriminant), width)
         denominator = high.slope - low.slope + 2 * d2
-        share = 1 - (high.slope + d2 - d1) / denominator if denominator != 0 else 0.5
+        fraction = 1 - (high.slope + d2 - d1) / denominator if denominator != 0 else 0.5
     else:
-        share = 0.5
-    return low.length + width * min(max(share, _SAFEGUARD), 1 - _SAFEGUARD)
+        fraction = 0.5
+    return low.length + width * min(max(fraction, _SAFEGUARD), 1 - _SAFEGUARD)

@@ -11,7 +11,7 @@ import numpy as np
 from ..._input.scalars import positive
 from ..._runtime.solver_entry_point import grouped
 from ...errors import DesignRejected
-from .approximation import Asymptotes, Surroundings
+from .approximation import ApproximationData, Asymptotes
 from .base import BoxOptimizer, require_range
 from .box import Box
 from .sample import Sample
@@ -20,8 +20,10 @@ if TYPE_CHECKING:
     from ..._input.kinds import Numbers
 
 
-_KEPT = 0.5  # each step, of the steepest slope so far: one wild design must not set the scale for good
-_CONVEXITY = 1e-6  # of the steepest slope so far: damps steps once the gradient has all but vanished
+_DECAY = 0.5  # [-] factor per step of the steepest slope so far: a single extreme design must not set the scale forever
+_CONVEXITY = (
+    1e-6  # [-] relative to the steepest slope so far: damps steps once the gradient has almost vanished
+)
 
 
 class MMA(BoxOptimizer):
@@ -31,8 +33,8 @@ class MMA(BoxOptimizer):
     scale: the typical size of a variable, in the same forms; by default upper - lower, and needed without finite bounds.
     move: the longest step of a variable, in sizes. asymptote_initial: first distance of the asymptotes, in sizes;
     asymptote_shrink, asymptote_grow: its factors after an oscillation and after progress.
-    penalty: the price of breaking a constraint by as much as its slope would change it over a size, in units of the
-    same change of the objective; only a design that cannot keep its constraints pays it.
+    penalty: the cost of breaking a constraint by as much as its slope would change it over a size, in units of the same
+    change of the objective; it matters only for a design that cannot satisfy its constraints.
     max_backtracks: how often a step to a design that the closure rejects is halved.
 
     Every option but the last two can differ between parameter groups. K. Svanberg, The method of moving asymptotes,
@@ -85,9 +87,9 @@ class MMA(BoxOptimizer):
         around, distance = self._surroundings(sample, box, x)
         _, t = around.step(self._first_convexity(around), self.penalty)
         for shortening in range(self.max_backtracks + 1):
-            share = 0.5**shortening
+            fraction = 0.5**shortening
             try:
-                reached, trial = self._trial(box.moved(x, share * t * around.scale))
+                reached, trial = self._trial(box.moved(x, fraction * t * around.scale))
             except DesignRejected:
                 if shortening == self.max_backtracks:
                     raise
@@ -101,23 +103,25 @@ class MMA(BoxOptimizer):
         reached, trial = self._trial(box.moved(x, t * around.scale))
         self._commit(x, reached, trial.differentiate(), distance, around.size)
 
-    def _surroundings(self, sample: Sample, box: Box, x: np.ndarray) -> tuple[Surroundings, np.ndarray]:
-        """What the approximations are made of, over the free entries; and the asymptotes' distances, (n,)."""
+    def _surroundings(self, sample: Sample, box: Box, x: np.ndarray) -> tuple[ApproximationData, np.ndarray]:
+        """Return the data of the approximations over the free entries, and the asymptotes' distances, (n,)."""
         distance = self._distance(x, box)
-        steepest = _KEPT * self._run.get("size", 0.0)
-        return Surroundings.of(sample, box, x, distance, self._option("move"), steepest), distance
+        steepest = _DECAY * self._run.get("size", 0.0)
+        return ApproximationData.of(sample, box, x, distance, self._option("move"), steepest), distance
 
-    def _first_convexity(self, around: Surroundings) -> np.ndarray:
-        """(1 + m,) rho of the approximations that are tried first."""
+    def _first_convexity(self, around: ApproximationData) -> np.ndarray:
+        """Return the convexities rho of the first approximations, (1 + m,)."""
         return _CONVEXITY * around.sizes
 
     def _commit(
         self, x: np.ndarray, reached: np.ndarray, sample: Sample, distance: np.ndarray, size: float
     ) -> None:
+        """Store the design and sample that a step has reached, and the state for the next step."""
         self._run = {"before": x, "before_that": self._run.get("before"), "distance": distance, "size": size}
-        self._keep(reached, sample)
+        self._store(reached, sample)
 
     def _distance(self, x: np.ndarray, box: Box) -> np.ndarray:
+        """Return the distances of the asymptotes, (n,), from the last two steps."""
         options = Asymptotes(*(self._option(f"asymptote_{name}") for name in ("initial", "shrink", "grow")))
         before, before_that = self._run.get("before"), self._run.get("before_that")
         if before_that is None:

@@ -1,4 +1,4 @@
-"""What a closure says of one design: objective and constraints, and their gradients when asked for."""
+"""Results of a closure at one design: objective and constraints, and their gradients on request."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ import torch
 
 @dataclass(frozen=True)
 class Sample:
-    """objective: a number. gradient: (n,). constraints g <= 0: (m,). jacobian: (m, n). All float64."""
+    """The objective and the constraints at a design, with gradients.
+
+    objective: a number. gradient: (n,). constraints g <= 0: (m,). jacobian: (m, n). All float64.
+    """
 
     objective: float
     gradient: np.ndarray
@@ -21,12 +24,12 @@ class Sample:
 
     @property
     def violation(self) -> float:
-        """The largest positive constraint, 0 when all hold."""
+        """The largest positive constraint, 0 if all are satisfied."""
         return float(self.constraints.max(initial=0.0))
 
 
 class Trial:
-    """The values of a closure, with the graph that their gradients come from.
+    """The values of a closure, with the graph for their gradients.
 
     closure: returns the objective, a scalar tensor, or (objective, constraints), with constraints (m,) <= 0.
     Raises TypeError or ValueError for anything else and FloatingPointError for a value that is not finite.
@@ -47,9 +50,13 @@ class Trial:
         _require_finite("the constraints", self.constraints)
 
     def differentiate(self) -> Sample:
-        """The sample with gradients. The parameters' `.grad` is left holding the objective's; after an error, what it
-        held. Raises ValueError where objective, a constraint or a parameter has no part in them."""
-        kept = [parameter.grad for parameter in self._parameters]
+        """Return the sample with gradients. The parameters' `.grad` is then that of the objective; after an error, as
+        before.
+
+        Raises ValueError if the objective or a constraint does not depend on the parameters, or a parameter
+        affects none of them.
+        """
+        before = [parameter.grad for parameter in self._parameters]
         reached = [False] * len(self._parameters)
         try:
             rows = [
@@ -67,13 +74,13 @@ class Trial:
                     "objective or the constraints: no gradient reaches it"
                 )
         except BaseException:
-            self._leave(kept)
+            self._leave(before)
             raise
         self._leave(gradients)
         return Sample(self.objective, rows[0], self.constraints, np.array(rows[1:]).reshape(-1, rows[0].size))
 
     def _row(self, value: torch.Tensor, label: str, reached: list[bool], retain: bool) -> np.ndarray:
-        """(n,) a gradient; marks the parameters that it reaches."""
+        """Return one gradient, (n,), and mark the parameters that it reaches."""
         self._leave([None] * len(self._parameters))
         if value.requires_grad:
             value.backward(retain_graph=retain, inputs=self._parameters)
@@ -91,6 +98,7 @@ class Trial:
         return row.numpy()
 
     def _leave(self, gradients: list[Any]) -> None:
+        """Set the parameters' `.grad`."""
         for parameter, gradient in zip(self._parameters, gradients, strict=True):
             parameter.grad = gradient
 
@@ -122,7 +130,7 @@ def _checked_constraints(constraints) -> torch.Tensor | None:
             tuple(constraints.shape) if isinstance(constraints, torch.Tensor) else type(constraints).__name__
         )
         raise ValueError(
-            f"the constraints must be a tensor of shape (m,), each entry <= 0 when it holds, got {came}"
+            f"the constraints must be a tensor of shape (m,), each entry <= 0 if satisfied, got {came}"
         )
     return constraints if len(constraints) else None
 

@@ -1,3 +1,3 @@
-"""What optimizers say where a step moves nothing. Needs no torch."""
+"""Message of the optimizers if a step changes nothing. Needs no torch."""
 
 STAGNATION = "the optimizer finds no lower design, to rounding"

@@ -5,8 +5,8 @@
                 lower_j <= t_j <= upper_j,  y_i >= 0
 
 K. Svanberg, MMA and GCMMA - two methods for nonlinear optimization (2007), sections 4 and 5, without the variable
-z, which only min-max problems need, and with asymptotes at -s and s, where MMA's own rules keep them. The unknowns
-t are steps in units of the variables' sizes and the functions are scaled to unit slopes, so that the tolerances
+z, which only min-max problems need, and with asymptotes at -s and s, as MMA's own rules place them. The variables t
+are steps in units of the design variables' sizes, and the functions are scaled to unit slopes, so that the tolerances
 below mean the same in every problem.
 """
 
@@ -17,12 +17,15 @@ from dataclasses import dataclass
 import numpy as np
 
 _LAST_BARRIER = 1e-10
-_NEWTON_LIMIT = 100  # a barrier value takes 3 to 10
+_NEWTON_LIMIT = 100  # Newton iterations for one barrier value, which takes 3 to 10
 
 
 @dataclass(frozen=True)
 class Subproblem:
-    """p, q: (1 + m, n) >= 0, the objective's row first. limits b: (m,). asymptote s, lower, upper: (n,). penalty c."""
+    """The data of the subproblem.
+
+    p, q: (1 + m, n) >= 0, the objective's row first. limits b: (m,). asymptote s, lower, upper: (n,). penalty c.
+    """
 
     p: np.ndarray
     q: np.ndarray
@@ -33,11 +36,11 @@ class Subproblem:
     penalty: float
 
     def solve(self) -> np.ndarray:
-        """The minimizer t, (n,)."""
+        """Return the minimizer t, (n,)."""
         return self._unconstrained() if len(self.limits) == 0 else self._interior_point()
 
     def _unconstrained(self) -> np.ndarray:
-        """p / (s - t)^2 = q / (s + t)^2 for each variable on its own, cut to its interval."""
+        """Solve p / (s - t)^2 = q / (s + t)^2 for each variable separately, clipped to its interval."""
         root_p, root_q = np.sqrt(self.p[0]), np.sqrt(self.q[0])
         return np.clip(self.asymptote * (root_q - root_p) / (root_q + root_p), self.lower, self.upper)
 
@@ -50,7 +53,7 @@ class Subproblem:
                 if np.abs(residual).max() < 0.9 * barrier:
                     break
                 moved = point.newton(self, barrier, np.linalg.norm(residual))
-                if moved is None:  # at the floor of rounding
+                if moved is None:  # the residual is round-off
                     break
                 point = moved
             barrier *= 0.1
@@ -59,7 +62,8 @@ class Subproblem:
 
 @dataclass(frozen=True)
 class _Point:
-    """Primal t, y, slack s of the constraints, and the multipliers of constraints, of t's bounds and of y's."""
+    """An iterate: primal t, y, slack s of the constraints, and the multipliers of constraints, of t's bounds and of
+    y's."""
 
     t: np.ndarray
     y: np.ndarray
@@ -81,15 +85,16 @@ class _Point:
         return self.t, self.y, self.slack, self.multiplier, self.at_lower, self.at_upper, self.at_zero
 
     def slopes(self, sub: Subproblem) -> np.ndarray:
-        """(1 + m, n) derivatives of objective and constraints."""
+        """Return the derivatives of objective and constraints, (1 + m, n)."""
         return sub.p / (sub.asymptote - self.t) ** 2 - sub.q / (sub.asymptote + self.t) ** 2
 
     def excess(self, sub: Subproblem) -> np.ndarray:
-        """(m,) constraints less y and b."""
+        """Return the constraints minus y and b, (m,)."""
         values = sub.p[1:] @ (1 / (sub.asymptote - self.t)) + sub.q[1:] @ (1 / (sub.asymptote + self.t))
         return values - self.y - sub.limits
 
     def residual(self, sub: Subproblem, barrier: float) -> np.ndarray:
+        """Return the residual of the perturbed optimality conditions."""
         slopes = self.slopes(sub)
         return np.concatenate(
             [
@@ -104,7 +109,7 @@ class _Point:
         )
 
     def newton(self, sub: Subproblem, barrier: float, norm: float) -> _Point | None:
-        """One damped Newton step; None if no step makes the residual smaller."""
+        """Take one damped Newton step; returns None if no step reduces the residual."""
         direction = self._direction(sub, barrier)
         rates = [-step / value for step, value in zip(direction[1:], self.parts()[1:], strict=True)]
         rates += [-direction[0] / (self.t - sub.lower), direction[0] / (sub.upper - self.t)]
@@ -120,7 +125,7 @@ class _Point:
         return None
 
     def _direction(self, sub: Subproblem, barrier: float) -> tuple[np.ndarray, ...]:
-        """Newton's step: everything but the m multipliers eliminated."""
+        """Return the Newton step, from a system of the m multipliers after elimination of all else."""
         above, below = self.t - sub.lower, sub.upper - self.t
         slopes = self.slopes(sub)
         jacobian = slopes[1:]

@@ -1,4 +1,4 @@
-"""Any other torch optimizer, in the form that `ms.minimize` drives."""
+"""Gives other torch optimizers the interface that `ms.minimize` uses."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from .sample import Sample
 
 
 class AnyTorch(Iterate):
-    """A torch optimizer that is asked for one step after the other, and knows the objective where it stands.
+    """A torch optimizer that is asked for one step after the other, and knows the objective at the current design.
 
-    Each step gets a closure, which answers from the kept sample where the design is known; an optimizer whose step
-    takes none finds the parameters' gradients. No constraints, no bounds. A step that leads to a rejected design, or
-    meets one on its way, is taken back and again with half the learning rate, up to `max_backtracks` times; a line
-    search of torch's own, which extends steps, may meet it again each time. A step that raises leaves parameters and
-    the optimizer's state as they were.
+    Each step gets a closure, which returns the stored sample if the design is known; an optimizer whose step takes
+    no closure finds the parameters' gradients. There are no constraints and no bounds. A step that leads to a
+    rejected design, or meets one on its way, is undone and repeated with half the learning rate, up to
+    `max_backtracks` times; a line search of torch's own, which extends steps, may meet it again each time. A step
+    that raises leaves parameters and the optimizer's state as they were.
     """
 
     max_backtracks: int
@@ -40,17 +40,18 @@ class AnyTorch(Iterate):
         return self.optimizer.param_groups
 
     def step(self, closure: Callable[..., Any]) -> float:
-        """Moves the parameters and returns the objective there."""
+        """Move the parameters by one step, with the learning rate halved after each rejection, and return the
+        objective there."""
         for shortening in range(self.max_backtracks + 1):
             try:
-                return self._step(closure, share=0.5**shortening)
+                return self._step(closure, factor=0.5**shortening)
             except DesignRejected:
                 if shortening == self.max_backtracks:
                     raise
 
     def full_step(self, closure: Callable[..., Any]) -> float:
-        """The step at the full learning rate and no other."""
-        return self._step(closure, share=1.0)
+        """Take the step at the full learning rate, whatever the objective is there."""
+        return self._step(closure, factor=1.0)
 
     def state_dict(self) -> dict[Any, Any]:
         return {"optimizer": self.optimizer.state_dict(), "sample": self._sample_state()}
@@ -60,10 +61,11 @@ class AnyTorch(Iterate):
         self._load_sample(state_dict["sample"])
 
     def configuration(self) -> dict[Any, Any]:
-        """{name: value} of the groups' options."""
+        """Return {name: value} of the groups' options."""
         return {"max_backtracks": self.max_backtracks, **group_options(self.param_groups, set())}
 
-    def _step(self, closure: Callable[..., Any], share: float) -> float:
+    def _step(self, closure: Callable[..., Any], factor: float) -> float:
+        """Take a step with the learning rates times a factor, and return the objective there."""
         begin = self.evaluate(closure)
         self._refuse_constraints(begin)
         x, state = self._sample_x, copy.deepcopy(self.optimizer.state_dict())
@@ -73,12 +75,12 @@ class AnyTorch(Iterate):
             with Restoring(self):
                 for group, rate in zip(self.param_groups, rates, strict=True):
                     if rate is not None:
-                        group["lr"] = share * rate
+                        group["lr"] = factor * rate
                 self._move(closure)
                 reached = self.evaluate(closure)
         except BaseException:
             self.optimizer.load_state_dict(state)
-            self._keep(x, begin)
+            self._store(x, begin)
             raise
         finally:
             for group, rate in zip(self.param_groups, rates, strict=True):
