@@ -135,7 +135,7 @@ def pressure_on(columns, positions, law):
 
 @pytest.mark.parametrize("cells", [(1, 1), (4, 4), (9, 7)])
 def test_a_flat_mesh_is_as_good_as_a_plane(cells) -> None:
-    # A smaller sheet above a larger one: area times stiffness times b from both sides, wherever the edges run.
+    # A smaller sheet above a larger one: the energy is area times stiffness times b from both sides, whatever the meshes.
     law = {"stiffness": 1e3, "reach": 0.2, "thickness": 0.0, "smoothing": 1.0, "penalty": False}
     gap = 0.05
     positions, surfaces = stacked(grid(cells, 0.0, 3.0), grid((5, 5), gap, 1.0, (1.03, 0.97)))
@@ -149,7 +149,7 @@ def test_a_flat_mesh_is_as_good_as_a_plane(cells) -> None:
     upper = forces[len(np.unique(surfaces[0])) :]
     assert (
         np.abs(upper[:, :2]).max() < 1e-9 * np.abs(upper).max()
-    )  # no step at an edge, nothing along the plane
+    )  # no jump at an edge, no force along the plane
 
 
 def test_a_point_is_pushed_away_wherever_it_is_on_a_crumpled_sheet() -> None:
@@ -238,7 +238,7 @@ def test_crossings_are_those_of_ipctk(seed) -> None:
         )
         for number, swapped, faces in zip(found["contact"], found["swapped"], found["faces"], strict=True)
     }
-    if seed:  # in one plane everything that lies on each other crosses, of which theirs tells nothing
+    if seed:  # seed 0 is coplanar: overlapping faces cross there, which ipctk does not report
         assert got == expected
     else:
         assert expected <= got and got

@@ -51,7 +51,7 @@ def test_distances_are_those_of_ipctk(kind, gap) -> None:
     x = np.concatenate([random_pairs(kind, 2000), random_pairs(kind, 500, gap=gap), hard_pairs(kind, gap)[0]])
     distances, weights, normals, _ = _core.pair_proximities(kind, x)
     theirs = np.sqrt([getattr(ipctk, f"{kind}_distance")(*each) for each in x])
-    told = np.isfinite(theirs)  # they have none from a triangle that is a point
+    told = np.isfinite(theirs)  # ipctk has no distance from a triangle degenerate to a point
     assert np.abs(distances - theirs)[told].max() < 1e-8 * gap and told.sum() >= len(x) - 1
     assert np.allclose(distances[~told], gap)
     # The weights name the closest points, and the normal joins them.
@@ -79,14 +79,14 @@ def test_energies_are_those_of_ipctk(kind, thickness, gap) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_degenerate_pairs_have_the_gradients_of_ipctk(kind) -> None:
-    # With a mollifier, as parallel edges have none of their own: there any of the closest points will do.
+    # With a mollifier, as the gradient of parallel edges is not unique: any pair of closest points is correct.
     x, _ = hard_pairs(kind, 0.05)
     parallel = 1e-3 if kind == "edge_edge" else 0.0
     ours = _core.pair_energies(kind, x, AREA, parallel, LAW)
     for got, each in zip(ours["gradient"].reshape(-1, 12), x, strict=True):
         expected = by_ipctk(kind, each, LAW, parallel)[1]
         if kind == "point_triangle" and not each[1:].any():
-            continue  # a triangle that is a point has no distance there
+            continue  # ipctk has no distance from a triangle degenerate to a point
         assert np.abs(got - expected).max() <= 1e-8 * AREA * LAW["stiffness"]
 
 
@@ -139,7 +139,7 @@ def test_hard_pairs_have_finite_numbers_and_push_apart(kind) -> None:
     at = _core.pair_energies(kind, x, AREA, 1e-3 if kind == "edge_edge" else 0.0, LAW)
     for each in at.values():
         assert np.isfinite(each).all()
-    assert np.abs(at["gradient"].sum(1)).max() <= 1e-9 * np.abs(at["gradient"]).max()  # no force on the whole
+    assert np.abs(at["gradient"].sum(1)).max() <= 1e-9 * np.abs(at["gradient"]).max()  # no net force
     torque = np.cross(x, at["gradient"]).sum(1)
     assert np.abs(torque).max() <= 1e-9 * np.abs(at["gradient"]).max()
     pushed = x - 1e-9 * at["gradient"] / (np.abs(at["gradient"]).max((1, 2), keepdims=True) + 1e-300)
@@ -238,7 +238,7 @@ def test_derivatives_of_friction(kind) -> None:
     assert np.abs(by_stiffness - expected).max() < 1e-9 * np.abs(expected).max()
 
 
-def test_friction_is_that_of_ipctk_where_it_sticks_and_slides() -> None:
+def test_friction_is_that_of_ipctk_in_sticking_and_sliding() -> None:
     ipctk = pytest.importorskip("ipctk", reason="the oracle of contact is not installed")
     x = near_ones("edge_edge", random_pairs("edge_edge", 100, gap=0.1), LAW)
     v = (
@@ -272,7 +272,7 @@ def test_static_friction_falls_to_the_kinetic_one() -> None:
     assert 0.3 < shares[2] < 0.6 and shares[3:] == pytest.approx([0.3, 0.3])
 
 
-def test_neighbours_have_a_law_of_their_own_size() -> None:
+def test_contact_law_of_neighbours_fits_the_room_between_them() -> None:
     x = near_ones("point_triangle", random_pairs("point_triangle", 200, gap=0.1), LAW)
     law, small = LAW | {"thickness": 0.02}, LAW | {"thickness": 0.01, "reach": 0.2, "smoothing": 0.05}
     halved = _core.pair_energies("point_triangle", x, AREA, 0.0, law, room=0.21)

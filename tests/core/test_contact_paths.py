@@ -27,7 +27,7 @@ def gaps(kind, begin, end, fraction, thickness):
 @pytest.mark.parametrize("kind", KINDS)
 def test_never_later_than_the_first_contact_of_ipctk(kind) -> None:
     ipctk = pytest.importorskip("ipctk", reason="the oracle of contact is not installed")
-    # Theirs stops at a 10,000th of the first distance by itself, ours at a thousandth.
+    # ipctk stops at a 10,000th of the initial distance, ours at a thousandth.
     oracle = ipctk.TightInclusionCCD(tolerance=1e-9, max_iterations=10**7, conservative_rescaling=0.9999)
     begin, end = paths(kind, 600)
     ours = _core.pair_free_shares(kind, begin, end, 0.0, 1e-3)
@@ -41,13 +41,13 @@ def test_never_later_than_the_first_contact_of_ipctk(kind) -> None:
         assert fraction <= first
         ratios.append(fraction / max(first, 1e-12))
     assert hits > 50
-    # And hardly ever much earlier: what keeps a hundredth of the gap.
+    # The bound is rarely much too small: compared with the one that keeps a hundredth of the gap.
     assert np.quantile(ratios, 0.02) > 0.9
 
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(("thickness", "keep"), [(0.0, 0.1), (0.05, 0.2), (0.0, 0.5)])
-def test_all_of_the_way_keeps_its_gap(kind, thickness, keep) -> None:
+def test_gap_is_kept_along_the_path_up_to_the_bound(kind, thickness, keep) -> None:
     begin, end = paths(kind, 3000, seed=1)
     first = _core.pair_proximities(kind, begin)[0] - thickness
     fraction = _core.pair_free_shares(kind, begin, end, thickness, keep)
@@ -56,15 +56,15 @@ def test_all_of_the_way_keeps_its_gap(kind, thickness, keep) -> None:
     apart = first > 0.0
     for t in np.linspace(0.0, 1.0, 120):
         assert (gaps(kind, begin, end, t * fraction, thickness) - keep * first)[apart].min() > -1e-14
-    # Where it stops, there is hardly more gap than there must be.
+    # Where the bound stops a pair, its gap is hardly larger than required.
     stopped = apart & (fraction < 1.0)
     left = gaps(kind, begin, end, fraction, thickness)[stopped] / first[stopped]
     assert stopped.sum() > 80 and np.quantile(left, 0.99) < keep + 0.02
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_sliding_is_free(kind) -> None:
-    # A millionth apart, moved by a thousand times that along each other.
+def test_sliding_pairs_are_not_bounded(kind) -> None:
+    # Pairs a millionth apart, moved along each other by a thousand times that.
     x, names = hard_pairs(kind, 1e-6)
     which = "above the inside" if kind == "point_triangle" else "parallel, side by side"
     begin = x[[names.index(which)]]
@@ -85,7 +85,7 @@ def test_hard_pairs_that_close_stop_before_they_touch(kind) -> None:
     assert (away == 1.0).all(), names
 
 
-def test_far_from_the_origin_it_stops_a_little_earlier_but_never_late() -> None:
+def test_bound_far_from_the_origin_is_smaller_but_never_too_large() -> None:
     for kind in KINDS:
         begin, end = paths(kind, 400, seed=3)
         shift = np.array([1e6, -2e6, 5e5])

@@ -170,7 +170,7 @@ def test_a_mirrored_scene_has_the_mirrored_equilibrium(bending):
 
 @pytest.mark.filterwarnings("ignore::magshell.UnitWarning")  # the field is scaled with the modulus
 @pytest.mark.parametrize(("size", "stiffness"), [(1e-3, 1.0), (1e3, 1e-4), (1.0, 1e5)])
-def test_similar_sheets_deform_alike(size, stiffness):
+def test_scaled_sheets_deform_in_proportion(size, stiffness):
     """Check scaling by s in length and k in modulus: line loads scale by k s, M_r B by k."""
     mesh = strip()
     x = mesh.rest_positions[:, 0]
@@ -291,7 +291,7 @@ def quarter_dome(rotation, weight):
 
 
 @pytest.mark.parametrize("rotation", [np.eye(3), OBLIQUE], ids=["along the axes", "oblique"])
-def test_a_quarter_with_symmetry_planes_is_the_whole(rotation):
+def test_quarter_with_symmetry_planes_equals_the_full_dome(rotation):
     whole = dome(3, quarter=False)
     full = sagging(whole.transformed(rotation), whole, [], rotation, 0.05)
     part = quarter_dome(rotation, 0.05)

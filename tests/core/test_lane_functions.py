@@ -32,7 +32,7 @@ def test_logarithm_is_true_to_an_ulp(which):
     assert errors.max() < 1.0
 
 
-def test_logarithm_of_what_has_none_or_an_infinite_one():
+def test_logarithm_of_negative_zero_and_infinite_numbers():
     numbers = [0.0, -0.0, -1.0, -5e-324, -np.inf, np.inf, np.nan, 1.0]
     expected = [-np.inf, -np.inf, np.nan, np.nan, np.nan, np.inf, np.nan, 0.0]
     np.testing.assert_array_equal(_core.lane_logarithms(numbers), expected)

@@ -119,7 +119,7 @@ def test_no_warning_without_reason(name):
         free(ms.Solid(THICK[name](), material=SOFT))
 
 
-def test_a_fin_is_named_by_its_place_and_a_solve_does_not_warn_again():
+def test_warning_locates_a_fin_and_is_not_repeated_by_a_solve():
     with pytest.warns(ms.MeshQualityWarning) as warned:
         solid = ms.Solid(fin(1), material=SOFT)
         free(solid)
@@ -163,7 +163,7 @@ def test_zero_energy_modes_of_isochoric_material_are_counted(mesh, free):
     with warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always")
         solid = ms.Solid(mesh, material=material)
-        ms.Solid(mesh, material=SOFT)  # of so few none is slender
+        ms.Solid(mesh, material=SOFT)  # no region of so few elements is slender
     assert len(warned) <= 1
     said = [str(each.message) for each in warned if "cost no energy" in str(each.message)]
     assert len(said) == (free > 0) and all(f"has {free} shape" in text for text in said)

@@ -47,7 +47,7 @@ def set_muscle(model, activation, direction, strength=STRENGTH):
         ("actuator 0", "strength"): np.array([strength]),
         ("actuator 0", "activation"): np.array([activation]),
     }
-    model.set({"young_modulus": 1e-12, "poisson_ratio": 0.0})  # as good as none: fibres alone
+    model.set({"young_modulus": 1e-12, "poisson_ratio": 0.0})  # a negligible host: fibres alone
 
 
 def torch_force(model, form, x, activation, direction, strength=STRENGTH):
@@ -134,7 +134,7 @@ def test_fibres_without_length_pull_nowhere(element, form):
     assert np.isfinite(model.energy(x))
 
 
-def test_the_energy_of_an_active_stress_is_as_it_is_written():
+def test_energy_of_an_active_stress_is_that_of_the_formula():
     model = model_of("linear", "active stress", activation=0.7)
     x = deformed(model.nodes, (1.3, 0.9, 0.7))
     gradients, volumes = shape_gradients(model.nodes, model.tetrahedra)

@@ -166,7 +166,7 @@ USELESS = {
 
 @pytest.mark.parametrize("places", USELESS)
 @pytest.mark.parametrize("bending", ["midedge", "hinge"])
-def test_useless_points_do_no_harm(bending, places):
+def test_degenerate_points_give_a_valid_ordering(bending, places):
     pattern, points = pattern_of(ms.meshes.rectangle(0.1, 0.1, cells=(24, 24)), bending)
     points = USELESS[places](points)
     sums_to_one(pattern, ordering="dissection", points=points)
@@ -174,7 +174,7 @@ def test_useless_points_do_no_harm(bending, places):
     assert _core.analyze(*pattern, ordering="dissection", points=points).flops < 3.0 * good
 
 
-def test_parts_that_do_not_hang_together():
+def test_disconnected_parts_are_ordered_separately():
     """Order two disconnected parts side by side, far apart, and in one place."""
     (size, starts, rows), points = pattern_of(ms.meshes.rectangle(0.1, 0.1, cells=(20, 20)), "midedge")
     two = 2 * size, np.append(starts, starts[1:] + starts[-1]), np.append(rows, rows + size)

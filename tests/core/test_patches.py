@@ -45,7 +45,7 @@ def test_uniform_stretch_has_the_energy_of_plane_stress(nu, bending):
     assert energies["bending"] < 1e-20
 
 
-def test_affine_moves_of_the_boundary_move_the_inside_alike():
+def test_affine_displacement_of_the_boundary_extends_to_the_inside():
     shell = sheet(poisson_ratio=0.3)
     mesh = shell.mesh
     stretch = np.array([[1.2, 0.15, 0.0], [0.05, 0.9, 0.0], [0.0, 0.0, 1.0]]) - np.eye(3)
@@ -186,7 +186,7 @@ def test_a_couple_bends_a_strip_to_a_circle_about_its_axis(bending, flipped):
     assert abs(heights[1]) == pytest.approx(heights[0], rel=1e-9)
 
 
-def test_loads_are_what_they_say_in_total():
+def test_loads_have_the_stated_resultants():
     shell = sheet(mass_density=1e3)
     mesh = shell.mesh
     area, edges, force = 0.3 * 0.2, mesh.edges_at(x=0.3), np.array([1.0, -2.0, 3.0])

@@ -19,12 +19,12 @@ def test_small_load_on_a_shallow_roof(load_factor: float) -> None:
     np.testing.assert_allclose(state.displacements, response, atol=0.02 * np.abs(response).max())
 
 
-def test_a_state_says_whether_round_off_ended_its_solve() -> None:
+def test_result_reports_whether_round_off_ended_its_solve() -> None:
     scene = cylinder_roof.scene(cylinder_roof.quarter((16, 16)), "midedge")
     small, usual = (ms.equilibrium(scene, load_factor=factor) for factor in (1e-4, 1.0))
     assert small.at_roundoff and "at round-off" in repr(small)
     assert not usual.at_roundoff and "at round-off" not in repr(usual)
-    # the same state is exact enough where less is asked
+    # the same state meets a looser tolerance
     assert not ms.equilibrium(scene, load_factor=1e-4, solver=ms.MixedNewton(tolerance=1e-5)).at_roundoff
 
 

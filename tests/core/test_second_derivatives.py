@@ -71,7 +71,7 @@ def test_a_gradient_penalty_is_refused_but_the_gradient_can_be_read(way, loss):
         (value + (first**2).sum()).backward()
 
 
-def test_a_gradient_by_what_is_not_an_input_of_the_solve_is_refused_too():
+def test_second_derivative_by_a_loss_weight_is_refused_too():
     """Check the weight of a loss, on which the gradient depends only through what comes back to the solve."""
     field, weight = FIELD.clone().requires_grad_(), torch.ones((), dtype=torch.float64, requires_grad=True)
     (first,) = torch.autograd.grad(weight * height(at_rest(field)), field, create_graph=True)

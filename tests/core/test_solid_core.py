@@ -140,7 +140,7 @@ def test_gradient_by_every_constant(material, element):
     for (name, each), by in zip(leaves.items(), expected, strict=True):
         got = found[name]
         by = by.numpy()
-        if name == "fibres":  # unit vectors: only what turns them
+        if name == "fibres":  # unit vectors: only changes across them are compared
             by = by - np.sum(by * each.detach().numpy(), axis=1, keepdims=True) * each.detach().numpy()
             got = got - np.sum(got * values[name], axis=1, keepdims=True) * values[name]
         assert np.abs(got - by).max() < 1e-9 * max(np.abs(by).max(), 1e-12), name

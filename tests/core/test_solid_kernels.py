@@ -82,7 +82,7 @@ def test_derivatives_are_differences_of_the_energy(material, element):
 
 
 @pytest.mark.parametrize("material, element", MADE)
-def test_rest_is_free_of_forces_and_stable_and_turns_cost_nothing(material, element):
+def test_rest_is_force_free_and_stable_and_rotations_have_no_energy(material, element):
     nodes, tetrahedra = sample_element(element)
     model = SolidModel(nodes, tetrahedra, material, element == "mean")
     stiffness = np.abs(model.hessian(nodes)).max()

@@ -134,7 +134,7 @@ def test_face_on_is_twice_rho_a_v2(face):
 
 
 @waters
-def test_both_sides_are_alike(tables, rng):
+def test_forces_do_not_depend_on_the_orientation_of_faces(tables, rng):
     x, v, w = random_faces(rng)
     ours, turned = (
         kernel(make(tables), a[:, i], v[:, i], w[:, i]) for a in [x] for i in ([0, 1, 2], [2, 1, 0])

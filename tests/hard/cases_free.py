@@ -39,7 +39,9 @@ def falling(integrator):
 def thrown():
     scene = free_sheet()
     x = scene.mesh.rest_positions - center(scene, scene.mesh.rest_positions)
-    spin = np.array([0.0, 0.0, 2.0 * np.pi * 1.0])  # 1 turn a second, about the axis of the largest inertia
+    spin = np.array(
+        [0.0, 0.0, 2.0 * np.pi * 1.0]
+    )  # rad/s: one revolution per second about the axis of the largest inertia
     velocities = np.cross(spin, x) + np.array((0.3, -0.2, 0.5))
     motion = ms.simulate(
         scene, steps=1000, time_step=5e-3, velocities=velocities, record_every=100, progress=False

@@ -11,7 +11,9 @@ from magshell.model.supports.supports import rotation_matrix
 
 GRAVITY, SIDE, THICKNESS = 9.81, 0.02, 1e-3
 TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) * 0.01
-TIP_UP = np.arccos(1 / np.sqrt(3)) / np.sqrt(2) * np.array([1.0, -1.0, 0.0])  # turns (1, 1, 1) to the z axis
+TIP_UP = (
+    np.arccos(1 / np.sqrt(3)) / np.sqrt(2) * np.array([1.0, -1.0, 0.0])
+)  # rotates (1, 1, 1) to the z axis
 
 
 def plate(obstacles, friction=0.6, gravity=(0, 0, -GRAVITY), cells=(6, 6), **contact) -> ms.Scene:

@@ -53,7 +53,7 @@ def ball_past_poles(axis):
     """Compare a ball joint with a wheel on a spring about any axis, where Euler angles would be singular."""
     turn = np.eye(3)["xyz".index(axis)]
     ball = ms.Link(mass=1.0, inertia=0.02, center=(0, 0, 0))
-    rate = np.sqrt(2.0 / 0.02) * 3.1  # it turns to 3.1 of pi and back
+    rate = np.sqrt(2.0 / 0.02) * 3.1  # amplitude 3.1 rad, just below pi
     socket = ms.Ball(ball, origin=(0, 0, 0), spring_stiffness=2.0, rate=rate * turn)
     period = 2 * np.pi * np.sqrt(0.02 / 2.0)
     move = ms.simulate(ms.Scene(ms.Skeleton([ball], [socket])), steps=800, time_step=period / 800)

@@ -19,7 +19,7 @@ def bent_far(ratio):
     sheet = shell(mesh, thickness=ratio * LENGTH)
     found = ms.equilibrium(cantilever(sheet, (0, 0, force_for(4.0, sheet, LENGTH))))
     end = end_position(mesh, found.positions) / LENGTH
-    # A thick one stretches by P / (E A) = ratio^2 / 3.
+    # A thick strip stretches by P / (E A) = ratio^2 / 3.
     return both(near("end x, z", end[[0, 2]], elastica(4.0), rel=1e-3 + ratio**2, scale=1.0), at_rest(found))
 
 

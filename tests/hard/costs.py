@@ -19,7 +19,7 @@ import numpy as np
 
 import magshell as ms
 
-# (factorizations, iterations) of the calls of a case together, on 23 November 2026, and what else is to be said.
+# (factorizations, iterations) of all calls of a case, measured on 23 November 2026, and a remark.
 MEASURED: dict[str, tuple[int, int, str]] = {
     "ventricle, 3x1 cells": (97, 95, "apex at -26.31 mm"),
     "ventricle in four calls, 3x1 cells": (80, 80, ""),

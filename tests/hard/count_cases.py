@@ -11,7 +11,7 @@ import magshell as ms
 from benchmarks import motion_costs, projective_motions, surrounding_costs, thrown_bars
 from benchmarks.statics import strongly_bent
 
-Counted = tuple[str, str, Callable[[], object]]  # family, case, what is run
+Counted = tuple[str, str, Callable[[], object]]  # family, case, the call to be counted
 
 INTEGRATORS = (ms.ImplicitEuler(), ms.TRBDF2(), ms.SDIRK2(), ms.SDIRK3())
 
@@ -110,7 +110,9 @@ def thick_tube(pressure: float) -> ms.Scene:
     solid = ms.Solid(
         ms.TetMesh(x, unit.tetrahedra), material=ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.4999)
     )
-    ends = pressure * inner**2 / (outer**2 - inner**2)  # what a rigid cap hands on to the wall
+    ends = (
+        pressure * inner**2 / (outer**2 - inner**2)
+    )  # axial traction [Pa] that rigid end caps transmit to the wall
     loads = [
         ms.Pressure(pressure, faces=unit.faces_at(x=0.0)),
         ms.Pressure(-ends, faces=unit.faces_at(z=1.0)),

@@ -31,7 +31,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--against", type=Path, help="the numbers of an earlier run")
     parser.add_argument("--known", type=Path, help="compare these numbers, run nothing")
     options = parser.parse_args(arguments)
-    sys.path.append(str(Path(__file__).parents[1] / "support"))  # what the hard cases share with other tests
+    sys.path.append(
+        str(Path(__file__).parents[1] / "support")
+    )  # helpers that the hard cases share with other tests
     earlier = json.loads(options.against.read_text()) if options.against else {}
     if options.known:
         found = json.loads(options.known.read_text())

@@ -40,7 +40,9 @@ import magshell as ms
 
 SEED = 20261121
 TIME_LIMIT = 5.0  # s of the processor, of a call
-MEMORY = 12 << 30  # bytes of address space: what asks for more gets a MemoryError, and the machine its rest
+MEMORY = (
+    12 << 30
+)  # bytes of address space: a larger request gets a MemoryError, and the machine does not swap
 DOCUMENTED = (
     ValueError,
     TypeError,
@@ -88,7 +90,7 @@ def spoil(table: list[Call], number: int) -> tuple[Call, dict, str]:
     """Return the call with this number, its arguments, and a text of those that are spoilt."""
     rng = np.random.default_rng([SEED, number])
     weights = np.array([1.0 / call.cost for call in table])
-    # First every function in turn, so that none is missed, then as it comes.
+    # Every function once in order, so that none is missed, then at random.
     k = number if number < len(table) else int(rng.choice(len(table), p=weights / weights.sum()))
     call = table[k]
     arguments = dict(call.arguments)
@@ -140,7 +142,7 @@ def main() -> None:
         os.chdir(folder)
         table = everything(Path(folder))
         first = next(call for call in table if call.name == "optim.MMA")
-        first.function(**first.arguments)  # torch imports the rest of itself, which takes long
+        first.function(**first.arguments)  # torch loads parts of itself here, which takes long
         refused = 0
         for number in range(options.first, options.first + options.count):
             call, arguments, what = spoil(table, number)

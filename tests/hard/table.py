@@ -19,7 +19,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("words", nargs="*", help="run only cases whose family and name hold all of them")
     parser.add_argument("--wide", action="store_true", help="do not shorten what does not fit")
     options = parser.parse_args(arguments)
-    sys.path.append(str(Path(__file__).parents[1] / "support"))  # what the cases share with other tests
+    sys.path.append(
+        str(Path(__file__).parents[1] / "support")
+    )  # helpers that the cases share with other tests
     chosen = [each for each in all_cases() if all(word in each.id for word in options.words)]
     began = time.perf_counter()
     print(_line(("family", "case", "what is hard", "expected", "got"), "time", "", options.wide))

@@ -189,7 +189,7 @@ def knotted(width, cells) -> ms.TetMesh:
     tangent = np.gradient(path, axis=0)
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     across = [np.cross(tangent[0], (0.0, 0.0, 1.0))]
-    for each in tangent[1:]:  # turned as little as can be
+    for each in tangent[1:]:  # parallel transport along the path
         across.append(across[-1] - (across[-1] @ each) * each)
     across = np.array([v / np.linalg.norm(v) for v in across])
     up = np.cross(tangent, across)

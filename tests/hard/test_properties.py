@@ -166,7 +166,7 @@ def test_the_order_of_a_scenes_parts_does_not_matter(seed, order):
 
 @some
 @given(seed=SEEDS, bending=BENDINGS, speed=st.tuples(*[st.floats(-3, 3)] * 3))
-def test_a_free_body_moves_alike_in_every_moving_frame(seed, bending, speed):
+def test_motion_of_a_free_body_is_the_same_in_every_inertial_frame(seed, bending, speed):
     mesh = random_mesh(seed)
     scene = ms.Scene(sheet(mesh, bending), allow_rigid_motions=True)
     own = 0.3 * np.random.default_rng(seed).normal(size=(mesh.n_vertices, 3))
@@ -280,7 +280,7 @@ def test_a_motion_without_drive_gains_no_energy(seed, integrator, damping):
     scene = ms.Scene(sheet(mesh), supports=[clamp(mesh)])
     velocities = 0.5 * np.random.default_rng(seed).normal(size=(mesh.n_vertices, 3))
     move = moving(scene, steps=40, velocities=velocities, integrator=integrator, damping=damping)
-    # Second-order schemes may pass the true energy by their error, which is what they lose in a step or two.
+    # Second-order schemes may exceed the true energy by their error, about the loss of one or two steps.
     slack = 0.0 if isinstance(integrator, ms.ImplicitEuler) else 0.05
     assert (move.energy <= (1.0 + slack) * move.energy[0] + 1e-12).all()
     assert move.energy[-1] < move.energy[0]

@@ -23,7 +23,7 @@ SOLVES, BYTES_A_SOLVE = 1000, 4000  # an array of one state of these scenes is 1
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads /proc")
 @pytest.mark.parametrize("solve", REPEATS, ids=lambda f: f.__name__)
-def test_a_thousand_solves_leave_nothing(solve):
+def test_a_thousand_solves_leak_no_memory(solve):
     on = scene()
     for _ in range(100):  # pools and caches fill
         solve(on)

@@ -7,7 +7,7 @@
 namespace magshell {
 namespace {
 
-// [rad] Smallest angle opposite the long edge of a cap; see test_caps_inside_a_sheet_do_not_stiffen_it.
+// [rad] Smallest angle opposite the long edge of a cap; see test_obtuse_faces_inside_a_sheet_do_not_stiffen_it.
 constexpr double cap_angle = 150.0 / 180.0 * std::numbers::pi;
 constexpr double flat =
     0.1;  // [rad] rest angle above which an edge is a fold that stays; see test_faces_at_folds_and_hinges_keep_their_own_triangles

@@ -8,14 +8,14 @@ namespace magshell {
 namespace {
 
 // [-] largest number of directions tried; the fraction found so far is safe anyway. Fixed by
-// test_all_of_the_way_keeps_its_gap
+// test_gap_is_kept_along_the_path_up_to_the_bound
 constexpr int most_turns = 1024;
 // [-] fraction of the usable gap that may be left unused; fixed by
 // test_hard_pairs_that_close_stop_before_they_touch
 constexpr double small_rest = 0.01;
 // Relative round-off of a projected difference of positions. [-] A position x + t p has an error of two units
 // of round-off, a difference of two such positions five, and its product with a unit direction (itself accurate
-// to four) less than 32. Fixed by test_far_from_the_origin_it_stops_a_little_earlier_but_never_late.
+// to four) less than 32. Fixed by test_bound_far_from_the_origin_is_smaller_but_never_too_large.
 constexpr double round_off = 32.0 * std::numeric_limits<double>::epsilon();
 
 /// Returns the number of nodes of a pair's first part.

@@ -130,7 +130,7 @@ Mat3 DofMap::free_motions(Index node) const {
 
 // At two nodes of one symmetry plane, the block has no free part but round-off.
 bool DofMap::acts_on_free_motion(Index a, Index b, const Vec3& axis) const {
-    // [-] of the axis; see test_a_quarter_with_symmetry_planes_is_the_whole
+    // [-] of the axis; see test_quarter_with_symmetry_planes_equals_the_full_dome
     constexpr double round_off = 1e-10;
     Mat3 across;
     across << 0.0, -axis.z(), axis.y(), axis.z(), 0.0, -axis.x(), -axis.y(), axis.x(), 0.0;

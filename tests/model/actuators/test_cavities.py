@@ -19,7 +19,7 @@ LAWS = {
 
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
-def test_results_say_volume_and_pressure_by_the_law(law, element):
+def test_results_have_volume_and_pressure_by_the_law(law, element):
     body = hollow_block(element)
     cavity = ms.Cavity(body, **LAWS[law])
     scene = held(body, actuators=[cavity])
@@ -45,7 +45,7 @@ def test_water_keeps_its_volume_and_takes_few_iterations():
     assert found.load_steps == 1 and found.iterations <= 12
     softer = ms.Cavity(body, volume=1.5e-6, bulk_modulus=2.2e7)
     near = ms.equilibrium(held(body, actuators=[softer]))
-    assert near.iterations <= found.iterations + 2  # stiffness costs nothing
+    assert near.iterations <= found.iterations + 2  # a stiffer fluid needs no more iterations
 
 
 def test_several_cavities_share_a_wall():
@@ -300,7 +300,7 @@ def test_vacuum_is_crushed_to_a_stable_rest_or_refused():
     assert float(found[vacuum].pressure) == -2e3 and float(found[vacuum].volume) < 1e-6
 
 
-def test_a_collapse_is_an_error_that_says_so():
+def test_collapse_raises_an_error_that_names_it():
     sheet = box_sheet(size=0.03, thickness=2e-4, modulus=1e4)
     vacuum = ms.Cavity(sheet, gas_pressure=0.0)
     with pytest.raises(ms.NotConverged) as caught:

@@ -108,7 +108,7 @@ def test_a_sliding_tendon_has_one_tension_and_a_fixed_one_many():
     assert float(found[slides][slides].tension) == pytest.approx(20.0 * beyond, rel=1e-12)
 
 
-def test_slack_it_does_nothing_and_pulls_once_it_is_shortened():
+def test_slack_tendon_has_no_force_until_it_is_shortened():
     body = bar()
     tendon = ms.Tendon(along(), body, stiffness=20.0, rest_length=0.12)
     scene = fixed(body, actuators=[tendon])

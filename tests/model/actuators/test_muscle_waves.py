@@ -21,7 +21,7 @@ def test_a_wave_travels_with_its_speed():
     assert back.numpy() == pytest.approx(expected, abs=1e-12)
 
 
-def test_a_pulse_is_where_it_has_run():
+def test_pulse_has_travelled_by_speed_times_time():
     a = control.pulse(TIMES, PLACES, speed=0.2, width=0.04, delay=0.1, amplitude=0.8).numpy()
     k = 7  # 0.35 s: 0.05 m
     assert PLACES[np.argmax(a[k])] == pytest.approx(0.05, abs=0.006)

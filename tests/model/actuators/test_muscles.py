@@ -108,7 +108,7 @@ def test_segments_and_weights_are_those_along_the_line():
     assert muscle.activation.shape == (5,)
 
 
-def test_a_segment_pulls_where_it_is():
+def test_segment_contracts_its_own_part():
     mesh = ms.meshes.box((0.1, 0.02, 0.02), cells=(10, 2, 2))
     body = ms.Solid(mesh, material=ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.3), element="linear")
     fibres = ms.fibres_along([(0, 0.01, 0.01), (0.1, 0.01, 0.01)], body, reach=0.05)

@@ -155,7 +155,7 @@ def test_ties_that_do_not_fit_are_refused(make, message):
         ms.Scene([left, right], ties=[make(left, right)], supports=[clamped(left.mesh, left)])
 
 
-def test_bodies_that_do_not_touch_are_not_tied():
+def test_bodies_without_common_points_are_refused_as_tied():
     left, right, _ = halves()
     far = ms.Shell(FULL.transformed(translation=(0, 0, 1.0)), young_modulus=1e6, **PLATE)
     with pytest.raises(
@@ -176,7 +176,7 @@ def test_welded_vertices_have_one_position_and_velocity(name):
 
 
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
-def test_a_sheet_on_a_solid_stretches_with_it(element):
+def test_coat_of_a_solid_has_the_same_strain(element):
     """Stretch a bar and its coat, both St. Venant-Kirchhoff with one Poisson ratio.
 
     Lateral strains agree, and second Piola-Kirchhoff forces add up.

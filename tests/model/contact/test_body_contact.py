@@ -83,7 +83,7 @@ def test_sheets_at_rest_on_each_other():
     assert touching.normal_force > 0.5 * weight
 
 
-def test_upper_sheet_lies_on_the_lower_with_its_whole_weight():
+def test_upper_sheet_rests_on_the_lower_with_its_full_weight():
     """Check that contact supports the weight of a sheet that nothing else holds."""
     lower, upper = ms.Shell(PLATE, **SOFT), above(1.2e-3)
     touch = ms.Contact(lower, upper)
@@ -125,7 +125,7 @@ def test_ball_falls_onto_a_sheet_and_never_through(integrator):
     )
     distances = [move.contact_state(touch, k).smallest_distance for k in range(len(move))]
     assert 0.5e-3 < min(distances) < 0.6e-3
-    assert move[sheet].positions[..., 2].min() < -2e-3  # it gave way
+    assert move[sheet].positions[..., 2].min() < -2e-3  # the sheet is deflected
     middles = move[ball].positions.mean(1)[:, 2]
     assert middles.min() > move[sheet].positions[..., 2].min()
 

@@ -148,7 +148,7 @@ def test_starts_that_lie_in_each_other():
 
 
 @pytest.mark.parametrize("rotation", [(0, 0, np.pi / 4), (0.3, -0.7, 0.2)])
-def test_defaults_do_not_depend_on_how_a_body_lies(rotation):
+def test_defaults_do_not_depend_on_the_orientation_of_a_body(rotation):
     turn = ms.obstacles.Plane(rotation=rotation)._frame(0.0)[0]
     meshes = [PLATE, PLATE.transformed(rotation=turn)]
     sheets = [ms.Shell(mesh, **SHEET) for mesh in meshes]

@@ -24,7 +24,7 @@ def torque(positions, forces):
     return np.cross(positions - POINT, forces).sum(axis=0)
 
 
-def test_supports_hold_what_rests_in_contact():
+def test_reactions_balance_the_weight_of_bodies_in_contact():
     """Check that forces and torques of a clamp, with its moment, and of a pin balance the weight.
 
     Contact forces balance each other.
@@ -121,7 +121,7 @@ def test_friction_of_sticking_bodies_stays_below_the_limit():
     assert not found.is_sliding.any() and found.coefficient == 0.8
     assert 0.0 < found.friction_ratios.max() < 0.5
     mass = upper.vertex_masses.sum()
-    assert found.friction_force[0] == pytest.approx(mass * 1.0, rel=0.05)  # on the lower one
+    assert found.friction_force[0] == pytest.approx(mass * 1.0, rel=0.05)  # force on the lower body
 
 
 def test_forces_of_obstacles_balance_weight_and_inertia():

@@ -58,7 +58,7 @@ def test_published_numbers_are_those_of_the_closed_form():
 @FRICTIONS
 def test_slides_at_049_as_far_as_backward_euler(make_scene, lagged):
     distances, _ = slid(make_scene, 0.49, lagged=lagged)
-    np.testing.assert_allclose(distances[-1], EULER_DISTANCE, rtol=1e-5)  # asked for: 1e-3
+    np.testing.assert_allclose(distances[-1], EULER_DISTANCE, rtol=1e-5)  # the validation set requires 1e-3
 
 
 @PLACES

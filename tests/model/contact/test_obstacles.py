@@ -125,7 +125,7 @@ def test_closed_tube_is_the_union_of_its_balls(seed):
     np.testing.assert_allclose(found, wanted, atol=1e-5)
 
 
-def test_open_tube_goes_on_with_the_radius_of_its_last_point():
+def test_open_tube_continues_with_the_radius_of_its_last_point():
     radii = [0.1, 0.2, 0.15, 0.12, 0.1, 0.1, 0.15]
     pipe = ob.Tube([[x, 0, 0] for x in range(7)], radii)
     x = np.array([-30.0, -3.5, 0.0, 1.0, 6.0, 9.5, 30.0])
@@ -162,7 +162,7 @@ def test_tilted_height_field_is_a_slope_within_its_border():
 
 def test_height_field_is_level_beyond_its_border():
     field = ob.HeightField(X, Y, 0.1 * X[:, None] + 0 * Y)
-    assert abs(field.signed_distance([5, 0, 1.11]) - 1) < 1e-12  # the slope goes on for one more cell
+    assert abs(field.signed_distance([5, 0, 1.11]) - 1) < 1e-12  # the slope continues for one more cell
     np.testing.assert_allclose(field.normals([[5, 3, 1.0], [-5, 0, 1.0]]), [[0, 0, 1]] * 2, atol=1e-12)
 
 

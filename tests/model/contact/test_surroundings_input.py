@@ -163,7 +163,7 @@ test_solves_refuse = refused(
 
 
 @pytest.mark.parametrize("solve", [ms.simulate, ms.equilibrium])
-def test_a_start_inside_says_how_deep_and_where(solve):
+def test_start_inside_an_obstacle_reports_depth_and_vertex(solve):
     scene = block_on(GROUND)
     options = {"steps": 1, "time_step": 1e-3} if solve is ms.simulate else {}
     with pytest.raises(

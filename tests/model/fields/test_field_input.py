@@ -167,7 +167,7 @@ def test_missing_and_old_magpylib_are_named(monkeypatch):
         ms.MagpylibField(None, length_scale=0.01)
 
 
-def test_a_python_field_of_the_core_checks_what_it_gets():
+def test_python_field_of_the_core_checks_returned_arrays():
     x = np.zeros((2, 3))
     for sampler in (lambda *_: (x,), lambda *_: (x, x)):
         with pytest.raises(ValueError, match="Python field"):

@@ -83,7 +83,7 @@ def test_couples_of_a_uniform_field_count_beside_the_force_of_a_weak_source():
     assert beside < 0.1 * coarse
 
 
-def test_a_motion_is_warned_of_once_where_it_came_nearest():
+def test_motion_is_warned_of_once_at_its_closest_approach():
     scene = between_plates(6, 1e-3, mass_density=1e3)
     told = warned(lambda: ms.simulate(scene, steps=2, time_step=1e-4, progress=False))
     assert len(told) == 1 and "the motion, in recorded state" in told[0]

@@ -47,7 +47,7 @@ def sheet_above(magnet) -> tuple[ms.Scene, dict]:
     return scene, {"remanent_magnetization": (0, 0, 50e3)}
 
 
-def test_a_motion_and_a_solve_that_fail_there_say_so() -> None:
+def test_failures_of_motions_and_solves_name_vertices_inside_a_magnet() -> None:
     magnet = ms.CylinderMagnet(5e-3, 1e-2, (0, 0, 1e6), center=(0.035, 0.005, -0.03))
     scene, magnetized = sheet_above(magnet)
     few = ms.Newton(max_iterations=3)

@@ -201,7 +201,7 @@ def test_an_obstacle_that_moves_by_a_value_moves_as_by_its_motion():
     assert contact.obstacles == (block,) and block.motion is None
 
 
-def test_a_belt_takes_along_what_lies_on_it_at_its_own_speed():
+def test_sheet_on_a_belt_moves_at_the_speed_of_the_belt():
     block, scene = on_a_block()
     speed, steps, time_step = 0.02, 60, 1e-3
     path = ends(lambda t: (speed * t, 0.0, -0.0505), steps, time_step)
@@ -230,7 +230,7 @@ def test_gradient_by_the_path_of_an_obstacle_with_friction(integrator, lagged):
     check_gradients(loss, given, {"center": 1e-8, "rotation": 1e-6, "time_step": 1e-7})
 
 
-def test_functions_of_torch_have_gradients_by_what_they_are_made_of():
+def test_functions_of_torch_have_gradients_by_their_tensors():
     block, scene = on_a_block()
 
     def loss(given):
@@ -359,7 +359,7 @@ def test_gradients_through_a_step_that_was_taken_in_parts():
     check_gradients(loss, given, {"ball": 1e-8, "lift": 1e-8})
 
 
-def test_a_motion_in_two_parts_goes_on_with_functions_of_the_time():
+def test_motion_in_two_parts_continues_with_functions_of_the_time():
     scene, given = in_field(CUBE), {"time_step": 2e-3, **MAGNETIZED, **EXACT}
     values = {CUBE: {"center": approach, "rotation": rotation_vector}}
     whole = ms.simulate(scene, steps=6, values=values, **given)

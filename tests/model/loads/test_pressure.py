@@ -161,7 +161,7 @@ def test_oblique_symmetry_planes_close_a_surface():
     assert np.allclose(found[0][1], found[1][1], rtol=1e-7)
 
 
-def test_a_warm_start_goes_on_without_a_potential():
+def test_warm_start_works_without_a_potential():
     scene = flap_of("linear")
     warm = ms.WarmStart(scene)
     for pressure in (15.0, 18.0, 20.0):

@@ -145,7 +145,7 @@ def test_the_side_of_the_normals(here):
 
 @pytest.mark.parametrize("lagged", [False, True], ids=["exact", "lagged"])
 @pytest.mark.parametrize("integrator", INTEGRATORS, ids=repr)
-def test_a_motion_goes_on_where_it_stopped(integrator, lagged):
+def test_continued_motion_has_the_same_bits(integrator, lagged):
     """Check that a motion in two halves has the same bits; obstacles continue from their time."""
     scene = scene_of(lagged=lagged)
     whole = fall(scene, np.eye(3), integrator, velocities=VELOCITY)

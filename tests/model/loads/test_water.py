@@ -47,7 +47,7 @@ def test_tables_go_through_their_values_twice_differentiably(rng):
     for knot in UNEVEN[1:-1]:
         for curve in (water._drag_curve, water._thrust_curve):
             behind, at, ahead = curve.samples(knot + np.array([-1e-7, 0, 1e-7]))[:, 1]
-            assert ahead - at == pytest.approx(at - behind, abs=1e-9)  # 1e-7 times what the curvature jumps
+            assert ahead - at == pytest.approx(at - behind, abs=1e-9)  # 1e-7 times the jump of the curvature
 
 
 @pytest.mark.parametrize(

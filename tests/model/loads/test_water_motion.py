@@ -37,7 +37,9 @@ def test_falling_plate_reaches_the_terminal_speed(integrator, drag, thrust):
     scene = plate(ms.Water(drag_coefficient=drag, thrust_coefficient=thrust), (0, 0, -GRAVITY))
     terminal, time = closed_form(scene)
     motion = simulated(scene, 80, time / 4, integrator=integrator)
-    np.testing.assert_allclose(-motion.velocities[-1, :, 2], terminal, rtol=1e-9)  # asked for: 1e-3
+    np.testing.assert_allclose(
+        -motion.velocities[-1, :, 2], terminal, rtol=1e-9
+    )  # the validation set requires 1e-3
     assert np.abs(motion.velocities[-1, :, :2]).max() < 1e-9 * terminal
 
 
@@ -73,7 +75,7 @@ def test_added_mass_slows_the_start():
     motion = simulated(still, 1, 1e-6)
     np.testing.assert_allclose(
         motion.velocities[-1, :, 1], 1e-6 * GRAVITY, rtol=1e-7
-    )  # edge-on it carries none
+    )  # edge-on there is no added mass
 
 
 def test_in_a_flow_the_relative_motion_counts():
@@ -97,7 +99,7 @@ def test_plate_moving_with_the_water_has_no_force(integrator, added_mass):
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS, ids=repr)
-def test_edge_on_nothing_slows_a_plate(integrator):
+def test_edge_on_plate_keeps_its_speed(integrator):
     """Check that an edge-on plate keeps its speed, as C(0) = 0 and faces have no friction along them."""
     scene = plate(ms.Water(added_mass=5.0))
     speed = np.array([0.4, -0.3, 0.0])

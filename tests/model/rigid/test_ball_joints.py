@@ -132,7 +132,7 @@ def test_a_motor_beyond_half_a_turn_goes_the_shorter_way():
     np.testing.assert_allclose(ms.equilibrium(scene)[bob].rotation, rotation_matrix((0, 0, -0.5)), atol=1e-13)
 
 
-def test_a_motor_in_time_and_what_it_takes():
+def test_motor_moment_in_time_is_that_of_inertia():
     """Compare a motor's moment about an axis of inertia with inertia times angular acceleration.
 
     There is no gravity; Euler's equations give the moment where the axis rotates.

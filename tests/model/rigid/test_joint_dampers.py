@@ -81,7 +81,7 @@ def test_a_ball_damper_takes_momentum_from_a_spinning_ball():
     np.testing.assert_allclose(move[socket].rate, exact, atol=3e-3)
 
 
-def test_an_equilibrium_knows_no_dampers():
+def test_equilibrium_ignores_dampers():
     links, joints = chain(1)
     joints = [joint._again({"spring_stiffness": 30.0, "damping": 5.0}) for joint in joints]
     without = [joint._again({"spring_stiffness": 30.0}) for joint in joints]
@@ -108,7 +108,7 @@ def test_gradient_by_damping_in_time_and_past_full_turns():
     np.testing.assert_allclose(damping.grad, differences(turned, given, 1e-4), rtol=1e-5)
 
 
-def test_going_on_has_the_same_bits():
+def test_continued_damped_motion_has_the_same_bits():
     links, joints = chain(2)
     joints = [joint._again({"damping": 0.3}) for joint in joints]
     scene = ms.Scene(ms.Skeleton(links, joints), gravity=(0, 0, -G))

@@ -54,7 +54,7 @@ def test_motor_at_constant_rate_needs_the_static_torque():
     assert off[20:].max() < 2e-2  # of 9.8: second order in steps of 0.03 rad
 
 
-def test_a_sliding_motor_feels_the_acceleration():
+def test_force_of_a_sliding_motor_includes_inertia():
     block, bob = ms.Link(mass=2.0, inertia=0.1, center=(0, 0, 0)), ms.Link(mass=1.0, center=(0, 0, -1.0))
     slide = ms.Prismatic(block, origin=(0, 0, 0), axis=(1, 0, 0), motor_displacement=0.0)
     pin = ms.Revolute(bob, block, origin=(0, 0, -1.5), axis=(0, 1, 0), damping=1e5)  # hardly turns

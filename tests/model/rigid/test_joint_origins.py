@@ -119,7 +119,9 @@ def test_start_follows_the_changed_origin_of_a_motor():
     arm, tool = (ms.Link(mass=m, inertia=0.01, center=(x, 0, 0)) for m, x in ((2.0, ARM), (0.5, 0.6)))
     hinge = ms.Revolute(arm, origin=(0, 0, 0), axis=(0, 1, 0), spring_stiffness=SPRING)
     motor = ms.Revolute(tool, arm, origin=(0.5, 0, 0), axis=(0, 0, 1), motor_angle=0.4)
-    scene = ms.Scene(ms.Skeleton([arm, tool], [hinge, motor]))  # no weight: nothing but the motor knows
+    scene = ms.Scene(
+        ms.Skeleton([arm, tool], [hinge, motor])
+    )  # no weight: only the motor depends on the origin
     rest = ms.equilibrium(scene)
     moved = {motor: {"origin": (0.45, 0.02, 0.0)}}
     fresh = ms.equilibrium(scene, values=moved)[tool].center

@@ -254,7 +254,7 @@ def test_a_magnet_against_the_field_buckles_the_strip():
     assert growing.unstable == 1
 
 
-def test_going_on_has_the_same_bits():
+def test_continued_motion_of_a_rigid_body_has_the_same_bits():
     part, free = ms.RigidBody(END, mass=1e-3, inertia=1e-8), top(center=(0, 0, 1.0))
     scene = ms.Scene([strip(), part, free], gravity=(0, 0, -1.0), allow_rigid_motions=True)
     whole = ms.simulate(scene, steps=8, time_step=1e-3)

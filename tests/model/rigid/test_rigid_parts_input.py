@@ -213,7 +213,7 @@ def test_a_warm_start_follows_a_payload():
         assert warm.positions == pytest.approx(cold.positions, abs=1e-9)
 
 
-def test_a_start_that_says_twice_how_a_free_body_moves():
+def test_continued_motion_refuses_another_velocity_of_a_free_body():
     free = ms.RigidBody(mass=1.0, inertia=1.0, velocity=(0, 0, 1.0))
     scene = ms.Scene(free, allow_rigid_motions=True)
     first = ms.simulate(scene, steps=1, time_step=0.1)

@@ -53,7 +53,7 @@ def test_a_path_follows_a_torque_and_a_motor():
         assert float(path[joint].angle[-1]) == pytest.approx(float(rest[joint].angle), abs=1e-8)
 
 
-def test_a_moment_in_a_ball_joint_is_refused_where_it_must():
+def test_moment_in_a_ball_joint_is_refused_by_linear_theory():
     bob = ms.Link(mass=1.0, inertia=0.1, center=(0, 0, -1.0))
     ball = ms.Ball(bob, origin=(0, 0, 0), spring_stiffness=2.0, torque=(0.6, -0.2, 0.9))
     scene = ms.Scene(ms.Skeleton([bob], [ball]), gravity=(0, 0, -G))
@@ -63,7 +63,7 @@ def test_a_moment_in_a_ball_joint_is_refused_where_it_must():
         ms.follow_path(scene, gravity_factor=1.0)
 
 
-def test_a_skeleton_that_motors_hold_altogether_has_nothing_to_vibrate():
+def test_skeleton_fully_held_by_motors_has_no_vibrations():
     scene, joints = double_pendulum(motor_angle=0.4, second={"motor_angle": 0.3})
     rest = ms.equilibrium(scene)
     assert [float(rest[joint].angle) for joint in joints] == pytest.approx([0.4, 0.3], abs=1e-14)

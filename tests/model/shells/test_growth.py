@@ -130,7 +130,7 @@ def bilayer(thicknesses, moduli, mismatch):
     )
     strains = np.array([mismatch, 0.0])
     growth = 1.0 + np.dot(stiffness, strains) / np.sum(stiffness)
-    # Positive where the normal's side, the upper one, is shorter.
+    # The curvature is positive if the upper layer, on the normal's side, is shorter.
     curvature = -np.dot(stiffness, strains * (middles - middle)) / bending
     thickness = np.sqrt(12.0 * bending / np.sum(stiffness))
     return {

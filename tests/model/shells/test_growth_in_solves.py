@@ -109,7 +109,7 @@ def test_magnetization_of_a_solve_stays_constant_during_growth(tmp_path):
     assert layout.of(numbers, "body 0", "growth") == pytest.approx(1.01)
 
 
-def test_a_scene_without_growth_has_no_numbers_for_it():
+def test_scene_without_growth_stores_no_growth():
     layout = held(shell())._value_layout
     assert not any(name in ("growth", "rest_curvature") for _, name in layout)
 

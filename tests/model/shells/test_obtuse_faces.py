@@ -28,7 +28,7 @@ def no_warnings():
 
 @pytest.mark.parametrize("beta", [1.0, 5.0])
 @pytest.mark.parametrize("height", [0.1, 0.01, 0.001])
-def test_caps_inside_a_sheet_do_not_stiffen_it(height, beta, no_warnings):
+def test_obtuse_faces_inside_a_sheet_do_not_stiffen_it(height, beta, no_warnings):
     """Check a strip with obtuse faces inside it and none at its border.
 
     With strains measured on these faces themselves the rise is 0.3 to 10 % too low. Faces at the border keep their own.
@@ -36,7 +36,7 @@ def test_caps_inside_a_sheet_do_not_stiffen_it(height, beta, no_warnings):
     assert abs(error_of(crossed(LENGTH, WIDTH, (40, 4), [0.5, height, height, height]), beta)) < 2e-3
 
 
-def test_caps_across_the_strip_do_no_harm(no_warnings):
+def test_obtuse_faces_across_the_strip_do_not_stiffen_it(no_warnings):
     assert abs(error_of(crossed(LENGTH, WIDTH, (40, 4), [0.01] * 4, across=True))) < 2e-3
 
 
@@ -49,7 +49,7 @@ def test_no_warning_without_reason(mesh, no_warnings):
     assert abs(error_of(sheet)) < 2e-3
 
 
-def test_caps_at_the_border_are_named_once_a_scene():
+def test_obtuse_faces_at_the_border_are_warned_of_once_a_scene():
     mesh = crossed(LENGTH, WIDTH, (40, 4), [0.01, 0.5, 0.5, 0.5])
     scene = clamped(mesh, "midedge")
     with pytest.warns(
@@ -58,7 +58,7 @@ def test_caps_at_the_border_are_named_once_a_scene():
         found = ms.equilibrium(scene, **controls(1.0, UP))
     assert told[0].filename == __file__
     rise = found.positions[mesh.vertices_at(x=LENGTH), 2].mean() / LENGTH
-    assert rise < 0.99 * ACROSS[1.0][1]  # it says so with reason
+    assert rise < 0.99 * ACROSS[1.0][1]  # the warning is justified: the sheet is too stiff
     named = int(str(told[0].message).split("among them ")[1].split()[0])
     assert np.degrees(mesh.quality.largest_angles[named]) > 177
     with warnings.catch_warnings():
@@ -81,7 +81,7 @@ def test_a_motion_and_a_path_warn_too():
 
 
 @pytest.mark.parametrize("bending", ["midedge", "hinge"])
-def test_a_patch_of_caps_stretches_as_one(bending):
+def test_patch_of_obtuse_faces_has_uniform_stretch(bending):
     """Check a traction across the strip, which the obtuse faces at its border transmit as well."""
     mesh = crossed(LENGTH, WIDTH, (8, 4), [0.01] * 4)
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0, bending=bending)

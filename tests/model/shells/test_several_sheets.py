@@ -215,7 +215,7 @@ def compressed_strips(*which):
     )
 
 
-def test_pictures_films_pages_and_files_hold_all_of_them(pair, tmp_path):
+def test_pictures_films_pages_and_files_contain_all_sheets(pair, tmp_path):
     _, scene, _ = pair
     rest = ms.equilibrium(scene, applied_flux_density=STRONG)
     state = states_of(rest)[0]
@@ -275,7 +275,7 @@ def test_thin_sheet_inside_an_obstacle_is_named_beside_a_thick_one():
     [copy.copy, copy.deepcopy, lambda scene: pickle.loads(pickle.dumps(scene))],
     ids=["copy", "deepcopy", "pickle"],
 )
-def test_copies_keep_what_is_about_which_body(pair, duplicate):
+def test_copies_keep_the_body_of_supports_and_loads(pair, duplicate):
     _, scene, _ = pair
     twin = duplicate(scene)
     assert repr(twin) == repr(scene)

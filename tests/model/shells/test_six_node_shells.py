@@ -35,7 +35,7 @@ def test_bending_follows_from_the_mesh_by_default():
     assert ms.Shell(sheet.mesh.first_order(), thickness=1e-3, young_modulus=1e6).bending == "midedge"
 
 
-def test_rigid_motions_cost_nothing():
+def test_rigid_motions_have_no_energy():
     sheet = arch()
     scene = ms.Scene(sheet, allow_rigid_motions=True)
     moved = sheet.mesh.rest_positions @ rotation((0.4, -1.0, 0.7)).T + (1.0, 2.0, 3.0)

@@ -118,7 +118,7 @@ def by_numpy(shell, positions, rotations):
             delta = 0.5 * theta + sign * rotations[e]
             curvature += delta * np.outer(turned[i], turned[i]) / (area * np.linalg.norm(turned[i]))
         for found, of in ((membrane, tensor), (bent, 0.5 * shell.thickness[f] * curvature)):
-            values = np.linalg.eigvalsh(of)  # one of them zero, across the face
+            values = np.linalg.eigvalsh(of)  # one of them is zero, that across the face
             zero = np.argmin(np.abs(values))
             found[f] = np.sort(np.delete(values, zero))[::-1]
     return membrane, bent
@@ -212,7 +212,7 @@ def test_motion_has_strains_in_each_state(dtype):
     assert move.largest_bending_strain[0] < 1e-12 < move.largest_bending_strain[-1]
     for k in range(4):
         found = move.strains(k)
-        tolerance = 1e-4 if dtype == "float32" else 1e-9  # what comes back was rounded to it
+        tolerance = 1e-4 if dtype == "float32" else 1e-9  # returned arrays are rounded to float32
         assert np.abs(found.bending).max() == pytest.approx(move.largest_bending_strain[k], abs=tolerance)
         assert np.abs(found.membrane).max() == pytest.approx(move.largest_membrane_strain[k], abs=tolerance)
     assert f"state {int(np.argmax(move.largest_bending_strain))}: largest strain" in repr(move)

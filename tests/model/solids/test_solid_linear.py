@@ -167,7 +167,7 @@ def test_follow_warm_start_and_multistart_come_to_the_equilibrium():
     )
 
 
-def test_copies_and_pickles_vibrate_alike():
+def test_copies_and_pickles_have_the_same_frequencies():
     solid = bar(0.3, cells=(4, 1, 1))
     scene = bent(solid)
     expected = ms.vibration_modes(scene, count=2).squares

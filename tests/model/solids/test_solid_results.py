@@ -126,14 +126,14 @@ def test_a_face_of_a_quadratic_solid_is_not_held_by_its_corners_alone():
     with pytest.raises(ValueError, match=r"corners of 2 faces.*solid\.mesh\.vertices_at"):
         ms.Scene(quadratic, supports=[ms.Pin(wrong)])
     ms.Scene(quadratic, supports=[ms.Pin(quadratic.mesh.vertices_at(x=0.0))])
-    right = quadratic.mesh.vertices_at(x=0.1)  # beside faces that are held as a whole
+    right = quadratic.mesh.vertices_at(x=0.1)  # beside faces whose nodes are all held
     with pytest.raises(ValueError, match=r"corners of 2 faces"):
         ms.Scene(quadratic, supports=[ms.Pin(np.union1d(wrong, right))])
     linear = ms.Solid(mesh, material=ms.NeoHookean(**MODULI), element="linear")
     ms.Scene(linear, supports=[ms.Pin(wrong)])
 
 
-def test_an_eighth_behind_symmetry_planes_is_the_whole():
+def test_eighth_with_symmetry_planes_equals_the_full_block():
     """Compare a block pulled at both ends with its eighth."""
     material = ms.NeoHookean(**MODULI)
     whole = ms.Solid(ms.meshes.box((0.2, 0.04, 0.04), cells=(4, 2, 2)), material=material)

@@ -144,7 +144,7 @@ def test_a_shell_and_a_solid_share_a_scene():
     assert "does not pass through itself" in repr(both)
 
 
-def test_copies_solve_alike():
+def test_copies_have_the_same_solution():
     _, scene = finger()
     assert np.array_equal(ms.equilibrium(copy.deepcopy(scene)).positions, ms.equilibrium(scene).positions)
 

@@ -1,4 +1,4 @@
-"""Supports that turn and sheets that can still turn."""
+"""Supports that rotate, and sheets that their supports leave free to rotate."""
 
 import numpy as np
 

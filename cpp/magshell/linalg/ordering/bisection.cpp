@@ -166,7 +166,7 @@ CutState::CutState(const NodeGraph& graph)
       beside(graph.size()),
       has_moved(graph.size(), false) {
     if (graph.points.empty()) return;
-    // [-] Enlargement for round-off; fixed by test_useless_points_do_no_harm
+    // [-] Enlargement for round-off; fixed by test_degenerate_points_give_a_valid_ordering
     constexpr double for_rounding = 1.0 + 1e-9;
     reach.assign(graph.size(), 0.0);
     for (Index node = 0; node < graph.size(); ++node) {
