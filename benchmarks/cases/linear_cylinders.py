@@ -79,7 +79,7 @@ def eighth(
     along = y**grading * PINCHED_LENGTH / 2
     points = np.stack([PINCHED_RADIUS * np.sin(angle), along, PINCHED_RADIUS * np.cos(angle)], axis=1)
     mesh = ms.TriangleMesh(points, even.faces)
-    return mesh if order == 1 else ms.QuadraticTriangleMesh.of(mesh, place=_onto_the_cylinder)
+    return mesh if order == 1 else ms.QuadraticTriangleMesh.from_triangles(mesh, project=_onto_the_cylinder)
 
 
 def _onto_the_cylinder(points: np.ndarray) -> np.ndarray:

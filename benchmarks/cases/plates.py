@@ -75,7 +75,7 @@ def circular_plate(rings: int = 48, bending: str = "midedge", *, irregular: floa
 
 
 def _of_order(mesh: ms.TriangleMesh, bending: str) -> ms.TriangleMesh | ms.QuadraticTriangleMesh:
-    return mesh if order_of(bending) == 1 else ms.QuadraticTriangleMesh.of(mesh)
+    return mesh if order_of(bending) == 1 else ms.QuadraticTriangleMesh.from_triangles(mesh)
 
 
 def _disk(rings: int, irregular: float | None, bending: str) -> ms.TriangleMesh | ms.QuadraticTriangleMesh:
@@ -97,7 +97,7 @@ def _disk(rings: int, irregular: float | None, bending: str) -> ms.TriangleMesh 
         points[rim] /= np.linalg.norm(points[rim], axis=1, keepdims=True)
         return points
 
-    return ms.QuadraticTriangleMesh.of(moved, place=onto_the_rim)
+    return ms.QuadraticTriangleMesh.from_triangles(moved, project=onto_the_rim)
 
 
 def middle_deflection(mesh: ms.TriangleMesh | ms.QuadraticTriangleMesh, support: str, load: str) -> float:

@@ -61,7 +61,7 @@ def test_malformed_matrices_are_refused() -> None:
 def plate(bending: str, map_positions=lambda x: x, loads=None, supports=None, **options) -> ms.Scene:
     flat = ms.meshes.rectangle(1.0, 1.0, cells=(4, 4), irregular=0.2)
     flat = ms.TriangleMesh(map_positions(flat.rest_positions), flat.faces)
-    mesh = ms.QuadraticTriangleMesh.of(flat) if bending == "midedge2" else flat
+    mesh = ms.QuadraticTriangleMesh.from_triangles(flat) if bending == "midedge2" else flat
     sheet = ms.Shell(mesh, thickness=0.01, young_modulus=1e6, poisson_ratio=0.3, bending=bending)
     held = [ms.Clamp(mesh.boundary_edges)] if supports is None else supports(mesh)
     loads = [ms.AreaLoad((0, 0, 1.0))] if loads is None else loads

@@ -24,15 +24,15 @@ def solid_calls(s: Sample) -> Iterator[Call]:
     given = {"rest_positions": block.rest_positions, "tetrahedra": block.tetrahedra, "parts": parts}
     given["part_names"] = {"odd": 1}
     flat = ms.meshes.rectangle(0.1, 0.05, cells=(3, 2))
-    six = ms.QuadraticTriangleMesh.of(flat)
+    six = ms.QuadraticTriangleMesh.from_triangles(flat)
     yield Call(
         "QuadraticTriangleMesh",
         ms.QuadraticTriangleMesh,
         {"rest_positions": six.rest_positions, "elements": six.elements},
     )
     yield Call(
-        "QuadraticTriangleMesh.of",
-        ms.QuadraticTriangleMesh.of,
+        "QuadraticTriangleMesh.from_triangles",
+        ms.QuadraticTriangleMesh.from_triangles,
         {"mesh": flat, "place": lambda points: points},
     )
     yield Call("QuadraticTriangleMesh.fitted", ms.QuadraticTriangleMesh.fitted, {"mesh": flat, "to": flat})

@@ -177,7 +177,7 @@ def test_spherical_cap_lies_where_it_says():
         (lambda m: m.cylinder(1.0, 1.0, -1.0, cells=(9, 2)), "angle .* must span more than 0"),
         (
             lambda m: m.sector(0.0, 1.0, math.tau, (4, 5), irregular=0.25),
-            "moves turn face .* over; choose a smaller",
+            "displacements invert face .*; choose a smaller",
         ),
         (lambda m: m.spherical_cap(0.0, cells=(9, 2)), r"radius \[m\] must be positive"),
         (

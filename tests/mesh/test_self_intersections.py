@@ -247,11 +247,14 @@ def test_a_motion_tells_and_prints():
 def test_what_costs_much_is_not_done_unasked(monkeypatch):
     mesh = square()
     states = np.stack([mesh.rest_positions] * 3)
-    assert crossings.told(mesh, states) == "does not pass through itself in any state"
+    assert crossings.describe_self_intersections(mesh, states) == "does not pass through itself in any state"
     monkeypatch.setattr(crossings, "AFFORDABLE_FACES", 2 * mesh.n_faces)
-    assert crossings.told(mesh, states) == "does not pass through itself in the last state"
+    assert (
+        crossings.describe_self_intersections(mesh, states)
+        == "does not pass through itself in the last state"
+    )
     monkeypatch.setattr(crossings, "AFFORDABLE_FACES", mesh.n_faces - 1)
-    assert "ask self_intersections()" in crossings.told(mesh, states)
+    assert "ask self_intersections()" in crossings.describe_self_intersections(mesh, states)
 
 
 def test_a_picture_says_so():

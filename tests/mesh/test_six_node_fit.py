@@ -18,7 +18,7 @@ def strip(n: int) -> ms.TriangleMesh:
 @pytest.mark.parametrize("fine, error", [(4, 1e-3), (8, 1e-5), (32, 1e-8)])
 def test_the_finer_the_nearer(fine, error):
     """Border and inside; straight elements are 8e-3 off."""
-    assert on_cylinder(ms.QuadraticTriangleMesh.of(strip(4))) > 7e-3
+    assert on_cylinder(ms.QuadraticTriangleMesh.from_triangles(strip(4))) > 7e-3
     fitted = ms.QuadraticTriangleMesh.fitted(strip(4), to=strip(fine))
     assert on_cylinder(fitted) < error
     exact = ms.meshes.cylinder(1.0, 1.0, angle=1.0, cells=(4, 4), order=2)
@@ -35,7 +35,10 @@ def test_closed_surfaces_and_those_of_two_curvatures():
 def test_flat_sheets_stay_flat_and_corners_stay_sharp():
     mesh = ms.meshes.rectangle(1.0, 1.0, cells=(4, 4), irregular=0.2)
     fitted = ms.QuadraticTriangleMesh.fitted(mesh, to=mesh.refined())
-    assert np.abs(fitted.rest_positions - ms.QuadraticTriangleMesh.of(mesh).rest_positions).max() < 1e-12
+    assert (
+        np.abs(fitted.rest_positions - ms.QuadraticTriangleMesh.from_triangles(mesh).rest_positions).max()
+        < 1e-12
+    )
 
 
 def test_a_rim_is_bent_in_its_plane():
@@ -68,7 +71,7 @@ def test_the_roof_on_a_fitted_mesh():
 
     exact = sinks(ms.meshes.cylinder(*size, span, cells=(8, 8), order=2))
     assert sinks(ms.QuadraticTriangleMesh.fitted(flat, to=fine)) == pytest.approx(exact, rel=1e-5)
-    assert abs(sinks(ms.QuadraticTriangleMesh.of(flat)) / exact - 1.0) > 1e-3
+    assert abs(sinks(ms.QuadraticTriangleMesh.from_triangles(flat)) / exact - 1.0) > 1e-3
 
 
 def test_what_is_refused():
@@ -76,7 +79,7 @@ def test_what_is_refused():
         ms.QuadraticTriangleMesh.fitted(strip(4), to=ms.meshes.cylinder(1.0, 1.0, cells=(8, 2)))
     with pytest.raises(ValueError, match="border of to has no vertex at"):
         ms.QuadraticTriangleMesh.fitted(strip(4), to=strip(6))
-    with pytest.raises(ValueError, match="no surface that faces the same way"):
+    with pytest.raises(ValueError, match="no surface with its normal on the same side"):
         ms.QuadraticTriangleMesh.fitted(strip(4), to=strip(8).flipped())
     with pytest.raises(ValueError, match="to must be a TriangleMesh, got QuadraticTriangleMesh"):
-        ms.QuadraticTriangleMesh.fitted(strip(4), to=ms.QuadraticTriangleMesh.of(strip(4)))
+        ms.QuadraticTriangleMesh.fitted(strip(4), to=ms.QuadraticTriangleMesh.from_triangles(strip(4)))

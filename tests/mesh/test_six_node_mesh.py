@@ -105,13 +105,13 @@ def test_refined_onto_a_surface():
     mesh = ms.meshes.cylinder(1.0, 1.0, cells=(8, 2), order=2)
     outwards = [1, 0, 1]
 
-    def place(x):
+    def project(x):
         return x * [0, 1, 0] + x * outwards / np.linalg.norm(x * outwards, axis=1, keepdims=True)
 
-    radii = np.linalg.norm(mesh.refined(place).rest_positions * outwards, axis=1)
+    radii = np.linalg.norm(mesh.refined(project).rest_positions * outwards, axis=1)
     assert np.abs(radii - 1).max() < 1e-14
     assert np.abs(np.linalg.norm(mesh.refined().rest_positions * outwards, axis=1) - 1).max() > 1e-4
-    with pytest.raises(ValueError, match=r"place\(nodes\) \[m\] must have shape \(m, 3\) = "):
+    with pytest.raises(ValueError, match=r"project\(nodes\) \[m\] must have shape \(m, 3\) = "):
         mesh.refined(lambda x: x[:2])
 
 
@@ -168,14 +168,14 @@ def test_is_refused(message, make):
         ms.QuadraticTriangleMesh(*make())
 
 
-def test_place_is_checked():
+def test_project_function_of_a_quadratic_mesh_is_checked():
     flat = ms.meshes.rectangle(1.0, 1.0, cells=(1, 1))
     with pytest.raises(ValueError, match="must have shape"):
-        ms.QuadraticTriangleMesh.of(flat, place=lambda x: x[:2])
+        ms.QuadraticTriangleMesh.from_triangles(flat, project=lambda x: x[:2])
     with pytest.raises(ValueError, match="finite"):
-        ms.QuadraticTriangleMesh.of(flat, place=lambda x: x * np.nan)
+        ms.QuadraticTriangleMesh.from_triangles(flat, project=lambda x: x * np.nan)
     with pytest.raises(ValueError, match="TriangleMesh"):
-        ms.QuadraticTriangleMesh.of(ms.meshes.box((1, 1, 1), cells=(1, 1, 1)))
+        ms.QuadraticTriangleMesh.from_triangles(ms.meshes.box((1, 1, 1), cells=(1, 1, 1)))
     with pytest.raises(ValueError, match="order must be 1"):
         ms.meshes.rectangle(1.0, 1.0, cells=(1, 1), order=3)
 

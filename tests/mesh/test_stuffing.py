@@ -7,7 +7,7 @@ import magshell as ms
 from magshell import shapes
 from magshell.mesh.generate._bcc_lattice import lattice_inside
 from magshell.mesh.generate._stuffing import Cuts, stuffed
-from magshell.mesh.generate._tet_cells import turned
+from magshell.mesh.generate._tet_cells import oriented
 from magshell.mesh.tetrahedra.quality import TetQuality
 from magshell.mesh.topology import face_table
 
@@ -64,7 +64,7 @@ def test_angles_in_a_lattice_of_random_signs_and_cuts(seed):
     inner, outer = lattice.points[cuts.inner], lattice.points[cuts.outer]
     cuts.points = inner + cuts.fraction[:, None] * (outer - inner)
     points, tetrahedra, _ = stuffed(cuts)
-    tetrahedra = turned(points, tetrahedra)
+    tetrahedra = oriented(points, tetrahedra)
     assert_within_bounds(TetQuality(Corners(points, tetrahedra)))
     assert face_table(tetrahedra).counts.max() <= 2  # diagonals agree on both sides
     table = face_table(tetrahedra)
@@ -135,7 +135,7 @@ def test_the_repair_is_needed_and_works():
     counts = np.ceil((high - low) / 0.0055).astype(int) + 2
     lattice = lattice_inside(HAND, 0.5 * (low + high) - 0.5 * 0.0055 * counts, counts, 0.0055)
     points, tetrahedra, _ = stuffed(Cuts(lattice, HAND))
-    tetrahedra = turned(points, tetrahedra)
+    tetrahedra = oriented(points, tetrahedra)
     used = np.unique(tetrahedra)
     with pytest.raises(ValueError, match="touches itself at 1 edge"):
         ms.TetMesh(points[used], np.searchsorted(used, tetrahedra))
@@ -248,7 +248,7 @@ def test_any_function_and_obstacles():
         ({"spacing": -1}, r"spacing \[m\] must be positive"),
         ({"spacing": 1e-5}, r"spacing \[m\] asks for about .* tetrahedra"),
         ({"order": 3}, "order must be 1"),
-        ({"shape": S.half_space((0, 0, 1)), "bounds": None}, "has no end: give bounds"),
+        ({"shape": S.half_space((0, 0, 1)), "bounds": None}, "is unbounded: give bounds"),
     ],
 )
 def test_what_is_refused(arguments, message):

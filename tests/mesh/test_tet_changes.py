@@ -1,4 +1,4 @@
-"""Meshes of tetrahedra from others: mended, of another order, divided, moved, welded."""
+"""Meshes of tetrahedra from others: repaired, of another order, divided, moved, welded."""
 
 import numpy as np
 import pytest
@@ -39,27 +39,27 @@ def test_mended_says_what_it_did():
 
 def test_mended_ten_nodes_and_parts():
     turned = BENT.tetrahedra[:, [1, 0, 2, 3, 4, 6, 5, 8, 7, 9]]
-    mended = ms.TetMesh.repaired(
+    repaired = ms.TetMesh.repaired(
         BENT.rest_positions, turned, parts=np.arange(BENT.n_tetrahedra), part_names={"last": 159}
     )
-    assert mended.mesh.volume == pytest.approx(BENT.volume, rel=1e-14)
-    assert str(mended.report) == "160 tetrahedra turned"
-    assert np.array_equal(mended.mesh.parts, np.arange(160))
-    assert mended.mesh.part_names == {"last": 159}
+    assert repaired.mesh.volume == pytest.approx(BENT.volume, rel=1e-14)
+    assert str(repaired.report) == "160 tetrahedra turned"
+    assert np.array_equal(repaired.mesh.parts, np.arange(160))
+    assert repaired.mesh.part_names == {"last": 159}
 
 
 def test_nothing_to_mend():
-    mended = ms.TetMesh.repaired(BLOCK.rest_positions, BLOCK.tetrahedra)
-    assert str(mended.report) == "nothing to mend"
-    assert np.array_equal(mended.mesh.tetrahedra, BLOCK.tetrahedra)
+    repaired = ms.TetMesh.repaired(BLOCK.rest_positions, BLOCK.tetrahedra)
+    assert str(repaired.report) == "nothing to repair"
+    assert np.array_equal(repaired.mesh.tetrahedra, BLOCK.tetrahedra)
 
 
 def test_merging_drops_what_collapses():
     points = np.concatenate([CORNERS, [[0.0, 0, 1 + 1e-10]]])
     tetrahedra = positive_each(points, np.array([[0, 1, 2, 3], [1, 2, 3, 4]]))
-    mended = ms.TetMesh.repaired(points, tetrahedra, merge_tolerance=1e-9)
-    assert str(mended.report) == "1 vertex merged with another, 1 collapsed tetrahedron dropped"
-    assert mended.tetrahedron_map.tolist() == [0, -1]
+    repaired = ms.TetMesh.repaired(points, tetrahedra, merge_tolerance=1e-9)
+    assert str(repaired.report) == "1 vertex merged with another, 1 collapsed tetrahedron dropped"
+    assert repaired.tetrahedron_map.tolist() == [0, -1]
 
 
 @pytest.mark.parametrize(

@@ -114,12 +114,12 @@ def test_unused_points(tmp_path):
         (
             [("tetra", LINEAR.tetrahedra), ("hexahedron", [np.arange(8)])],
             {},
-            "1 cells of type 'hexahedron' beside",
+            "1 cells of type 'hexahedron' as well",
         ),
         (
             [("tetra", LINEAR.tetrahedra), ("tetra10", [np.arange(10)])],
             {},
-            "1 cells of type 'tetra10' beside",
+            "1 cells of type 'tetra10' as well",
         ),
         ([("tetra", LINEAR.tetrahedra[:, [1, 0, 2, 3]])], {}, "bad.vtu.*160 tetrahedra have negative volume"),
         (

@@ -131,7 +131,7 @@ def test_a_sheet_too_thick_for_its_bend_is_refused(tmp_path):
         [0.01 * np.cos(angle[along]), strip.rest_positions[:, 1], 0.01 * np.sin(angle[along])], axis=1
     )
     ms.write_surface(tmp_path / "thin.stl", strip, positions=curl, thickness=0.01)
-    with pytest.raises(ValueError, match=r"too thick to bend as it does at face \d+"):
+    with pytest.raises(ValueError, match=r"too thick for its curvature at face \d+"):
         ms.write_surface(tmp_path / "thick.stl", strip, positions=curl, thickness=0.03)
     x, y, z = strip.rest_positions.T
     flat = np.stack([np.minimum(x, 1 - x), y, z], axis=1)

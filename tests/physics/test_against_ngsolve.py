@@ -19,7 +19,7 @@ from benchmarks.baselines.ngsolve_mesh import netgen_mesh  # noqa: E402
 def test_plate_under_pressure(cells, support):
     """B5, to first order: a quarter of it, irregular, graded."""
     flat = plates.graded_quarter((cells, cells), irregular=0.25)
-    mesh = ms.QuadraticTriangleMesh.of(flat)
+    mesh = ms.QuadraticTriangleMesh.from_triangles(flat)
     nu = plates.POISSON_RATIO
     sheet = ms.Shell(mesh, thickness=plates.THICKNESS, young_modulus=plates.YOUNG_MODULUS, poisson_ratio=nu)
     rim = mesh.edges_where(lambda middles: middles[:, :2].max(axis=1) > 0.5 - 1e-9)
@@ -58,7 +58,7 @@ def test_sheared_strip(cells):
     """A1 at its full load, through large rotations; NGSolve integrates by the same points."""
     length, force = shear_strip.LENGTH, shear_strip.FULL_LOAD
     flat = shear_strip.strip(cells, "midedge")
-    mesh = ms.QuadraticTriangleMesh.of(flat)
+    mesh = ms.QuadraticTriangleMesh.from_triangles(flat)
     scene = shear_strip.scene(mesh, "midedge2")
     found = ms.equilibrium(scene, solver=ms.MixedNewton(tolerance=1e-13)).displacements[: flat.n_vertices]
     names = {"left": lambda x: x[0] < 1e-9, "right": lambda x: x[0] > length - 1e-9, "free": lambda _: True}

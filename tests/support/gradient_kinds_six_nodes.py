@@ -19,7 +19,7 @@ def _magnetization(n: int) -> np.ndarray:
 
 def curved(own_magnetization: bool) -> ms.Shell:
     coarse = ms.meshes.rectangle(0.1, 0.06, cells=(2, 1), diagonals="aligned")
-    flat = ms.QuadraticTriangleMesh.of(coarse)
+    flat = ms.QuadraticTriangleMesh.from_triangles(coarse)
     mesh = ms.QuadraticTriangleMesh(_bent(flat.rest_positions), flat.elements)
     n = mesh.n_elements
     return ms.Shell(

@@ -41,7 +41,7 @@ class Arrays:
 def _bodies(given: Arrays) -> dict[str, object]:
     corners = [[0, 0, 0], [0.02, 0, 0], [0.02, 0.02, 0], [0, 0.02, 0], [0.04, 0, 0], [0.04, 0.02, 0]]
     flat = ms.TriangleMesh(given(corners), given([[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2]], np.int64))
-    six = ms.QuadraticTriangleMesh.of(flat)
+    six = ms.QuadraticTriangleMesh.from_triangles(flat)
     box = ms.meshes.box((0.04, 0.02, 0.02), cells=(2, 1, 1))
     tets = ms.TetMesh(
         given(box.rest_positions),

@@ -1,1 +1,1 @@
-"""Defines meshes of triangles and of tetrahedra, makes them, reads and writes them."""
+"""Triangle meshes and tetrahedral meshes: data structures, generators, files."""

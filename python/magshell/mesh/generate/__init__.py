@@ -1,4 +1,4 @@
-"""Generators of meshes: sheets, rings, shells of revolution, any planar outline; and solids of tetrahedra."""
+"""Mesh generators: rectangles, rings, surfaces of revolution and planar outlines of triangles, and solids of tetrahedra."""
 
 from .balls import ball
 from .boxes import box
@@ -32,5 +32,5 @@ __all__ = [
 
 
 def __dir__() -> list[str]:
-    """Returns what is public, for tab completion."""
+    """Return the public names, for tab completion."""
     return sorted(__all__)

@@ -1,4 +1,4 @@
-"""Spans of an angle around an axis."""
+"""Ranges of an angle around an axis."""
 
 from __future__ import annotations
 
@@ -17,7 +17,11 @@ _ROUND_OFF = 1e-12
 
 
 def angle_span(name: str, angle: Numbers, symmetric: bool = False) -> tuple[float, float]:
-    """(from, to) in rad of a span given as such, or by its width: from 0, or to both sides of 0."""
+    """Return a range of angles as (from, to) in rad.
+
+    angle: the range itself, or its width: then it begins at 0, or, if `symmetric`, extends to both sides of 0. Raises
+    ValueError, with `name`, for a range that is empty or wider than 2 pi.
+    """
     span = real_numbers(f"{name} [rad]", angle)
     if span.shape == ():
         span = np.array([-0.5, 0.5]) * span if symmetric else np.array([0.0, span])
@@ -28,5 +32,6 @@ def angle_span(name: str, angle: Numbers, symmetric: bool = False) -> tuple[floa
     return float(span[0]), float(span[1])
 
 
-def is_full_turn(start: float, stop: float) -> bool:
+def is_full_circle(start: float, stop: float) -> bool:
+    """Return whether a range of angles, rad, is a full circle, up to round-off."""
     return stop - start >= TURN * (1 - _ROUND_OFF)

@@ -1,8 +1,9 @@
-"""The body-centerd cubic lattice of tetrahedra, all alike.
+"""The body-centered cubic (BCC) lattice, whose tetrahedra are all congruent.
 
-Its points are the corners of cubic cells and their centers; each center and its neighbour along an axis make four
-tetrahedra with the four edges of the square between them. Nodes 0 and 2 of a tetrahedron are the centers, 1 and 3 the
-corners: both pairs are a cell apart, the *long* edges; the other four are the *short* ones, sqrt(3)/2 of that.
+Its points are the corners and the centers of cubic cells. Each center, with its neighbour along an axis, forms four
+tetrahedra with the four edges of the square between the two. Nodes 0 and 2 of a tetrahedron are centers, nodes 1 and 3 are
+corners of cells. The edges 0-2 and 1-3 have the length of a cell: the *long* edges. The other four are the *short* edges,
+sqrt(3)/2 times as long.
 """
 
 from __future__ import annotations
@@ -16,8 +17,11 @@ from ..signed_distance import Distance
 
 @dataclass(frozen=True)
 class Lattice:
-    """points: (n, 3), m. values: (n,), m, the distances there, none of them 0. parity: (n,), 0 or 1, different at
-    the two ends of a long edge. colour: (n,), 0 to 3, different at the two ends of any edge. tetrahedra: (n_t, 4)."""
+    """A body-centered cubic lattice with the signed distances of its points.
+
+    points: (n, 3), m. values: (n,), m, the distances, none of them 0. parity: (n,), 0 or 1, different at the two ends of a
+    long edge. colour: (n,), 0 to 3, different at the two ends of any edge. tetrahedra: (n_t, 4).
+    """
 
     points: np.ndarray
     values: np.ndarray
@@ -27,11 +31,17 @@ class Lattice:
 
 
 def lattice_inside(distance: Distance, low: np.ndarray, counts: np.ndarray, spacing: float) -> Lattice:
-    """The lattice on counts (3,) cells from `low` (3,) on, with those tetrahedra that reach inside."""
+    """Build the lattice on a box of cells, with those of its tetrahedra that have a node inside the shape.
+
+    distance: the signed distance of the shape. low: (3,), m, the lower corner of the box. counts: (3,), the numbers of
+    cells. spacing: m, the length of a cell.
+    """
     corner, center = _integers(counts + 1), _integers(counts)
     points = low + spacing * np.concatenate([corner, center + 0.5])
     values = distance(points)
-    values[values == 0] = np.finfo(float).tiny  # outside, and so near that the point moves to where it is
+    values[values == 0] = np.finfo(
+        float
+    ).tiny  # outside, but so near that the point snaps to its own position
     parity = np.concatenate([corner.sum(axis=1), center.sum(axis=1)]) % 2
     colour = parity + np.repeat([0, 2], [len(corner), len(center)])
     inside = values < 0

@@ -1,11 +1,12 @@
-"""Isosurface stuffing (Labelle and Shewchuk 2007), with tetrahedra of one size.
+"""Isosurface stuffing (Labelle and Shewchuk 2007, [Labelle07]) with tetrahedra of one size.
 
-A body-centerd cubic lattice of tetrahedra, all alike, covers the shape. Lattice points that the surface passes nearby
-move onto it; the tetrahedra that the surface still cuts are cut there. Nothing comes out with dihedral angles beyond
-those of its authors' proof, 10.7 and 164.8 degrees, and what lies inside is the lattice.
+A body-centered cubic lattice of congruent tetrahedra covers the shape. Lattice points close to the surface snap onto it; the
+tetrahedra that the surface still cuts are divided, and their inner parts are kept. The interior is the lattice itself. The
+authors prove that all dihedral angles lie between 10.7 and 164.8 degrees.
 
-In comments, [Labelle07]. What it leaves open (which diagonals, in which order points move) is chosen here, and with it
-how near is nearby: the bounds hold in lattices of random signs and cuts (tests/mesh/test_stuffing.py), which is no proof.
+[Labelle07] leaves open which diagonals are taken and in which order points move. Both are chosen here, and with them the
+distance within which a point snaps, so the proof does not apply. The tests find the same bounds in lattices with random
+signs and cuts (tests/mesh/test_stuffing.py).
 """
 
 from __future__ import annotations
@@ -16,14 +17,15 @@ from ..signed_distance import Distance, zeros_between
 from ..topology import EDGES, FACES, edge_table
 from ._bcc_lattice import Lattice
 
-# how near to a point, as a fraction of the edge, a cut moves it. Larger ones spoil tetrahedra whose corners move, smaller
-# ones those that are cut: here both reach 10.75 degrees
+# [-] A lattice point snaps to a cut that is nearer than this fraction of the long or short edge. Larger values spoil
+# tetrahedra whose corners move, smaller ones tetrahedra that are cut: with these, the smallest angle of both is 10.75
+# degrees.
 _NEAR_LONG, _NEAR_SHORT = 0.285, 0.398
 _IS_LONG = np.array([sorted(edge) in ([0, 2], [1, 3]) for edge in EDGES.tolist()])
 
 
 class Cuts:
-    """Where the surface cuts the edges of a lattice."""
+    """The points at which the surface cuts the edges of a lattice."""
 
     def __init__(self, lattice: Lattice, distance: Distance):
         self.lattice = lattice
@@ -45,18 +47,21 @@ class Cuts:
         self.points = ends[0] + self.fraction[:, None] * (ends[1] - ends[0])
         self.n_edges = len(table.edges)
 
-    def keep_away(self, vertices: np.ndarray) -> None:
-        """Cuts next to these vertices move so far from them, and from their neighbours, that neither will move."""
-        held = np.isin(self.inner, vertices) | np.isin(self.outer, vertices)
-        least = self.near * (1 + 1e-9)  # round-off must not move it after all
-        self.fraction = np.where(held, np.clip(self.fraction, least, 1 - least), self.fraction)
+    def prevent_snapping(self, vertices: np.ndarray) -> None:
+        """Move the cuts on the edges of these vertices so far from both ends that neither end snaps to them."""
+        affected = np.isin(self.inner, vertices) | np.isin(self.outer, vertices)
+        least = self.near * (1 + 1e-9)  # above the threshold also after round-off
+        self.fraction = np.where(affected, np.clip(self.fraction, least, 1 - least), self.fraction)
         ends = self.lattice.points[self.inner], self.lattice.points[self.outer]
         self.points = ends[0] + self.fraction[:, None] * (ends[1] - ends[0])
 
 
 def stuffed(cuts: Cuts) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points (n, 3), the lattice's first; tetrahedra (n_t, 4), either way around; and for each lattice point -1 where it is
-    inside, 1 outside, 0 where it moved onto the surface."""
+    """Build the tetrahedra inside the surface.
+
+    Returns points (n, 3) m, of which the lattice points are the first; tetrahedra (n_t, 4) of either orientation; and for
+    each lattice point -1 if it is inside, 1 if outside, 0 if it snapped onto the surface.
+    """
     lattice = cuts.lattice
     points, sign = lattice.points.copy(), np.sign(lattice.values).astype(int)
     alive = _warp(cuts, points, sign)
@@ -67,8 +72,11 @@ def stuffed(cuts: Cuts) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _warp(cuts: Cuts, points: np.ndarray, sign: np.ndarray) -> np.ndarray:
-    """Moves lattice points onto cuts that are near, in turns of points that have no edge in common. Returns which cuts are
-    left, (n,) bool: those on no edge of a point that moved."""
+    """Move lattice points to their nearest cut if it is close enough, colour by colour.
+
+    Points of one colour share no edge, so the result does not depend on their order. Changes `points` and `sign` in place.
+    Returns which cuts remain, (n,) bool: those on no edge of a point that moved.
+    """
     alive = np.ones(len(cuts.edges), dtype=bool)
     for colour in range(4):
         near_inner = alive & (cuts.fraction < cuts.near) & (cuts.lattice.colour[cuts.inner] == colour)
@@ -85,11 +93,11 @@ def _warp(cuts: Cuts, points: np.ndarray, sign: np.ndarray) -> np.ndarray:
 
 
 def _pieces(cuts: Cuts, sign: np.ndarray, cut_of_edge: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """What of each tetrahedron lies inside, (n_t, 4)."""
+    """Return the tetrahedra (n_t, 4) that fill the part of each lattice tetrahedron inside the surface."""
     tetrahedra, parity = cuts.lattice.tetrahedra, cuts.lattice.parity
     signs = sign[tetrahedra]
     n_in, n_out = (signs < 0).sum(axis=1), (signs > 0).sum(axis=1)
-    whole = tetrahedra[(n_in > 0) & (n_out == 0)]
+    uncut = tetrahedra[(n_in > 0) & (n_out == 0)]
 
     split = np.flatnonzero((n_in > 0) & (n_out > 0))
     four, signs, n_in, n_out = tetrahedra[split], signs[split], n_in[split], n_out[split]
@@ -100,7 +108,7 @@ def _pieces(cuts: Cuts, sign: np.ndarray, cut_of_edge: np.ndarray, points: np.nd
     one = n_in == 1
     inner = np.argmin(signs, axis=1)
     to_inner = np.take_along_axis(between, inner[:, None, None], axis=1)[:, 0]
-    pieces = [whole, np.where(signs > 0, to_inner, four)[one]]
+    pieces = [uncut, np.where(signs > 0, to_inner, four)[one]]
     for number, cut_up in ((2, _two_inside), (3, _three_inside)):
         chosen = n_in == number
         pieces += cut_up(four[chosen], signs[chosen], between[chosen], parity, points)
@@ -108,7 +116,7 @@ def _pieces(cuts: Cuts, sign: np.ndarray, cut_of_edge: np.ndarray, points: np.nd
 
 
 def _three_inside(four, signs, between, parity, points) -> list[np.ndarray]:
-    """A prism: three corners, and their cuts with the edges to the fourth."""
+    """Divide tetrahedra with three inner corners: the part inside is a prism of these corners and three cuts."""
     out = np.argmax(signs, axis=1)
     partner = (out + 2) % 4
     p, q = (out + 1) % 4, (out + 3) % 4
@@ -117,15 +125,16 @@ def _three_inside(four, signs, between, parity, points) -> list[np.ndarray]:
     p, q = np.where(even_first, p, q), np.where(even_first, q, p)
     a, b, c = four[row, partner], four[row, p], four[row, q]
     a_cut, b_cut, c_cut = between[row, partner, out], between[row, p, out], between[row, q, out]
-    # sides a b and a c: from the cut of the long edge; side b c: from the even corner
+    # diagonals of the sides a b and a c: from the cut of the long edge; of the side b c: from the corner of even parity
     return _stack((a, b, c, a_cut), (a_cut, b, c, c_cut), (a_cut, b, c_cut, b_cut))
 
 
 def _two_inside(four, signs, between, parity, points) -> list[np.ndarray]:
+    """Divide tetrahedra with two inner corners: a pyramid if a third is on the surface, otherwise a wedge."""
     row = np.arange(len(four))
     order = np.argsort(signs, axis=1, kind="stable")
     p, q, r, s = order.T
-    # with a corner on the surface, r: a pyramid with the apex there
+    # corner r is on the surface: a pyramid with its apex there
     zero = signs[row, r] == 0
     pyramid = _pyramid(*(x[zero] for x in (four, between, p, q, r, s)), parity)
     four, between, row = four[~zero], between[~zero], np.arange((~zero).sum())
@@ -139,6 +148,7 @@ def _two_inside(four, signs, between, parity, points) -> list[np.ndarray]:
 
 
 def _pyramid(four, between, p, q, apex, out, parity) -> list[np.ndarray]:
+    """Divide pyramids on the inner corners p and q, their two cuts, and an apex on the surface."""
     row = np.arange(len(four))
     along = (p + 2) % 4 == q
     q_to_out = (q + 2) % 4 == out
@@ -146,12 +156,12 @@ def _pyramid(four, between, p, q, apex, out, parity) -> list[np.ndarray]:
     p, q = np.where(first, p, q), np.where(first, q, p)
     a, b, top = four[row, p], four[row, q], four[row, apex]
     a_cut, b_cut = between[row, p, out], between[row, q, out]
-    # the diagonal from a to b_cut: b's edge is the long one, or a is even
+    # the diagonal of the base runs from a to b_cut, where the edge of b is the long one, or a has even parity
     return _stack((a, b, b_cut, top), (a, b_cut, a_cut, top))
 
 
 def _long_ridge(four, between, p, q, r, s, parity, points) -> list[np.ndarray]:
-    """Both inner corners on one long edge: its sides are cut alike."""
+    """Divide tetrahedra whose two inner corners are the ends of a long edge."""
     row = np.arange(len(four))
     even_first = parity[four[row, p]] == 0
     p, q = np.where(even_first, p, q), np.where(even_first, q, p)
@@ -159,7 +169,7 @@ def _long_ridge(four, between, p, q, r, s, parity, points) -> list[np.ndarray]:
     r, s = np.where(even_first, r, s), np.where(even_first, s, r)
     a, b = four[row, p], four[row, q]
     ar, as_, br, bs = between[row, p, r], between[row, p, s], between[row, q, r], between[row, q, s]
-    # the diagonals of the sides go from a to br and bs; the cut itself is divided so that the smallest angle is larger
+    # the diagonals of the sides go from a to br and bs; of the two diagonals of the cut, that with the larger smallest angle
     one = [(a, ar, as_, bs), (a, br, bs, ar)]
     other = [(a, ar, as_, br), (a, br, bs, as_)]
     least = [
@@ -174,12 +184,15 @@ def _long_ridge(four, between, p, q, r, s, parity, points) -> list[np.ndarray]:
 
 
 def _short_ridge(four, between, p, q) -> list[np.ndarray]:
-    """Both inner corners on a short edge: each is cut on its own long edge and on a short one to the other's partner."""
+    """Divide tetrahedra whose two inner corners are the ends of a short edge.
+
+    Each corner has one cut on its long edge, and one on a short edge.
+    """
     row = np.arange(len(four))
     r, s = (p + 2) % 4, (q + 2) % 4
     a, b = four[row, p], four[row, q]
     ar, as_, br, bs = between[row, p, r], between[row, p, s], between[row, q, r], between[row, q, s]
-    # sides a b r: from ar to b; a b s: from bs to a; the cut: from ar to bs
+    # diagonals: of the side a b r from ar to b, of the side a b s from bs to a, of the cut from ar to bs
     return _stack((a, b, ar, bs), (a, ar, as_, bs), (b, bs, br, ar))
 
 
@@ -188,8 +201,10 @@ def _stack(*corners) -> list[np.ndarray]:
 
 
 def _least_angles(corners: np.ndarray) -> np.ndarray:
-    """(n_t,): minus the largest cosine of the dihedral angles of tetrahedra (n_t, 4, 3), rounded so that round-off does
-    not decide between equal ones."""
+    """Return a measure of the smallest dihedral angle of tetrahedra (n_t, 4, 3): minus the largest cosine, (n_t,).
+
+    It is rounded, so that round-off does not decide between equal angles.
+    """
     x, y, z = np.moveaxis(corners[:, FACES], 2, 0)
     normals = np.cross(y - x, z - x)
     normals /= np.linalg.norm(normals, axis=2, keepdims=True)

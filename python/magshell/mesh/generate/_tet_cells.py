@@ -1,6 +1,7 @@
-"""Cells with eight corners, and prisms, divided into tetrahedra that fit together.
+"""Division of hexahedral cells and prisms into tetrahedra whose faces match between neighbours.
 
-Eight corners are numbered in binary: corner 1 is the next along the first axis, 2 along the second, 4 along the third.
+The eight corners of a cell are numbered in binary: corner 1 is next to corner 0 along the first axis, 2 along the second, 4
+along the third.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ _MOST_TETRAHEDRA = (2**31 - 1) // 4
 
 
 def checked_cells(cells: Numbers, axes: tuple[str, ...]) -> tuple[int, ...]:
+    """Return the numbers of cells as integers. Raises ValueError unless they are one integer of at least 1 per axis."""
     counts = array_of("cells", cells, f"be {len(axes)} integers")
     if counts.shape != (len(axes),) or not np.issubdtype(counts.dtype, np.integer) or (counts < 1).any():
         raise ValueError(
@@ -31,7 +33,10 @@ def checked_cells(cells: Numbers, axes: tuple[str, ...]) -> tuple[int, ...]:
 
 
 def check_size(n_tetrahedra: float, asked_by: str = "cells") -> None:
-    """Refuses more tetrahedra than 32-bit indices of their corners can count."""
+    """Raise ValueError if there are more tetrahedra than 32-bit indices of their corners can number.
+
+    asked_by: the argument that its message names.
+    """
     if n_tetrahedra > _MOST_TETRAHEDRA:
         raise ValueError(
             f"{asked_by} asks for about {n_tetrahedra:.3g} tetrahedra; a mesh has at most {_MOST_TETRAHEDRA}"
@@ -39,11 +44,13 @@ def check_size(n_tetrahedra: float, asked_by: str = "cells") -> None:
 
 
 def check_diagonals(diagonals: str) -> None:
+    """Raise ValueError unless `diagonals` is one of DIAGONALS."""
     if diagonals not in DIAGONALS:
         raise ValueError(f"diagonals must be one of {', '.join(map(repr, DIAGONALS))}, got {diagonals!r:.60}")
 
 
 def check_order(order) -> int:
+    """Return the order of tetrahedra. Raises ValueError unless it is 1 or 2."""
     if isinstance(order, bool) or order not in (1, 2):
         raise ValueError(f"order must be 1 (four nodes) or 2 (ten nodes), got {order!r:.60}")
     return int(order)
@@ -52,9 +59,10 @@ def check_order(order) -> int:
 def lattice(
     counts: tuple[int, int, int], periodic: bool = False
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points (n, 3) in the unit cube, corners (n_c, 8) of its cells, and the numbers of each along the axes (n_c, 3).
+    """Build the lattice of cells in the unit cube.
 
-    periodic: the second axis closes on itself.
+    counts: the numbers of cells along the axes. periodic: whether the second axis is closed into a ring.
+    Returns points (n, 3), the corners (n_c, 8) of the cells, and the indices (n_c, 3) of each cell along the axes.
     """
     shape = np.array(counts) + 1
     number = np.arange(shape.prod()).reshape(shape)
@@ -71,17 +79,18 @@ def lattice(
 
 
 def six_each(corners: np.ndarray, mirrored: np.ndarray) -> np.ndarray:
-    """(6 n_c, 4) from corners (n_c, 8): six around the diagonal from corner 0 to 7 of each cell.
+    """Divide cells with corners (n_c, 8) into six tetrahedra each, (6 n_c, 4), around the diagonal from corner 0 to 7.
 
-    mirrored: (n_c, 3) bool, along which axes a cell is the mirror image of that. Neighbours fit together where all are
-    alike, and where each axis alternates.
+    mirrored: (n_c, 3) bool, the axes along which the division of a cell is mirrored. Neighbours match if all cells are
+        alike,
+    and if cells alternate along an axis.
     """
-    turned = mirrored @ np.array([1, 2, 4])
+    flips = mirrored @ np.array([1, 2, 4])
     tetrahedra = []
     for path in permutations((1, 2, 4)):
         steps = np.array([0, path[0], path[0] | path[1], 7])
         odd = sum(a > b for i, a in enumerate(path) for b in path[i + 1 :]) % 2
-        nodes = np.take_along_axis(corners, steps[None, :] ^ turned[:, None], axis=1)
+        nodes = np.take_along_axis(corners, steps[None, :] ^ flips[:, None], axis=1)
         inverted = (mirrored.sum(axis=1) + odd) % 2 == 1
         tetrahedra.append(np.where(inverted[:, None], nodes[:, MIRRORED[:4]], nodes))
     return np.stack(tetrahedra, axis=1).reshape(-1, 4)
@@ -90,9 +99,11 @@ def six_each(corners: np.ndarray, mirrored: np.ndarray) -> np.ndarray:
 def twenty_four_each(
     points: np.ndarray, corners: np.ndarray, corner_points: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Points with those in the middle of cells and of their sides, and (24 n_c, 4): one on each edge of each side.
+    """Divide cells into 24 tetrahedra each, with a new point in the middle of each cell and of each of its sides.
 
-    corner_points: (n_c, 8, 3), where each cell sees its corners, which on a closed axis is not where its neighbour does.
+    corners: (n_c, 8). corner_points: (n_c, 8, 3), the corners' positions as each cell has them: along a periodic axis the
+    same corner has different parameters in the first and the last cell.
+    Returns all points, the given ones first, and tetrahedra (24 n_c, 4), one for each edge of each side.
     """
     sides = np.array([(0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6)])
     rings = corners[:, sides].reshape(-1, 4)
@@ -106,10 +117,11 @@ def twenty_four_each(
 
 
 def prisms(faces: np.ndarray, n_points: int, layers: int) -> np.ndarray:
-    """(3 layers n_f, 4): prisms between copies of a triangulation, (layers + 1) of them, each with n_points more.
+    """Divide the prisms between layers + 1 copies of a triangulation into tetrahedra, (3 layers n_f, 4).
 
-    The sides of prisms are cut from the lower to the higher vertex of an order that begins with the vertices of fewest
-    faces, so that no corner of the solid is cut off by a single tetrahedron; every other layer is mirrored.
+    Vertex v of copy k has the number v + n_points k. The diagonals of the prisms' sides run from the lower to the higher
+    vertex in an order that begins with the vertices of fewest faces: so no corner of the solid consists of a single
+    tetrahedron. Every other layer is mirrored.
     """
     rank = np.empty(n_points, dtype=int)
     rank[np.argsort(np.bincount(faces.ravel(), minlength=n_points), kind="stable")] = np.arange(n_points)
@@ -127,8 +139,8 @@ def prisms(faces: np.ndarray, n_points: int, layers: int) -> np.ndarray:
     return np.concatenate(stacked)
 
 
-def turned(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
-    """The same tetrahedra with positive volumes."""
+def oriented(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
+    """Return the same tetrahedra with their nodes reordered where needed, so that all volumes are positive."""
     a, b, c = np.moveaxis(points[tetrahedra[:, 1:]] - points[tetrahedra[:, :1]], 1, 0)
     inverted = np.einsum("ti,ti->t", np.cross(a, b), c) < 0
     return np.where(inverted[:, None], tetrahedra[:, MIRRORED[:4]], tetrahedra)

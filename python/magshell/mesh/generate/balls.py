@@ -1,4 +1,4 @@
-"""A ball."""
+"""The generator of balls of tetrahedra."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from ..._input.scalars import positive
 from ..._runtime.solver_entry_point import grouped
 from ..tetrahedra.tet_mesh import TetMesh
 from ._round import round_order
-from ._tet_cells import check_order, check_size, turned
+from ._tet_cells import check_order, check_size, oriented
 
 
 @grouped()
 def ball(radius: float, cells: int, order: int = 1) -> TetMesh:
-    """The ball of the given radius [m] around the origin: 20 cells^3 tetrahedra, dihedral angles near those of regular
-    ones.
+    """Build a ball around the origin from 20 cells^3 nearly regular tetrahedra.
 
-    An icosahedron's twenty corners at the center, each divided evenly and bent so that layer k of `cells` lies on a sphere.
+    The twenty tetrahedra between the center and the faces of an icosahedron are divided evenly, then mapped so that layer k
+    of `cells` lies on a sphere.
 
     Args:
         radius: m.
-        cells: from the center to the surface.
-        order: 1 for four nodes, 2 for ten, those on the surface on it.
+        cells: the number of cells from the center to the surface.
+        order: 1 for four nodes; 2 for ten, with the midside nodes of surface edges on the sphere.
 
     >>> ball(0.01, cells=4).n_tetrahedra
     1280
@@ -34,7 +34,7 @@ def ball(radius: float, cells: int, order: int = 1) -> TetMesh:
     check_size(20.0 * cells**3)
     outer, triangles = _icosahedron()
     lattice, small = _divided(cells)
-    # the weights of the twelve outer corners, whole numbers: the same in all tetrahedra that a point belongs to
+    # integer weights of the twelve outer corners: a point gets the same ones in all of the twenty tetrahedra it belongs to
     weights = np.zeros((len(triangles), len(lattice), 12), dtype=np.int32)
     for i in range(3):
         np.put_along_axis(
@@ -53,11 +53,11 @@ def ball(radius: float, cells: int, order: int = 1) -> TetMesh:
     )
     which = which.reshape(20, len(lattice))
     tetrahedra = which[:, small].reshape(-1, 4)
-    return round_order(TetMesh(points, turned(points, tetrahedra)), order, axes=(0, 1, 2))
+    return round_order(TetMesh(points, oriented(points, tetrahedra)), order, axes=(0, 1, 2))
 
 
 def _icosahedron() -> tuple[np.ndarray, np.ndarray]:
-    """Corners (12, 3) of unit length, and triangles (20, 3) in any direction."""
+    """Return the corners (12, 3) of an icosahedron, of unit length, and its triangles (20, 3) of either orientation."""
     golden = 0.5 * (1 + np.sqrt(5))
     corners = np.array(
         [np.roll((0.0, s, t * golden), shift) for shift in range(3) for s in (-1, 1) for t in (-1, 1)]
@@ -68,11 +68,11 @@ def _icosahedron() -> tuple[np.ndarray, np.ndarray]:
 
 
 def _divided(n: int) -> tuple[np.ndarray, np.ndarray]:
-    """A tetrahedron divided into n^3: of its lattice points the weights (k, 3) of corners 1 to 3, in units of 1 / n, and
-    the small ones (n^3, 4).
+    """Divide a tetrahedron into n^3 small ones.
 
-    Points are those with n >= x >= y >= z >= 0 of a cubic lattice, small tetrahedra the six around the diagonal of each
-    cube as far as they lie there. What that does to a face is the same from both sides.
+    Returns the barycentric weights (k, 3) of corners 1 to 3 at each point, in units of 1 / n, and the small tetrahedra
+    (n^3, 4). The points are those with n >= x >= y >= z >= 0 of a cubic lattice. The small tetrahedra are those of the six
+    around the diagonal of each cube that lie in this region. Two tetrahedra divide a common face in the same way.
     """
     x, y, z = np.meshgrid(*[np.arange(n + 1)] * 3, indexing="ij")
     inside = (x >= y) & (y >= z)

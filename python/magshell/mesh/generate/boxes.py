@@ -1,4 +1,4 @@
-"""A block."""
+"""The generator of rectangular blocks of tetrahedra."""
 
 from __future__ import annotations
 
@@ -27,14 +27,15 @@ if TYPE_CHECKING:
 def box(
     size: Numbers, cells: tuple[int, int, int], diagonals: str = "alternating", order: int = 1
 ) -> TetMesh:
-    """The block [0, a] x [0, b] x [0, c] of tetrahedra.
+    """Build the block [0, a] x [0, b] x [0, c] of tetrahedra.
 
     Args:
         size: (a, b, c), m.
-        cells: along x, y and z.
-        diagonals: "alternating" (six tetrahedra a cell, mirrored from cell to cell: with even cells the block is its own
-            mirror image, and six meet in each of its corners), "aligned" (six, all cells alike) or "crossed" (24, with a
-            vertex in the middle of each cell and side: its own mirror image for any cells).
+        cells: numbers of cells along x, y and z.
+        diagonals: how cells are divided. "alternating": six tetrahedra per cell, mirrored from cell to cell; with even
+            numbers of cells the block is its own mirror image, and six tetrahedra meet at each of its corners. "aligned":
+            six tetrahedra per cell, all cells alike. "crossed": 24 per cell, with a vertex in the middle of each cell and
+            side; the block is its own mirror image for any numbers of cells.
         order: 1 for four nodes, 2 for ten.
 
     >>> box((0.1, 0.01, 0.01), cells=(20, 2, 2)).n_tetrahedra

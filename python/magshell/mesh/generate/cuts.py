@@ -1,4 +1,4 @@
-"""Cuts a mesh open along edges."""
+"""Cuts of a triangle mesh along its edges."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 @grouped()
 def cut(mesh: TriangleMesh, edges: Numbers) -> TriangleMesh:
-    """The mesh cut along interior edges: both sides of the cut get vertices of their own.
+    """Cut a mesh along interior edges, so that the two sides of the cut get separate vertices.
 
     The ends of a cut stay joined unless they lie on the boundary or on another cut, so a slit needs at least
-    two edges to open. Faces keep their numbers; vertices keep theirs on one side and are added at the end for
-    the others.
+    two edges to open. Faces keep their numbers. Vertices on one side of the cut keep their numbers, those on the other side
+    are appended at the end.
 
     Args:
-        mesh: stays as it is.
+        mesh: the mesh to cut; it is not changed.
         edges: indices of interior edges.
 
     Raises:
@@ -60,7 +60,10 @@ def cut(mesh: TriangleMesh, edges: Numbers) -> TriangleMesh:
 
 
 def _corners_at(mesh: TriangleMesh, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Face corners (3 face + i) at the lower and the higher vertex of interior edges, (n, 2 faces) each."""
+    """Return the face corners, 3 face + i, at the lower and at the higher vertex of interior edges, (n, 2) each.
+
+    The two columns are the two faces of an edge.
+    """
     lows, highs = [], []
     for side, (at_low, at_high) in enumerate(((1, 2), (2, 1))):  # edge i runs from vertex i + 1 to i + 2
         face = mesh.edge_faces[edges, side].astype(np.int64)
@@ -71,7 +74,7 @@ def _corners_at(mesh: TriangleMesh, edges: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def _corner_vertices(mesh: TriangleMesh, uncut: np.ndarray) -> np.ndarray:
-    """(3 n_f,): the new vertex at each face corner. Uncut edges keep the corners at their ends together."""
+    """Return the new vertex at each face corner, (3 n_f,); corners stay joined across uncut edges."""
     pairs = np.concatenate(_corners_at(mesh, uncut))
     n_corners = 3 * mesh.n_faces
     graph = scipy.sparse.coo_array(

@@ -1,4 +1,4 @@
-"""A flat round sheet."""
+"""The generator of flat round disks of triangles."""
 
 from __future__ import annotations
 
@@ -15,11 +15,14 @@ from ._six_nodes import round_sheet
 
 @grouped()
 def disk(radius: float, cells: int, *, order: int = 1) -> TriangleMesh | Any:
-    """The disk of the given radius [m] around the origin in the plane z = 0, its normal along +z.
+    """Build a disk around the origin in the plane z = 0, with its normal along +z.
 
-    order: 1 for three nodes a face; 2 for a QuadraticTriangleMesh, whose edges on its rims are arcs.
+    Ring k has 6 k vertices, so all of the 6 cells^2 faces are nearly equilateral.
 
-    Ring k of `cells` rings holds 6 k vertices, so all faces are nearly equilateral: 6 cells^2 of them.
+    Args:
+        radius: m.
+        cells: the number of rings.
+        order: 1 for three nodes per face; 2 for a QuadraticTriangleMesh, whose boundary edges are arcs.
 
     >>> disk(0.01, cells=8).n_faces
     384
@@ -37,7 +40,7 @@ def disk(radius: float, cells: int, *, order: int = 1) -> TriangleMesh | Any:
 
 
 def _ring_faces(k: int) -> np.ndarray:
-    """Faces between rings k - 1 and k: in each of six sectors, k on the outer one, k - 1 on the inner."""
+    """Return the faces between rings k - 1 and k: in each of six sectors k on the outer ring, and k - 1 on the inner."""
     sector, i = (index.ravel() for index in np.meshgrid(np.arange(6), np.arange(k), indexing="ij"))
 
     def outer(step):

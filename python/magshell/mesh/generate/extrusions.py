@@ -1,4 +1,4 @@
-"""Flat sheets made thick, round bars among them."""
+"""Generators of solids by extrusion of flat meshes, among them round bars."""
 
 from __future__ import annotations
 
@@ -10,24 +10,25 @@ from ..._runtime.solver_entry_point import grouped
 from ..tetrahedra.tet_mesh import TetMesh
 from ..triangles.triangle_mesh import TriangleMesh, checked_mesh
 from ._round import round_order
-from ._tet_cells import check_order, check_size, checked_cells, prisms, turned
+from ._tet_cells import check_order, check_size, checked_cells, oriented, prisms
 from .disks import disk
 
-_FLAT = 1e-9  # of the sheet's size
+_FLAT = 1e-9  # [-] largest range of z of a flat mesh, relative to the diagonal of its bounding box
 
 
 @grouped()
 def extruded(sheet: TriangleMesh, height: float, layers: int, order: int = 1) -> TetMesh:
-    """The solid between a flat sheet and its copy at `height` [m] above it.
+    """Build a solid of tetrahedra by extruding a flat triangle mesh along z.
 
     Args:
-        sheet: in a plane z = constant. Vertex v of it becomes v + n_v k of layer k.
+        sheet: a triangle mesh in a plane z = constant. Its vertex v has the number v + n_v k at level k of the solid.
         height: m, along z.
-        layers: of prisms, three tetrahedra each; each layer is the mirror image of the one below it.
-        order: 1 for four nodes, 2 for ten, on straight edges.
+        layers: the number of layers of prisms; each prism is divided into three tetrahedra, and each layer is the mirror
+            image of the one below it.
+        order: 1 for four nodes; 2 for ten, with straight edges.
 
     Raises:
-        ValueError: also for a sheet that is not flat.
+        ValueError: if an argument is out of range or the sheet is not flat.
 
     >>> import magshell as ms
     >>> round(extruded(ms.meshes.rectangle(1.0, 1.0, cells=(2, 2)), height=0.5, layers=2).volume, 9)
@@ -48,19 +49,20 @@ def extruded(sheet: TriangleMesh, height: float, layers: int, order: int = 1) ->
 
 @grouped()
 def stacked(sheet: TriangleMesh, height: float, layers: int) -> TetMesh:
+    """Build a solid of four-node tetrahedra as `extruded` does, without its checks."""
     levels = [(0, 0, height * k / layers) for k in range(layers + 1)]
     points = np.concatenate([sheet.rest_positions + level for level in levels])
-    return TetMesh(points, turned(points, prisms(sheet.faces.astype(np.int64), sheet.n_vertices, layers)))
+    return TetMesh(points, oriented(points, prisms(sheet.faces.astype(np.int64), sheet.n_vertices, layers)))
 
 
 @grouped()
 def solid_cylinder(radius: float, length: float, cells: tuple[int, int], order: int = 1) -> TetMesh:
-    """A round bar around the z axis, 0 <= z <= length.
+    """Build a solid cylinder around the z axis, 0 <= z <= length.
 
     Args:
         radius, length: m.
-        cells: (rings from the axis to the surface, layers along z): 18 tetrahedra times rings^2 times layers.
-        order: 1 for four nodes, 2 for ten, those on the round surface on it.
+        cells: (rings from the axis to the surface, layers along z); there are 18 rings^2 layers tetrahedra.
+        order: 1 for four nodes; 2 for ten, with the midside nodes on the round surface.
 
     >>> bar = solid_cylinder(0.01, 0.1, cells=(3, 20))
     >>> bar.n_tetrahedra

@@ -1,4 +1,4 @@
-"""The solid inside a closed surface, meshed by gmsh."""
+"""The generator of solids inside a closed surface, meshed by gmsh."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from ..tetrahedra.tet_mesh import TetMesh
 from ..topology import face_table, groups
 from ..triangles.triangle_mesh import TriangleMesh, checked_mesh
 from ._gmsh_session import gmsh_session
-from ._tet_cells import check_order, check_size, turned
+from ._tet_cells import check_order, check_size, oriented
 
 
 @grouped()
 def tetrahedralize(surface: TriangleMesh, size: float | None = None, order: int = 1) -> TetMesh:
-    """The solid inside a closed surface, which stays as it is. Needs the extra `gmsh`.
+    """Fill a closed surface with tetrahedra; its vertices and faces are kept. Needs the extra `gmsh`.
 
     Args:
-        surface: closed, of one piece or several apart from each other or within each other (a piece inside another bounds a
-            chamber); its normals all outwards or all inwards. Vertex v of it is vertex v of the mesh.
-        size: the longest edge to aim for inside, m; by default they grow from the surface's.
-        order: 1 for four nodes, 2 for ten, on straight edges.
+        surface: a closed mesh of one or several pieces that do not cross; a piece inside another bounds a chamber. Its
+            normals point all outwards or all inwards. Its vertex v is vertex v of the result.
+        size: the target length of edges inside, m; by default it grows from the edges of the surface.
+        order: 1 for four nodes; 2 for ten, with straight edges.
 
     Raises:
         ValueError: for a surface that is open or passes through itself.
@@ -47,30 +47,34 @@ def tetrahedralize(surface: TriangleMesh, size: float | None = None, order: int 
             f"({len(crossing)} such pairs)"
         )
     check_size(float(12 * np.prod(np.ptp(surface.rest_positions, axis=0) / size)), "size [m]")
-    # gmsh's kernel has absolute tolerances: mesh in units of about the extent. A power of two is exact.
+    # The tolerances of gmsh's kernel are absolute, so the mesh is scaled to a size of about 1; a power of two does so
+    # exactly.
     unit = 2.0 ** np.round(np.log2(np.ptp(surface.rest_positions, axis=0).max()))
     try:
         points, tetrahedra = _mesh_with_gmsh(surface.rest_positions / unit, surface.faces, size / unit)
     except Exception as error:
-        if type(error) is not Exception:  # gmsh raises no other
+        if type(error) is not Exception:  # gmsh raises plain Exception only
             raise
         raise ValueError(f"gmsh cannot mesh the inside of this surface: {error}") from error
     points = np.concatenate([surface.rest_positions, unit * points[surface.n_vertices :]])
     outwards = surface if _enclosed(surface) > 0 else surface.flipped()
-    tetrahedra = _within(turned(points, tetrahedra), outwards)
+    tetrahedra = _within(oriented(points, tetrahedra), outwards)
     used = np.union1d(np.arange(surface.n_vertices), tetrahedra)
     mesh = TetMesh(points[used], np.searchsorted(used, tetrahedra))
     return mesh.second_order() if order == 2 else mesh
 
 
 def _enclosed(surface: TriangleMesh) -> float:
-    """m3, negative where normals point inwards."""
+    """Return the volume enclosed by a closed surface, m3; negative if its normals point inwards."""
     x = surface.rest_positions - surface.rest_positions.mean(axis=0)
     return float(np.linalg.det(x[surface.faces]).sum() / 6)
 
 
 def _mesh_with_gmsh(points: np.ndarray, faces: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Points (n, 3), the given ones first, and tetrahedra (n_t, 4)."""
+    """Mesh the inside of a closed surface with gmsh.
+
+    Returns points (n, 3), the given ones first, and tetrahedra (n_t, 4).
+    """
     with gmsh_session(min(size, 1e22)) as gmsh:
         gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 1)
         sheet = gmsh.model.addDiscreteEntity(2)
@@ -90,15 +94,15 @@ def _mesh_with_gmsh(points: np.ndarray, faces: np.ndarray, size: float) -> tuple
 
 
 def _within(tetrahedra: np.ndarray, surface: TriangleMesh) -> np.ndarray:
-    """Those of the tetrahedra (n_t, 4), right way around, that lie behind the surface: gmsh fills its chambers too.
+    """Select those tetrahedra that lie inside the surface, because gmsh fills chambers as well.
 
-    Every triangle of the surface must be a face of them. Regions between the surface's pieces are told apart by the side
-    on which they see it.
+    tetrahedra: (n_t, 4), with positive volumes; every triangle of the surface must be a face of one of them. A region
+    between pieces of the surface lies inside if it is behind the triangles that bound it, with respect to their normals.
     """
     both = np.concatenate(
         [tetrahedra, np.column_stack([surface.faces, np.full(surface.n_faces, tetrahedra.max() + 1)])]
     )
-    table = face_table(both)  # each triangle of the surface as face 3 of a tetrahedron that there is not
+    table = face_table(both)  # each triangle of the surface is face 3 of an auxiliary tetrahedron
     n = len(tetrahedra)
     number = table.order // 4
     rank = np.repeat(np.arange(len(table.first)), table.counts)
@@ -110,12 +114,11 @@ def _within(tetrahedra: np.ndarray, surface: TriangleMesh) -> np.ndarray:
     region = groups(len(both), pairs[(pairs < n).all(axis=1)])
 
     runs_even = np.zeros(len(table.first), dtype=bool)
-    runs_even[rank[is_surface]] = ~table.even[
-        table.order[is_surface]
-    ]  # face 3 is (0, 2, 1): the other way around
-    beside = (number < n) & on_surface[rank]
-    behind = table.even[table.order[beside]] == runs_even[rank[beside]]
-    inner, outer = (np.unique(region[number[beside]][chosen]) for chosen in (behind, ~behind))
+    # face 3 has the nodes (0, 2, 1): the opposite orientation
+    runs_even[rank[is_surface]] = ~table.even[table.order[is_surface]]
+    adjacent = (number < n) & on_surface[rank]
+    behind = table.even[table.order[adjacent]] == runs_even[rank[adjacent]]
+    inner, outer = (np.unique(region[number[adjacent]][chosen]) for chosen in (behind, ~behind))
     if len(np.intersect1d(inner, outer)):
         raise ValueError(
             "surface: its normals must be all outwards, or all inwards, and into every chamber alike"

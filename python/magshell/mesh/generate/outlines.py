@@ -1,4 +1,4 @@
-"""A flat sheet of any outline, with holes and slits, meshed by gmsh."""
+"""The generator of flat meshes inside any polygon, with holes and slits, meshed by gmsh."""
 
 from __future__ import annotations
 
@@ -30,26 +30,26 @@ from .cuts import cut
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
 
-_GROWTH = 0.3  # of the mesh size, with the distance from a short side
-_ON_BOUNDARY = 1e-7  # of the outline's extent: a slit that ends this close to the boundary reaches it
+_GROWTH = 0.3  # [-] increase of the mesh size per distance from a short side
+_ON_BOUNDARY = 1e-7  # [-] a slit ends on the boundary if it is closer than this, relative to the longest side of the outline
 
 
 @grouped()
 def outline(
     outer: Numbers, holes: Sequence[Any] = (), slits: Sequence[Any] = (), *, size: float, order: int = 1
 ) -> TriangleMesh | Any:
-    """The sheet inside a polygon in the plane z = 0, its normal along +z. Needs the extra `gmsh`.
+    """Mesh the inside of a polygon in the plane z = 0, with the normal along +z. Needs the extra `gmsh`.
 
     Args:
-        outer: (n, 2), m, the corners in either direction, the first one not repeated.
-        holes: polygons alike, inside the outer one and apart from each other; one, or a list.
-        slits: polylines (n, 2), m, cut through the sheet: both sides get vertices of their own. Slits may
-            cross and may end on the boundary; an end inside the sheet stays joined. One, or a list.
-        size: the longest edge to aim for, m. Short sides of the polygons make the mesh finer around them.
-        order: 1 for three nodes a face; 2 for a QuadraticTriangleMesh, whose `elements` the same triangles are.
+        outer: (n, 2), m, the corners of the polygon in either direction, without a repeated first corner.
+        holes: polygons (n, 2), m, inside the outer one and apart from each other; one, or a list.
+        slits: polylines (n, 2), m, along which the mesh is cut: its two sides get separate vertices. Slits may
+            cross and may end on the boundary; an end in the interior stays joined. One, or a list.
+        size: the target length of edges, m. The mesh is finer around short sides of the polygons.
+        order: 1 for three nodes per face; 2 for a QuadraticTriangleMesh, whose `elements` are the same triangles.
 
     Raises:
-        ValueError: for polygons that intersect themselves or each other, holes or slits outside of the sheet,
+        ValueError: for polygons that intersect themselves or each other, holes or slits outside of the outer polygon,
             and slits too short for two edges of the mesh.
         ImportError: without gmsh.
 
@@ -66,7 +66,8 @@ def outline(
     _check_holes(outer, holes)
     _check_slits(outer, holes, slits)
 
-    # gmsh's kernel has absolute tolerances: mesh in units of about the extent. A power of two is exact.
+    # The tolerances of gmsh's kernel are absolute, so the mesh is scaled to a size of about 1; a power of two does so
+    # exactly.
     unit = 2.0 ** np.round(np.log2(np.ptp(outer, axis=0).max()))
     cells = float(np.prod(np.ptp(outer, axis=0) / size))
     check_size(2 * int(min(cells, 1e18)), "size [m]")
@@ -75,7 +76,7 @@ def outline(
             outer / unit, [hole / unit for hole in holes], [slit / unit for slit in slits], size / unit
         )
     except Exception as error:
-        if type(error) is not Exception:  # gmsh raises no other
+        if type(error) is not Exception:  # gmsh raises plain Exception only
             raise
         raise ValueError(f"gmsh cannot mesh this outline: {error}") from error
     x, y = unit * points.T
@@ -88,12 +89,12 @@ def outline(
 
 def _check_holes(outer: np.ndarray, holes: list[np.ndarray]) -> None:
     for k, hole in enumerate(holes):
-        if len(crossings(sides(outer), sides(hole), touching=True)):
+        if len(crossings(sides(outer), sides(hole), include_contacts=True)):
             raise ValueError(f"hole {k} meets the outer polygon; make it part of that instead")
         if not contains(outer, hole[:1])[0]:
             raise ValueError(f"hole {k} lies outside of the outer polygon")
         for other in range(k):
-            if len(crossings(sides(holes[other]), sides(hole), touching=True)):
+            if len(crossings(sides(holes[other]), sides(hole), include_contacts=True)):
                 raise ValueError(f"holes {other} and {k} meet; make them one")
             if contains(holes[other], hole[:1])[0] or contains(hole, holes[other][:1])[0]:
                 raise ValueError(f"of holes {other} and {k} one lies inside the other")
@@ -104,7 +105,7 @@ def _check_slits(outer: np.ndarray, holes: list[np.ndarray], slits: list[np.ndar
     named = [("outer polygon", outer), *((f"hole {k}", hole) for k, hole in enumerate(holes))]
     for k, slit in enumerate(slits):
         for name, polygon in named:
-            for segment, side in crossings(segments(slit), sides(polygon), touching=False):
+            for segment, side in crossings(segments(slit), sides(polygon), include_contacts=False):
                 point = meeting_point(segments(slit)[segment], sides(polygon)[side])
                 if np.linalg.norm(slit[segment : segment + 2] - point, axis=1).min() > tolerance:
                     raise ValueError(f"slit {k} leaves the sheet: it crosses side {side} of the {name}")
@@ -121,7 +122,10 @@ def _check_slits(outer: np.ndarray, holes: list[np.ndarray], slits: list[np.ndar
 
 
 def _mesh_with_gmsh(outer, holes, slits, size: float) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
-    """Points (n, 2), faces (n_f, 3), and for each slit the vertex pairs (k, 2) of the mesh edges along it."""
+    """Mesh the inside of a polygon with gmsh.
+
+    Returns points (n, 2), faces (n_f, 3), and for each slit the vertex pairs (k, 2) of the mesh edges along it.
+    """
     with gmsh_session(size) as gmsh:
         kernel = gmsh.model.occ
 
@@ -155,10 +159,10 @@ def _mesh_with_gmsh(outer, holes, slits, size: float) -> tuple[np.ndarray, np.nd
 
 
 def _grade(gmsh, size: float) -> None:
-    """Wraps short sides in small faces, which grow inwards.
+    """Set size fields that make faces small along short sides, and let them grow away from these.
 
-    Left alone, gmsh fills the sheet with faces as small as the shortest side, or sets large ones against it.
-    Sides are taken together by octaves of length: a size field for each.
+    Without them, gmsh fills the polygon with faces as small as the shortest side, or puts large faces next to it.
+    Sides whose lengths lie within a factor of two share a size field.
     """
     lengths = {curve: gmsh.model.occ.getMass(1, curve) for _, curve in gmsh.model.getEntities(1)}
     octaves: dict[int, list[int]] = {}
@@ -186,7 +190,7 @@ def _grade(gmsh, size: float) -> None:
 
 
 def _upwards(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Faces turned so that their normals point along +z."""
+    """Return the faces oriented so that their normals point along +z."""
     (x0, y0), (x1, y1), (x2, y2) = (points[faces[:, i]].T for i in range(3))
     downwards = (x1 - x0) * (y2 - y0) < (x2 - x0) * (y1 - y0)
     return np.where(downwards[:, None], faces[:, ::-1], faces)
@@ -198,7 +202,7 @@ def _edges_of(mesh: TriangleMesh, ends: np.ndarray) -> np.ndarray:
 
 
 def _check_slits_open(mesh: TriangleMesh, slit_sides: list[np.ndarray]) -> None:
-    """A slit that is one edge of the mesh opens only where it meets the boundary or another slit."""
+    """Check that slits open: a slit that is a single edge of the mesh must meet the boundary or another slit."""
     for k, ends in enumerate(slit_sides):
         others = [mesh.boundary_vertices, *(other.ravel() for other in slit_sides if other is not ends)]
         if len(ends) == 1 and not np.isin(ends, np.concatenate(others)).any():

@@ -1,4 +1,4 @@
-"""A flat rectangular sheet."""
+"""The generator of flat rectangles of triangles."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ def rectangle(
     *,
     order: int = 1,
 ) -> TriangleMesh | Any:
-    """The sheet [0, length] x [0, width] [m] in the plane z = 0, its normal along +z.
+    """Build the rectangle [0, length] x [0, width] in the plane z = 0, with its normal along +z.
 
     Args:
         length, width: along x and y, m.
-        cells: along x and y.
-        diagonals: "alternating", "aligned" (all from the origin outwards) or "crossed" (four faces a cell).
-        irregular: moves interior vertices at random by up to this fraction of their spacing, at most 0.25.
-        seed: of these moves; the same seed gives the same mesh.
-        order: 1 for three nodes a face; 2 for a QuadraticTriangleMesh, whose `elements` the same triangles are.
+        cells: numbers of cells along x and y.
+        diagonals: "alternating", "aligned" (all pointing away from the origin) or "crossed" (four faces per cell).
+        irregular: largest random displacement of interior vertices, as a fraction of their spacing, at most 0.25.
+        seed: the seed of these displacements; the same seed gives the same mesh.
+        order: 1 for three nodes per face; 2 for a QuadraticTriangleMesh, whose `elements` are the same triangles.
 
     >>> rectangle(0.12, 0.02, cells=(60, 10)).n_faces
     1200

@@ -1,4 +1,4 @@
-"""A solid of any shape that a signed distance describes."""
+"""The generator of solids described by a signed distance."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from ..topology import FACES, face_table, nonmanifold_edges, nonmanifold_vertice
 from ._bcc_lattice import lattice_inside
 from ._lost import warn_of_loss
 from ._stuffing import Cuts, stuffed
-from ._tet_cells import check_order, check_size, turned
+from ._tet_cells import check_order, check_size, oriented
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
 
-_PER_CELL = 12  # tetrahedra
-_SAMPLES = 40_000  # that a volume is estimated from
-_TRIES = 4  # of spacings for a wanted number of tetrahedra
-_CLOSE = 0.02  # enough, of that number
-_ROUNDS = 50  # of mending where the surface touches itself
+_PER_CELL = 12  # tetrahedra per cubic cell of the lattice
+_SAMPLES = 40_000  # sample points from which a volume is estimated
+_TRIES = 4  # spacings tried for a wanted number of tetrahedra
+_CLOSE = 0.02  # [-] error of the logarithm of that number that ends the search
+_ROUNDS = 50  # largest number of rebuilds to remove points at which the surface touches itself
 
 
 @grouped()
@@ -38,30 +38,31 @@ def from_distance(
     bounds: Numbers | None = None,
     order: int = 1,
 ) -> TetMesh:
-    """The solid where a signed distance is negative, by isosurface stuffing.
+    """Mesh the solid in which a signed distance is negative, by isosurface stuffing.
 
-    Inside all tetrahedra are alike, twelve to a cube of side `spacing`, with dihedral angles of 60 and 90 degrees; at the
-    surface angles stay between 10.7 and 164.8 degrees in all lattices with random cuts that the tests look at: measured,
-    not proven. The surface's vertices lie on it, sharp edges of it are blunted by up to about half the spacing. What is
-    thinner than the spacing may be lost in part, and what comes closer to itself than that may be joined: two spacings
-    through a finger keep it whole.
+    Inside, all tetrahedra are congruent, twelve per cube of side `spacing`, with dihedral angles of 60 and 90 degrees. Near
+    the surface the angles stay between 10.7 and 164.8 degrees; this is not proven, but found in all tests with random cuts.
+    The vertices of the surface lie on it; its sharp edges are blunted by up to about half the spacing. Walls thinner than
+    the spacing may be lost in part, and gaps narrower than that may be closed; a finger of two spacings in diameter is safe.
 
     Args:
-        shape: one of `ms.shapes`; or any function (n, 3) m -> (n,) m that is negative inside and continuous. Only its
+        shape: one of `ms.shapes`; or any continuous function (n, 3) m -> (n,) m that is negative inside. Only its
             sign and its zeros matter, so it need not be a true distance.
-        spacing: m. It is also the longest edge inside.
-        n_tetrahedra: about how many there are to be, instead of spacing.
-        bounds: (2, 3) m, the lower and upper corner of a box around the shape, for a function, or a shape that has no end.
-        order: 1 for four nodes, 2 for ten, with the nodes on the surface's edges on it.
+        spacing: m, the side of the lattice's cubes and the longest edge inside.
+        n_tetrahedra: the approximate number of tetrahedra, instead of spacing.
+        bounds: (2, 3) m, the lower and upper corner of a box around the shape; needed for a function and for an unbounded
+            shape.
+        order: 1 for four nodes; 2 for ten, with the midside nodes of surface edges on the surface.
 
-    Parts named by `Shape.named` become parts of the mesh, 1, 2, ... in their order, by which is nearest to a tetrahedron's
-    barycenter; 0 is what none has named. The same arguments give the same mesh.
+    The parts of a shape that have names (`Shape.named`) become parts 1, 2, ... of the mesh, in their order. A tetrahedron
+    belongs to the part nearest to its barycenter, or to part 0 if no part has a name there. The same arguments give the same
+    mesh.
 
-    An ms.MeshQualityWarning says where more than 15 % of the shape's volume was lost or joined, where there are more or
-    fewer parts than the shape has, and where the number of tetrahedra asked for is missed by more than 20 %.
+    An ms.MeshQualityWarning reports a volume that differs from that of the shape by more than 15 %, a different number of
+    connected parts, and a number of tetrahedra that differs from n_tetrahedra by more than 20 %.
 
     Raises:
-        ValueError: also for a shape that reaches beyond its bounds, and where nothing is found inside.
+        ValueError: also for a shape that reaches beyond its bounds, and if nothing is found inside.
 
     >>> import magshell as ms
     >>> ms.meshes.from_distance(ms.shapes.ball(1.0), spacing=0.25).n_components
@@ -93,7 +94,7 @@ def _bounds(shape, bounds) -> tuple[np.ndarray, np.ndarray]:
     elif isinstance(shape, Shape):
         low, high = shape.bounds
         if not (np.isfinite(low).all() and np.isfinite(high).all()):
-            raise ValueError(f"{shape!r} has no end: give bounds, or cut it by `& ms.shapes.box(...)`")
+            raise ValueError(f"{shape!r} is unbounded: give bounds, or cut it by `& ms.shapes.box(...)`")
     else:
         raise ValueError("bounds [m] are needed for a function: the corners (2, 3) of a box around the shape")
     if not (low < high).all():
@@ -104,30 +105,36 @@ def _bounds(shape, bounds) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _solid_of(distance: Distance, low, high, wanted: int) -> tuple[np.ndarray, np.ndarray, float]:
-    """The solid whose number of tetrahedra comes closest to the wanted one, of a few spacings, and that."""
+    """Search for the spacing that gives about the wanted number of tetrahedra.
+
+    Returns the points, tetrahedra and spacing [m] of the closest of a few tries.
+    """
     extent = high - low
     across = np.maximum(np.ceil(extent * (_SAMPLES / extent.prod()) ** (1 / 3)), 8).astype(int)
     at = np.stack(np.meshgrid(*[(np.arange(n) + 0.5) / n for n in across], indexing="ij"), axis=-1).reshape(
         -1, 3
     )
-    share = (distance(low + extent * at) < 0).mean()
-    if share == 0:
+    fraction = (distance(low + extent * at) < 0).mean()
+    if fraction == 0:
         raise ValueError("shape: nothing of it was found within its bounds")
-    spacing = float((_PER_CELL * share * extent.prod() / wanted) ** (1 / 3))
-    best, smallest_miss = None, np.inf
+    spacing = float((_PER_CELL * fraction * extent.prod() / wanted) ** (1 / 3))
+    best, smallest_error = None, np.inf
     for _ in range(_TRIES):
         found = _solid(distance, low, high, spacing)
-        miss = abs(np.log(len(found[1]) / wanted))
-        if miss < smallest_miss:
-            best, smallest_miss = (*found, spacing), miss
-        if smallest_miss <= _CLOSE:
+        error = abs(np.log(len(found[1]) / wanted))
+        if error < smallest_error:
+            best, smallest_error = (*found, spacing), error
+        if smallest_error <= _CLOSE:
             break
         spacing *= (len(found[1]) / wanted) ** (1 / 3)
     return best
 
 
 def _solid(distance: Distance, low, high, spacing: float) -> tuple[np.ndarray, np.ndarray]:
-    """Points and tetrahedra, every point in use, with a surface that nowhere touches itself."""
+    """Mesh the solid for one spacing [m], with a manifold surface.
+
+    Returns points (n, 3), without unused ones, and tetrahedra (n_t, 4).
+    """
     cells = (high - low) / spacing
     check_size(float(_PER_CELL * np.prod(cells + 2)), "spacing [m]")
     counts = np.ceil(cells - 1e-9).astype(int) + 2
@@ -149,19 +156,19 @@ def _solid(distance: Distance, low, high, spacing: float) -> tuple[np.ndarray, n
         points, tetrahedra, sign = stuffed(cuts)
         if len(tetrahedra) == 0:
             raise ValueError(f"shape: too thin for a spacing of {spacing:.6g} m; choose a smaller one")
-        tetrahedra = turned(points, tetrahedra)
-        touching = _touching(tetrahedra)
-        touching = touching[touching < len(sign)]
-        if len(touching) == 0:
+        tetrahedra = oriented(points, tetrahedra)
+        nonmanifold = _nonmanifold_points(tetrahedra)
+        nonmanifold = nonmanifold[nonmanifold < len(sign)]
+        if len(nonmanifold) == 0:
             break
-        # only points that moved onto the surface can be where it touches itself: they stay where they were
-        cuts.keep_away(touching[sign[touching] == 0])
+        # the surface can touch itself only at lattice points that snapped onto it: in the next round they do not snap
+        cuts.prevent_snapping(nonmanifold[sign[nonmanifold] == 0])
     used = np.unique(tetrahedra)
     return points[used], np.searchsorted(used, tetrahedra)
 
 
-def _touching(tetrahedra: np.ndarray) -> np.ndarray:
-    """Vertices, and ends of edges, where the surface touches itself."""
+def _nonmanifold_points(tetrahedra: np.ndarray) -> np.ndarray:
+    """Return the vertices at which the surface touches itself: ends of nonmanifold edges, else nonmanifold vertices."""
     outer = outer_faces(face_table(tetrahedra))
     faces = tetrahedra[outer[:, None] // 4, FACES[outer % 4]]
     edges = nonmanifold_edges(faces)

@@ -1,4 +1,4 @@
-"""Makes cylinders, rings and spherical caps."""
+"""Generators of cylinders, rings, sectors and spherical caps of triangles."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from ..._input.quantity import quantity
 from ..._input.scalars import positive
 from ..._runtime.solver_entry_point import grouped
 from ..triangles.triangle_mesh import TriangleMesh
-from ._angles import TURN, angle_span, is_full_turn
+from ._angles import TURN, angle_span, is_full_circle
 from ._grid import checked_cells, grid
 from ._six_nodes import round_sheet
 
 
 def surface(points: np.ndarray, faces: np.ndarray, outwards: Callable[..., Any]) -> TriangleMesh:
-    """The mesh, if the normal of each face is on the side of outwards(barycenters).
+    """Build a mesh, and check that the normal of each face points to the side of outwards(barycenters).
 
-    Bending a grid is not linear: a face that is merely slanted in the unit square may turn over on a
+    The map of a grid onto a surface is not linear: a face that is only distorted in the unit square may be inverted on a
     coarse or pointed surface.
     """
     mesh = TriangleMesh(points, faces)
-    turned = np.flatnonzero((mesh.face_normals * outwards(mesh.face_barycenters)).sum(axis=1) <= 0)
-    if len(turned):
+    inverted = np.flatnonzero((mesh.face_normals * outwards(mesh.face_barycenters)).sum(axis=1) <= 0)
+    if len(inverted):
         raise ValueError(
-            f"irregular moves turn face {turned[0]} over; choose a smaller fraction, another seed, more cells"
+            f"irregular: the displacements invert face {inverted[0]}; choose a smaller fraction, another seed or more cells"
         )
     return mesh
 
@@ -43,18 +43,17 @@ def cylinder(
     seed: int = 0,
     order: int = 1,
 ) -> TriangleMesh | Any:
-    """A cylinder around the y axis, 0 <= y <= length, its normal outwards.
+    """Build a cylindrical surface around the y axis, 0 <= y <= length, with its normal outwards.
 
         x = radius sin(phi),   z = radius cos(phi)
 
     Args:
         radius, length: m.
-        angle: phi in rad, measured from the top (+z) towards +x: (from, to), or the width of a span symmetric
-            about the top, so that a roof of half angle a has angle = 2 a. A full turn is closed: its seam is
-            joined.
+        angle: phi in rad, measured from the top (+z) towards +x: (from, to), or the width of a range symmetric
+            about the top, so that a roof of half angle a has angle = 2 a. A full circle is closed, without a seam.
         cells: (around, along).
         diagonals, irregular, seed: as for `rectangle`.
-        order: likewise; nodes between corners lie on the cylinder too.
+        order: as for `rectangle`; midside nodes lie on the cylinder as well.
 
     >>> import math
     >>> roof = cylinder(25.0, 50.0, angle=math.radians(80.0), cells=(16, 16))
@@ -63,9 +62,9 @@ def cylinder(
     """
     radius, length = positive("radius", "m", radius), positive("length", "m", length)
     start, stop = angle_span("angle", angle, symmetric=True)
-    # the grid closes along its second parameter, so that is phi; -y then keeps d/du x d/dv outwards
+    # A grid is periodic in its second parameter, so that must be phi; the first is -y, for dx/du x dx/dv to point outwards.
     around, along = checked_cells(cells)
-    g = grid((along, around), diagonals, irregular, seed, periodic=is_full_turn(start, stop))
+    g = grid((along, around), diagonals, irregular, seed, periodic=is_full_circle(start, stop))
     y = length * (1 - g.parameters[:, 0])
     phi = start + (stop - start) * g.parameters[:, 1]
     points = np.stack([radius * np.sin(phi), y, radius * np.cos(phi)], axis=1)
@@ -84,13 +83,13 @@ def annulus(
     *,
     order: int = 1,
 ) -> TriangleMesh | Any:
-    """The ring between two radii [m] around the origin in the plane z = 0, its normal along +z.
+    """Build the ring between two radii around the origin in the plane z = 0, with its normal along +z.
 
     Args:
         inner_radius, outer_radius: m.
         cells: (radial, around).
         diagonals, irregular, seed: as for `rectangle`.
-        order: likewise; edges on its rims are arcs.
+        order: as for `rectangle`; boundary edges are arcs.
 
     >>> import magshell as ms
     >>> ms.meshes.annulus(0.01, 0.02, cells=(2, 24)).n_faces
@@ -111,14 +110,15 @@ def sector(
     *,
     order: int = 1,
 ) -> TriangleMesh | Any:
-    """The part of a ring between two angles from the x axis, in the plane z = 0, its normal along +z.
+    """Build a sector of a ring around the origin in the plane z = 0, with its normal along +z.
 
     Args:
-        inner_radius, outer_radius: m. With an inner radius of 0 the sector comes to a point at the origin.
-        angle: rad, from 0 to `angle` or (from, to). A full turn closes the ring: then the seam is joined.
+        inner_radius, outer_radius: m. With an inner radius of 0 the sector has its tip at the origin.
+        angle: rad, measured from the x axis: (from, to), or the width of a range from 0. A full circle is closed, without a
+            seam.
         cells: (radial, around).
         diagonals, irregular, seed: as for `rectangle`.
-        order: likewise; edges on its rims are arcs.
+        order: as for `rectangle`; boundary edges on the arcs are arcs.
 
     >>> import math
     >>> sector(0.0, 0.01, math.pi / 2, cells=(4, 6)).boundary_loops[0].size
@@ -129,7 +129,9 @@ def sector(
     if not 0 <= inner < outer:
         raise ValueError(f"inner_radius [m] must be in [0, outer_radius = {outer}), got {inner_radius}")
     start, stop = angle_span("angle", angle)
-    g = grid(cells, diagonals, irregular, seed, periodic=is_full_turn(start, stop), poles=(inner == 0, False))
+    g = grid(
+        cells, diagonals, irregular, seed, periodic=is_full_circle(start, stop), poles=(inner == 0, False)
+    )
     radius = inner + (outer - inner) * g.parameters[:, 0]
     theta = start + (stop - start) * g.parameters[:, 1]
     points = np.stack([radius * np.cos(theta), radius * np.sin(theta), np.zeros_like(theta)], axis=1)
@@ -150,16 +152,17 @@ def spherical_cap(
     seed: int = 0,
     order: int = 1,
 ) -> TriangleMesh | Any:
-    """The part of the sphere around the origin between two polar angles, its normal outwards.
+    """Build the part of a sphere around the origin between two polar angles, with its normal outwards.
 
     Args:
         radius: m.
         angle_from, angle_to: rad from the +z axis, 0 <= angle_from < angle_to <= pi. At 0 and pi the cap
-            closes in a vertex at the pole, with a fan of faces around it.
-        sector_angle: azimuth in rad from the x axis, from 0 to it or (from, to). A full turn joins its seam.
+            is closed by a vertex at the pole, with a fan of faces around it.
+        sector_angle: azimuth in rad, measured from the x axis: (from, to), or the width of a range from 0. A full circle is
+            closed, without a seam.
         cells: (around, along the meridian).
         diagonals, irregular, seed: as for `rectangle`.
-        order: likewise; nodes between corners lie on the sphere too.
+        order: as for `rectangle`; midside nodes lie on the sphere as well.
 
     >>> import math
     >>> quarter = spherical_cap(10.0, math.radians(18), math.pi / 2, math.pi / 2, cells=(16, 16))
@@ -178,7 +181,7 @@ def spherical_cap(
     around, along = checked_cells(cells)
     if all(poles) and along < 2:
         raise ValueError(f"from pole to pole a cap needs at least 2 cells along the meridian, got {along}")
-    g = grid((along, around), diagonals, irregular, seed, periodic=is_full_turn(start, stop), poles=poles)
+    g = grid((along, around), diagonals, irregular, seed, periodic=is_full_circle(start, stop), poles=poles)
     theta = angle_from + (angle_to - angle_from) * g.parameters[:, 0]
     phi = start + (stop - start) * g.parameters[:, 1]
     sine = np.sin(theta)

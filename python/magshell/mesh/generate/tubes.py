@@ -1,4 +1,4 @@
-"""A thick tube, whole or a sector of it."""
+"""The generator of thick-walled tubes of tetrahedra, closed or a sector."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from ..._input.scalars import positive
 from ..._runtime.solver_entry_point import grouped
 from ..tetrahedra.tet_mesh import TetMesh
-from ._angles import TURN, angle_span, is_full_turn
+from ._angles import TURN, angle_span, is_full_circle
 from ._round import round_order
 from ._tet_cells import (
     check_diagonals,
@@ -31,17 +31,17 @@ def tube(
     diagonals: str = "alternating",
     order: int = 1,
 ) -> TetMesh:
-    """A thick tube around the z axis, 0 <= z <= length.
+    """Build a thick-walled tube around the z axis, 0 <= z <= length.
 
         x = r cos(phi),   y = r sin(phi)
 
     Args:
         inner_radius, outer_radius, length: m.
-        angle: phi in rad: (from, to), or the width from 0, so that pi / 2 is a quarter between the planes y = 0 and
-            x = 0. A full turn is closed.
+        angle: phi in rad: (from, to), or the width of a range from 0, so that pi / 2 is a quarter between the planes y = 0
+            and x = 0. A full circle is closed.
         cells: (through the wall, around, along).
-        diagonals: as for `box`. "alternating" on a full turn needs an even number around.
-        order: 1 for four nodes, 2 for ten, those on round surfaces on them.
+        diagonals: as for `box`. "alternating" on a full circle needs an even number of cells around.
+        order: 1 for four nodes; 2 for ten, with the midside nodes on the round surfaces.
 
     >>> quarter = tube(0.01, 0.02, 0.05, angle=np.pi / 2, cells=(4, 8, 1), order=2)
     >>> len(quarter.vertices_at(x=0.0))
@@ -56,7 +56,7 @@ def tube(
     check_diagonals(diagonals)
     order = check_order(order)
     check_size(24.0 * np.prod([float(n) for n in counts]))
-    closed = is_full_turn(start, stop)
+    closed = is_full_circle(start, stop)
     if closed and counts[1] < 3:
         raise ValueError(f"a closed tube needs at least 3 cells around, got {counts[1]}")
     if closed and diagonals == "alternating" and counts[1] % 2:

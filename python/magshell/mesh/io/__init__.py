@@ -1,1 +1,1 @@
-"""Reads and writes files of meshes."""
+"""Reading and writing of mesh files."""

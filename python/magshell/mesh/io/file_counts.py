@@ -1,4 +1,4 @@
-"""Counts that STL and MSH files claim, compared with the file's size before memory is asked for."""
+"""Checks of the counts in STL and MSH files against the file's size, before memory is allocated for them."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ from pathlib import Path
 from .msh_numbers import MshNumbers
 
 _INT, _DOUBLE = 4, 8  # bytes
-_LEAST_TAG_LIMIT = (
-    10**7
-)  # [-] node tags up to this one, or ten times the file's bytes, are read: each takes 8 bytes
+# [-] Node tags are accepted up to this number or ten times the file's bytes: the reader allocates 8 bytes per tag.
+_LEAST_TAG_LIMIT = 10**7
 _ELEMENT_NODES = {
     **{1: 2, 2: 3, 3: 4, 4: 4, 5: 8, 6: 6, 7: 5, 8: 3, 9: 6, 10: 9, 11: 10},
     **{12: 27, 13: 18, 14: 14, 15: 1, 16: 8, 17: 20, 18: 15, 19: 13, 21: 10, 23: 15, 25: 21, 26: 4, 29: 20},
@@ -19,7 +18,7 @@ _ELEMENT_NODES = {
 
 
 def check_counts(path: Path) -> None:
-    """Raises ValueError where an STL or MSH file says that it holds more than its size allows, or in STL less."""
+    """Raise ValueError if an STL or MSH file claims more data than its size allows, or for STL less."""
     check = {".stl": _check_stl, ".msh": _check_msh}.get(path.suffix.lower())
     if check:
         check(path.read_bytes())
@@ -95,7 +94,7 @@ def _entities_4_1(numbers: MshNumbers) -> None:
         for _ in range(count):
             numbers.ints(1)
             numbers.skip(6 if dimension else 3, _DOUBLE)
-            for _ in range(2 if dimension else 1):  # groups, and what bounds it
+            for _ in range(2 if dimension else 1):  # physical groups, then bounding entities
                 numbers.skip(numbers.sizes(1)[0], _INT)
 
 

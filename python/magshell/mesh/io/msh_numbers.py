@@ -12,7 +12,7 @@ _NUMERIC = re.compile(rb"(?:\s*[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?(?=\s|$)
 class MshNumbers:
     """A section between $Name and $EndName: words in a text file, else int32, float64 and sizes of 4 or 8 bytes.
 
-    Every method raises ValueError where the section has fewer numbers than it is asked for.
+    Every method raises ValueError if the section has fewer numbers than requested.
     """
 
     def __init__(self, name: str, section: bytes, is_text: bool, size: int):
@@ -22,7 +22,7 @@ class MshNumbers:
         self._words = _words(section) if is_text else np.zeros(0)
 
     def check(self, count: int, width: int) -> None:
-        """Raises ValueError unless so many more numbers, of this width in bytes, may be there."""
+        """Raise ValueError unless the section has room for `count` more numbers of `width` bytes each."""
         there = len(self._words) - self._at if self.is_text else (len(self._data) - self._at) // width
         if not 0 <= count <= there:
             raise ValueError(
@@ -30,20 +30,20 @@ class MshNumbers:
             )
 
     def skip(self, count: int, width: int) -> None:
-        """Pass over so many numbers."""
+        """Skip `count` numbers of `width` bytes each."""
         self.check(count, width)
         self._at += count if self.is_text else count * width
 
     def ints(self, count: int) -> list[int]:
-        """Return the next int32."""
+        """Return the next `count` int32 numbers."""
         return self._integers(count, "<i4").tolist()
 
     def sizes(self, count: int) -> list[int]:
-        """Return the next sizes."""
+        """Return the next `count` sizes."""
         return self._integers(count, f"<u{self._size}").tolist()
 
     def largest_size(self, count: int) -> int:
-        """Return the largest of the next sizes, 0 of none."""
+        """Return the largest of the next `count` sizes, or 0 if `count` is 0."""
         return int(self._integers(count, f"<u{self._size}").max(initial=0))
 
     def first_line(self) -> int:
@@ -55,7 +55,7 @@ class MshNumbers:
         return int(self._data[:end])
 
     def lines(self, count: int) -> list[str]:
-        """Return the next lines, of a section that nothing else was read of."""
+        """Return the next `count` lines; nothing but lines may have been read from the section before."""
         if not 0 <= count <= self._data.count(b"\n", self._at):
             raise ValueError(f"${self.name} says that {count:,} lines follow, but it has fewer")
         found = []
@@ -66,7 +66,7 @@ class MshNumbers:
         return found
 
     def check_bytes(self, count: int) -> None:
-        """Raises ValueError unless so many bytes follow the lines that were read."""
+        """Raise ValueError unless at least `count` bytes follow the lines that were read."""
         there = len(self._data) - self._at
         if not 0 <= count <= there:
             raise ValueError(f"${self.name} says that its numbers take {count:,} bytes, but it has {there:,}")
@@ -89,6 +89,6 @@ class MshNumbers:
 
 
 def _words(section: bytes) -> np.ndarray:
-    """Return the numbers at the beginning of a text, up to the first word that is none."""
+    """Return the numbers at the beginning of a text, up to the first word that is not a number."""
     found = _NUMERIC.match(section)
     return np.fromstring(found[0] if found else b"", sep=" ")

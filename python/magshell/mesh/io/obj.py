@@ -1,4 +1,4 @@
-"""OBJ files as modellers write them: colours, normals, textures, groups and materials are passed over."""
+"""OBJ files: vertices and triangles; colours, normals, textures, groups and materials are ignored."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ import numpy as np
 
 
 def read_obj(path: Path) -> tuple[np.ndarray, np.ndarray, dict[Any, Any], dict[Any, Any]]:
-    """(points, faces, no fields). Raises ValueError, with the line, on what is not a vertex or a triangle."""
+    """Read an OBJ file as (points, faces, vertex fields, face fields); the fields are empty.
+
+    Raises ValueError, which names the line, for an invalid vertex and for a face that is not a triangle.
+    """
     points: list[list[float]] = []
     faces: list[list[int]] = []
     for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), start=1):
@@ -30,7 +33,11 @@ def read_obj(path: Path) -> tuple[np.ndarray, np.ndarray, dict[Any, Any], dict[A
 
 
 def _vertex(word: str, n_points: int) -> int:
-    """`word` is vertex, vertex/texture, vertex//normal or all three; from 1, or backwards from -1."""
+    """Return the vertex that a word of a face stands for, counted from 0.
+
+    The word is vertex, vertex/texture, vertex//normal or vertex/texture/normal. Its vertices are counted from 1, or
+    backwards from -1.
+    """
     index = int(word.split("/")[0])
     if index == 0:
         raise ValueError("vertices are numbered from 1")
@@ -38,6 +45,7 @@ def _vertex(word: str, n_points: int) -> int:
 
 
 def write_obj(file: BinaryIO, points: np.ndarray, faces: np.ndarray) -> None:
+    """Write points (n, 3) and triangles (n_f, 3) as an OBJ file."""
     rows = [f"v {x!r} {y!r} {z!r}\n" for x, y, z in points.tolist()]
     rows += [f"f {a} {b} {c}\n" for a, b, c in (faces + 1).tolist()]
     file.write("".join(["# written by magshell\n", *rows]).encode())

@@ -1,7 +1,7 @@
-"""PLY files: ASCII and binary in, binary little endian out, with fields on vertices and faces.
+"""PLY files with fields on vertices and faces: reads ASCII and binary, writes binary little endian.
 
-A field of several components is stored as one property each (`name_x`, `name_y`, `name_z`), as other programs
-expect, and a comment in the header says which belong together, so that it is read back in one piece.
+A field of several components is stored as one property per component (`name_x`, `name_y`, `name_z`), as other programs
+expect. A comment in the header says which properties belong together, so that the field is read back in one piece.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _RESERVED = {"x", "y", "z", *_FACE_LISTS}
 class _Property:
     name: str
     type: str
-    count_type: str | None = None  # of the length that stands before a list
+    count_type: str | None = None  # type of the length before a list; None for a single number
 
 
 @dataclass
@@ -41,7 +41,10 @@ class _Element:
 
 
 def read_ply(path: Path) -> tuple[np.ndarray, np.ndarray, dict[Any, Any], dict[Any, Any]]:
-    """(points, faces, vertex fields, face fields). Raises ValueError on what is not PLY, or not triangles."""
+    """Read a PLY file as (points, faces, vertex fields, face fields).
+
+    Raises ValueError if it is not a PLY file, or has faces that are not triangles.
+    """
     data = path.read_bytes()
     order, elements, groups, body = _header(data)
     wanted = {"vertex", "face"}
@@ -50,7 +53,7 @@ def read_ply(path: Path) -> tuple[np.ndarray, np.ndarray, dict[Any, Any], dict[A
         rows = iter(data[body:].decode("ascii").split("\n"))
     for element in elements:
         if not wanted:
-            break  # what follows (edges, cameras) is not needed
+            break  # the remaining elements, such as edges and cameras, are not needed
         if order:
             tables[element.name], offset = _binary_table(element, data, offset, order)
         else:
@@ -76,7 +79,10 @@ def write_ply(
     vertex_fields: dict[Any, Any],
     face_fields: dict[Any, Any],
 ) -> None:
-    """Fields: name -> (n,) or (n, k), float64 or int32."""
+    """Write a binary PLY file.
+
+    vertex_fields, face_fields: name -> (n,) or (n, k), float64 or int32.
+    """
     vertex, vertex_comments = _columns("vertex", vertex_fields)
     face, face_comments = _columns("face", face_fields)
     for axis in reversed(range(3)):
@@ -89,14 +95,18 @@ def write_ply(
         *_property_lines(face),
         "end_header",
     ]
-    lengths = np.full(len(faces), 3, dtype="u1")  # under a name that no field can have
+    lengths = np.full(len(faces), 3, dtype="u1")  # stored under a name with a space, which no field can have
     face = {"vertex_indices count": lengths, "vertex_indices": faces.astype("<i4"), **face}
     parts = [("\n".join(header) + "\n").encode(), _packed(vertex).tobytes(), _packed(face).tobytes()]
     replace_file(path, lambda file: file.writelines(parts))
 
 
 def _header(data: bytes) -> tuple[str, list[_Element], dict[Any, Any], int]:
-    """Byte order ("" for ASCII), elements, field components that belong together, where the body starts."""
+    """Read the header of a PLY file.
+
+    Returns the byte order ("" for ASCII), the elements, the components of each field by element and name, and the offset of
+    the first byte after the header. Raises ValueError if it is not a valid PLY header.
+    """
     end = data.find(b"\nend_header") + 1
     if not data.startswith(b"ply") or not end:
         raise ValueError("it has no PLY header")
@@ -127,7 +137,10 @@ def _header(data: bytes) -> tuple[str, list[_Element], dict[Any, Any], int]:
 
 
 def _text(header: bytes) -> str:
-    """PLY says nothing of letters beyond ASCII; magshell writes them as UTF-8."""
+    """Decode a header as UTF-8, or else as Latin-1.
+
+    PLY does not define an encoding beyond ASCII; magshell writes UTF-8.
+    """
     try:
         return header.decode("utf-8")
     except UnicodeDecodeError:
@@ -135,7 +148,8 @@ def _text(header: bytes) -> str:
 
 
 def _binary_table(element: _Element, data: bytes, offset: int, order: str) -> tuple[dict[Any, Any], int]:
-    # all lists of an element are taken to be as long as in its first row; _same_lengths checks it
+    """Read the rows of an element from a binary file. Returns its columns by name, and the offset of the next element."""
+    # all lists of an element are assumed to be as long as in its first row; _same_lengths checks this
     columns, position = [], offset
     for prop in element.properties:
         if prop.count_type is None:
@@ -157,7 +171,7 @@ def _binary_table(element: _Element, data: bytes, offset: int, order: str) -> tu
 
 
 def _list_length(element: _Element, prop: _Property, data: bytes, position: int, order: str) -> int:
-    """How many entries the list of an element's first row has. Raises ValueError where the file has no room for them."""
+    """Return the length of the list in an element's first row. Raises ValueError if the file is too short for it."""
     kind = np.dtype(order + str(prop.count_type))
     room = len(data) - position - kind.itemsize
     if room < 0:
@@ -172,6 +186,7 @@ def _list_length(element: _Element, prop: _Property, data: bytes, position: int,
 
 
 def _ascii_table(element: _Element, lines) -> dict[Any, Any]:
+    """Read the rows of an element from the lines of a text file. Returns its columns by name."""
     rows = []
     while len(rows) < element.count:
         line = next(lines, None)
@@ -199,7 +214,7 @@ def _ascii_table(element: _Element, lines) -> dict[Any, Any]:
 
 
 def _of_type(prop: _Property, words: list[Any]) -> np.ndarray:
-    """Words as the numbers that the header says they are."""
+    """Convert words to numbers of the type that the header gives for the property."""
     numbers = np.array(words, dtype=np.float64)
     if prop.type.startswith("f"):
         return numbers.astype(prop.type)
@@ -207,6 +222,7 @@ def _of_type(prop: _Property, words: list[Any]) -> np.ndarray:
 
 
 def _same_lengths(element: _Element, counts: dict[str, np.ndarray]) -> None:
+    """Raise ValueError if a list does not have the same length in all rows of an element."""
     for name, lengths in counts.items():
         other = np.flatnonzero(lengths != lengths[0]) if len(lengths) else []
         if len(other) and name in _FACE_LISTS:
@@ -227,7 +243,10 @@ def _grouped(columns: dict[str, np.ndarray], groups: dict[str, list[str]]) -> di
 
 
 def _columns(element: str, fields: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], list[str]]:
-    """A property for each component, and the comments that tell which belong together."""
+    """Split fields into one property per component.
+
+    Returns the properties by name, and the header comments that say which of them belong together.
+    """
     columns, comments = {}, []
     for name, values in fields.items():
         if values.ndim == 1:

@@ -1,4 +1,4 @@
-"""Meshes and fields from files and to files."""
+"""Reading and writing of meshes, with fields on them."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ if TYPE_CHECKING:
 _MESHIO_MODULES = {".stl": "stl", ".vtu": "vtu", ".msh": "gmsh"}
 _READABLE = (".obj", ".ply", *_MESHIO_MODULES)
 _WRITERS = (".vtu", ".ply")
-_LOWER_CELLS = ("vertex", "line", "line3")  # gmsh writes them beside the surface
+_LOWER_CELLS = ("vertex", "line", "line3")  # gmsh writes them in addition to the surface
 _TRIANGLES = ("triangle", "triangle6")
 
 
 class Fields(NamedTuple):
-    """What a file holds beside the mesh: name -> (n_v,) or (n_v, k), and name -> (n_f,) or (n_f, k)."""
+    """The fields in a file of triangles: `vertex` name -> (n_v,) or (n_v, k), `face` name -> (n_f,) or (n_f, k)."""
 
     vertex: dict[str, np.ndarray]
     face: dict[str, np.ndarray]
@@ -44,26 +44,27 @@ class Fields(NamedTuple):
 
 @grouped()
 def read_mesh(path: FilePath, drop_unused: bool = False, unit: str = "m") -> TriangleMesh | Any:
-    """The mesh in an OBJ, PLY, STL, VTU or gmsh MSH file (the last three need the extra `io`): a TetMesh where a VTU or
-    MSH file holds tetrahedra, a QuadraticTriangleMesh where it holds triangles of six points (gmsh's second order), else a
-    TriangleMesh.
+    """Read a mesh from an OBJ, PLY, STL, VTU or gmsh MSH file (the last three need the extra `io`).
 
-    No format has a word for the unit, and CAD programs write mm: say so by `unit`. Points in the plane get z = 0. An
-    STL file stores each triangle apart: its corners within 1e-6 of the mesh's size are one vertex.
+    Returns a TetMesh if a VTU or MSH file has tetrahedra, a QuadraticTriangleMesh if it has triangles of six points (gmsh's
+    second order), and otherwise a TriangleMesh.
 
-    Tetrahedra have 4 points or 10; triangles and lines beside them are left out. gmsh's physical groups of volumes become
-    parts with their names, as does a cell field `part` of integers.
+    None of the formats stores the unit, and CAD programs often write mm: then give `unit`. Points with two coordinates get
+    z = 0. An STL file stores each triangle separately: corners within 1e-6 of the mesh's size become one vertex.
+
+    Tetrahedra have 4 or 10 points; triangles and lines in the same file are ignored. gmsh's physical groups of volumes
+    become parts with their names; an integer cell field `part` becomes parts as well.
 
     Args:
-        path: the ending tells the format.
-        drop_unused: leave out points that no triangle, or no tetrahedron, uses, instead of refusing them.
-        unit: of the coordinates in the file, "m" or "mm".
+        path: the file; its ending determines the format.
+        drop_unused: drop points that no triangle, or no tetrahedron, uses, instead of raising an error.
+        unit: the unit of the coordinates in the file, "m" or "mm".
 
     Raises:
-        FileNotFoundError: no such file.
-        ValueError: unknown ending, a file that cannot be read, that holds other faces than triangles or none,
-            or whose mesh `TriangleMesh` or `TetMesh` refuses.
-        ImportError: without meshio, where it is needed.
+        FileNotFoundError: if there is no such file.
+        ValueError: for an unknown ending, a file that cannot be read, that has other faces than triangles or none,
+            or whose mesh is refused by `TriangleMesh` or `TetMesh`.
+        ImportError: if meshio is needed and not installed.
 
     >>> import magshell as ms, tempfile
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -79,7 +80,7 @@ def read_mesh(path: FilePath, drop_unused: bool = False, unit: str = "m") -> Tri
 
 
 def read_fields(path: FilePath, drop_unused: bool = False) -> Fields | TetFields:
-    """The fields in a file, for the vertices and faces, or tetrahedra, of `read_mesh` with the same arguments.
+    """Read the fields in a file, on the vertices and faces, or tetrahedra, of `read_mesh` with the same arguments.
 
     path, drop_unused: as in `read_mesh`.
 
@@ -101,21 +102,21 @@ def write_mesh(
     face_fields: Mapping[str, Numbers] | None = None,
     tetrahedron_fields: Mapping[str, Numbers] | None = None,
 ) -> None:
-    """Writes a mesh and fields on it to VTU (needs the extra `io`) or, of triangles, binary PLY.
+    """Write a mesh and fields on it to a VTU file (needs the extra `io`) or, for three-node triangles, a binary PLY file.
 
     Args:
-        path: ends in .vtu or .ply.
-        mesh: gives the faces, or the tetrahedra: their parts are written as the field `part`, without names. Fields on a
-            solid's faces go to a file of its `surface`. Of a QuadraticTriangleMesh the curved elements are written, and what
-            `face_fields` says of them; fields on its flat faces go to a file of its `surface` too.
-        positions: (n_v, 3), m, instead of the rest positions.
+        path: the file, which ends in .vtu or .ply.
+        mesh: the mesh to write. The parts of tetrahedra are written as the cell field `part`, without their names. Fields on
+            the faces of a solid are written with the mesh's `surface`. The curved elements of a QuadraticTriangleMesh are
+            written, and `face_fields` belong to them; fields on its flat faces are written with its `surface` as well.
+        positions: (n_v, 3), m, the positions to write instead of the rest positions.
         vertex_fields: name -> (n_v,) or (n_v, k).
         face_fields: name -> (n_f,) or (n_f, k).
         tetrahedron_fields: name -> (n_t,) or (n_t, k).
 
     Raises:
-        ValueError: unknown ending, wrong shapes, or names with spaces or one of " < > &.
-        OSError: it cannot be written; an older file is as it was.
+        ValueError: for an unknown ending, wrong shapes, or names with spaces or one of " < > &.
+        OSError: if the file cannot be written; an existing file then stays as it was.
 
     >>> import magshell as ms, tempfile
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -132,8 +133,8 @@ def write_mesh(
     solid, six = isinstance(mesh, TetMesh), isinstance(mesh, QuadraticTriangleMesh)
     if not (solid or six or isinstance(mesh, TriangleMesh)) and hasattr(mesh, "surface"):
         raise ValueError(
-            "mesh is that of several bodies, some of tetrahedra: write_series writes a result of all of them, and of one "
-            "write its own, result[body].mesh"
+            "mesh is that of several bodies, some of tetrahedra: write all of them by write_series, or the mesh of one "
+            "body, result[body].mesh"
         )
     if six and ending == ".ply":
         raise ValueError("PLY holds no triangles of six nodes: write .vtu, or the mesh's `surface`")
@@ -162,7 +163,10 @@ def write_cells(
     on_vertices: dict[Any, Any],
     cell_data: dict[str, list[Any]],
 ) -> None:
-    """A VTU of what has been checked: cells [(meshio's kind, rows)] and data {name: [of each kind]}."""
+    """Write a VTU file without further checks.
+
+    cells: [(meshio's name of a kind of cell, rows)]. cell_data: name -> [the values for each entry of `cells`].
+    """
     meshio = _meshio("vtu")
     content = _meshio().Mesh(points, cells, point_data=on_vertices, cell_data=cell_data)
     with replacing(path) as part:
@@ -170,6 +174,7 @@ def write_cells(
 
 
 def _refuse_misplaced(solid: bool, ending: str, face_fields, tetrahedron_fields) -> None:
+    """Raise ValueError for a kind of mesh that the format cannot store, and for fields on cells that the mesh lacks."""
     if solid and ending == ".ply":
         raise ValueError("PLY holds no tetrahedra: write .vtu, or the mesh's `surface`")
     if solid and face_fields:
@@ -183,6 +188,7 @@ def _refuse_misplaced(solid: bool, ending: str, face_fields, tetrahedron_fields)
 def _read(
     path, drop_unused: bool
 ) -> tuple[TriangleMesh | QuadraticTriangleMesh, Fields] | tuple[TetMesh, TetFields]:
+    """Read a file as (mesh, fields)."""
     path = Path(path)
     ending = path.suffix.lower()
     if ending not in _READABLE:
@@ -216,7 +222,7 @@ def _read(
 
 
 def _reason(error: Exception) -> str:
-    """Say what a reader stumbled over; many say too little."""
+    """Return the reason why a file could not be read; the text of some readers' errors does not suffice alone."""
     text = str(error)
     if text and not isinstance(error, LookupError | TypeError | AssertionError | AttributeError):
         return text
@@ -224,6 +230,7 @@ def _reason(error: Exception) -> str:
 
 
 def _solid(path: Path, found: TetContent, drop_unused: bool) -> tuple[TetMesh, TetFields]:
+    """Build the mesh of tetrahedra and its fields from the content of a file."""
     nodes = index_array(f"the tetrahedra of {str(path)!r}", found.tetrahedra)
     found.points, found.tetrahedra, found.vertex_fields = _used(
         path, "tetrahedron", found.points, nodes, found.vertex_fields, drop_unused
@@ -235,7 +242,10 @@ def _solid(path: Path, found: TetContent, drop_unused: bool) -> tuple[TetMesh, T
 
 
 def _used(path: Path, cell: str, points, cells, vertex_fields, drop_unused: bool):
-    """Points, cells and fields without the points that no cell uses. Raises ValueError where those are not to be dropped."""
+    """Return points, cells and vertex fields without the points that no cell uses.
+
+    Raises ValueError if there are such points and drop_unused is False.
+    """
     used = np.unique(cells)
     within = used.size == 0 or (used[0] >= 0 and used[-1] < len(points))
     if not within or len(used) == len(points):
@@ -251,6 +261,7 @@ def _used(path: Path, cell: str, points, cells, vertex_fields, drop_unused: bool
 
 
 def _meshio(module: str | None = None):
+    """Import meshio, or one of its modules. Raises ImportError, which says how to install it."""
     try:
         return importlib.import_module(f"meshio.{module}" if module else "meshio")
     except ImportError as error:
@@ -260,9 +271,10 @@ def _meshio(module: str | None = None):
 def _read_with_meshio(
     path: Path,
 ) -> tuple[np.ndarray, np.ndarray, dict[Any, Any], dict[Any, Any]] | TetContent:
+    """Read an STL, VTU or MSH file: (points, faces, vertex fields, face fields), or the content of a solid."""
     check_counts(path)
-    # meshio.read ends the interpreter on a file it cannot read; the readers of the formats raise
-    with np.errstate(over="ignore"):  # its STL reader multiplies whatever stands where the count should
+    # meshio.read exits the interpreter on a file it cannot read; the readers of the formats raise an error
+    with np.errstate(over="ignore"):  # its STL reader multiplies the claimed count before it checks it
         content = _meshio(_MESHIO_MODULES[path.suffix.lower()]).read(path)
     solid = tetrahedra_of(content)
     if solid is not None:
@@ -275,7 +287,7 @@ def _read_with_meshio(
     if others:
         other, count = next(iter(others.items()))
         raise ValueError(
-            f"it holds {count} cells of type {other!r}; only triangles, all of 3 points or all of 6, are supported"
+            f"the file has {count} cells of type {other!r}; only triangles, all of 3 points or all of 6, are supported"
         )
     triangles = [k for k, block in enumerate(content.cells) if block.type == kind]
     if not triangles:
@@ -289,6 +301,7 @@ def _read_with_meshio(
 
 
 def _merge_coincident(points: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Merge points closer than RELATIVE_TOLERANCE of the bounding-box diagonal. Returns the points and faces."""
     tolerance = RELATIVE_TOLERANCE * float(np.linalg.norm(np.ptp(points, axis=0)))
     pairs = scipy.spatial.cKDTree(points).query_pairs(tolerance, output_type="ndarray")
     graph = scipy.sparse.coo_array(
@@ -303,7 +316,10 @@ def _merge_coincident(points: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray
 
 
 def check_field_name(kind: str, name: str) -> None:
-    """Refuses what one of the formats could not hold: PLY ends a name at a space, and XML has signs of its own."""
+    """Raise ValueError for a name that a format cannot store: PLY ends a name at a space, XML reserves some characters.
+
+    kind: the kind of field that the message names.
+    """
     if not (isinstance(name, str) and name and name.isprintable()) or set(name) & set(' "<>&'):
         raise ValueError(
             f'{kind} field names must be printable words without spaces and without any of " < > &, got {name!r}'
@@ -311,6 +327,7 @@ def check_field_name(kind: str, name: str) -> None:
 
 
 def _checked_fields(kind: str, fields, rows: int) -> dict[str, np.ndarray]:
+    """Return the fields as arrays (rows,) or (rows, k) of int32 or float64. Raises ValueError for other shapes or types."""
     checked = {}
     for name, values in named_values(f"{kind}_fields", fields).items():
         check_field_name(kind, name)

@@ -1,4 +1,4 @@
-"""STL files of triangles, binary."""
+"""Binary STL files of triangles."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribut
 
 
 def write_stl(file: BinaryIO, points: np.ndarray, faces: np.ndarray) -> None:
+    """Write points (n, 3) and triangles (n_f, 3) as a binary STL file."""
     corners = points[faces]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(across, axis=1, keepdims=True)

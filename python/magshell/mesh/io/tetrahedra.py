@@ -1,4 +1,4 @@
-"""Tetrahedra in what meshio reads and writes: MSH and VTU."""
+"""Conversion between tetrahedral meshes and meshio's meshes, for MSH and VTU files."""
 
 from __future__ import annotations
 
@@ -10,14 +10,20 @@ import numpy as np
 from ..._input.arrays import integer_array
 from ..tetrahedra.tet_mesh import TetMesh
 
-LOWER_CELLS = ("vertex", "line", "line3", "triangle", "triangle6")  # gmsh writes them beside the solid
+LOWER_CELLS = (
+    "vertex",
+    "line",
+    "line3",
+    "triangle",
+    "triangle6",
+)  # gmsh writes them in addition to the solid
 _KINDS = ("tetra", "tetra10")
-_PART = "part"  # the cell field of ours
+_PART = "part"  # the cell field that write_mesh writes
 _PART_FIELDS = (_PART, "gmsh:physical")
 
 
 class TetFields(NamedTuple):
-    """What a file holds beside a mesh of tetrahedra: name -> (n_v,) or (n_v, k), and name -> (n_t,) or (n_t, k)."""
+    """The fields in a file of tetrahedra: `vertex` name -> (n_v,) or (n_v, k), `tetrahedron` name -> (n_t,) or (n_t, k)."""
 
     vertex: dict[str, np.ndarray]
     tetrahedron: dict[str, np.ndarray]
@@ -25,7 +31,7 @@ class TetFields(NamedTuple):
 
 @dataclass
 class TetContent:
-    """What was read of a file."""
+    """The content of a file of tetrahedra: points, cells, fields and part names."""
 
     points: np.ndarray
     tetrahedra: np.ndarray
@@ -34,7 +40,7 @@ class TetContent:
     part_names: dict[str, int]
 
     def build(self) -> tuple[TetMesh, TetFields]:
-        """The mesh, its parts from the field `part` or gmsh's physical groups of volumes, and all other fields."""
+        """Build the mesh and its fields; its parts come from the field `part` or gmsh's physical groups of volumes."""
         fields = dict(self.tetrahedron_fields)
         chosen = next((name for name in _PART_FIELDS if name in fields), None)
         parts = None if chosen is None else integer_array(f"the cell field {chosen!r}", fields.pop(chosen))
@@ -43,7 +49,10 @@ class TetContent:
 
 
 def tetrahedra_of(content: Any) -> TetContent | None:
-    """What meshio's mesh holds of tetrahedra; None where it holds none."""
+    """Extract the tetrahedra from meshio's mesh; None if it has none.
+
+    Raises ValueError if it has other volume cells, or tetrahedra of both 4 and 10 points.
+    """
     kinds = {block.type for block in content.cells}
     there = [kind for kind in _KINDS if kind in kinds]
     if not there:
@@ -53,8 +62,8 @@ def tetrahedra_of(content: Any) -> TetContent | None:
         kind = min(others)
         count = sum(len(block.data) for block in content.cells if block.type == kind)
         raise ValueError(
-            f"it holds {count} cells of type {kind!r} beside those of type {there[0]!r}; a mesh is of tetrahedra of 4 points"
-            " or of 10, and of nothing else"
+            f"the file has {count} cells of type {kind!r} as well as cells of type {there[0]!r}; only tetrahedra, all of 4 "
+            "points or all of 10, are supported"
         )
     blocks = [k for k, block in enumerate(content.cells) if block.type == there[0]]
     fields = {name: np.concatenate([data[k] for k in blocks]) for name, data in content.cell_data.items()}
@@ -71,7 +80,10 @@ def tetrahedra_of(content: Any) -> TetContent | None:
 
 
 def cells_and_data(mesh: TetMesh, fields: dict[str, np.ndarray]) -> tuple[list[Any], dict[str, list[Any]]]:
-    """For meshio. A mesh of several parts, or of one with another number than 0, has them in the field `part`."""
+    """Convert a mesh and its fields to meshio's cells and cell data.
+
+    Parts are written as the cell field `part`, unless all of them are 0.
+    """
     data = {name: [values] for name, values in fields.items()}
     if mesh.parts.any():
         if _PART in data:

@@ -1,1 +1,1 @@
-"""Defines meshes of tetrahedra with four and with ten nodes."""
+"""Meshes of tetrahedra with four and with ten nodes."""

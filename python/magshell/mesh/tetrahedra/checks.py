@@ -1,4 +1,4 @@
-"""What a mesh of tetrahedra must hold; each refusal names the first offenders."""
+"""Checks of tetrahedral meshes; each raises a ValueError that names the first invalid tetrahedra or vertices."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ import numpy as np
 from ..topology import EDGES, FaceTable, edge_table, nonmanifold_edges, nonmanifold_vertices
 from .jacobian import bent, jacobians, not_positive, straight_volumes
 
-# Six volumes over the longest edge cubed is 0.71 for a regular tetrahedron. Below this, round-off decides the sign.
+# [-] Smallest six-fold volume over the cube of the longest edge, which is 0.71 for a regular tetrahedron. Below this limit,
+# round-off decides the sign of the volume.
 DEGENERATE = 1e-10
-_MEND = "TetMesh.repaired(...) mends this, and says what it did"
+_REPAIR_ADVICE = "TetMesh.repaired(...) repairs this, and reports what it did"
 _GMSH_ORDER = [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]
 
 
 def listed(numbers: Iterable[Any], most: int = 5) -> str:
+    """Format numbers for a message, the first `most` of them."""
     numbers = [tuple(n) if isinstance(n, list) else n for n in np.asarray(numbers).tolist()]
     return ", ".join(map(str, numbers[:most])) + (", ..." if len(numbers) > most else "")
 
@@ -26,6 +28,7 @@ def plural(count: int, one: str, several: str) -> str:
 
 
 def check_range(tetrahedra: np.ndarray, n_vertices: int) -> None:
+    """Check the shape of the tetrahedra, (n_t, 4) or (n_t, 10), and that their vertices exist."""
     if tetrahedra.ndim != 2 or tetrahedra.shape[1] not in (4, 10):
         raise ValueError(f"tetrahedra must have shape (n_t, 4) or (n_t, 10), got {tetrahedra.shape}")
     if len(tetrahedra) == 0:
@@ -43,35 +46,40 @@ def check_range(tetrahedra: np.ndarray, n_vertices: int) -> None:
 
 
 def check_distinct(tetrahedra: np.ndarray) -> None:
+    """Check that no tetrahedron has the same vertex twice."""
     twice = np.flatnonzero(names_twice(tetrahedra))
     if len(twice):
         t = twice[0]
         raise ValueError(
-            f"tetrahedron {t} ({listed(tetrahedra[t], 10)}) names a vertex twice; its vertices must differ. {_MEND}"
+            f"tetrahedron {t} ({listed(tetrahedra[t], 10)}) names a vertex twice; its vertices must differ. {_REPAIR_ADVICE}"
         )
 
 
 def names_twice(tetrahedra: np.ndarray) -> np.ndarray:
+    """Return whether each tetrahedron has the same vertex twice, (n_t,) bool."""
     ordered = np.sort(tetrahedra, axis=1)
     return (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
 
 
 def check_all_used(tetrahedra: np.ndarray, n_vertices: int) -> None:
+    """Check that every vertex belongs to a tetrahedron."""
     unused = np.flatnonzero(np.bincount(tetrahedra.ravel(), minlength=n_vertices) == 0)
     if len(unused):
         raise ValueError(
-            f"{plural(len(unused), 'vertex belongs', 'vertices belong')} to no tetrahedron: {listed(unused)}. {_MEND}"
+            f"{plural(len(unused), 'vertex belongs', 'vertices belong')} to no tetrahedron: {listed(unused)}. "
+            f"{_REPAIR_ADVICE}"
         )
 
 
 def volume_floor(corner_positions: np.ndarray) -> np.ndarray:
-    """(n_t,), m3: a volume smaller than this is degenerate."""
+    """Return the volume below which a tetrahedron with its longest edge is degenerate, (n_t,) m3."""
     ends = corner_positions[:, EDGES]
     longest2 = np.square(ends[:, :, 1] - ends[:, :, 0]).sum(axis=2).max(axis=1)
     return DEGENERATE * longest2**1.5 / 6
 
 
 def check_volumes(positions: np.ndarray, tetrahedra: np.ndarray) -> None:
+    """Check that all tetrahedra have a positive volume, and are not degenerate."""
     corners = positions[tetrahedra[:, :4]]
     volumes, floor = straight_volumes(corners), volume_floor(corners)
     flat = np.flatnonzero(~(np.abs(volumes) > floor))
@@ -86,21 +94,22 @@ def check_volumes(positions: np.ndarray, tetrahedra: np.ndarray) -> None:
         all_of_them = " (all)" if len(negative) == len(tetrahedra) else ""
         raise ValueError(
             f"{plural(len(negative), 'tetrahedron has', 'tetrahedra have')} negative volume{all_of_them}: "
-            f"{listed(negative)}. Corners must be ordered so that (x1 - x0) x (x2 - x0) . (x3 - x0) > 0. {_MEND}"
+            f"{listed(negative)}. Corners must be ordered so that (x1 - x0) x (x2 - x0) . (x3 - x0) > 0. {_REPAIR_ADVICE}"
         )
 
 
 def check_duplicates(tetrahedra: np.ndarray) -> None:
+    """Check that no two tetrahedra have the same corners."""
     repeats, of = duplicates(tetrahedra)
     if len(repeats):
         raise ValueError(
             f"tetrahedra {of[0]} and {repeats[0]} have the same corners ({listed(tetrahedra[of[0], :4])}), "
-            f"{plural(len(repeats), 'such repeat', 'such repeats')}; every tetrahedron must be given once. {_MEND}"
+            f"{plural(len(repeats), 'such repeat', 'such repeats')}; every tetrahedron must be given once. {_REPAIR_ADVICE}"
         )
 
 
 def duplicates(tetrahedra: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Tetrahedra whose corners an earlier one has, ascending, and that one."""
+    """Find the tetrahedra that have the same corners as an earlier one, ascending, (k,), and the earlier ones, (k,)."""
     ordered = np.sort(tetrahedra[:, :4], axis=1)
     _, first, which = np.unique(ordered, axis=0, return_index=True, return_inverse=True)
     earliest = first[which.ravel()]
@@ -109,7 +118,7 @@ def duplicates(tetrahedra: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def check_faces(corners: np.ndarray, table: FaceTable) -> None:
-    """At most two tetrahedra at a face, one on each side."""
+    """Check that at most two tetrahedra meet at a face, one on each side."""
     crowded = np.flatnonzero(table.counts > 2)
     if len(crowded):
         sharing = np.sort(table.order[table.first[crowded[0]] :][: table.counts[crowded[0]]] // 4)
@@ -130,7 +139,10 @@ def check_faces(corners: np.ndarray, table: FaceTable) -> None:
 
 
 def check_surface(faces: np.ndarray) -> None:
-    """faces: (n_f, 3) corners, closed. It must be a manifold: two faces at an edge, one fan at a vertex."""
+    """Check that a closed surface is a manifold: two faces at each edge, one fan of faces at each vertex.
+
+    faces: (n_f, 3), corners.
+    """
     edges = nonmanifold_edges(faces)
     if len(edges):
         raise ValueError(
@@ -146,7 +158,7 @@ def check_surface(faces: np.ndarray) -> None:
 
 
 def check_middle_nodes(tetrahedra: np.ndarray) -> None:
-    """One node for each edge, the same in all tetrahedra around it, and a corner of none."""
+    """Check that each edge has one midside node, the same in all tetrahedra around it, which is not a corner."""
     table = edge_table(tetrahedra[:, :4])
     which, nodes = table.tetrahedron_edges.ravel(), tetrahedra[:, 4:].ravel()
     node_of = np.zeros(len(table.edges), dtype=nodes.dtype)
@@ -170,6 +182,7 @@ def check_middle_nodes(tetrahedra: np.ndarray) -> None:
 
 
 def check_jacobians(positions: np.ndarray, tetrahedra: np.ndarray) -> None:
+    """Check that the Jacobian determinant is positive everywhere in all ten-node tetrahedra."""
     curved = np.flatnonzero(bent(positions[tetrahedra]))
     nodes = positions[tetrahedra[curved]]
     floor = 6 * volume_floor(nodes[:, :4])
@@ -178,7 +191,7 @@ def check_jacobians(positions: np.ndarray, tetrahedra: np.ndarray) -> None:
         return
     exchanged = not_positive(jacobians(nodes[:, _GMSH_ORDER]), floor)
     remedy = (
-        "With the last two nodes exchanged all are well: these are in gmsh's order"
+        "All are valid with the last two nodes exchanged: these are in gmsh's order"
         if not exchanged.any()
         else "Move their middle nodes towards the middle of their edges"
     )

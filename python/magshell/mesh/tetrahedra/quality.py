@@ -1,4 +1,4 @@
-"""What shapes the tetrahedra of a mesh have."""
+"""Quality measures of the tetrahedra of a mesh."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 
 
 class TetQuality(Frozen):
-    """The shapes of a mesh's tetrahedra at rest, as arrays (n_t,); `print` tells the extremes.
+    """The quality measures of a mesh's tetrahedra in the reference configuration, as arrays (n_t,); `print` shows extremes.
 
-    All are of the four corners, but for `jacobian_ratios`, which say how ten nodes bend a tetrahedron. Small dihedral
-    angles make the stiffness matrix ill-conditioned, angles near 180 degrees spoil the strain: both are best between 20
-    and 140 degrees. A regular tetrahedron has 70.5.
+    All but `jacobian_ratios`, which measures how much ten nodes curve a tetrahedron, refer to the four corners. Small
+    dihedral angles make the stiffness matrix ill-conditioned, and angles near 180 degrees make strains inaccurate: angles
+    between 20 and 140 degrees are best. A regular tetrahedron has 70.5 degrees.
 
     >>> import magshell as ms
     >>> ms.meshes.box((1.0, 1.0, 1.0), cells=(2, 2, 2)).quality
@@ -39,13 +39,13 @@ class TetQuality(Frozen):
 
     @cached_property
     def _lengths(self) -> np.ndarray:
-        """(n_t, 6), m."""
+        """The lengths of the edges of each tetrahedron, straight from corner to corner, (n_t, 6) m."""
         ends = self._corners[:, EDGES]
         return np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
 
     @cached_property
     def _face_vectors(self) -> np.ndarray:
-        """(n_t, 4, 3), m2: twice the area of each face along its normal, outwards."""
+        """The outward normal vectors of the faces, with twice the area as length, (n_t, 4, 3) m2."""
         a, b, c = np.moveaxis(self._corners[:, FACES], 2, 0)
         return np.cross(b - a, c - a)
 
@@ -56,7 +56,7 @@ class TetQuality(Frozen):
 
     @cached_property
     def dihedral_angles(self) -> np.ndarray:
-        """(n_t, 6), rad, inside, at the edges 01 12 20 03 13 23."""
+        """The inner dihedral angles at the edges 01 12 20 03 13 23, (n_t, 6) rad."""
         normals = self._face_vectors
         opposite = np.array([[k for k in range(4) if k not in edge] for edge in EDGES.tolist()])
         one, other = normals[:, opposite[:, 0]], normals[:, opposite[:, 1]]
@@ -65,19 +65,22 @@ class TetQuality(Frozen):
 
     @cached_property
     def smallest_angles(self) -> np.ndarray:
-        """(n_t,), rad: the smallest dihedral angle of each."""
+        """The smallest dihedral angle of each tetrahedron, (n_t,) rad."""
         return frozen(self.dihedral_angles.min(axis=1))
 
     @cached_property
     def largest_angles(self) -> np.ndarray:
-        """(n_t,), rad: the largest dihedral angle of each."""
+        """The largest dihedral angle of each tetrahedron, (n_t,) rad."""
         return frozen(self.dihedral_angles.max(axis=1))
 
     @cached_property
     def radius_ratios(self) -> np.ndarray:
-        """(n_t,): three times the inscribed over the circumscribed radius; 1 where it is regular, 0 where it is flat."""
+        """The radius ratio of each tetrahedron, (n_t,): three times the inscribed over the circumscribed radius.
+
+        It is 1 for a regular tetrahedron, and 0 for a flat one.
+        """
         inscribed = 6 * self._volumes / np.linalg.norm(self._face_vectors, axis=2).sum(axis=1)
-        # Crelle: 6 V R is the area of a triangle whose sides are the products of opposite edges
+        # Crelle's formula: 6 V R is the area of a triangle whose sides are the products of opposite edges
         sides = np.sort(self._lengths[:, [0, 1, 2]] * self._lengths[:, [5, 3, 4]], axis=1).T
         c, b, a = sides
         area = 0.25 * np.sqrt(np.maximum((a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c)), 0))
@@ -85,25 +88,34 @@ class TetQuality(Frozen):
 
     @cached_property
     def aspects(self) -> np.ndarray:
-        """(n_t,): longest edge over shortest height, relative to the sqrt(3/2) of a regular tetrahedron."""
+        """The aspect ratio of each tetrahedron, (n_t,): longest edge over shortest height, divided by sqrt(3/2).
+
+        It is 1 for a regular tetrahedron.
+        """
         height = 6 * self._volumes / np.linalg.norm(self._face_vectors, axis=2).max(axis=1)
         return frozen(self._lengths.max(axis=1) / (np.sqrt(1.5) * height))
 
     @cached_property
     def volume_ratios(self) -> np.ndarray:
-        """(n_t,): the volume over the mean of all."""
+        """The volume of each tetrahedron over the mean volume of all, (n_t,)."""
         return frozen(self._mesh.volumes / self._mesh.volumes.mean())
 
     @cached_property
     def jacobian_ratios(self) -> np.ndarray:
-        """(n_t,): the least Jacobian over its mean; 1 where the edges are straight and their nodes in the middle."""
+        """The smallest Jacobian determinant of each tetrahedron over its mean, (n_t,).
+
+        It is 1 if all edges are straight with their nodes in the middle.
+        """
         if self._mesh.order == 1:
             return frozen(np.ones(self._mesh.n_tetrahedra))
         coefficients = jacobians(self._mesh.rest_positions[self._mesh.tetrahedra])
         return frozen(least_jacobians(coefficients) / coefficients.mean(axis=1))
 
     def worst(self, count: int = 3) -> np.ndarray:
-        """The tetrahedra with the smallest dihedral angles, the worst first; of equal ones, the lowest number first."""
+        """Return the `count` tetrahedra with the smallest dihedral angles, worst first.
+
+        Of equal ones, the lowest number comes first.
+        """
         return np.argsort(np.round(self.smallest_angles, 9), kind="stable")[:count]
 
     def __repr__(self) -> str:

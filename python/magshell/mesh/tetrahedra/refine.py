@@ -1,4 +1,4 @@
-"""Refines tetrahedra, and raises or lowers their order."""
+"""Refinement of tetrahedral meshes, and conversion between four and ten nodes."""
 
 from __future__ import annotations
 
@@ -18,10 +18,11 @@ if TYPE_CHECKING:
 
 
 Projection = Distance
-_LEAST_JACOBIAN = 0.1  # of the straight tetrahedron's
+_LEAST_JACOBIAN = 0.1  # [-] smallest Jacobian determinant, relative to that of the straight tetrahedron
 
 
 def quadratic(mesh: TetMesh, surface: Projection | None) -> TetMesh:
+    """Return the mesh with ten nodes, with the midside nodes on the boundary moved onto a surface if one is given."""
     nodes = ten_nodes(mesh)
     positions = np.concatenate([mesh.rest_positions, mesh.edge_midpoints])
     if surface is None:
@@ -29,46 +30,53 @@ def quadratic(mesh: TetMesh, surface: Projection | None) -> TetMesh:
     edges, middles = middles_on_surface(mesh, mesh.boundary_edges, surface)
     target = positions.copy()
     target[mesh.n_vertices + edges] = middles
-    placed = held_back(positions, target, nodes)
-    warn_of_nodes_off(mesh, edges, placed[mesh.n_vertices + edges], surface)
-    return type(mesh)(placed, nodes, mesh.parts, mesh.part_names)
+    positions = limit_displacements(positions, target, nodes)
+    warn_of_nodes_off(mesh, edges, positions[mesh.n_vertices + edges], surface)
+    return type(mesh)(positions, nodes, mesh.parts, mesh.part_names)
 
 
-def curved(mesh: TetMesh, place: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> TetMesh:
-    """The mesh with ten nodes, those on edges at place(midpoints, edges (n_e, 2)), or as far towards it as tetrahedra
-    keep a tenth of their Jacobian."""
+def curved(mesh: TetMesh, project: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> TetMesh:
+    """Return the mesh with ten nodes, with the midside nodes at project(midpoints (n_e, 3), edges (n_e, 2)), (n_e, 3) m.
+
+    A node moves only part of the way if its tetrahedra would keep less than a tenth of their Jacobian determinant.
+    """
     nodes = ten_nodes(mesh)
     straight = np.concatenate([mesh.rest_positions, mesh.edge_midpoints])
-    target = np.concatenate([mesh.rest_positions, place(mesh.edge_midpoints, mesh.edges)])
-    return type(mesh)(held_back(straight, target, nodes), nodes, mesh.parts, mesh.part_names)
+    target = np.concatenate([mesh.rest_positions, project(mesh.edge_midpoints, mesh.edges)])
+    return type(mesh)(limit_displacements(straight, target, nodes), nodes, mesh.parts, mesh.part_names)
 
 
 def ten_nodes(mesh: TetMesh) -> np.ndarray:
+    """Return the ten nodes of each tetrahedron, (n_t, 10), with node n_v + k on edge k."""
     return np.concatenate([mesh.tetrahedra, mesh.n_vertices + mesh.tetrahedron_edges], axis=1)
 
 
-def held_back(straight: np.ndarray, target: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """Positions on the way from straight (n_v, 3) to target: all the way, or half of it and half again where a
-    tetrahedron (n_t, 10) would keep less than a tenth of its Jacobian."""
-    share = np.ones(len(straight))
+def limit_displacements(straight: np.ndarray, target: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """Return the nodes moved from `straight` (n_v, 3) to `target`, or only part of the way.
+
+    The displacement of the nodes of a tetrahedron, `nodes` (n_t, 10), is halved up to four times, then set to zero, as long
+    as its Jacobian determinant is below a tenth of that of the straight tetrahedron.
+    """
+    fraction = np.ones(len(straight))
     floor = _LEAST_JACOBIAN * 6 * straight_volumes(straight[nodes[:, :4]])
     checked = np.flatnonzero((straight != target).any(axis=1)[nodes].any(axis=1))
-    for halving in count():  # ends: nodes that no longer move at all make no tetrahedron bad
-        positions = straight + share[:, None] * (target - straight)
+    for halving in count():  # this ends, because tetrahedra whose nodes do not move are valid
+        positions = straight + fraction[:, None] * (target - straight)
         bad = checked[not_positive(jacobians(positions[nodes[checked]]), floor[checked])]
         if len(bad) == 0:
             return positions
-        share[np.unique(nodes[bad])] *= 0.5 if halving < 4 else 0.0
+        fraction[np.unique(nodes[bad])] *= 0.5 if halving < 4 else 0.0
 
 
 def linear(mesh: TetMesh) -> TetMesh:
+    """Return the mesh of the corners only, with four-node tetrahedra."""
     used = np.unique(mesh.corners)
     return type(mesh)(
         mesh.rest_positions[used], np.searchsorted(used, mesh.corners), mesh.parts, mesh.part_names
     )
 
 
-# local nodes: 0 to 3 corners, 4 to 9 the middles of 01 12 20 03 13 23
+# nodes of a tetrahedron: 0 to 3 are its corners, 4 to 9 the midpoints of the edges 01 12 20 03 13 23
 _CHILDREN = np.array(
     [
         (0, 4, 6, 7),
@@ -84,17 +92,18 @@ _CHILDREN = np.array(
 _BARYCENTRIC = np.concatenate([np.eye(4), 0.5 * (np.eye(4)[EDGES[:, 0]] + np.eye(4)[EDGES[:, 1]])])
 
 
-def _turned(children: np.ndarray) -> np.ndarray:
-    """The same with positive volumes."""
+def _oriented(children: np.ndarray) -> np.ndarray:
+    """Return the same tetrahedra (8, 4) with their nodes reordered where needed, so that all volumes are positive."""
     corners = _BARYCENTRIC[children][:, :, 1:]
     inverted = straight_volumes(corners) < 0
     return np.where(inverted[:, None], children[:, MIRRORED[:4]], children)
 
 
-CHILDREN = _turned(_CHILDREN)
+CHILDREN = _oriented(_CHILDREN)
 
 
 def refined(mesh: TetMesh, surface: Projection | None = None) -> TetMesh:
+    """Return the mesh with each tetrahedron divided into eight; see `TetMesh.refined`."""
     parts = np.repeat(mesh.parts, 8)
     if mesh.order == 1:
         nodes = ten_nodes(mesh)
@@ -105,7 +114,7 @@ def refined(mesh: TetMesh, surface: Projection | None = None) -> TetMesh:
 
     corners = mesh.tetrahedra[:, CHILDREN].reshape(-1, 4)
     table = edge_table(corners)
-    # the curved edges' middles are where the parent's map takes them, the same from each side but for round-off
+    # the new midside nodes lie on the curved parent; its neighbours give the same positions up to round-off
     middles = 0.5 * (_BARYCENTRIC[CHILDREN[:, EDGES[:, 0]]] + _BARYCENTRIC[CHILDREN[:, EDGES[:, 1]]])
     values = shape_values(middles.reshape(-1, 4)).reshape(8, 6, 10)
     on_edges = np.einsum("cen,tni->tcei", values, mesh.rest_positions[mesh.tetrahedra]).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""Tetrahedra from elsewhere made into a mesh, with a word about everything that was done to them."""
+"""Repair of invalid tetrahedral meshes, with a report of the changes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 @immutable
 @dataclass(frozen=True)
 class RepairReport:
-    """How many of each: merged, turned and dropped."""
+    """The numbers of vertices and tetrahedra that a repair merged, reoriented (`turned`) and dropped; `print` lists them."""
 
     vertices_merged: int
     tetrahedra_collapsed: int
@@ -33,19 +33,23 @@ class RepairReport:
     vertices_unused: int
 
     def __str__(self) -> str:
-        said = [
+        changes = [
             (self.vertices_merged, "vertex merged with another", "vertices merged with others"),
             (self.tetrahedra_collapsed, "collapsed tetrahedron dropped", "collapsed tetrahedra dropped"),
             (self.tetrahedra_turned, "tetrahedron turned", "tetrahedra turned"),
             (self.tetrahedra_doubled, "repeated tetrahedron dropped", "repeated tetrahedra dropped"),
             (self.vertices_unused, "unused vertex dropped", "unused vertices dropped"),
         ]
-        return ", ".join(plural(*each) for each in said if each[0]) or "nothing to mend"
+        return ", ".join(plural(*each) for each in changes if each[0]) or "nothing to repair"
 
 
 @immutable
-class Mended(NamedTuple):
-    """mesh: a TetMesh. vertex_map: (n_v,), tetrahedron_map: (n_t,), from old to new numbers, -1 where left out."""
+class RepairedMesh(NamedTuple):
+    """A repaired mesh, with the maps from the given vertices and tetrahedra to it.
+
+    mesh: a TetMesh. vertex_map: (n_v,), tetrahedron_map: (n_t,), from old to new numbers, -1 for those left out.
+    report: the numbers of changes.
+    """
 
     mesh: Any
     vertex_map: np.ndarray
@@ -53,14 +57,15 @@ class Mended(NamedTuple):
     report: RepairReport
 
 
-def mended(
+def repair(
     kind: type[TetMesh],
     rest_positions: Numbers,
     tetrahedra: Numbers,
     parts: Numbers,
     part_names: dict[str, int],
     merge_tolerance: Numbers,
-) -> Mended:
+) -> RepairedMesh:
+    """Build a mesh of the class `kind` from invalid data, as `TetMesh.repaired` describes."""
     positions = quantity("rest_positions", "m", rest_positions, ("n_v", 3))
     nodes = index_array("tetrahedra", tetrahedra)
     n_given = len(positions)
@@ -72,14 +77,14 @@ def mended(
     merged = int((target != np.arange(n_given)).sum())
     nodes = target[nodes]
 
-    kept = np.flatnonzero(~names_twice(nodes))
-    collapsed = len(nodes) - len(kept)
-    nodes = nodes[kept]
+    remaining = np.flatnonzero(~names_twice(nodes))
+    collapsed = len(nodes) - len(remaining)
+    nodes = nodes[remaining]
     inverted = straight_volumes(positions[nodes[:, :4]]) < 0
     nodes = np.where(inverted[:, None], nodes[:, MIRRORED[: nodes.shape[1]]], nodes)
     repeats, _ = duplicates(nodes)
     once = np.setdiff1d(np.arange(len(nodes)), repeats)
-    nodes, kept, turned = nodes[once], kept[once], int(inverted[once].sum())
+    nodes, remaining, turned = nodes[once], remaining[once], int(inverted[once].sum())
     if len(nodes) == 0:
         raise ValueError("no tetrahedron is left: each has a vertex twice")
 
@@ -87,16 +92,18 @@ def mended(
     number = np.full(n_given, -1)
     number[used] = np.arange(len(used))
     tetrahedron_map = np.full(len(parts), -1)
-    tetrahedron_map[kept] = np.arange(len(kept))
-    mesh = kind(positions[used], number[nodes], parts[kept], part_names)
+    tetrahedron_map[remaining] = np.arange(len(remaining))
+    mesh = kind(positions[used], number[nodes], parts[remaining], part_names)
     unused = len(np.unique(target)) - len(used)
-    return Mended(
-        mesh, number[target], tetrahedron_map, RepairReport(merged, collapsed, turned, len(repeats), unused)
-    )
+    report = RepairReport(merged, collapsed, turned, len(repeats), unused)
+    return RepairedMesh(mesh, number[target], tetrahedron_map, report)
 
 
 def coincident(positions: np.ndarray, tolerance: float) -> np.ndarray:
-    """(n_v,): the first of the vertices that coincide with each, by chains of pairs within a tolerance [m]."""
+    """Return the first of the vertices that coincide with each one, (n_v,).
+
+    Two vertices coincide if they are connected by a chain of vertices with distances within the tolerance [m].
+    """
     tolerance = float(quantity("merge_tolerance", "m", tolerance, ()))
     if tolerance < 0:
         raise ValueError(f"merge_tolerance [m] must not be negative, got {tolerance}")

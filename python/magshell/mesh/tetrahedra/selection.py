@@ -1,4 +1,4 @@
-"""Tetrahedra of a mesh by where they are and which part they belong to; vertices, edges and faces as for triangles."""
+"""Selection of tetrahedra by their position and by the part that they belong to."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 
 class TetSelection(MeshBase):
-    """The selecting half of TetMesh. Faces are the triangles of its surface; edges join corners.
+    """Base class of TetMesh with its selection methods. Faces are the triangles of its surface; edges join corners.
 
-    Tolerances are those of `vertices_at`; a selection that finds nothing raises a ValueError that says what is there.
+    Tolerances are those of `vertices_at`. A selection that finds nothing raises a ValueError that says what lies nearest.
     """
 
     def tetrahedra_at(
@@ -29,7 +29,7 @@ class TetSelection(MeshBase):
         z: Numbers | None = None,
         tolerance: float | None = None,
     ) -> np.ndarray:
-        """Tetrahedra with a corner at the given coordinates [m]: the layer that lies against a plane, for example."""
+        """Select the tetrahedra with a corner at the given coordinates [m], such as the layer next to a plane."""
         wanted, tolerance = self._coordinates(x, y, z, tolerance)
         found = np.flatnonzero(self._matches(wanted, tolerance)[self.corners].any(axis=1))
         if len(found) == 0:
@@ -37,11 +37,11 @@ class TetSelection(MeshBase):
         return Indices(found, "tetrahedra")
 
     def tetrahedra_where(self, predicate: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """Tetrahedra where predicate((n_t, 3) barycenters [m]) -> (n_t,) bool holds."""
+        """Select the tetrahedra for which `predicate` is True; it maps barycenters (n_t, 3) [m] to booleans (n_t,)."""
         return _where("tetrahedron", predicate, self.tetrahedron_barycenters, np.arange(self.n_tetrahedra))
 
     def tetrahedra_in(self, part: int | str | Sequence[int | str]) -> np.ndarray:
-        """Tetrahedra of a part, by its number or name, or of several.
+        """Select the tetrahedra of a part, given by its number or name, or of several parts.
 
         >>> import magshell as ms
         >>> block = ms.meshes.box((2.0, 1.0, 1.0), cells=(2, 1, 1))
@@ -52,22 +52,24 @@ class TetSelection(MeshBase):
         return Indices(np.flatnonzero(self._in_parts(part)), "tetrahedra")
 
     def vertices_in(self, part: int | str | Sequence[int | str]) -> np.ndarray:
-        """Vertices of the tetrahedra of a part; those on its border belong to both sides."""
+        """Select the vertices of a part's tetrahedra; a vertex on the border between two parts belongs to both."""
         return Indices(np.unique(self.tetrahedra[self._in_parts(part)]).astype(np.int64), "vertices")
 
     def faces_in(self, part: int | str | Sequence[int | str]) -> np.ndarray:
-        """Faces of the surface whose tetrahedron belongs to a part. ValueError where none does."""
+        """Select the faces of the surface whose tetrahedron belongs to a part. Raises ValueError if there are none."""
         found = np.flatnonzero(self._in_parts(part)[self.face_tetrahedra])
         if len(found) == 0:
             raise ValueError(f"part {part!r} lies inside: none of its tetrahedra is on the surface")
         return Indices(found, "faces")
 
     def _in_parts(self, part) -> np.ndarray:
+        """Return whether each tetrahedron belongs to the part, or to one of several, (n_t,) bool."""
         wanted = [part] if isinstance(part, str) or not isinstance(part, Iterable) else list(part)
         numbers = [self._part_number(each) for each in wanted]
         return np.isin(self.parts, numbers)
 
     def _part_number(self, part) -> int:
+        """Return the number of a part given by its number or name. Raises ValueError if no tetrahedron belongs to it."""
         there = np.unique(self.parts).tolist()
         names = ", ".join(f"{name!r} ({number})" for name, number in self.part_names.items())
         what = f"its parts are {', '.join(map(str, there[:20]))}" + (f", named {names}" if names else "")
@@ -81,7 +83,7 @@ class TetSelection(MeshBase):
 
 
 def checked_parts(parts: Numbers, n_tetrahedra: int) -> np.ndarray:
-    """(n_t,) int32, zeros for None."""
+    """Return the part of each tetrahedron, (n_t,) int32, zeros for None. Raises ValueError for invalid parts."""
     if parts is None:
         return np.zeros(n_tetrahedra, dtype=np.int32)
     array = np.asarray(parts) if isinstance(parts, np.ndarray) else parts
@@ -98,7 +100,7 @@ def checked_parts(parts: Numbers, n_tetrahedra: int) -> np.ndarray:
 
 
 def checked_part_names(names: dict[str, int]) -> dict[str, int]:
-    """name -> number; a name may be of a part that has no tetrahedron any more."""
+    """Return the names of parts as {name: number}, after a check; a part may have no tetrahedra."""
     if not isinstance(names, Mapping | None):
         raise ValueError(f"part_names must be a dictionary of name: number, got {type(names).__name__}")
     checked = {}

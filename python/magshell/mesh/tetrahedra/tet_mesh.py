@@ -1,4 +1,4 @@
-"""The mesh of tetrahedra: rest positions, tetrahedra of four or ten nodes, parts, and the surface around them."""
+"""The tetrahedral mesh: rest positions, tetrahedra of four or ten nodes, parts, and its surface."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from .checks import (
 from .jacobian import quadratic_volumes, straight_volumes
 from .quality import TetQuality
 from .refine import Projection, linear, quadratic, refined
-from .repair import Mended, mended
+from .repair import RepairedMesh, repair
 from .selection import TetSelection, checked_part_names, checked_parts
 
 if TYPE_CHECKING:
@@ -46,23 +46,23 @@ if TYPE_CHECKING:
 
 
 class TetMesh(TetSelection):
-    """A conforming mesh of tetrahedra with a manifold surface, of one piece or several. Immutable.
+    """A conforming tetrahedral mesh with a manifold surface, of one or several connected pieces. Immutable.
 
     Args:
         rest_positions: (n_v, 3), m.
         tetrahedra: (n_t, 4) vertex indices, with (x1 - x0) x (x2 - x0) . (x3 - x0) > 0; or (n_t, 10): the corners, then
-            the nodes on the edges 01 12 20 03 13 23, VTK's order. gmsh's has the last two exchanged.
-        parts: (n_t,), a number for each tetrahedron: the part (region, material) it belongs to; all 0 by default.
+            the midside nodes on the edges 01 12 20 03 13 23, in VTK's order. In gmsh's order the last two are exchanged.
+        parts: (n_t,), the number of the part (region, material) that each tetrahedron belongs to; all 0 by default.
         part_names: {name: number}.
 
     Raises:
-        ValueError: naming the first offenders: coordinates that are not finite, indices out of range, degenerate,
-            inverted or doubled tetrahedra, faces of more than two, vertices that belong to none, a surface that touches
-            itself in an edge or a vertex, ten nodes between which the Jacobian is not positive. `TetMesh.repaired` mends
-            what can be, and says what it did.
+        ValueError: for coordinates that are not finite, indices out of range, degenerate, inverted or repeated tetrahedra,
+            faces of more than two tetrahedra, vertices of none, a surface that touches itself at an edge or a vertex, and
+            ten-node tetrahedra whose Jacobian determinant is not positive. The message names the first of them. Some of
+            these can be repaired by `TetMesh.repaired`.
 
-    `faces` are the triangles of the surface, outwards, in the numbers of this mesh's vertices: one for each face of four-
-    node tetrahedra, four flat ones for each of ten-node ones. `surface` is the same as a TriangleMesh.
+    `faces` are the triangles of the surface, oriented outwards, with the vertex numbers of this mesh: one triangle for each
+    outer side of a four-node tetrahedron, four flat ones for that of a ten-node one. `surface` is their TriangleMesh.
 
     >>> corner = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
     >>> corner.faces.tolist()
@@ -95,9 +95,8 @@ class TetMesh(TetSelection):
         self._rest_positions = positions
         self._tetrahedra = frozen(nodes.astype(np.int32))
 
-    def __reduce__(
-        self,
-    ) -> tuple[Any, ...]:  # copies and worker processes rebuild the connectivity, which is cheap
+    # Copies and worker processes compute the connectivity again, which is cheap.
+    def __reduce__(self) -> tuple[Any, ...]:
         return TetMesh, (self.rest_positions, self.tetrahedra, self.parts, self.part_names)
 
     def __repr__(self) -> str:
@@ -124,59 +123,59 @@ class TetMesh(TetSelection):
         parts: Numbers | None = None,
         part_names: dict[str, int] | None = None,
         merge_tolerance: Numbers | None = None,
-    ) -> Mended:
-        """A mesh of what the constructor would refuse: (mesh, vertex_map, tetrahedron_map, report).
+    ) -> RepairedMesh:
+        """Build a mesh from data that the constructor would refuse: (mesh, vertex_map, tetrahedron_map, report).
 
-        Vertices nearer than `merge_tolerance` [m] become one (by default none do); tetrahedra that then name a vertex
-        twice are left out; inverted ones get two corners exchanged; of those with the same corners the first stays;
-        vertices that belong to none are left out. `report` counts each, and `print(report)` says it in words.
-        vertex_map (n_v,) and tetrahedron_map (n_t,) lead from the old numbers to the new ones, -1 where one is left out.
+        Vertices closer than `merge_tolerance` [m] become one (by default none do), and tetrahedra that then have a vertex
+        twice are dropped. Two corners of inverted tetrahedra are exchanged. Of tetrahedra with the same corners the first
+        is kept. Vertices without a tetrahedron are dropped. `report` counts each change; `print(report)` lists them.
+        vertex_map (n_v,) and tetrahedron_map (n_t,) map the old numbers to the new ones, -1 for those dropped.
 
-        Raises ValueError where that is not enough: flat tetrahedra, overlaps, a surface that touches itself.
+        Raises ValueError for defects that this does not remove: flat tetrahedra, overlaps, a surface that touches itself.
 
         >>> import magshell as ms
         >>> cube = ms.meshes.box((1, 1, 1), cells=(1, 1, 1))
-        >>> mended = TetMesh.repaired(cube.rest_positions, cube.tetrahedra[:, [1, 0, 2, 3]])
-        >>> print(mended.report)
+        >>> repaired = TetMesh.repaired(cube.rest_positions, cube.tetrahedra[:, [1, 0, 2, 3]])
+        >>> print(repaired.report)
         6 tetrahedra turned
         """
-        return mended(cls, rest_positions, tetrahedra, parts, part_names, merge_tolerance)
+        return repair(cls, rest_positions, tetrahedra, parts, part_names, merge_tolerance)
 
-    # What it is made of
+    # Nodes and elements
 
     @property
     def rest_positions(self) -> np.ndarray:
-        """(n_v, 3), m, read-only."""
+        """The positions of the vertices in the reference configuration, (n_v, 3) m, read-only."""
         return self._rest_positions
 
     @property
     def tetrahedra(self) -> np.ndarray:
-        """(n_t, 4) or (n_t, 10) vertex indices, int32, read-only."""
+        """The vertex indices of each tetrahedron, (n_t, 4) or (n_t, 10) int32, read-only."""
         return self._tetrahedra
 
     @property
     def corners(self) -> np.ndarray:
-        """(n_t, 4): the first four nodes of each, read-only."""
+        """The corners of each tetrahedron, its first four nodes, (n_t, 4) int32, read-only."""
         return self.tetrahedra[:, :4]
 
     @property
     def parts(self) -> np.ndarray:
-        """(n_t,): the number of the part that each belongs to, int32, read-only."""
+        """The number of the part that each tetrahedron belongs to, (n_t,) int32, read-only."""
         return self._parts
 
     @property
     def part_names(self) -> dict[str, int]:
-        """{name: number}, a copy."""
+        """The names of the parts, {name: number}, as a copy."""
         return dict(self._part_names)
 
     @property
     def order(self) -> int:
-        """1 for four nodes, 2 for ten."""
+        """The order of the tetrahedra: 1 for four nodes, 2 for ten."""
         return 1 if self.tetrahedra.shape[1] == 4 else 2
 
     @property
     def n_tetrahedra(self) -> int:
-        """How many there are."""
+        """The number of tetrahedra."""
         return len(self.tetrahedra)
 
     # Connectivity
@@ -187,17 +186,17 @@ class TetMesh(TetSelection):
 
     @property
     def edges(self) -> np.ndarray:
-        """(n_e, 2) corners, lower one first, sorted, int32, read-only."""
+        """The corners at the ends of each edge, (n_e, 2) int32, lower one first, sorted, read-only."""
         return frozen(self._edge_table.edges)
 
     @property
     def tetrahedron_edges(self) -> np.ndarray:
-        """(n_t, 6): the edges 01 12 20 03 13 23 of each, int32, read-only."""
+        """The edges 01 12 20 03 13 23 of each tetrahedron, (n_t, 6) int32, read-only."""
         return frozen(self._edge_table.tetrahedron_edges)
 
     @cached_property
     def edge_nodes(self) -> np.ndarray:
-        """(n_e,): the node on each edge, int32, read-only. ValueError for tetrahedra of four nodes."""
+        """The midside node of each edge, (n_e,) int32, read-only. Raises ValueError for four-node tetrahedra."""
         if self.order == 1:
             raise ValueError("tetrahedra of four nodes have none on their edges: take second_order()")
         nodes = np.empty(self.n_edges, dtype=np.int32)
@@ -211,46 +210,49 @@ class TetMesh(TetSelection):
 
     @property
     def faces(self) -> np.ndarray:
-        """(n_f, 3) vertex indices: the triangles of the surface, outwards, int32, read-only."""
+        """The vertex indices of the triangles of the surface, (n_f, 3) int32, oriented outwards, read-only."""
         return self._triangles[0]
 
     @property
     def faces_of_corners(self) -> np.ndarray:
-        """(n, 3): the corners of each outer side of a tetrahedron, one triangle a side also where there are ten nodes."""
+        """The corners of each outer side of a tetrahedron, (n, 3): one triangle per side also for ten nodes."""
         return self.corners[self._outer[:, None] // 4, FACES[self._outer % 4]]
 
     @property
     def nodes_of_sides(self) -> np.ndarray:
-        """(n, 3) or (n, 6): the nodes of each outer side of a tetrahedron: the corners, then the nodes between the first
-        and the second, the second and the third, the third and the first. Of six, side k is faces 4 k to 4 k + 3."""
+        """The nodes of each outer side of a tetrahedron, (n, 3) or (n, 6).
+
+        The corners a, b, c come first, then the midside nodes of the edges ab, bc, ca. A side k of six nodes is shown by the
+        faces 4 k to 4 k + 3.
+        """
         nodes = FACES if self.order == 1 else FACE_NODES
         return self.tetrahedra[self._outer[:, None] // 4, nodes[self._outer % 4]]
 
     @property
     def face_tetrahedra(self) -> np.ndarray:
-        """(n_f,): the tetrahedron behind each face, int32, read-only."""
+        """The tetrahedron behind each face, (n_f,) int32, read-only."""
         return self._triangles[1]
 
     @cached_property
     def surface(self) -> TriangleMesh:
-        """The surface as a mesh of its own: its faces are `faces`, its vertices `surface_vertices`."""
+        """The surface as a TriangleMesh: its faces are `faces`, its vertices `surface_vertices`."""
         return TriangleMesh(
             self.rest_positions[self.surface_vertices], np.searchsorted(self.surface_vertices, self.faces)
         )
 
     @cached_property
     def surface_vertices(self) -> np.ndarray:
-        """(n_s,): which vertex each vertex of `surface` is, ascending."""
+        """The number in this mesh of each vertex of `surface`, (n_s,), ascending."""
         return frozen(np.unique(self.faces))
 
     @property
     def boundary_vertices(self) -> np.ndarray:
-        """Indices of the vertices on the surface, ascending."""
+        """The indices of the vertices on the surface, ascending."""
         return self.surface_vertices
 
     @cached_property
     def boundary_edges(self) -> np.ndarray:
-        """Indices of the edges on the surface, ascending."""
+        """The indices of the edges on the surface, ascending."""
         nodes = self.faces_of_corners.astype(np.int64)
         ends = np.sort(nodes[:, [(0, 1), (1, 2), (2, 0)]].reshape(-1, 2), axis=1)
         keys = self.edges[:, 0].astype(np.int64) * self.n_vertices + self.edges[:, 1]
@@ -258,87 +260,91 @@ class TetMesh(TetSelection):
 
     @cached_property
     def components(self) -> np.ndarray:
-        """(n_v,): the number of the connected piece each vertex belongs to, from 0."""
+        """The number, from 0, of the connected piece that each vertex belongs to, (n_v,)."""
         piece = groups(self.n_tetrahedra, neighbours(self._face_table))
         of_vertex = np.empty(self.n_vertices, dtype=np.int32)
         of_vertex[self.tetrahedra] = piece[:, None]
         return frozen(of_vertex)
 
-    # Geometry at rest
+    # Geometry of the reference configuration
 
     @cached_property
     def volumes(self) -> np.ndarray:
-        """(n_t,), m3; of ten nodes, of the curved tetrahedra."""
+        """The volumes of the tetrahedra, curved ones for ten nodes, (n_t,) m3."""
         nodes = self.rest_positions[self.tetrahedra]
         return frozen(straight_volumes(nodes) if self.order == 1 else quadratic_volumes(nodes))
 
     @property
     def volume(self) -> float:
-        """m3."""
+        """The volume of the mesh, m3."""
         return float(self.volumes.sum())
 
     @cached_property
     def tetrahedron_barycenters(self) -> np.ndarray:
-        """(n_t, 3), m, of the four corners."""
+        """The barycenters of the four corners of each tetrahedron, (n_t, 3) m."""
         return frozen(self.rest_positions[self.corners].mean(axis=1))
 
     @property
     def face_areas(self) -> np.ndarray:
-        """(n_f,), m2."""
+        """The areas of the faces, (n_f,) m2."""
         return self.surface.face_areas
 
     @property
     def face_normals(self) -> np.ndarray:
-        """(n_f, 3) unit vectors, outwards."""
+        """The outward unit normals of the faces, (n_f, 3)."""
         return self.surface.face_normals
 
     @property
     def face_barycenters(self) -> np.ndarray:
-        """(n_f, 3), m."""
+        """The barycenters of the faces, (n_f, 3) m."""
         return self.surface.face_barycenters
 
     @cached_property
     def quality(self) -> TetQuality:
-        """The shapes of its tetrahedra: dihedral angles, radius ratios, aspects, Jacobians."""
+        """The quality of the tetrahedra: dihedral angles, radius ratios, aspect ratios, Jacobian determinants."""
         return TetQuality(self)
 
     def self_intersections(self, positions: Numbers) -> np.ndarray:
-        """The faces of the surface that pass through each other at positions (n_v, 3) m, (k, 2)."""
+        """Find the pairs of faces that pass through each other at positions (n_v, 3) m, (k, 2).
+
+        See `TriangleMesh.self_intersections`.
+        """
         return self.surface.self_intersections(np.asarray(positions)[self.surface_vertices])
 
-    # Other meshes from this one
+    # Modified meshes
 
     def with_parts(self, parts: Numbers, names: dict[str, int] | None = None) -> TetMesh:
-        """The same mesh with other parts (n_t,), integers or booleans, and names {name: number} for them."""
+        """Return the same mesh with other parts (n_t,), integers or booleans, and names {name: number} for them."""
         return TetMesh(self.rest_positions, self.tetrahedra, parts, names)
 
     def second_order(self, surface: Projection | None = None) -> TetMesh:
-        """The mesh with ten nodes: corners keep their numbers, edge k gets node n_v + k, see `edge_nodes`.
+        """Return the mesh with ten nodes: corners keep their numbers, edge k gets node n_v + k (see `edge_nodes`).
 
-        surface: where curved boundaries are: a signed distance, (n, 3) m -> (n,) m, as those of `ms.shapes`. Nodes on
-            edges of the surface move onto it, where both corners lie on it within 1e-3 of the edge; where that would turn
-            a tetrahedron inside out, only as far as it does not, of which an ms.MeshQualityWarning says how many and how
-            far they stay off it. By default they stay halfway.
+        surface: the curved boundary as a signed distance, (n, 3) m -> (n,) m, such as one of `ms.shapes`. The midside nodes
+            of surface edges move onto it if both corners lie on it within 1e-3 of the edge's length. If that would make the
+            Jacobian determinant of a tetrahedron too small, they move only part of the way; an ms.MeshQualityWarning says
+            how many nodes stay off the surface, and how far. By default all nodes stay in the middle of their edges.
         """
         return self if self.order == 2 else quadratic(self, surface)
 
     def first_order(self) -> TetMesh:
-        """The mesh with the corners alone, numbered as they come."""
+        """Return the mesh of the corners only, with four-node tetrahedra; vertices are renumbered in the same order."""
         return self if self.order == 1 else linear(self)
 
     def refined(self, surface: Projection | None = None) -> TetMesh:
-        """Each tetrahedron divided into eight, at the middle of its edges; they keep their part, 8 t to 8 t + 7.
+        """Return the mesh with each tetrahedron t divided into eight, 8 t to 8 t + 7, at the midpoints of its edges.
 
-        Vertices keep their numbers, and edge k gets vertex n_v + k: ten nodes become corners where they are. Repeated,
-        it makes no more than three shapes of each tetrahedron. surface: as for `second_order`.
+        Parts are inherited. Vertices keep their numbers, and midside nodes become corners; of four-node tetrahedra, the
+        midpoint of edge k is vertex n_v + k. Repeated refinement produces at most three shapes per tetrahedron.
+        surface: as for `second_order`.
         """
         return refined(self, surface)
 
     def transformed(self, rotation: Rotates | None = None, translation: Numbers | None = None) -> TetMesh:
-        """The mesh moved by x -> rotation x + translation.
+        """Return the mesh transformed by x -> rotation x + translation.
 
-        rotation: a (3, 3) matrix or a scipy Rotation. Any invertible matrix will do; under one that mirrors, corners 0
-            and 2 of each tetrahedron change places. translation: (3,), m.
+        rotation: a (3, 3) matrix or a scipy Rotation. Any invertible matrix is allowed; under one that mirrors, corners 0
+            and 2 of each tetrahedron are exchanged. translation: (3,), m.
         """
         positions = moved(self.rest_positions, rotation, translation)
         tetrahedra = self.tetrahedra
@@ -347,6 +353,6 @@ class TetMesh(TetSelection):
         return TetMesh(positions, tetrahedra, self.parts, self.part_names)
 
     def scaled(self, factor: float) -> TetMesh:
-        """The mesh with all coordinates multiplied by a positive factor."""
+        """Return the mesh with all coordinates multiplied by a positive factor."""
         positions = self.rest_positions * positive("factor", "", factor)
         return TetMesh(positions, self.tetrahedra, self.parts, self.part_names)

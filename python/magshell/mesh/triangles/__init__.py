@@ -1,1 +1,1 @@
-"""Defines meshes of triangles with three and with six nodes."""
+"""Meshes of triangles with three and with six nodes."""

@@ -1,4 +1,4 @@
-"""What shapes the faces of a mesh have, and how thin they are beside the sheet."""
+"""Quality measures of the faces of a mesh."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 
 class MeshQuality(Frozen):
-    """The shapes of a mesh's faces at rest, as arrays (n_f,) that can be plotted; `print` tells the extremes.
+    """The quality measures of a mesh's faces in the reference configuration, as arrays (n_f,); `print` shows extremes.
 
-    A face with an angle near 180 degrees is a *cap*. Where a sheet bends along the long edge of a cap, the cap cannot
-    follow and stiffens what is around it, the more so the thinner the sheet: a solve warns where that shows. Needles,
-    long and thin with two angles near 90 degrees, do no such harm.
+    A face with an angle near 180 degrees is a *cap*. Where a shell bends along the long edge of a cap, the cap stretches
+    instead of bending (membrane locking), the more so the thinner the shell is; a solve warns if that matters. *Needles*,
+    long thin faces with two angles near 90 degrees, are harmless.
 
     >>> import magshell as ms
     >>> ms.meshes.rectangle(0.1, 0.02, cells=(10, 2)).quality
@@ -35,50 +35,57 @@ class MeshQuality(Frozen):
 
     @cached_property
     def _sorted_edges(self) -> np.ndarray:
-        """(3, n_f), m, shortest first."""
+        """The edge lengths of each face in ascending order, (3, n_f) m."""
         return np.sort(self._mesh.edge_lengths[self._mesh.face_edges], axis=1).T
 
     def _angles(self, opposite: int) -> np.ndarray:
+        """Compute the angle of each face opposite its shortest (0), middle (1) or longest (2) edge, (n_f,) rad."""
         squares = self._sorted_edges**2
         # b c sin = 2 A,   b c cos = (b^2 + c^2 - a^2) / 2
         return np.arctan2(2 * self._mesh.face_areas, 0.5 * (squares.sum(axis=0) - 2 * squares[opposite]))
 
     @cached_property
     def smallest_angles(self) -> np.ndarray:
-        """(n_f,), rad."""
+        """The smallest angle of each face, (n_f,) rad."""
         return frozen(self._angles(opposite=0))
 
     @cached_property
     def largest_angles(self) -> np.ndarray:
-        """(n_f,), rad."""
+        """The largest angle of each face, (n_f,) rad."""
         return frozen(self._angles(opposite=2))
 
     @cached_property
     def aspects(self) -> np.ndarray:
-        """(n_f,): longest edge over inscribed radius, relative to the 2 sqrt(3) of an equilateral triangle."""
+        """The aspect ratio of each face, (n_f,): longest edge over inscribed radius, divided by 2 sqrt(3).
+
+        It is 1 for an equilateral triangle.
+        """
         lengths = self._sorted_edges
         inscribed_radius = 2 * self._mesh.face_areas / lengths.sum(axis=0)
         return frozen(lengths[2] / (2 * np.sqrt(3) * inscribed_radius))
 
     @cached_property
     def heights(self) -> np.ndarray:
-        """(n_f,), m: the shortest height of each face, which stands on its longest edge."""
+        """The shortest height of each face, that on its longest edge, (n_f,) m."""
         return frozen(2 * self._mesh.face_areas / self._sorted_edges[2])
 
     @cached_property
     def heights_over_lengths(self) -> np.ndarray:
-        """(n_f,): the shortest height over the longest edge; 0.87 where a face is equilateral, 0 where it is none."""
+        """The shortest height of each face over its longest edge, (n_f,): 0.87 if equilateral, 0 if degenerate."""
         return frozen(self.heights / self._sorted_edges[2])
 
     @cached_property
     def heights_over_thickness(self) -> np.ndarray:
-        """(n_f,): the shortest height over the thickness of the sheet. ValueError where only the mesh is known."""
+        """The shortest height of each face over the thickness of the shell, (n_f,).
+
+        Raises ValueError for the quality of a mesh, which has no thickness.
+        """
         if self.thickness is None:
             raise ValueError("a mesh has no thickness: ask the `quality` of a Shell")
         return frozen(self.heights / self.thickness)
 
     def worst(self, count: int = 3) -> np.ndarray:
-        """The faces with the largest angles, the worst first; of equal ones, the lowest number first."""
+        """Return the `count` faces with the largest angles, worst first; of equal ones, the lowest number first."""
         return np.argsort(-np.round(self.largest_angles, 9), kind="stable")[:count]
 
     def __repr__(self) -> str:

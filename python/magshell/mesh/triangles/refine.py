@@ -1,4 +1,4 @@
-"""Triangles divided into four by the middles of their edges."""
+"""Uniform refinement of triangle meshes: each face is divided into four."""
 
 from __future__ import annotations
 
@@ -11,12 +11,16 @@ from ..signed_distance import Distance, middles_on_surface
 if TYPE_CHECKING:
     from .triangle_mesh import TriangleMesh
 
-# local nodes: 0 to 2 corners, 3 to 5 the middles of the edges opposite them
+# nodes of a face: 0 to 2 are its corners, 3 to 5 the midpoints of the edges opposite to them
 _CHILDREN = np.array([(0, 5, 4), (5, 1, 3), (4, 3, 2), (3, 4, 5)])
 
 
 def refined(mesh: TriangleMesh, surface: Distance | None) -> TriangleMesh:
-    """The mesh of the children, those of face f at 4 f; vertices keep their numbers, edge k gets vertex n_v + k."""
+    """Return the refined mesh, in which face f becomes the faces 4 f to 4 f + 3.
+
+    Vertices keep their numbers, and the midpoint of edge k is vertex n_v + k. surface: a signed distance onto whose zeros
+    midpoints are moved, or None.
+    """
     middles = mesh.edge_midpoints
     if surface is not None:
         edges, on_it = middles_on_surface(mesh, np.arange(mesh.n_edges), surface)

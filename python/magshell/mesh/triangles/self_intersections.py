@@ -1,4 +1,4 @@
-"""Whether a sheet passes through itself, said where it costs little."""
+"""The sentence in printed results that tells whether a shell passes through itself."""
 
 from __future__ import annotations
 
@@ -9,17 +9,20 @@ import numpy as np
 if TYPE_CHECKING:
     from .triangle_mesh import TriangleMesh
 
-# Faces that are looked at unasked, when a result is printed or drawn: some 30 ms.
+# Number of faces that are checked when a result is printed or drawn: this takes some 30 ms.
 AFFORDABLE_FACES = 20_000
 
 
-def told(mesh: TriangleMesh, states: np.ndarray) -> str:
-    """In words, of states (n, n_v, 3), m: all of them, or the last, or none, whatever is affordable."""
+def describe_self_intersections(mesh: TriangleMesh, states: np.ndarray) -> str:
+    """Describe whether a shell passes through itself in its states, (n, n_v, 3) m.
+
+    To stay fast, only the last state of a long motion is checked, and no state of a large mesh; the text says so.
+    """
     count = len(states)
     if not count or mesh.n_faces > AFFORDABLE_FACES:
         return "whether it passes through itself: ask self_intersections()"
-    looked_at = range(count) if count * mesh.n_faces <= AFFORDABLE_FACES else [count - 1]
-    pairs = {k: len(mesh.self_intersections(states[k])) for k in looked_at}
+    checked = range(count) if count * mesh.n_faces <= AFFORDABLE_FACES else [count - 1]
+    pairs = {k: len(mesh.self_intersections(states[k])) for k in checked}
     crossing = [k for k, found in pairs.items() if found]
     where = "" if count == 1 else " in any state" if len(pairs) == count else " in the last state"
     if not crossing:

@@ -1,4 +1,4 @@
-"""Checks, integrates and refines triangles of six nodes."""
+"""Shape functions, integrals, checks and refinement of six-node triangles."""
 
 from __future__ import annotations
 
@@ -12,14 +12,16 @@ if TYPE_CHECKING:
     from .six_node_mesh import QuadraticTriangleMesh
 
 
-_NODES = np.array(
-    [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5)]
-)  # parameters of six nodes
-_WHOLE = _NODES[:3]
+# parameters (s, t) of the six nodes in the reference triangle
+_NODES = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5)])
+_REFERENCE_TRIANGLE = _NODES[:3]
 
 
 def rule(corners: np.ndarray, order: int = 4) -> tuple[np.ndarray, np.ndarray]:
-    """Points (p, 2) and weights (p,): Gauss's rule for the square, drawn together into a triangle (3, 2)."""
+    """Return the points (p, 2) and weights (p,) of a quadrature rule on a triangle with the given corners, (3, 2).
+
+    It is the Gauss-Legendre product rule of the square, collapsed to a triangle; p = order^2.
+    """
     at, lengths = np.polynomial.legendre.leggauss(order)
     u, v = (each.ravel() for each in np.meshgrid((at + 1) / 2, (at + 1) / 2))
     weights = np.outer(lengths, lengths).ravel() / 4 * (1 - u)
@@ -29,7 +31,7 @@ def rule(corners: np.ndarray, order: int = 4) -> tuple[np.ndarray, np.ndarray]:
 
 
 def shapes(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of six nodes at points (p, 2): (p, 6), and their slopes (p, 2, 6)."""
+    """Return the six shape functions at points (p, 2), (p, 6), and their derivatives, (p, 2, 6)."""
     s, t = points.T
     corner = np.stack([1 - s - t, s, t], axis=1)
     slope = np.array([[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])
@@ -43,36 +45,44 @@ def shapes(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def across(positions: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """(p, n, 3), m2: along the normal at points (p, 2) of elements (n, 6, 3), as long as they stretch area there."""
+    """Return the normal vectors dx/ds x dx/dt at points (p, 2) of elements (n, 6, 3), (p, n, 3) m2.
+
+    Their length is the ratio of an element's area to that of the reference triangle.
+    """
     _, slopes = shapes(points)
     along = np.einsum("pan,kni->apki", slopes, positions)
     return np.cross(along[0], along[1])
 
 
 def area_vectors(positions: np.ndarray) -> np.ndarray:
-    """(n, 3), m2: the integrals of the unit normal over elements (n, 6, 3)."""
-    points, weights = rule(_WHOLE)
+    """Return the integrals of the unit normal over elements (n, 6, 3), (n, 3) m2."""
+    points, weights = rule(_REFERENCE_TRIANGLE)
     return np.einsum("p,pki->ki", weights, across(positions, points))
 
 
 def shape_integrals(positions: np.ndarray, part: np.ndarray | None = None) -> np.ndarray:
-    """(n, 6), m2: of the shape functions over elements (n, 6, 3), or over the flat face `part` (3,) of theirs alone, given
-    by its nodes."""
-    points, weights = rule(_WHOLE if part is None else _NODES[part])
+    """Return the integrals of the shape functions over elements (n, 6, 3), (n, 6) m2.
+
+    part: (3,), three nodes of an element; the integrals are then those over the part between these nodes.
+    """
+    points, weights = rule(_REFERENCE_TRIANGLE if part is None else _NODES[part])
     densities = np.linalg.norm(across(positions, points), axis=2)
     return np.einsum("p,pk,pn->kn", weights, densities, shapes(points)[0])
 
 
 def shape_products(positions: np.ndarray) -> np.ndarray:
-    """(n, 6, 6), m2: of the products of two of them."""
-    points, weights = rule(_WHOLE)
+    """Return the integrals of the products of two shape functions over elements (n, 6, 3), (n, 6, 6) m2."""
+    points, weights = rule(_REFERENCE_TRIANGLE)
     densities = np.linalg.norm(across(positions, points), axis=2)
     values = shapes(points)[0]
     return np.einsum("p,pk,pn,pm->knm", weights, densities, values, values)
 
 
 def edge_integrals(positions: np.ndarray) -> np.ndarray:
-    """(k, 3), m: of the shape functions along edges (k, 3, 3): their ends, then the node between."""
+    """Return the integrals of the shape functions along edges, (k, 3) m.
+
+    positions: (k, 3, 3) m, the two ends of each edge, then its midside node.
+    """
     at, lengths = np.polynomial.legendre.leggauss(5)
     s, weights = (at + 1) / 2, lengths / 2
     values = np.stack([(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)], axis=1)
@@ -82,16 +92,16 @@ def edge_integrals(positions: np.ndarray) -> np.ndarray:
 
 
 def edge_lengths(positions: np.ndarray) -> np.ndarray:
-    """(k,), m, of edges (k, 3, 3)."""
+    """Return the lengths of curved edges, (k,) m; positions: as for `edge_integrals`."""
     return edge_integrals(positions).sum(axis=1)
 
 
-_LATTICE = 6  # points along each edge at which the element must not be inside out
-_LEAST = 1e-6  # of the mean: below it an element is folded up
+_LATTICE = 6  # intervals along each edge of the points at which the Jacobian determinant must be positive
+_LEAST = 1e-6  # [-] smallest Jacobian determinant of a valid element, relative to its mean
 
 
 def check_elements(nodes: np.ndarray, n_vertices: int) -> None:
-    """Raises ValueError where shape or numbers are wrong."""
+    """Raise ValueError unless the elements have shape (n, 6), valid and distinct vertices, and leave no vertex unused."""
     if nodes.ndim != 2 or nodes.shape[1] != 6:
         raise ValueError(f"elements must have shape (n, 6), got {nodes.shape}")
     if len(nodes) == 0:
@@ -112,7 +122,7 @@ def check_elements(nodes: np.ndarray, n_vertices: int) -> None:
 
 
 def check_middle_nodes(nodes: np.ndarray, element_edges: np.ndarray) -> None:
-    """Raises ValueError unless each edge has one node, which is on no other and no corner."""
+    """Raise ValueError unless each edge has one midside node, which is neither on another edge nor a corner."""
     edges, middles = element_edges[:, [2, 0, 1]].ravel(), nodes[:, 3:].ravel()
     corner = np.isin(middles, nodes[:, :3])
     if corner.any():
@@ -133,12 +143,12 @@ def check_middle_nodes(nodes: np.ndarray, element_edges: np.ndarray) -> None:
 
 
 def check_jacobians(positions: np.ndarray) -> None:
-    """Raises ValueError where an element (n, 6, 3) is turned inside out or folded up by its nodes between the corners."""
+    """Raise ValueError if the midside nodes of an element, (n, 6, 3) m, make its Jacobian determinant nonpositive."""
     mean = area_vectors(positions)
     steps = np.arange(_LATTICE + 1) / _LATTICE
     points = np.array([(s, t) for s in steps for t in steps if s + t < 1.0 + 1e-9])
-    shares = np.einsum("pni,ni->np", across(positions, points), mean) / 2.0
-    worst = shares.min(axis=1) / np.maximum((mean**2).sum(axis=1), 1e-300)
+    determinants = np.einsum("pni,ni->np", across(positions, points), mean) / 2.0
+    worst = determinants.min(axis=1) / np.maximum((mean**2).sum(axis=1), 1e-300)
     bad = np.flatnonzero(~(worst > _LEAST))
     if len(bad):
         raise ValueError(
@@ -148,13 +158,17 @@ def check_jacobians(positions: np.ndarray) -> None:
         )
 
 
-_INNER = [(3, 4), (4, 5), (5, 3)]  # nodes of an element between which edges inside it run
+_INNER = [(3, 4), (4, 5), (5, 3)]  # ends of the edges inside a divided element
 _PARAMETERS = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5)])
 
 
 def divided(mesh: QuadraticTriangleMesh) -> tuple[np.ndarray, np.ndarray]:
-    """Positions of the new nodes (2 n_e + 3 n, 3), and the elements (4 n, 6): of element k those at its corners, then the
-    one between its middle nodes. Edge k gets two nodes, the first nearer to its first end; then each element gets three."""
+    """Divide each element into four with the same curved shape.
+
+    Returns the positions of the new nodes, (2 n_e + 3 n, 3) m, and the elements (4 n, 6). The new nodes are two on each
+    edge, first the one nearer to its first end, then three inside each element. Element k becomes 4 k to 4 k + 3: those at
+    its corners, then the one between its midside nodes.
+    """
     n_v, n_e, elements = mesh.n_vertices, mesh.n_edges, mesh.elements
     new = np.empty((2 * n_e + 3 * mesh.n_elements, 3))
     node_between: dict[tuple[int, int], np.ndarray] = {}

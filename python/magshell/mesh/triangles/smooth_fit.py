@@ -1,4 +1,4 @@
-"""A smooth surface through the vertices of a fine mesh, and its border: where middle nodes of coarser edges go."""
+"""Smooth surfaces fitted to the vertices of a fine mesh, onto which midside nodes of a coarser mesh are moved."""
 
 from __future__ import annotations
 
@@ -7,19 +7,23 @@ import scipy
 
 from .triangle_mesh import TriangleMesh
 
-_SMOOTH = np.radians(40.0)  # faces that fold by more are a crease, borders that turn by more have a corner
-_NEAR = 0.25  # of an edge: how far the surface may be from its middle
-_SAME_PLACE = 1e-6  # of an edge
-_ENOUGH = 28  # vertices that a polynomial of fourth degree, 15 numbers, is fitted to
-_CANDIDATES = 12
-_ALONG = 7  # vertices of the border that a curve of fourth degree is fitted to
+# [rad] A larger angle between the normals of adjacent faces is a crease; between boundary edges, a corner.
+_SMOOTH = np.radians(40.0)
+_NEAR = (
+    0.25  # [-] largest distance between the middle of an edge and the surface, relative to the edge's length
+)
+_SAME_PLACE = 1e-6  # [-] largest distance between equal vertices, relative to the edge's length
+_ENOUGH = 28  # vertices to which a polynomial of fourth degree, with 15 coefficients, is fitted
+_CANDIDATES = 12  # nearest vertices among which one on a face of the same orientation is sought
+_ALONG = 7  # boundary vertices to which a curve of fourth degree is fitted
 _POWERS = [(i, d - i) for d in range(5) for i in range(d + 1)]
 
 
 class SmoothSurface:
-    """Of a fine mesh: polynomials of fourth degree over the tangent plane, fitted around each place that is asked for.
+    """A smooth surface through the vertices of a fine mesh, fitted locally by polynomials over the tangent plane.
 
-    Raises ValueError where the mesh has creases inside.
+    At each requested point a polynomial of fourth degree is fitted to the vertices around it.
+    Raises ValueError if the mesh has creases inside.
     """
 
     def __init__(self, fine: TriangleMesh, name: str):
@@ -29,12 +33,13 @@ class SmoothSurface:
         ends = np.concatenate([fine.edges, fine.edges[:, ::-1]])
         self._around = scipy.sparse.csr_array((np.ones(len(ends), dtype=bool), tuple(ends.T)), shape=(n, n))
         self._tree = scipy.spatial.cKDTree(fine.rest_positions)
-        self._beside: dict[int, list[int]] = {}
+        self._border_neighbours: dict[int, list[int]] = {}
         for a, b in fine.edges[fine.boundary_edges].tolist():
-            self._beside.setdefault(a, []).append(b)
-            self._beside.setdefault(b, []).append(a)
+            self._border_neighbours.setdefault(a, []).append(b)
+            self._border_neighbours.setdefault(b, []).append(a)
 
     def _refuse_creases(self) -> None:
+        """Raise ValueError if the normals of two adjacent faces differ by more than _SMOOTH."""
         fine = self._mesh
         sides = fine.face_normals[fine.edge_faces[fine.interior_edges]]
         cosines = np.einsum("ki,ki->k", sides[:, 0], sides[:, 1])
@@ -45,11 +50,14 @@ class SmoothSurface:
                 f"{self._name} folds by {fold:.0f} degrees at its edge {edge}, from vertex {fine.edges[edge][0]} to "
                 f"{fine.edges[edge][1]}: a smooth surface is fitted where faces turn by at most "
                 f"{np.degrees(_SMOOTH):.0f} from one to the next. Take a finer mesh, or "
-                f"QuadraticTriangleMesh.of(mesh, place=...)"
+                f"QuadraticTriangleMesh.from_triangles(mesh, project=...)"
             )
 
     def inside(self, point: np.ndarray, normal: np.ndarray, length: float) -> np.ndarray:
-        """(3,): the surface above or below the middle (3,) of an edge, along its normal (3,)."""
+        """Return the point (3,) of the surface above or below the middle of an interior edge.
+
+        point: (3,) m, the middle of the edge. normal: (3,), the unit normal there. length: m, that of the edge.
+        """
         start = self._nearest(point, normal, length)
         members, ring = {start}, [start]
         while ring and len(members) < _ENOUGH:
@@ -68,7 +76,10 @@ class SmoothSurface:
         return point + height * axes[2]
 
     def border(self, first: np.ndarray, last: np.ndarray) -> np.ndarray:
-        """(3,): the border halfway between two of its vertices, on the curve through those nearby, up to corners."""
+        """Return the point (3,) of the boundary curve halfway between two of its vertices, (3,) m each.
+
+        The curve is fitted to the boundary vertices nearby, not beyond corners.
+        """
         length = float(np.linalg.norm(last - first))
         chain = self._chain(self._vertex(first, length), self._vertex(last, length))
         points = self._mesh.rest_positions[chain]
@@ -81,16 +92,16 @@ class SmoothSurface:
         powers = np.polynomial.polynomial.polyfit(s, points[near], min(4, len(near) - 1))
         curve = np.polynomial.Polynomial
         across = curve((powers - middle * (np.arange(len(powers)) == 0)[:, None]) @ along)
-        place = 0.0
+        root = 0.0
         for _ in range(8):
-            place -= across(place) / across.deriv()(place)
-        return np.polynomial.polynomial.polyval(place, powers)
+            root -= across(root) / across.deriv()(root)
+        return np.polynomial.polynomial.polyval(root, powers)
 
     def _neighbours(self, vertex: int) -> np.ndarray:
         return self._around.indices[self._around.indptr[vertex] : self._around.indptr[vertex + 1]]
 
     def _nearest(self, point: np.ndarray, normal: np.ndarray, length: float) -> int:
-        """The nearest vertex of the sheet that faces the same way: others may be close by."""
+        """Return the nearest vertex with a normal on the same side; another part of the shell may be close by."""
         count = min(_CANDIDATES, self._mesh.n_vertices)
         distances, vertices = (np.atleast_1d(each) for each in self._tree.query(point, k=count))
         facing = self._mesh.vertex_normals[vertices] @ normal > 0.5
@@ -100,59 +111,66 @@ class SmoothSurface:
 
     def _too_far(self, point: np.ndarray, distance: float) -> ValueError:
         return ValueError(
-            f"{self._name} has no surface that faces the same way near the middle of an edge at {_told(point)} m, the "
-            f"nearest is {distance:.3g} m away: the mesh must lie along it, its faces on the same side, and its edges must "
-            "be short beside its radii of curvature"
+            f"{self._name} has no surface with its normal on the same side near the middle of an edge at "
+            f"{_format_point(point)} m; the nearest is {distance:.3g} m away. The mesh must lie along it, with its normals "
+            "on the same side, and its edges must be short compared with the radii of curvature"
         )
 
     def _vertex(self, point: np.ndarray, length: float) -> int:
+        """Return the boundary vertex at a point (3,) m, or raise ValueError. length: m, that of the edge that ends there."""
         near = self._tree.query_ball_point(point, _SAME_PLACE * length)
-        found = [k for k in near if k in self._beside]
+        found = [k for k in near if k in self._border_neighbours]
         if not found:
             raise ValueError(
-                f"the border of {self._name} has no vertex at {_told(point)} m, where the mesh has one on its border: the "
-                "vertices of borders must be some of the finer mesh's"
+                f"the border of {self._name} has no vertex at {_format_point(point)} m, where the mesh has one: the border "
+                "vertices of the mesh must be border vertices of the finer one as well"
             )
         return found[0]
 
     def _chain(self, first: int, last: int) -> list[int]:
-        """Vertices of the border from a little before one to a little after another."""
-        ways = [way for towards in self._beside[first] if (way := self._way(first, towards, last))]
-        if not ways:
+        """Return the boundary vertices from a little before one vertex to a little after another."""
+        paths = [
+            p for towards in self._border_neighbours[first] if (p := self._border_path(first, towards, last))
+        ]
+        if not paths:
             raise ValueError(f"the border of {self._name} has two parts where the mesh has one edge")
-        way = min(ways, key=len)
-        before, after = self._beyond(way[1], way[0]), self._beyond(way[-2], way[-1])
-        return [*reversed(before), *way, *after]
+        path = min(paths, key=len)
+        before, after = self._beyond(path[1], path[0]), self._beyond(path[-2], path[-1])
+        return [*reversed(before), *path, *after]
 
-    def _way(self, first: int, towards: int, last: int) -> list[int]:
-        """Along the border from one vertex to another; empty if it does not get there."""
-        way = [first, towards]
-        while way[-1] != last:
-            following = [k for k in self._beside[way[-1]] if k != way[-2]]
+    def _border_path(self, first: int, towards: int, last: int) -> list[int]:
+        """Return the vertices along the boundary from one vertex to another, or [] if they are not connected that way."""
+        path = [first, towards]
+        while path[-1] != last:
+            following = [k for k in self._border_neighbours[path[-1]] if k != path[-2]]
             if len(following) != 1 or following[0] == first:
                 return []
-            way.append(following[0])
-        return way
+            path.append(following[0])
+        return path
 
     def _beyond(self, before: int, end: int) -> list[int]:
-        """What follows beyond an end of a way, up to a corner."""
+        """Return a few boundary vertices that follow after `end`, up to a corner; `before` precedes it."""
         found: list[int] = []
         for _ in range(_ALONG // 2):
-            following = [k for k in self._beside[end] if k != before]
-            if len(following) != 1 or following[0] in found or self._turns(before, end, following[0]):
+            following = [k for k in self._border_neighbours[end] if k != before]
+            if len(following) != 1 or following[0] in found or self._is_corner(before, end, following[0]):
                 break
             before, end = end, following[0]
             found.append(end)
         return found
 
-    def _turns(self, before: int, at: int, after: int) -> bool:
-        places = self._mesh.rest_positions
-        a, b = places[at] - places[before], places[after] - places[at]
+    def _is_corner(self, before: int, at: int, after: int) -> bool:
+        """Return whether the boundary bends by more than _SMOOTH at a vertex between two others."""
+        positions = self._mesh.rest_positions
+        a, b = positions[at] - positions[before], positions[after] - positions[at]
         return float(a @ b) < np.cos(_SMOOTH) * float(np.linalg.norm(a) * np.linalg.norm(b))
 
 
 def middles_on_fit(mesh: TriangleMesh, fine: TriangleMesh, name: str) -> np.ndarray:
-    """(n_e, 3) m: the middles of all edges of a mesh, moved onto the smooth surface of a finer one."""
+    """Return the midpoints of all edges of a mesh, moved onto the smooth surface of a finer one, (n_e, 3) m.
+
+    name: what error messages call the finer mesh.
+    """
     surface = SmoothSurface(fine, name)
     middles = np.array(mesh.edge_midpoints)
     normals = mesh.face_normals
@@ -168,17 +186,17 @@ def middles_on_fit(mesh: TriangleMesh, fine: TriangleMesh, name: str) -> np.ndar
 
 
 def _axes(normal: np.ndarray) -> np.ndarray:
-    """(3, 3): two across, and the normal."""
+    """Return an orthonormal basis (3, 3) whose last row is the normal."""
     across = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
     across /= np.linalg.norm(across)
     return np.stack([across, np.cross(normal, across), normal])
 
 
 def _crossing(off: np.ndarray, arc: np.ndarray) -> float:
-    """The length of arc where numbers, which need not grow all the way, first pass through zero from below."""
+    """Return the arc length at which the values `off` first change from negative to positive, by linear interpolation."""
     k = int(np.argmax((off[:-1] <= 0.0) & (off[1:] > 0.0)))
     return float(arc[k] - off[k] * (arc[k + 1] - arc[k]) / (off[k + 1] - off[k]))
 
 
-def _told(point: np.ndarray) -> str:
+def _format_point(point: np.ndarray) -> str:
     return f"({', '.join(f'{x:.6g}' for x in point)})"

@@ -1,4 +1,4 @@
-"""What a person asks about a mesh, in four lines."""
+"""The printed summary of a triangle mesh, and its boundary loops."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ if TYPE_CHECKING:
 
 
 def summary(mesh: TriangleMesh) -> str:
+    """Describe a mesh in four lines: counts, size, topology and quality of its faces."""
     extent = np.ptp(mesh.rest_positions, axis=0)
     parts = "1 part" if mesh.n_components == 1 else f"{mesh.n_components} parts"
     loops = [len(loop) for loop in mesh.boundary_loops]
@@ -32,7 +33,7 @@ def summary(mesh: TriangleMesh) -> str:
 
 
 def boundary_loops(mesh: TriangleMesh) -> list[np.ndarray]:
-    """Vertices of each boundary curve in the order its faces run them, from the lowest boundary edge on."""
+    """Return the vertices of each boundary curve, in the direction of its faces, beginning at its lowest boundary edge."""
     starts = {}  # boundary edge -> the vertex its face leaves
     for edge in mesh.boundary_edges:
         forward = mesh.edge_faces[edge, 0] >= 0
@@ -50,7 +51,10 @@ def boundary_loops(mesh: TriangleMesh) -> list[np.ndarray]:
 
 
 def _next_boundary_edge(mesh, edge: int) -> int:
-    """Turns around the far vertex through its faces, so that fans of faces meeting at a vertex stay apart."""
+    """Return the boundary edge that follows in its loop.
+
+    The search rotates about the common vertex from face to face, so that several fans of faces at a vertex stay separate.
+    """
     face = int(mesh.edge_faces[edge].max())
     while True:
         corner = int(np.flatnonzero(mesh.face_edges[face] == edge)[0])

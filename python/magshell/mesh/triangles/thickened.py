@@ -1,4 +1,4 @@
-"""The closed surface around a sheet that has a thickness."""
+"""The closed surface of a shell with its thickness."""
 
 from __future__ import annotations
 
@@ -7,17 +7,21 @@ import scipy
 
 from .triangle_mesh import TriangleMesh
 
-_LONGEST_MITER = 2.0  # of the offset at a vertex over half of the thickness: that of a fold by 120 degrees
+# [-] Largest offset at a vertex over half the thickness; 2 is that of two faces at a dihedral angle of 120 degrees from
+# flat.
+_LONGEST_MITER = 2.0
 
 
 def thickened(
     mesh: TriangleMesh, positions: np.ndarray, thickness: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(points (k, 3) m, faces (m, 3)) of both sides of a sheet at `positions`, and of the walls along its border.
+    """Build the closed surface of a shell: its two sides, and the walls along its boundary.
 
-    thickness: (n_f,) m; half of it goes to either side, along the normals at the vertices. Where fans of faces share
-    nothing but a vertex, each has points of its own, so that every edge has two faces.
-    Raises ValueError, naming a face, where the sheet bends more sharply than its thickness allows.
+    positions: (n_v, 3) m, of the middle surface. thickness: (n_f,) m; half of it lies on either side, along the vertex
+    normals. Fans of faces that share only a vertex get separate points there, so that every edge has two faces.
+
+    Returns points (k, 3) m and faces (m, 3). Raises ValueError, which names a face, if the radius of curvature is too small
+    for the thickness.
     """
     corner_points = _corner_points(mesh)
     count = int(corner_points.max()) + 1
@@ -39,7 +43,7 @@ def thickened(
 
 
 def _corner_points(mesh: TriangleMesh) -> np.ndarray:
-    """(3 n_f,): the number of the point that each corner of a face is: one where faces are joined along an edge."""
+    """Return the number of the point at each corner of the faces, (3 n_f,); faces that share an edge share points."""
     inner = mesh.interior_edges
     ends, pairs = mesh.edges[inner], mesh.edge_faces[inner]
     corners = [
@@ -56,7 +60,7 @@ def _corner_points(mesh: TriangleMesh) -> np.ndarray:
 
 
 def _border(mesh: TriangleMesh, faces: np.ndarray) -> np.ndarray:
-    """(k, 2): points at the start and the end of each edge with one face, as that face runs along it."""
+    """Return the points at the start and end of each boundary edge, in the direction of its face, (k, 2)."""
     alone = (mesh.edge_faces < 0).any(axis=1)
     rows, opposite = np.nonzero(alone[mesh.face_edges])
     return np.stack([faces[rows, (opposite + 1) % 3], faces[rows, (opposite + 2) % 3]], axis=1)
@@ -68,7 +72,10 @@ def _area_vectors(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def _offsets(faces: np.ndarray, areas: np.ndarray, thickness: np.ndarray, count: int) -> np.ndarray:
-    """(count, 3) m, from the middle to the upper side: so far that the faces around are as thick as they should be."""
+    """Return the vectors from the middle surface to the upper side at each point, (count, 3) m.
+
+    They are longer than half the thickness where faces meet at an angle, so that the faces get their full thickness.
+    """
     size = np.linalg.norm(areas, axis=1)
 
     def summed(values: np.ndarray) -> np.ndarray:
@@ -79,20 +86,21 @@ def _offsets(faces: np.ndarray, areas: np.ndarray, thickness: np.ndarray, count:
     if (flat := length <= 1e-9 * summed(size)).any():
         face = np.argmax(flat[faces].any(axis=1))
         raise ValueError(
-            f"the normals around face {face} cancel: the sheet is folded flat there, and has no sides"
+            f"the normals around face {face} cancel: the shell is folded flat there, and its two sides coincide"
         )
     normals /= length[:, None]
     total = summed(size)
-    along = length / total  # the mean of the cosines between normals of faces and this one
+    along = length / total  # mean cosine of the angle between this normal and those of the faces
     half = 0.5 * summed(size * thickness) / total
     return normals * (half * np.minimum(1.0 / along, _LONGEST_MITER))[:, None]
 
 
 def _check_sides(points: np.ndarray, top: np.ndarray, bottom: np.ndarray, areas: np.ndarray) -> None:
+    """Raise ValueError if a face of one side is inverted."""
     for side, sign in ((top, 1.0), (bottom, -1.0)):
-        turned = sign * (_area_vectors(points, side) * areas).sum(axis=1) <= 0.0
-        if turned.any():
+        inverted = sign * (_area_vectors(points, side) * areas).sum(axis=1) <= 0.0
+        if inverted.any():
             raise ValueError(
-                f"the sheet is too thick to bend as it does at face {np.argmax(turned)}: its inner side would turn over. "
+                f"the shell is too thick for its curvature at face {np.argmax(inverted)}: the inner side is inverted there. "
                 "Give a smaller thickness"
             )

@@ -1,4 +1,4 @@
-"""The triangle mesh: rest positions, faces, and what follows from them."""
+"""The mesh of three-node triangles: rest positions, faces, connectivity and geometry."""
 
 from __future__ import annotations
 
@@ -24,16 +24,15 @@ if TYPE_CHECKING:
 
 
 class TriangleMesh(MeshBase):
-    """An oriented manifold triangle mesh, with or without boundary, of one part or several. Immutable.
+    """An oriented manifold triangle mesh, with or without boundary, of one or several connected parts. Immutable.
 
     Args:
         rest_positions: (n_v, 3), m.
         faces: (n_f, 3) vertex indices, counter-clockwise seen from the side the normal points to.
 
     Raises:
-        ValueError: naming the first offender: coordinates that are not finite, indices out of range,
-            degenerate or doubled faces, edges with more than two faces, neighbours of opposite orientation,
-            unused vertices.
+        ValueError: for coordinates that are not finite, indices out of range, degenerate or repeated faces, edges with more
+            than two faces, neighbours of opposite orientation, and unused vertices. The message names the first of them.
 
     Edge i of a face is opposite its vertex i. Edges run from lower to higher vertex and are sorted.
 
@@ -46,9 +45,8 @@ class TriangleMesh(MeshBase):
             quantity("rest_positions", "m", rest_positions, ("n_v", 3)), index_array("faces", faces)
         )
 
-    def __reduce__(
-        self,
-    ) -> tuple[Any, ...]:  # copies and worker processes rebuild the connectivity, which is cheap
+    # Copies and worker processes compute the connectivity again, which is cheap.
+    def __reduce__(self) -> tuple[Any, ...]:
         return TriangleMesh, (self.rest_positions, self.faces)
 
     def __repr__(self) -> str:
@@ -60,72 +58,75 @@ class TriangleMesh(MeshBase):
 
     @cached_property
     def rest_positions(self) -> np.ndarray:
-        """(n_v, 3), m, read-only."""
+        """The positions of the vertices in the reference configuration, (n_v, 3) m, read-only."""
         return self._core.rest_positions
 
     @cached_property
     def faces(self) -> np.ndarray:
-        """(n_f, 3) vertex indices, int32, read-only."""
+        """The vertex indices of each face, (n_f, 3) int32, read-only."""
         return self._core.faces
 
     @property
     def elements(self) -> np.ndarray:
-        """What has a thickness and a magnetization of its own: here the faces, of a QuadraticTriangleMesh its elements."""
+        """The elements, which have a thickness and a magnetization each: here the same as `faces`."""
         return self.faces
 
     @property
     def nodes_of_edges(self) -> np.ndarray:
-        """(n_e, 2): all nodes on each edge, here its ends."""
+        """The nodes on each edge, (n_e, 2): here its ends only."""
         return self.edges
 
     @property
     def n_elements(self) -> int:
-        """How many faces there are."""
+        """The number of elements, here that of faces."""
         return self.n_faces
 
     @cached_property
     def edges(self) -> np.ndarray:
-        """(n_e, 2) vertex indices, lower one first, sorted, int32, read-only."""
+        """The vertex indices of each edge, (n_e, 2) int32, lower one first, sorted, read-only."""
         return self._core.edges
 
     @cached_property
     def edge_faces(self) -> np.ndarray:
-        """(n_e, 2): the face that runs the edge forward, the one that runs it backward; -1 for none."""
+        """The two faces at each edge, (n_e, 2), -1 for none.
+
+        The first face runs the edge from its lower to its higher vertex, the second face the other way.
+        """
         return self._core.edge_faces
 
     @cached_property
     def face_edges(self) -> np.ndarray:
-        """(n_f, 3): the edge opposite each vertex of the face, int32, read-only."""
+        """The edge opposite each vertex of the faces, (n_f, 3) int32, read-only."""
         return self._core.face_edges
 
     @cached_property
     def boundary_edges(self) -> np.ndarray:
-        """Indices of the edges with one face, ascending."""
+        """The indices of the edges with one face, ascending."""
         return frozen(np.flatnonzero((self.edge_faces < 0).any(axis=1)))
 
     @cached_property
     def interior_edges(self) -> np.ndarray:
-        """Indices of the edges with two faces, ascending."""
+        """The indices of the edges with two faces, ascending."""
         return frozen(np.flatnonzero((self.edge_faces >= 0).all(axis=1)))
 
     @cached_property
     def boundary_vertices(self) -> np.ndarray:
-        """Indices of the vertices on boundary edges, ascending."""
+        """The indices of the vertices on boundary edges, ascending."""
         return frozen(np.unique(self.edges[self.boundary_edges]))
 
     @cached_property
     def boundary_loops(self) -> tuple[np.ndarray, ...]:
-        """The vertices of each closed boundary curve, in order, the surface to their left."""
+        """The vertices of each closed boundary curve, in order, with the surface on the left."""
         return tuple(map(frozen, boundary_loops(self)))
 
     @cached_property
     def components(self) -> np.ndarray:
-        """(n_v,): the number of the connected part each vertex belongs to, from 0."""
+        """The number, from 0, of the connected part that each vertex belongs to, (n_v,)."""
         shape = (self.n_vertices, self.n_vertices)
         graph = scipy.sparse.coo_array((np.ones(self.n_edges, dtype=bool), tuple(self.edges.T)), shape=shape)
         return frozen(scipy.sparse.csgraph.connected_components(graph, directed=False)[1])
 
-    # Geometry at rest
+    # Geometry of the reference configuration
 
     @cached_property
     def _area_vectors(self) -> np.ndarray:
@@ -137,31 +138,31 @@ class TriangleMesh(MeshBase):
 
     @cached_property
     def face_areas(self) -> np.ndarray:
-        """(n_f,), m2."""
+        """The areas of the faces, (n_f,) m2."""
         return frozen(np.linalg.norm(self._area_vectors, axis=1))
 
     @property
     def element_areas(self) -> np.ndarray:
-        """(n_f,), m2: of the faces."""
+        """The areas of the elements, here the faces, (n_f,) m2."""
         return self.face_areas
 
     @cached_property
     def face_normals(self) -> np.ndarray:
-        """(n_f, 3) unit vectors."""
+        """The unit normals of the faces, (n_f, 3)."""
         return frozen(self._area_vectors / self.face_areas[:, None])
 
     @cached_property
     def face_barycenters(self) -> np.ndarray:
-        """(n_f, 3), m."""
+        """The barycenters of the faces, (n_f, 3) m."""
         return frozen(self.rest_positions[self.faces].mean(axis=1))
 
     @cached_property
     def vertex_normals(self) -> np.ndarray:
-        """(n_v, 3) unit vectors: the normals around each vertex, weighted by area. Zero where they cancel."""
+        """The unit normals at the vertices, (n_v, 3): area-weighted means of the faces' normals; zero where these cancel."""
         return frozen(self.normals_at_vertices(self.rest_positions))
 
     def normals_at_vertices(self, positions: np.ndarray) -> np.ndarray:
-        """The same (n_v, 3) where the vertices are at other positions, (n_v, 3) m."""
+        """Compute the vertex normals (n_v, 3) of the mesh with its vertices at other positions, (n_v, 3) m."""
         corners, areas = self.faces.ravel(), self._area_vectors_at(positions)
         total = np.stack([np.bincount(corners, np.repeat(area, 3)) for area in areas.T], axis=1)
         length = np.linalg.norm(total, axis=1, keepdims=True)
@@ -169,17 +170,17 @@ class TriangleMesh(MeshBase):
 
     @cached_property
     def quality(self) -> MeshQuality:
-        """The shapes of its faces: angles, aspect, heights. A Shell's `quality` knows the thickness as well."""
+        """The quality of the faces: angles, aspect ratios, heights. A Shell's `quality` knows the thickness as well."""
         return MeshQuality(self)
 
-    # The surface somewhere else
+    # Geometry of other configurations
 
     def self_intersections(self, positions: Numbers | None = None) -> np.ndarray:
-        """The pairs of faces that pass through each other, (k, 2), lower number first, sorted.
+        """Find the pairs of faces that pass through each other, (k, 2), lower number first, sorted.
 
-        positions: (n_v, 3), m; by default those at rest. Faces that share an edge never do; those that share a vertex
-        may, beyond it. What only touches does not count: nearer than 1e-12 of the sheet's size is touching, unless the
-        sheet goes through there. Takes about 1 microsecond a face.
+        positions: (n_v, 3), m; by default the rest positions. Faces that share an edge are never listed; faces that share a
+        vertex are, if they intersect away from it. Faces that only touch do not count: overlaps below 1e-12 of the mesh's
+        size are taken as touching, unless the surface passes through there. The search takes about 1 microsecond per face.
 
         >>> mesh = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.2, 0.2, -1], [0.3, 0.3, 1], [1, 1, 1]],
         ...     [[0, 1, 2], [3, 4, 5]])
@@ -195,40 +196,41 @@ class TriangleMesh(MeshBase):
             )
         return self._core.self_intersections(array)
 
-    # Other meshes from this one
+    # Modified meshes
 
     def flipped(self) -> TriangleMesh:
-        """The same surface with its normals on the other side; faces and vertices keep their numbers."""
+        """Return the same surface with reversed normals; faces and vertices keep their numbers."""
         return TriangleMesh(self.rest_positions, self.faces[:, [0, 2, 1]])
 
     def refined(self, surface: Distance | None = None) -> TriangleMesh:
-        """Each face divided into four, 4 f to 4 f + 3, at the middles of its edges.
+        """Return the mesh with each face divided into four, 4 f to 4 f + 3, at the midpoints of its edges.
 
-        Vertices keep their numbers, and edge k gets vertex n_v + k. surface: a signed distance in m, (n, 3) -> (n,), such
-        as an ms.shapes.Shape, onto which the middles of edges move whose ends lie on it; by default they stay straight.
+        Vertices keep their numbers, and the midpoint of edge k is vertex n_v + k. surface: a signed distance in m,
+        (n, 3) -> (n,), such as an ms.shapes.Shape. The midpoints of edges whose ends lie on it are moved onto it; by default
+        they stay on the straight edges.
         """
         return refined(self, surface)
 
     def transformed(
         self, rotation: Rotates | None = None, translation: Numbers | None = None
     ) -> TriangleMesh:
-        """The mesh moved by x -> rotation x + translation.
+        """Return the mesh transformed by x -> rotation x + translation.
 
         Args:
-            rotation: a (3, 3) matrix or a scipy Rotation. Any invertible matrix will do; under one that
-                mirrors, the faces keep their vertex order, so normals end on the other side of the mirrored
-                surface.
+            rotation: a (3, 3) matrix or a scipy Rotation. Any invertible matrix is allowed. The faces keep their vertex
+                order, so under a matrix that mirrors, the normals end up on the other side of the mirrored surface.
             translation: (3,), m.
         """
         return TriangleMesh(moved(self.rest_positions, rotation, translation), self.faces)
 
     def scaled(self, factor: float) -> TriangleMesh:
-        """The mesh with all coordinates multiplied by a positive factor."""
+        """Return the mesh with all coordinates multiplied by a positive factor."""
         positions = self.rest_positions * positive("factor", "", factor)
         return TriangleMesh(positions, self.faces)
 
 
 def checked_mesh(value: Any, name: str = "mesh") -> TriangleMesh:
+    """Return the value, or raise ValueError, which calls it `name`, if it is not a TriangleMesh."""
     if not isinstance(value, TriangleMesh):
         raise ValueError(f"{name} must be a TriangleMesh, got {type(value).__name__}")
     return value

@@ -412,7 +412,7 @@ def _checked_bending(bending, mesh) -> str:
     if bending == "midedge2" and mesh.order == 1:
         raise ValueError(
             'bending="midedge2" needs a mesh of six-node elements: ms.meshes.rectangle(..., order=2) and its like, '
-            "ms.QuadraticTriangleMesh.of(mesh, place=...) of a TriangleMesh, or a file of second order from gmsh"
+            "ms.QuadraticTriangleMesh.from_triangles(mesh, project=...), or a file of second order from gmsh"
         )
     if bending != "midedge2" and mesh.order == 2:
         raise ValueError(

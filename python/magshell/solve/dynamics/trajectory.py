@@ -16,7 +16,7 @@ from ..._runtime.files import replace_file
 from ..._runtime.frozen import immutable
 from ..._runtime.mixins import AnimateMixin
 from ..._runtime.npz import open_npz
-from ...mesh.triangles.self_intersections import told
+from ...mesh.triangles.self_intersections import describe_self_intersections
 from ...model.actuators.actuator import Actuator
 from ...model.contact.body_contact import BodyContact
 from ...model.contact.contact import Contact
@@ -307,7 +307,7 @@ class Trajectory(AnimateMixin, OfOneBody):
         halved = f", {len(self.substeps)} of them in parts" if self.substeps else ""
         halved += f", {len(self.fallback_steps)} by implicit Euler" if self.fallback_steps else ""
         strain = StrainHistory(self.largest_membrane_strain, self.largest_bending_strain)
-        crossings = told(self.scene.mesh, detached(self.positions))
+        crossings = describe_self_intersections(self.scene.mesh, detached(self.positions))
         a_step = 1e3 * self.wall_time / max(self.steps_done, 1)
         return (
             f"Trajectory: {self.steps_done}{stopped} steps{halved}, {self.times[-1]:.4g} s, {len(self)} states, "

@@ -10,7 +10,7 @@ import numpy as np
 from ..._input.tensors import detached, plain_arrays
 from ..._runtime.frozen import immutable
 from ..._runtime.mixins import SaveMixin
-from ...mesh.triangles.self_intersections import told
+from ...mesh.triangles.self_intersections import describe_self_intersections
 from ...model.contact.body_contact import BodyContact
 from ...model.contact.contact import Contact
 from ...model.results.result_lookup import OfOneBody, result_of
@@ -159,7 +159,7 @@ class Equilibrium(SaveMixin, OfOneBody):
             kind += f", {self.load_fraction:.1%} of the way"
         energies = ", ".join(f"{name} {value:.4g}" for name, value in self.energies.items())
         strain = Largest(self.largest_membrane_strain, self.largest_bending_strain)
-        crossings = told(self.scene.mesh, np.asarray(detached(self.positions))[None])
+        crossings = describe_self_intersections(self.scene.mesh, np.asarray(detached(self.positions))[None])
         extra = f", {self.saddles_escaped} saddles left" if self.saddles_escaped else ""
         extra += f", {self.relaxation_steps} relaxation steps" if self.relaxation_steps else ""
         ended = " at round-off" if self.at_roundoff else ""

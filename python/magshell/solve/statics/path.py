@@ -18,7 +18,7 @@ from ..._runtime.mixins import AnimateMixin
 from ..._runtime.progress import SolveBar
 from ..._runtime.solver_entry_point import grouped, solve_entry
 from ...errors import Interrupted, NotConverged
-from ...mesh.triangles.self_intersections import told
+from ...mesh.triangles.self_intersections import describe_self_intersections
 from ...model.results.result_lookup import OfOneBody, result_of
 from ...model.results.solid_result import told_strains
 from ...model.scene.scene import Scene
@@ -178,7 +178,7 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
         ]
         strain = StrainHistory(self.largest_membrane_strain, self.largest_bending_strain)
         lines.append(f"  {told_strains(self, strain)}")
-        lines.append(f"  {told(self.scene.mesh, self.positions)}")
+        lines.append(f"  {describe_self_intersections(self.scene.mesh, self.positions)}")
         lines.append(
             f"  {self.iterations} iterations, {self.factorizations} factorizations, {self.wall_time:.3g} s"
         )
