@@ -1,9 +1,9 @@
-"""Runs a build and says how far it is, a line every twentieth: `make` builds the package with it.
+"""Runs a build and prints its progress, one line for every twentieth: `make` builds the package with it.
 
     python scripts/build_progress.py LOG COMMAND...
 
-All that the command prints goes into the file LOG; of it, what Ninja counts, [12/138], and the time are told. Where the
-command fails, the end of LOG is shown, and its exit status is handed on.
+All output of the command goes into the file LOG. The lines printed show Ninja's count, [12/138], and the time. If
+the command fails, the end of LOG is shown, and its exit status is returned.
 """
 
 import re
@@ -12,15 +12,15 @@ import sys
 import time
 from pathlib import Path
 
-SHARES = 20  # lines from nothing to all
+LINES = 20  # lines that are printed during a build
 COUNTED = re.compile(r"\s*\[(\d+)/(\d+)\]")
-SHOWN = 60  # lines of a log whose build failed
+SHOWN = 60  # last lines of the log that are shown if the build fails
 
 
 def followed(log: Path, command: list[str]) -> int:
-    """The exit status of the command."""
+    """Run the command, print its progress, and return its exit status."""
     log.parent.mkdir(parents=True, exist_ok=True)
-    began, told = time.monotonic(), 0
+    began, printed = time.monotonic(), 0
     with log.open("w", buffering=1) as file:
         process = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace"
@@ -29,8 +29,8 @@ def followed(log: Path, command: list[str]) -> int:
             file.write(line)
             if found := COUNTED.match(line):
                 done, total = map(int, found.groups())
-                if done * SHARES // total > told:
-                    told = done * SHARES // total
+                if done * LINES // total > printed:
+                    printed = done * LINES // total
                     seconds = time.monotonic() - began
                     print(f"  built {done} of {total} ({100 * done // total} %), {seconds:.0f} s", flush=True)
         status = process.wait()

@@ -1,5 +1,7 @@
-"""Says in the extension's stub that containers hold anything, where pybind11 does not know what: a type checker counts a
-bare `dict` as unknown. `make stubs` runs it."""
+"""Completes the types of containers in the extension's stub, which pybind11 leaves bare. `make stubs` runs it.
+
+A type checker counts a bare `dict` as unknown: it becomes `dict[str, typing.Any]`.
+"""
 
 import re
 import sys
@@ -14,7 +16,7 @@ FULL = {
 
 
 def completed(stub: str) -> str:
-    """Of annotations alone: what stands behind a colon or an arrow."""
+    """Return the stub with complete container types in annotations: behind a colon or an arrow."""
     names = "|".join(map(re.escape, FULL))
     stub = re.sub(r"(?<=\*\*kwargs)(?!:)", ": typing.Any", stub)
     return re.sub(rf"(?<=[:>|] )({names})(?![\w.\[])", lambda found: FULL[found[1]], stub)

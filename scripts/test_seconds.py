@@ -1,5 +1,7 @@
-"""Writes how much time of the processor tests took, from a report of pytest: one line a test function, all its parameters
-together. `make seconds` runs it.
+"""Writes the processor time of each test from a report of pytest: one line for each test function, parameters
+together.
+
+`make seconds` runs it:
 
     python scripts/test_seconds.py build/tests.xml tests/seconds.txt
 """
@@ -10,7 +12,7 @@ import xml.etree.ElementTree as ElementTree
 from collections import defaultdict
 from pathlib import Path
 
-LEAST = 0.5  # s: shorter ones are not listed
+LEAST = 0.5  # [s] shorter tests are not listed
 HEADER = """\
 # Tests that took more than half a second of the processor, all parameters together: seconds, file::test.
 # `make quick` leaves them out, and several processes begin with the files that take longest. Written by `make seconds`;

@@ -1,4 +1,4 @@
-"""magshell's docstrings as reStructuredText: what each parameter is becomes a list, code stays code."""
+"""Converts magshell's docstrings to reStructuredText: descriptions of parameters become lists, code stays code."""
 
 import re
 
@@ -6,20 +6,22 @@ _FIELD = re.compile(
     r"^((?:\*{0,2}[A-Za-z_][\w.]*(?:\([^)]*\))?)(?:, \*{0,2}[A-Za-z_][\w.]*)*): (.*)$"
 )
 _SECTION = re.compile(r"^(Args|Raises|Returns):$")
-# For those who extend the package; a user calls none of these.
+# Names for developers of the package, left out of the manual.
 _INNER = {"current"}
 
 
 def process(app, what, name, obj, options, lines) -> None:
+    """Replace the lines of a docstring; a handler of Sphinx's autodoc-process-docstring."""
     lines[:] = [each for block in _blocks(lines) for each in [*_converted(block), ""]]
 
 
 def skip(app, what, name, obj, skipped, options) -> bool | None:
+    """Leave private names out of the manual; a handler of Sphinx's autodoc-skip-member."""
     return True if name in _INNER or name.startswith("_") else None
 
 
 def _blocks(lines: list[str]):
-    """Parts between empty lines; an example is one with the lines that its output has."""
+    """Split lines at empty ones into blocks; an example is one block with its output."""
     block: list[str] = []
     for line in [*lines, ""]:
         if line.strip():
@@ -30,6 +32,7 @@ def _blocks(lines: list[str]):
 
 
 def _converted(block: list[str]) -> list[str]:
+    """Convert one block of lines to reStructuredText."""
     if block[0].lstrip().startswith(">>>"):
         return ["::", "", *(f"   {line}" for line in block)]
     if all(line.startswith("    ") for line in block):
@@ -64,7 +67,7 @@ def _converted(block: list[str]) -> list[str]:
 
 
 def _escaped(text: str) -> str:
-    """Backticks mean code; nothing else means anything."""
+    """Escape the markup of reStructuredText; text in backticks becomes code."""
     parts = text.split("`")
     if len(parts) % 2 == 0:
         return _plain(text)

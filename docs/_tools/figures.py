@@ -1,9 +1,9 @@
-"""python docs/_tools/figures.py [--measure [WORDS ...]] [--page]: the figures of README and manual beside their commands.
+"""Compares the figures of README and manual with their commands: python docs/_tools/figures.py [--measure] [WORDS ...].
 
-Every figure in a text is in figures.json: what the page says word for word, and the command that makes the number, or the
-source that it was published in, or why it is no measurement. `--measure` runs the commands whose numbers can be read from
-their JSON and compares: counts and errors as exactly as the text gives them, times and memory within a factor of two.
-`tests/docs/test_figures.py` holds that each figure of a page is in the file.
+Every figure in a text is in figures.json, with the page's words and the command that computes the number, or its
+publication, or the reason why it is no measurement. `--measure` runs the commands whose numbers can be read from their
+JSON and compares them: counts and errors to the digits that the text gives, times and memory within a factor of two.
+`tests/docs/test_figures.py` checks that each figure of a page is in the file.
 """
 
 from __future__ import annotations
@@ -24,13 +24,14 @@ ORIGINS = (
     "command",
     "source",
     "given",
-)  # a run of ours, a publication, or a choice that the text itself makes
+)  # a command of this repository, a publication, or a choice that the text makes
+# The largest factor between a number and the text, for each kind of figure.
 KINDS = {
     "count": 1.0,
     "error": 1.0,
     "time": 2.0,
     "memory": 2.0,
-}  # how far a number may be from the text, a factor
+}
 
 NUMBER = r"\d[\d,]*(?:\.\d+)?(?:e-?\d+)?"
 _UNIT = (
@@ -57,13 +58,13 @@ def name_of(page: Path) -> str:
 
 
 def prose(text: str) -> str:
-    """Return the text with code blocks blanked, a line's end as any other space."""
+    """Return the text with code blocks blanked, and every line end replaced by a space."""
     blank = _FENCE.sub(lambda code: " " * len(code[0]), text)
     return re.sub(r"\s", " ", blank)
 
 
 def uncovered(page: Path, entries: list[dict[str, Any]]) -> list[str]:
-    """Return the figures of a page that no entry of the file holds, each with what stands before it."""
+    """Return the figures of a page that no entry of the file covers, each with the text before it."""
     text = prose(page.read_text())
     held = [
         span
@@ -79,6 +80,7 @@ def uncovered(page: Path, entries: list[dict[str, Any]]) -> list[str]:
 
 
 def _spans(says: str, text: str) -> list[tuple[int, int]]:
+    """Return where the words occur in a text, whatever the white space between them."""
     return [
         found.span()
         for found in re.finditer(r"\s+".join(map(re.escape, says.split())), text)
@@ -86,7 +88,7 @@ def _spans(says: str, text: str) -> list[tuple[int, int]]:
 
 
 def stale(entries: list[dict[str, Any]]) -> list[str]:
-    """Return what entries say that their pages do not."""
+    """Return the entries whose words are no longer on their page."""
     return [
         f"{entry['page']}: {entry['says']}"
         for entry in entries
@@ -100,7 +102,8 @@ def shown(entry: dict[str, Any]) -> list[str]:
 
 
 def agrees(text: str, value: float, kind: str) -> bool:
-    """Whether a written number is a measured one: to the digits that are written, or within the factor of its kind."""
+    """Return whether a written number agrees with a measured one: to the digits written, or within the factor of its
+    kind."""
     written = float(text.replace(",", ""))
     if KINDS[kind] > 1.0:
         return written / KINDS[kind] <= value <= written * KINDS[kind]
@@ -109,7 +112,7 @@ def agrees(text: str, value: float, kind: str) -> bool:
 
 
 def disagreements(entry: dict[str, Any], values: list[float]) -> list[str]:
-    """Return those numbers of an entry's text that are not the values of the same place."""
+    """Return the numbers of an entry's text that differ from the measured values."""
     return [
         f"{entry['page']}: {entry['says']!r} says {text}, {entry['command']} gives {value:.4g}"
         for text, value in zip(shown(entry), values, strict=True)
@@ -123,12 +126,13 @@ def read() -> list[dict[str, Any]]:
 
 
 def measured(entry: dict[str, Any], results: Any) -> list[float | None]:
-    """Return the values of an entry's numbers from a command's JSON; None for one that the entry does not place."""
-    return [None if place is None else _at(results, place) for place in entry["at"]]
+    """Return the values of an entry's numbers from a command's JSON; None for a number without a place in it."""
+    return [None if path is None else _at(results, path) for path in entry["at"]]
 
 
-def _at(results: Any, place: list[Any]) -> float:
-    *path, last = place
+def _at(results: Any, path: list[Any]) -> float:
+    """Return the number at a path of keys; a last entry {"times": factor} scales it."""
+    *path, last = path
     scale = 1.0
     if isinstance(last, dict):
         scale, (*path, last) = last["times"], path
@@ -138,7 +142,7 @@ def _at(results: Any, place: list[Any]) -> float:
 
 
 def run(command: str) -> Any:
-    """Return what a command writes with --json, its tables unseen."""
+    """Run a command with --json, without showing its output, and return the results it writes."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "results.json"
         words = [sys.executable, *command.split()[1:], "--json", str(path)]
@@ -148,7 +152,7 @@ def run(command: str) -> Any:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Print figures and what disagrees; 1 where something does."""
+    """Print the figures and those that disagree; returns 1 if one does."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -1,7 +1,7 @@
-"""The gallery: what the examples draw of small versions of themselves, each beside a link to its code.
+"""Builds the gallery: pictures that the examples draw of small versions of themselves, with links to their code.
 
-Pictures are made once for each state of the examples and of the package's Python, and kept under docs/_gallery, which is
-not committed.
+Pictures are made once for each state of the examples and of the package's Python, and stored in docs/_gallery,
+which is not committed.
 """
 
 import ast
@@ -17,8 +17,8 @@ ROOT = HERE.parent
 EXAMPLES = ROOT / "examples"
 MADE = HERE / "_gallery"
 
-# Arguments of `main` that make a picture in seconds, those that take longest first; examples that are not here take minutes,
-# and have words alone.
+# Arguments of `main` with which an example takes seconds, the longest ones first. Other examples take minutes and have no
+# picture.
 SMALL = {
     "gripper": "iterations=4, steps=60",
     "hexagram": "edges_per_side=6, n_vertices=280, iterations=25",
@@ -41,14 +41,14 @@ drawn.save({picture!r}, **({{}} if not hasattr(drawn.figure, "savefig") else {{"
 
 
 def make(app) -> None:
-    """Writes docs/_gallery/*.md with the pictures that are there."""
+    """Write docs/_gallery/*.md, with pictures of the examples that are new or have changed."""
     MADE.mkdir(exist_ok=True)
     names = sorted(
         path.stem for path in EXAMPLES.glob("*.py") if not path.stem.startswith("_")
     )
     if os.environ.get("MAGSHELL_GALLERY") != "none":
         old = [name for name in SMALL if not _is_new(MADE / f"{name}.png", name)]
-        # Each draws in a process of its own, on one thread.
+        # Each example runs in a process of its own, on one thread.
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             list(pool.map(lambda name: _draw(name, MADE / f"{name}.png"), old))
     for name in names:
@@ -57,6 +57,7 @@ def make(app) -> None:
 
 
 def _draw(name: str, picture: Path) -> None:
+    """Run an example in a process of its own, and save its picture."""
     script = _SCRIPT.format(
         examples=str(EXAMPLES), name=name, arguments=SMALL[name], picture=str(picture)
     )
@@ -78,15 +79,21 @@ def _draw(name: str, picture: Path) -> None:
         raise RuntimeError(
             f"the example {name} failed for the gallery:\n{found.stderr[-3000:]}"
         )
-    picture.with_suffix(".txt").write_text(_digest(name))
+    picture.with_suffix(".txt").write_text(_source_hash(name))
 
 
 def _is_new(picture: Path, name: str) -> bool:
-    told = picture.with_suffix(".txt")
-    return picture.exists() and told.exists() and told.read_text() == _digest(name)
+    """Return whether a picture was made from the present sources."""
+    hash_file = picture.with_suffix(".txt")
+    return (
+        picture.exists()
+        and hash_file.exists()
+        and hash_file.read_text() == _source_hash(name)
+    )
 
 
-def _digest(name: str) -> str:
+def _source_hash(name: str) -> str:
+    """Return the hash of all sources that an example's picture depends on."""
     found = hashlib.blake2b(SMALL[name].encode() + _SCRIPT.encode())
     sources = [
         EXAMPLES / f"{name}.py",
@@ -108,9 +115,9 @@ def _title(name: str) -> str:
 
 
 def _words(name: str) -> list[str]:
-    """Of its docstring, the first line and the rest."""
-    told = ast.get_docstring(ast.parse((EXAMPLES / f"{name}.py").read_text())) or ""
-    first, _, rest = told.partition("\n\n")
+    """Return the first line of an example's docstring, and the rest."""
+    text = ast.get_docstring(ast.parse((EXAMPLES / f"{name}.py").read_text())) or ""
+    first, _, rest = text.partition("\n\n")
     return [" ".join(first.split()), rest]
 
 

@@ -1,4 +1,5 @@
-"""python docs/_tools/small_figures.py [--json FILE]: the counts and errors of the texts that no part of the bench prints."""
+"""Measures the counts and errors in the texts that no benchmark prints: python docs/_tools/small_figures.py [--json
+FILE]."""
 
 from __future__ import annotations
 
@@ -18,11 +19,11 @@ from benchmarks.cases.solids import SOLID_CASES, bent_beam
 from benchmarks.statics import CASES, strongly_bent
 from benchmarks.surrounding_costs import SURROUNDINGS, TIME_STEP, falling
 
-STEPS = 100  # of the sheet of 768 faces that falls on a floor
+STEPS = 100  # time steps of the sheet of 768 faces that falls on a floor
 
 
 def measure() -> dict[str, Any]:
-    """Return {name: number} of all of them."""
+    """Measure all numbers: returns {name: number}."""
     return {
         **_from_flat(),
         "factorizations after a change of 1 %": _warm_start(),
@@ -35,6 +36,7 @@ def measure() -> dict[str, Any]:
 
 
 def _from_flat() -> dict[str, Any]:
+    """Count the factorizations of equilibria that start from the flat sheet."""
     found = {}
     for name, (build, controls, _) in CASES.items():
         found[name] = ms.equilibrium(build("midedge"), **controls).factorizations
@@ -57,14 +59,14 @@ def _warm_start() -> int:
 
 
 def _snap() -> float:
-    """Follow a roof through both limit points under the force that snaps it, critical points found."""
+    """Follow a roof through both limit points, with its critical points, and return the factorizations per point."""
     roof = cylinder_roof.scene(cylinder_roof.quarter((8, 8)), "midedge")
     path = ms.follow_path(roof, progress=False)
     return path.factorizations / len(path.positions)
 
 
 def _falling() -> dict[str, float]:
-    """Count the factorizations and iterations a step of a sheet that falls on a floor, and the most of one step."""
+    """Count the factorizations and iterations per step of a sheet that falls on a floor."""
     found = {}
     for name, each in SURROUNDINGS.items():
         move = ms.simulate(

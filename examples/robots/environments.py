@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from magshell.envs.actuator import Action
+from magshell.envs.action import Action
 from magshell.envs.environment import Environment
 from magshell.envs.library import require_gymnasium
-from magshell.envs.steered import ParametricAction
+from magshell.envs.parametric_action import ParametricAction
 from magshell.solve.options import ImplicitEuler
 from robots.cell_gripper import SPEED, CellGripper
 from robots.fish import TARGET, TETRAHEDRA, TORQUES, Fish

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import torch
     from numpy.typing import ArrayLike
 
-    from ..envs.actuator import Action
+    from ..envs.action import Action
     from ..mesh.tetrahedra.tet_mesh import TetMesh
     from ..mesh.triangles.six_node_mesh import QuadraticTriangleMesh
     from ..mesh.triangles.triangle_mesh import TriangleMesh

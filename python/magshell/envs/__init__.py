@@ -26,10 +26,10 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from .actuator import Action
+from .action import Action
+from .parametric_action import ParametricAction
 from .rollouts import Episode, episodes
 from .snapshot import Snapshot
-from .steered import ParametricAction
 
 __all__ = ["Action", "Environment", "Episode", "ParametricAction", "Snapshot", "episodes", "robots"]
 

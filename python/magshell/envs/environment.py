@@ -1,4 +1,4 @@
-"""A scene as an environment of gymnasium."""
+"""Environment of gymnasium made from a scene."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ..output.plot.style import Style, style_of
 from ..output.plot.view import View, view_of
 from ..output.results.state import states_of
 from ..solve.dynamics.simulate import simulate as simulate_motion
-from .actuator import Action
+from .action import Action
 from .frames import Camera
 from .library import require_gymnasium
 from .snapshot import Snapshot
@@ -34,32 +34,33 @@ if TYPE_CHECKING:
 if not TYPE_CHECKING:
     gymnasium = require_gymnasium("envs.Environment")
 
-_OWN = ("steps", "time_step", "start", "velocities", "values", "record_every", "progress")  # of ms.simulate
-_ROUNDING = 1e-6  # beyond the bounds, of actions that were single precision on their way
+# Arguments of ms.simulate that the environment sets itself.
+_OWN = ("steps", "time_step", "start", "velocities", "values", "record_every", "progress")
+_ROUNDING = 1e-6  # [-] allowed excess of an action beyond its bounds, which single precision may cause
 
 
 class Environment(gymnasium.Env):
-    """A scene that actions drive, step by step, as gymnasium has it.
+    """An environment of gymnasium: actions move a scene, step by step.
 
-    actuators: what an action sets, Action or ParametricAction objects. The action holds their numbers one
-        after another, each from
-        -1 to 1.
+    actuators: the values that an action sets, Action or ParametricAction objects. The action holds their numbers one after
+        another, each from -1 to 1.
     observation: function of a Snapshot, the state after an action: finite numbers, always as many, in any one shape.
     reward: function of a Snapshot: a number. `snapshot.before` is the state that the action began in.
-    time_step, steps_per_action: s, and how many of them an action lasts. actions_per_episode: after which it is truncated.
+    time_step: s. steps_per_action: number of time steps that an action lasts. actions_per_episode: after so many actions
+        an episode is truncated.
     start: function of numpy's Generator, which the seed of `reset` sets: the disturbance that an episode begins with, as
         {"start": ..., "velocities": ...} of ms.simulate, either or both. By default it begins at rest.
         `reset(options=...)` takes the same names, which come first.
     finished: function of a Snapshot: whether the episode ends there.
-    failure_reward: where a step of the motion fails, the episode ends with this reward, at the last good state, and
-        info["failure"] says why. None: ms.NotConverged comes through.
+    failure_reward: if a step of the motion fails, the episode ends with this reward, at the last good state, and
+        info["failure"] says why. None: ms.NotConverged is raised.
     simulate: {name: value}, further arguments of ms.simulate: integrator, damping, solver, ...
     render_mode: "rgb_array" or None; render_width: pixels; view, style: as in ms.plot, but without
         contacts.
 
-    The scene is built once; actions go on with the motion from its last state with the same bits as one long motion. The
-    same seed and actions give the same bits. To run many in processes, hand gymnasium.vector.AsyncVectorEnv functions
-    that make them; scenes can be pickled.
+    The scene is built once; each action continues the motion from its last state, with the same bits as one long motion.
+    The same seed and actions give the same bits. To run many environments in processes, pass functions that make them to
+    gymnasium.vector.AsyncVectorEnv; scenes can be pickled.
 
     Raises ValueError on bad input: an observation that is not finite or changes its shape, an action of another shape.
 
@@ -164,14 +165,14 @@ class Environment(gymnasium.Env):
     def reset(
         self, *, seed: int | None = None, options: dict[Any, Any] | None = None
     ) -> tuple[np.ndarray, dict[Any, Any]]:
-        """Begins an episode: (observation, info)."""
+        """Begin an episode: returns (observation, info)."""
         super().reset(seed=seed)
         begun = {} if self._start is None else self._start(self.np_random)
         self._begin({**named_values("what `start` returns", begun), **named_values("options", options)})
         return self._observed(self._now), {"time": 0.0}
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[Any, Any]]:
-        """One action: (observation, reward, terminated, truncated, info)."""
+        """Take one action: returns (observation, reward, terminated, truncated, info)."""
         if self._now is None:
             raise RuntimeError("reset must be called before the first step of an episode")
         values = self._values(action)
@@ -195,7 +196,7 @@ class Environment(gymnasium.Env):
         return self._observed(now), reward, terminated, self._taken >= self.actions_per_episode, info
 
     def render(self) -> np.ndarray | None:
-        """(height, width, 3) uint8, of the state as it is; None without a render_mode."""
+        """Draw the current state: returns (height, width, 3) uint8, or None without a render_mode."""
         if self.render_mode is None:
             return None
         if self._now is None:
@@ -208,12 +209,14 @@ class Environment(gymnasium.Env):
         return self._camera.frame(self._now)
 
     def close(self) -> None:
+        """Close the window that frames are drawn in."""
         if self._camera is not None:
             self._camera.close()
             self._camera = None
 
     def _begin(self, where: dict[Any, Any]) -> None:
-        """The state that an episode begins in: the first of a motion of one step, which is not gone on with."""
+        """Compute the state that an episode begins in: the first state of a motion of one step, whose end is not
+        used."""
         for name in where:
             if name not in ("start", "velocities"):
                 raise ValueError(f'an episode begins with "start" and "velocities", got {name!r}')
@@ -223,11 +226,12 @@ class Environment(gymnasium.Env):
         self._now = Snapshot(motion, 0, np.concatenate([value.ravel() for value in self._setting]))
 
     def _moved(self, where: dict[Any, Any], steps: int, before: list[Any], now: list[Any]):
+        """Return the motion during one action, as ms.simulate computes it."""
         values: dict[Any, Any] = {}
         for actuator, old, new in zip(self.actuators, before, now, strict=True):
-            courses = actuator._courses(old, new, steps)
-            for owner, course in zip(actuator.owners, courses, strict=True):
-                values.setdefault(owner, {})[actuator.name] = course
+            each_owners = actuator._all_time_series(old, new, steps)
+            for owner, series in zip(actuator.owners, each_owners, strict=True):
+                values.setdefault(owner, {})[actuator.name] = series
         if self.scene.has_uniform_field and FLUX_DENSITY not in self._options:
             values.setdefault(self.scene, {}).setdefault(FLUX_DENSITY, np.zeros(3))
         return simulate_motion(
@@ -242,7 +246,8 @@ class Environment(gymnasium.Env):
         )
 
     def _values(self, action) -> list[np.ndarray]:
-        """Of each actuator, its value. Raises ValueError on an action of another shape or beyond its bounds."""
+        """Return the values that an action sets, one for each actuator. Raises ValueError on another shape or beyond
+        the bounds."""
         array = real_numbers("action", action).astype(np.float64)
         if array.shape != self.action_space.shape:
             raise ValueError(f"action must have shape {self.action_space.shape}, got {array.shape}")
@@ -258,6 +263,7 @@ class Environment(gymnasium.Env):
         ]
 
     def _observed(self, now: Snapshot) -> np.ndarray:
+        """Return the observation as an array. Raises ValueError if it is not finite or its shape changes."""
         array = np.array(real_numbers("observation", self._observe(now)), dtype=np.float64)
         if not np.isfinite(array).all():
             raise ValueError(
@@ -269,6 +275,7 @@ class Environment(gymnasium.Env):
         return array
 
     def _rewarded(self, now: Snapshot) -> float:
+        """Return the reward as a float. Raises ValueError unless it is one finite number."""
         array = real_numbers("reward", self._reward(now))
         if array.size != 1 or not np.isfinite(array).all():
             raise ValueError(f"reward must be one finite number, got {array!r:.80}")

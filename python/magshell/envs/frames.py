@@ -1,4 +1,4 @@
-"""Frames of an episode: one view and one window, whatever moves."""
+"""Draws the frames of an episode, all with one view and in one window."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from .snapshot import Snapshot
 if TYPE_CHECKING:
     from ..output.plot.view import View
 
-_AROUND = 0.5  # of the rest shape's size: how much room is around it in the window
+_AROUND = 0.5  # [-] margin of the window around the rest shape, in units of its size
 
 
 class Camera:
-    """Paints snapshots. Made with the first; a context of the plotting library is open until `close`."""
+    """A painter of snapshots, made with the first one; it holds a window of the plotting library until `close`."""
 
     def __init__(
         self,
@@ -36,7 +36,7 @@ class Camera:
         style: Style,
         strongest: np.ndarray | None = None,
     ):
-        """strongest: (3,) T, the uniform field that its arrow is scaled by."""
+        """Set up the view and the window. strongest: (3,) T, the uniform field whose arrow has the full length."""
         state = _state(first)
         size = size_of([state])
         room = [
@@ -56,11 +56,12 @@ class Camera:
         self._reel.__enter__()
 
     def frame(self, snapshot: Snapshot) -> np.ndarray:
-        """(height, width, 3) uint8."""
+        """Draw a snapshot: returns (height, width, 3) uint8."""
         state = _state(snapshot)
         return self._reel.image(self._scenery.drawing(state, None, state.title))
 
     def close(self) -> None:
+        """Close the window."""
         self._reel.__exit__(None, None, None)
 
 

@@ -1,4 +1,4 @@
-"""gymnasium, or how to get it."""
+"""Imports gymnasium, or says how to install it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ if TYPE_CHECKING:
 
 
 def require_gymnasium(what: str) -> ModuleType:
-    """The gymnasium module. Raises ImportError that says how to get it."""
+    """Return the gymnasium module. Raises ImportError with the command that installs it; what: the feature that needs
+    it."""
     try:
         import gymnasium
     except ImportError as error:

@@ -1,4 +1,4 @@
-"""Two small robots that come along, registered with gymnasium under magshell/NAME-v0."""
+"""Two small robots as environments, registered with gymnasium under magshell/NAME-v0."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..model.solids.materials import NeoHookean
 from ..model.solids.solid import Solid
 from ..model.supports.supports import Clamp, Pin
 from ..solve.options import ImplicitEuler
-from .actuator import Action
+from .action import Action
 from .environment import Environment
 from .library import require_gymnasium
 
@@ -28,11 +28,13 @@ STRIP_LENGTH, STRIP_TARGET = 0.05, 0.01  # m
 def magnetic_strip(
     target: float = STRIP_TARGET, render_mode: str | None = None, disturbed: bool = True
 ) -> Environment:
-    """A magnetized strip, 5 cm long and clamped at one end; a field of up to 4 mT upwards and 1 mT along and across is
-    to lift its tip to a height, m. An action lasts 20 ms, an episode 1 s. Observed: heights and speeds of the tip and of
-    the middle, over its length. disturbed: whether it starts with a small velocity.
+    """Make the environment of a magnetized strip, 5 cm long and clamped at one end, whose tip a field lifts to a
+    height.
 
-    target: m, the height. render_mode: as in Environment.
+    The field is at most 4 mT upwards and 1 mT along and across. An action lasts 20 ms, an episode 1 s. Observed:
+    heights and speeds of the tip and of the middle, over the strip's length.
+
+    target: m, the height. render_mode: as in Environment. disturbed: whether it starts with a small velocity.
 
     >>> import magshell as ms
     >>> ms.envs.robots.magnetic_strip().action_space.shape
@@ -67,10 +69,13 @@ def magnetic_strip(
 
 
 def soft_arm(target: float = 0.6, render_mode: str | None = None) -> Environment:
-    """A soft bar, 40 cm long and held at one end, with two bones and the hinge between them inside; a torque up to 10 N m is
-    to bend it to an angle, rad. An action lasts 20 ms, an episode 1 s. Observed: angle and rate of the hinge.
+    """Make the environment of a soft bar, 40 cm long and held at one end, that a torque in its hinge bends to an
+    angle.
 
-    target, render_mode: as in magnetic_strip.
+    Inside the bar are two bones with the hinge between them. The torque is at most 10 N m. An action lasts 20 ms,
+    an episode 1 s. Observed: angle and rate of the hinge.
+
+    target: rad, the angle. render_mode: as in Environment.
 
     >>> import magshell as ms
     >>> ms.envs.robots.soft_arm().action_space.shape

@@ -1,4 +1,4 @@
-"""Whole episodes, one after another or at once in the processes of an executor."""
+"""Runs whole episodes, one after another or in parallel in the processes of an executor."""
 
 from __future__ import annotations
 
@@ -17,8 +17,11 @@ from .._runtime.frozen import immutable
 @immutable
 @dataclass(frozen=True)
 class Episode:
-    """observations: (n + 1, ...), the first that of `reset`. actions: (n, k). rewards: (n,). failure: why its motion failed,
-    or None. seed: as it was given."""
+    """The record of one episode.
+
+    observations: (n + 1, ...), the first that of `reset`. actions: (n, k). rewards: (n,). failure: why its motion
+    failed, or None. seed: as it was given.
+    """
 
     observations: np.ndarray = field(repr=False)
     actions: np.ndarray = field(repr=False)
@@ -28,7 +31,7 @@ class Episode:
 
     @property
     def reward(self) -> float:
-        """Of all of it."""
+        """The sum of all rewards of the episode."""
         return float(self.rewards.sum())
 
 
@@ -39,12 +42,12 @@ def episodes(
     seeds: Sequence[int] | None = None,
     executor: Executor | None = None,
 ) -> list[Episode]:
-    """One episode for each policy, in their order.
+    """Run one episode for each policy, and return them in their order.
 
     make: function without arguments that makes an environment: a registered robot, or one of yours at the top of a module,
-        where processes find it. Each process makes one and begins its episodes anew.
-    policies: actions, (n, k), from -1 to 1, of which an episode takes as many as it lasts, or fewer if they end first; or
-        functions of an observation that return an action (k,), which processes must be able to load.
+        where processes can import it. Each process makes one environment and resets it for every episode.
+    policies: for each episode either actions, (n, k), from -1 to 1, which it takes until it or they end; or a function of
+        an observation that returns an action (k,), which processes must be able to import.
     seeds: of `reset`, one each; 0, 1, ... by default.
     executor: any concurrent.futures.Executor, such as a ProcessPoolExecutor or dask.distributed's Client.get_executor();
         it is left open. None: here, one after another. The same seeds and actions give the same bits on all of them.
@@ -82,6 +85,7 @@ def episodes(
 
 
 def _actions(index: int, policy) -> np.ndarray:
+    """Return a policy's actions as an array, (n, k). Raises ValueError on another shape."""
     array = real_numbers(f"policies[{index}]", policy)
     if array.ndim != 2:
         raise ValueError(f"policies[{index}] must be a function or actions (n, k), got shape {array.shape}")
@@ -92,6 +96,7 @@ _made: dict[Any, Any] = {}  # in each process: the environment of the last funct
 
 
 def _episode(make: Callable[..., Any], policy, seed: int) -> Episode:
+    """Run one episode in this process."""
     if make not in _made:
         _made.clear()
         _made[make] = make()

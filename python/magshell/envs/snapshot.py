@@ -1,4 +1,4 @@
-"""What an environment's observation and reward are functions of: one state of a motion."""
+"""State of a motion that an environment's observation and reward are computed from."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ from ..solve.dynamics.trajectory import Trajectory
 class Snapshot:
     """One state of a motion.
 
-    motion, index: where it is recorded. action: (k,) the values that the actuators have, in their own units, one after
-        another. before: the snapshot an action earlier, None at the start of an episode (and of that one itself).
+    motion, index: the motion, and the number of this state in it. action: (k,), the values of the actuators in their own
+        units, one after another. before: the snapshot one action earlier; None at the start of an episode, and in a
+        snapshot that is itself the `before` of another.
 
-    `snapshot[item]` has what the result says of one body, link or joint in this state, `snapshot[hinge].angle` (without
-    full turns, in -pi to pi). With several bodies, rows are those of one after another.
+    `snapshot[item]` is the result of one body, link or joint in this state, such as `snapshot[hinge].angle` (without full
+    turns, in -pi to pi). With several bodies, rows are those of one after another.
     """
 
     motion: Trajectory = field(repr=False)
@@ -35,62 +36,63 @@ class Snapshot:
 
     @property
     def scene(self) -> Scene:
-        """Of the environment."""
+        """The scene of the environment."""
         return self.motion.scene
 
     @property
     def time(self) -> float:
-        """s, since the start of the episode."""
+        """The time since the start of the episode, s."""
         return float(self.motion.times[self.index])
 
     @property
     def positions(self) -> np.ndarray:
-        """(n_v, 3) m."""
+        """The positions of the vertices, (n_v, 3) m."""
         return self.motion.positions[self.index]
 
     @property
     def velocities(self) -> np.ndarray:
-        """(n_v, 3) m/s."""
+        """The velocities of the vertices, (n_v, 3) m/s."""
         return self.motion.velocities[self.index]
 
     @property
     def displacements(self) -> np.ndarray:
-        """(n_v, 3) m, from the rest shape."""
+        """The displacements of the vertices from the rest shape, (n_v, 3) m."""
         return self.motion.displacements[self.index]
 
     @property
     def edge_rotations(self) -> np.ndarray:
-        """(n_e,) rad."""
+        """The rotations of the edges, (n_e,) rad."""
         return self.motion.edge_rotations[self.index]
 
     @property
     def energy(self) -> float:
-        """Kinetic and potential, J."""
+        """The kinetic and potential energy, J."""
         return float(self.motion.energy[self.index])
 
     @property
     def remanent_magnetization(self) -> Any:
-        """A/m, as the scene has it."""
+        """The remanent magnetization of the scene, A/m."""
         return self.motion.remanent_magnetization
 
     @property
     def applied_flux_density(self) -> np.ndarray:
-        """(3,) T, the uniform part."""
+        """The uniform part of the applied field, (3,) T."""
         return self.motion.applied_flux_density[self.index]
 
     def strains(self) -> Any:
-        """The principal strains of every face of the sheets, Strains; where a solid is alone, what snapshot[solid] says."""
+        """Return the principal strains of every face of the sheets, as Strains; for a single solid, those of
+        snapshot[solid]."""
         return self.motion.strains(self.index)
 
     def stresses(self) -> Any:
-        """Returns the stresses of the scene's one body, as snapshot[body].stresses()."""
+        """Return the stresses of the scene's one body, as snapshot[body].stresses()."""
         return self.motion.stresses(self.index)
 
     def __getitem__(self, item: Any) -> Any:
-        """What it says of one body, link or joint."""
+        """Return the result of one body, link or joint in this state."""
         return result_of(self, item)
 
-    # What results of single bodies and pictures look at.
+    # Attributes that results of single bodies and pictures need.
 
     @property
     def _own_points(self):

@@ -1,4 +1,4 @@
-"""A value that a function of a few numbers of the action sets."""
+"""Component of an action that sets a value through a function of a few numbers."""
 
 from __future__ import annotations
 
@@ -9,25 +9,26 @@ import numpy as np
 
 from .._input.arrays import count
 from .._input.quantity import quantity
-from .actuator import Action
+from .action import Action
 
 if TYPE_CHECKING:
     from ..model.scene.scene import Scene
 
 
 class ParametricAction(Action):
-    """An Actuator whose numbers in the action are not the value's own, but what a function makes it of: waves along a
-    muscle, the speed of a support instead of its place.
+    """An Action whose numbers are arguments of a function that computes the value.
 
-    owner, name: as of Action; or a list of several owners whose values have one shape, set at once: their value is then
-        (owners, ...), one after another. numbers: how many entries of the action, each from -1 to 1.
-    value: function of these (numbers,), of the time [s] that the action begins, and of the value before it, that returns
-        the value, of its own shape.
+    Examples: waves along a muscle, or the speed of a support instead of its position.
+
+    owner, name: as of Action; or a list of several owners whose values have one shape and are set together: the value is
+        then (owners, ...), one row for each. numbers: number of entries of the action, each from -1 to 1.
+    value: function of these (numbers,), of the time [s] at which the action begins, and of the value before it, that
+        returns the value.
 
     >>> import magshell as ms
     >>> bob = ms.Link(mass=1.0, center=(0, 0, -1.0), inertia=0.1)
     >>> hinge = ms.Revolute(bob, origin=(0, 0, 0), axis=(0, 1, 0), torque=0.0)
-    >>> ms.envs.ParametricAction(hinge, "torque", 1, lambda share, time, before: before + 0.1 * share[0])
+    >>> ms.envs.ParametricAction(hinge, "torque", 1, lambda numbers, time, before: before + 0.1 * numbers[0])
     ParametricAction(torque of Revolute, by 1 number)
     """
 
@@ -53,17 +54,17 @@ class ParametricAction(Action):
 
     @property
     def size(self) -> int:
-        """How many numbers of an action it takes."""
+        """The number of entries of the action that the function takes."""
         return self._numbers
 
     @property
     def owners(self) -> tuple[Any, ...]:
-        """Of what the value is set, one by one."""
+        """The objects whose value is set, one by one."""
         return (self.owner, *(each.owner for each in self._further))
 
     @property
     def _at_start(self) -> np.ndarray:
-        """Its value in the scene, before any action; with several owners one row each."""
+        """The value in the scene before any action; with several owners one row each."""
         first = super()._at_start
         return np.stack([first, *(each._at_start for each in self._further)]) if self._several else first
 
@@ -76,10 +77,10 @@ class ParametricAction(Action):
         shape = (len(self.owners), *self.shape) if self._several else self.shape
         return quantity(f"what steers {self.name}", "", self._function(action, time, before), shape)
 
-    def _courses(self, before: np.ndarray, now: np.ndarray, steps: int) -> list[np.ndarray]:
+    def _all_time_series(self, before: np.ndarray, now: np.ndarray, steps: int) -> list[np.ndarray]:
         if not self._several:
-            return super()._courses(before, now, steps)
-        return [self._course(old, new, steps) for old, new in zip(before, now, strict=True)]
+            return super()._all_time_series(before, now, steps)
+        return [self._time_series(old, new, steps) for old, new in zip(before, now, strict=True)]
 
     def __repr__(self) -> str:
         numbers = "1 number" if self.size == 1 else f"{self.size} numbers"

@@ -1,4 +1,4 @@
-"""What an action of an environment sets: a value of one of the scene's objects, between bounds."""
+"""Component of an environment's action: a value of one of the scene's objects, between bounds."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 
 class Action(Frozen):
-    """A value that actions set. All its numbers are entries of the action, which run from -1 at `lower` to 1 at `upper`.
+    """A value that actions set. Its numbers are entries of the action, which run from -1 at `lower` to 1 at `upper`.
 
-    owner: the scene, for applied_flux_density [T] and the factors of ms.simulate; or one of its objects, for what may
-        change during a motion there: the torque of a joint, the displacement of a clamp, the moments of Dipoles, ...
+    owner: the scene, for applied_flux_density [T] and the factors of ms.simulate; or one of its objects, for values that
+        may change during a motion: the torque of a joint, the displacement of a clamp, the moments of Dipoles, ...
     lower, upper: bounds in the value's own unit, numbers or of its shape.
 
-    Fields and what acts in joints stay at the action's value while it lasts; what moves (supports, obstacles, sources)
-    goes there in a straight line from where the action before had it, at first from where the scene has it.
+    Fields and joint torques are constant while an action lasts. Values that move something (supports, obstacles, sources)
+    change linearly from the value of the action before, at first from the value in the scene.
 
     name: of the value.
 
@@ -66,54 +66,59 @@ class Action(Frozen):
             raise ValueError(f"lower of an Action must be below upper, got {lower} and {upper}")
 
     def _refuse(self, which: str, value):
+        """Raise ValueError: a bound has the wrong shape."""
         raise ValueError(
             f"{which} of {self.name} must be a number or have shape {self.shape}, got {np.shape(value)}"
         )
 
     @property
     def owners(self) -> tuple[Any, ...]:
-        """Of what the value is set."""
+        """The objects whose value is set."""
         return (self.owner,)
 
     @property
     def size(self) -> int:
-        """How many entries of the action it takes."""
+        """The number of entries of the action that the value takes."""
         return int(np.prod(self.shape))
 
     @property
     def _at_start(self) -> np.ndarray:
-        """Its value in the scene, before any action: of a field, none; of factors, one."""
+        """The value in the scene before any action: zero for a field, one for a factor."""
         if self._of_scene:
             return np.zeros(3) if self.name == FLUX_DENSITY else np.array(1.0)
         return np.array(self._of_owner, dtype=np.float64).reshape(self.shape)
 
     @property
     def _of_owner(self):
-        """As its owner has it, or None."""
+        """The value that its owner has, or None."""
         return getattr(getattr(self.owner, "_move", self.owner), self.name, None)
 
     def _check_in(self, scene: Scene) -> None:
-        """Raises ValueError unless its owner is the scene or among its objects."""
+        """Raise ValueError unless the owner is the scene or one of its objects."""
         if not any(self.owner is each for each in (scene, *scene.objects)):
             raise ValueError(f"{self!r} is about something that is neither the scene nor one of its objects")
         if self._of_scene and self.name not in controls_of(self.owner, scene):
             raise ValueError(f"the scene has no {self.name}")
 
     def value(self, action: np.ndarray, time: float, before: np.ndarray) -> np.ndarray:
-        """Of its own entries of an action, (size,) in -1 to 1, that begins at a time [s] with the value before."""
-        share = 0.5 * (action.reshape(self.shape) + 1.0)
-        return self.lower + share * (self.upper - self.lower)
+        """Return the value for its entries of an action, (size,) in -1 to 1, which begins at a time [s] with the
+        value `before`."""
+        fraction = 0.5 * (action.reshape(self.shape) + 1.0)
+        return self.lower + fraction * (self.upper - self.lower)
 
-    def _courses(self, before: np.ndarray, now: np.ndarray, steps: int) -> list[np.ndarray]:
-        """Of each owner, as ms.simulate takes it: (steps, ...) where it changes at once, else (steps + 1, ...) on a
-        straight line."""
-        return [self._course(before, now, steps)]
+    def _all_time_series(self, before: np.ndarray, now: np.ndarray, steps: int) -> list[np.ndarray]:
+        """Return the values of each owner during an action, as ms.simulate takes them.
 
-    def _course(self, before: np.ndarray, now: np.ndarray, steps: int) -> np.ndarray:
+        A value that may jump is constant, (steps, ...); another one is linear in time, (steps + 1, ...).
+        """
+        return [self._time_series(before, now, steps)]
+
+    def _time_series(self, before: np.ndarray, now: np.ndarray, steps: int) -> np.ndarray:
+        """Return the values of one owner during an action, constant or linear in time."""
         if self._of_scene or may_jump(self.owner):
             return np.broadcast_to(now, (steps, *self.shape))
-        shares = np.linspace(0.0, 1.0, steps + 1).reshape(-1, *(1 for _ in self.shape))
-        return (1.0 - shares) * before + shares * now
+        fractions = np.linspace(0.0, 1.0, steps + 1).reshape(-1, *(1 for _ in self.shape))
+        return (1.0 - fractions) * before + fractions * now
 
     def __repr__(self) -> str:
         numbers = "1 number" if self.size == 1 else f"{self.size} numbers"
