@@ -1,5 +1,6 @@
-"""A warning where nodes of ten-node tetrahedra do not get onto the curved surface they are to lie on."""
+"""Warnings where nodes of ten-node tetrahedra and of six-node triangles are off the curved surface they are to lie on."""
 
+import pickle
 import warnings
 
 import numpy as np
@@ -68,3 +69,82 @@ def test_shapes_that_are_meshed_by_their_distance_get_no_warning(spacing):
         ms.meshes.from_distance(
             ms.shapes.difference(ms.shapes.ball(1.0), ms.shapes.ball(0.7)), spacing=spacing, order=2
         )
+
+
+CURVED = {
+    "cylinder": (lambda n, **o: ms.meshes.cylinder(1.0, 1.0, cells=(n, n // 4), **o), np.pi * 2),
+    "sphere": (lambda n, **o: ms.meshes.spherical_cap(1.0, 0.0, np.pi, cells=(n, n // 2), **o), 4 * np.pi),
+}
+
+
+@pytest.mark.parametrize("make, area", CURVED.values(), ids=CURVED)
+def test_six_node_triangles_with_straight_edges_on_a_curved_surface_are_warned_of(make, area):
+    flat = make(16)
+    with pytest.warns(
+        ms.MeshQualityWarning, match=rf"^(\d+) of {flat.n_edges} nodes between corners lie on straight"
+    ) as told:
+        straight = ms.QuadraticTriangleMesh.from_triangles(flat)
+    assert told[0].filename == __file__ and len(told) == 1
+    # The farthest node off the unit sphere or cylinder is told within a tenth.
+    axes = [0, 2] if make(16).boundary_edges.size else [0, 1, 2]
+    off = 1.0 - np.linalg.norm(straight.edge_midpoints[:, axes], axis=1)
+    named = float(str(told[0].message).split(" m, ")[0].split()[-1])
+    assert named == pytest.approx(off.max(), rel=0.1)
+    assert straight.element_areas.sum() < area * (1 - 5e-3)
+
+
+@pytest.mark.parametrize("make, area", CURVED.values(), ids=CURVED)
+def test_six_node_triangles_on_the_surface_get_no_warning(make, area):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        curved = make(16, order=2)
+        curved.refined().flipped().scaled(2.0)
+        ms.QuadraticTriangleMesh(curved.rest_positions, curved.elements)
+        ms.QuadraticTriangleMesh.fitted(make(16), to=make(32))
+        ms.QuadraticTriangleMesh.from_triangles(make(128))  # short enough
+    assert curved.element_areas.sum() == pytest.approx(area, rel=1e-3)
+
+
+def test_elements_from_arrays_are_warned_of_and_copies_of_them_are_not():
+    with pytest.warns(ms.MeshQualityWarning):
+        straight = ms.QuadraticTriangleMesh.from_triangles(CURVED["cylinder"][0](16))
+    with pytest.warns(ms.MeshQualityWarning, match="lie on straight edges"):
+        ms.QuadraticTriangleMesh(straight.rest_positions, straight.elements)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        again = (
+            pickle.loads(pickle.dumps(straight))
+            .scaled(2.0)
+            .flipped()
+            .transformed(translation=(1.0, 0.0, 0.0))
+        )
+    assert again.element_areas.sum() == pytest.approx(4.0 * straight.element_areas.sum())
+
+
+def folded(angle: float, zigzag: bool) -> ms.TriangleMesh:
+    """A strip with folds by an angle [rad] every 1 m, four edges apart, all to one side or to both in turn."""
+    mesh = ms.meshes.rectangle(4.0, 1.0, cells=(16, 4))
+    s, turns = mesh.rest_positions[:, 0], np.arange(4)
+    slopes = angle * (turns % 2 if zigzag else turns)
+    corners = np.concatenate([[0.0 + 0.0j], np.cumsum(np.exp(1j * slopes))])
+    at = np.interp(s, np.arange(5), corners.real) + 1j * np.interp(s, np.arange(5), corners.imag)
+    return ms.TriangleMesh(np.stack([at.real, mesh.rest_positions[:, 1], at.imag], axis=1), mesh.faces)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: ms.meshes.rectangle(1.0, 1.0, cells=(4, 4), irregular=0.2),
+        lambda: ms.meshes.disk(1.0, 4),
+        lambda: folded(np.radians(30.0), zigzag=False),
+        lambda: folded(np.radians(35.0), zigzag=True),
+        lambda: ms.meshes.box((1.0, 1.0, 1.0), cells=(4, 4, 4)).surface,
+        lambda: ms.meshes.box((1.0, 1.0, 1.0), cells=(1, 1, 1)).surface,
+        lambda: ms.meshes.cylinder(1.0, 1.0, cells=(6, 4)),  # a hexagonal tube
+    ],
+)
+def test_folded_and_flat_meshes_get_no_warning(make):
+    mesh = make()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ms.QuadraticTriangleMesh.from_triangles(mesh)

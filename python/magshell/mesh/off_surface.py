@@ -1,4 +1,4 @@
-"""A warning about midside nodes that could not be moved onto the curved surface that they belong to."""
+"""Warnings about midside nodes that could not be moved onto the curved surface that they belong to, or were not."""
 
 from __future__ import annotations
 
@@ -13,10 +13,15 @@ from .signed_distance import Distance, checked_distance
 
 if TYPE_CHECKING:
     from .mesh_base import MeshBase
+    from .triangles.triangle_mesh import TriangleMesh
 
+# [rad] Turn between neighbouring faces above which their edge is a crease; see test_folded_and_flat_meshes_get_no_warning.
+CREASE = np.radians(40.0)
 # [-] Distance of a node over the length of its edge; straight edges of 1/12 rad of a sphere are this far off it. Fixed by
 # test_nodes_that_stay_off_a_thin_sphere_are_warned_of_with_their_count_and_distance.
 _OFF = 1e-2
+# [-] Distance of a node from the middle of its edge, over the bulge of the surface there, below which the edge is straight.
+_STRAIGHT = 0.1
 # [-] Fraction of the nodes that may stay off without a warning: nodes along ridges of the surface, where the distance has no
 # gradient to follow.
 _FEW = 0.02
@@ -41,3 +46,45 @@ def warn_of_nodes_off(mesh: MeshBase, edges: np.ndarray, middles: np.ndarray, su
         MeshQualityWarning,
         stacklevel=callers_level(),
     )
+
+
+def warn_of_straight_edges(mesh: TriangleMesh, middles: np.ndarray) -> None:
+    """Warn where more than a few of the middles (n_e, 3) m lie on straight edges of a mesh of a smoothly curved surface.
+
+    A smooth surface turns by about the same angle at both ends of an edge, and bulges by length * angle / 8 in its middle,
+    with the angle between the normals of the ends. A fold turns on one line alone, a zigzag to the other side at the next.
+    """
+    bulges = _bulges(mesh)
+    off = bulges > _OFF * mesh.edge_lengths
+    off &= np.linalg.norm(middles - mesh.edge_midpoints, axis=1) < _STRAIGHT * bulges
+    if off.sum() <= _FEW * mesh.n_edges:
+        return
+    shares = np.where(off, bulges / mesh.edge_lengths, 0.0)
+    worst = int(np.argmax(shares))
+    warnings.warn(
+        f"{off.sum()} of {mesh.n_edges} nodes between corners lie on straight edges of a mesh that is curved as a smooth "
+        f"surface is: they stay off it by up to about {bulges[worst]:.3g} m, {shares[worst]:.2g} of an edge, and six-node "
+        "elements are no better than flat ones there. Give project= the surface (QuadraticTriangleMesh.from_triangles), fit the nodes "
+        "to a finer mesh (QuadraticTriangleMesh.fitted), or make the mesh by ms.meshes with order=2",
+        MeshQualityWarning,
+        stacklevel=callers_level(),
+    )
+
+
+def _bulges(mesh: TriangleMesh) -> np.ndarray:
+    """Return how far a smooth surface through the vertices is from the middle of each edge, (n_e,) m; 0 at folds."""
+    edges, sides = mesh.edges, mesh.edge_faces
+    ends = mesh.rest_positions[edges[:, 1]] - mesh.rest_positions[edges[:, 0]]
+    normals = mesh.face_normals
+    beside = np.where(sides[:, :1] < 0, normals[sides[:, 1]], normals[sides[:, 0]])
+    beside = beside + np.where(sides[:, 1:] < 0, beside, normals[sides[:, 1]])
+    beside /= np.linalg.norm(beside, axis=1, keepdims=True)
+    at_ends = mesh.vertex_normals[edges]
+    before = np.einsum("ei,ei->e", beside - at_ends[:, 0], ends)
+    after = np.einsum("ei,ei->e", at_ends[:, 1] - beside, ends)
+    bulges = np.where(before * after > 0.0, 0.25 * np.minimum(np.abs(before), np.abs(after)), 0.0)
+    inside = mesh.interior_edges
+    cosines = np.einsum("ei,ei->e", normals[sides[inside, 0]], normals[sides[inside, 1]])
+    creased = np.zeros(mesh.n_vertices, dtype=bool)
+    creased[edges[inside[cosines < np.cos(CREASE)]]] = True
+    return np.where(creased[edges].any(axis=1), 0.0, bulges)

@@ -12,6 +12,7 @@ from ..._input.arrays import index_array
 from ..._input.quantity import quantity
 from ..._input.scalars import positive
 from ..mesh_base import MeshBase, frozen
+from ..off_surface import warn_of_straight_edges
 from ..selection import _where
 from ..topology import FLAT
 from ..transforms import moved
@@ -64,17 +65,15 @@ class QuadraticTriangleMesh(MeshBase):
     order = 2
 
     def __init__(self, rest_positions: Numbers, elements: Numbers):
-        positions = quantity("rest_positions", "m", rest_positions, ("n_v", 3))
-        nodes = index_array("elements", elements)
-        check_elements(nodes, len(positions))
-        self._corner_vertices = np.unique(nodes[:, :3])
-        self._corners = TriangleMesh(
-            positions[self._corner_vertices], np.searchsorted(self._corner_vertices, nodes[:, :3])
-        )
-        check_middle_nodes(nodes, self._corners.face_edges)
-        check_jacobians(positions[nodes])
-        self._rest_positions = frozen(positions)
-        self._elements = frozen(nodes.astype(np.int32))
+        vars(self).update(_parts(rest_positions, elements))
+        warn_of_straight_edges(self._corners, self.edge_midpoints)
+
+    @classmethod
+    def _again(cls, rest_positions: Numbers, elements: Numbers) -> QuadraticTriangleMesh:
+        """Make a mesh from another one or its copy, whose straight edges have been warned of."""
+        mesh = object.__new__(cls)
+        vars(mesh).update(_parts(rest_positions, elements))
+        return mesh
 
     @classmethod
     def from_triangles(
@@ -84,6 +83,7 @@ class QuadraticTriangleMesh(MeshBase):
 
         project: a function that moves the midpoints of all edges, (n_e, 3) m, onto the surface; its values are the midside
             nodes. Without it edges stay straight, and on a curved surface most of the accuracy of six nodes is lost.
+            (MeshQualityWarning, if the mesh turns from face to face as a smooth surface does).
 
         >>> import magshell as ms
         >>> coarse = ms.meshes.cylinder(1.0, 1.0, angle=1.0, cells=(4, 4))
@@ -130,7 +130,7 @@ class QuadraticTriangleMesh(MeshBase):
 
     # Copies and worker processes compute the connectivity again, which is cheap.
     def __reduce__(self) -> tuple[Any, ...]:
-        return QuadraticTriangleMesh, (self.rest_positions, self.elements)
+        return QuadraticTriangleMesh._again, (self.rest_positions, self.elements)
 
     def __repr__(self) -> str:
         extent = " x ".join(f"{length:.4g}" for length in np.ptp(self.rest_positions, axis=0))
@@ -317,21 +317,38 @@ class QuadraticTriangleMesh(MeshBase):
         new, elements = divided(self)
         if project is not None:
             new = _projected("project(nodes)", "m", project, new)
-        return QuadraticTriangleMesh(np.concatenate([self.rest_positions, new]), elements)
+        return self._again(np.concatenate([self.rest_positions, new]), elements)
 
     def flipped(self) -> QuadraticTriangleMesh:
         """Return the same surface with reversed normals; elements and vertices keep their numbers."""
-        return QuadraticTriangleMesh(self.rest_positions, self.elements[:, _MIRRORED])
+        return self._again(self.rest_positions, self.elements[:, _MIRRORED])
 
     def transformed(
         self, rotation: Rotates | None = None, translation: Numbers | None = None
     ) -> QuadraticTriangleMesh:
         """Return the mesh transformed by x -> rotation x + translation; see `TriangleMesh.transformed`."""
-        return QuadraticTriangleMesh(moved(self.rest_positions, rotation, translation), self.elements)
+        return self._again(moved(self.rest_positions, rotation, translation), self.elements)
 
     def scaled(self, factor: float) -> QuadraticTriangleMesh:
         """Return the mesh with all coordinates multiplied by a positive factor."""
-        return QuadraticTriangleMesh(self.rest_positions * positive("factor", "", factor), self.elements)
+        return self._again(self.rest_positions * positive("factor", "", factor), self.elements)
+
+
+def _parts(rest_positions: Numbers, elements: Numbers) -> dict[str, Any]:
+    """Return the attributes of a mesh, checked. Raises ValueError as the class says."""
+    positions = quantity("rest_positions", "m", rest_positions, ("n_v", 3))
+    nodes = index_array("elements", elements)
+    check_elements(nodes, len(positions))
+    numbers = np.unique(nodes[:, :3])
+    corners = TriangleMesh(positions[numbers], np.searchsorted(numbers, nodes[:, :3]))
+    check_middle_nodes(nodes, corners.face_edges)
+    check_jacobians(positions[nodes])
+    return {
+        "_corner_vertices": frozen(numbers),
+        "_corners": corners,
+        "_rest_positions": frozen(positions),
+        "_elements": frozen(nodes.astype(np.int32)),
+    }
 
 
 def _projected(

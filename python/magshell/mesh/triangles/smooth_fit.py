@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
+from ..off_surface import CREASE
 from .triangle_mesh import TriangleMesh
 
 # [rad] A larger angle between the normals of adjacent faces is a crease; between boundary edges, a corner.
-_SMOOTH = np.radians(40.0)
+_SMOOTH = CREASE
 _NEAR = (
     0.25  # [-] largest distance between the middle of an edge and the surface, relative to the edge's length
 )
