@@ -39,7 +39,7 @@ class MeshQualityWarning(UserWarning):
     """A warning about a mesh whose results cannot be trusted.
 
     Either faces are nearly degenerate (see TriangleMesh.quality), or a solid has too few tetrahedra for the mean-volume
-    formulation.
+    formulation, or midside nodes are off a curved surface.
     """
 
 
@@ -47,7 +47,7 @@ class UnitWarning(UserWarning):
     """A warning about a value whose unit is probably wrong, such as mm, kPa or mT given for m, Pa or T.
 
     It is raised once per scene and kind of value, where a thickness, modulus, density, magnetization or field is orders of
-    magnitude away from that of any real body. For models without units, switch it off by
+    magnitude away from that of any real body (the first three on every face). For models without units, switch it off by
     `warnings.filterwarnings("ignore", category=ms.UnitWarning)`.
     """
 

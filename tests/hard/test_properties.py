@@ -214,6 +214,7 @@ def test_numbering_does_not_matter_to_a_motion(seed):
     assert_close(there.positions, here.positions[:, vertices], 1e-9)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")  # densities and moduli of any unit
 @some
 @given(
     seed=SEEDS,

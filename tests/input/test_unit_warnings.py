@@ -130,3 +130,28 @@ def test_usual_sizes_and_materials_are_not_warned_of(size, values):
 def test_numbers_of_every_kind_of_a_zero_field_pass():
     there = scene(remanent_magnetization=np.zeros(3))
     assert not warned(lambda: ms.equilibrium(there, applied_flux_density=(0, 0, 12.0)))
+
+
+def varied(usual: float, some: float) -> np.ndarray:
+    rows = np.full(MESH.n_faces, usual)
+    rows[:2] = some
+    return rows
+
+
+@pytest.mark.parametrize(
+    "name, usual, some",
+    [
+        ("young_modulus", 1e5, 2.5e13),
+        ("young_modulus", 1e5, 1e-3),
+        ("mass_density", 1e3, 1e-9),
+        ("thickness", 1e-3, 1e-12),
+    ],
+)
+def test_some_faces_beyond_the_limits_are_not_warned_of_and_all_of_them_are(name, usual, some):
+    """A modulus fitted face by face goes that far on its way; a unit would be mistaken in every face."""
+    assert not warned(lambda: scene(**{name: varied(usual, some)}))
+    assert len(warned(lambda: scene(**{name: varied(1.5 * some, some)}))) == 1
+    if name != "mass_density":  # which has no part in a solve without gravity
+        there = scene(remanent_magnetization=np.zeros(3))
+        solve = {"applied_flux_density": np.zeros(3), name: varied(usual, some)}
+        assert not warned(lambda: ms.equilibrium(there, **solve))

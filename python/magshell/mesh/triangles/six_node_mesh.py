@@ -82,7 +82,7 @@ class QuadraticTriangleMesh(MeshBase):
         """Build a six-node mesh from a three-node one: vertices keep their numbers, edge k gets node n_v + k.
 
         project: a function that moves the midpoints of all edges, (n_e, 3) m, onto the surface; its values are the midside
-            nodes. Without it edges stay straight, and on a curved surface most of the accuracy of six nodes is lost.
+            nodes. Without it edges stay straight, and on a curved surface most of the accuracy of six nodes is lost
             (MeshQualityWarning, if the mesh turns from face to face as a smooth surface does).
 
         >>> import magshell as ms

@@ -1,5 +1,8 @@
 """Warns of sizes and material values that no soft body has, most often a mistaken unit; once per scene and kind of
 value.
+
+A mistaken unit is in every entry. If some faces are within the limits and others beyond, as a fit of a modulus face by face
+tries on its way, or a design that thins faces out to nothing, no unit is mistaken, and no warning is issued.
 """
 
 from __future__ import annotations
@@ -53,15 +56,15 @@ def warn_of_field(scene: Scene, flux_density: np.ndarray) -> None:
 def _warn_of_thickness(scene: Scene, shell: Shell, whose: str) -> None:
     thickest, thinnest = float(shell.thickness.max()), float(shell.thickness.min())
     extent, edge = shell.mesh.size, float(np.median(shell.mesh.edge_lengths))
-    if thickest > MOST_OF_EXTENT * extent or thinnest < LEAST_OF_EXTENT * extent:
-        worst = thickest if thickest > MOST_OF_EXTENT * extent else thinnest
+    if thinnest > MOST_OF_EXTENT * extent or thickest < LEAST_OF_EXTENT * extent:
+        worst = thickest if thinnest > MOST_OF_EXTENT * extent else thinnest
         _warn(
             scene,
             "thickness",
             f"thickness [m]{whose} is {worst:g}, {worst / extent:.3g} times the extent of the sheet, {extent:.3g} m",
             "mm?",
         )
-    elif thickest > MOST_OF_EDGE * edge:
+    elif thinnest > MOST_OF_EDGE * edge:
         _warn(
             scene,
             "thickness",
@@ -81,8 +84,8 @@ def _warn_of_range(
     if rows is None:
         return
     low, high = float(np.min(rows)), float(np.max(rows))
-    if low < limits[0] or high > limits[1]:
-        worst = low if low < limits[0] else high
+    if high < limits[0] or low > limits[1]:
+        worst = low if high < limits[0] else high
         text = f"{name} [{unit}]{whose} is {worst:g}, outside of {limits[0]:g} to {limits[1]:g}, far beyond all matter"
         _warn(scene, name, text, hint)
 
