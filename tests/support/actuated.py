@@ -81,8 +81,8 @@ def _of_cells(cells, x, factor):
 
 
 def _of_tendon(scene, tendon, x):
-    riding = tendon._riding(scene._bodies, scene._rigid)
-    points = torch.stack([(torch.from_numpy(w)[:, None] * x[v]).sum(0) for v, w in riding])
+    embedded = tendon._embedded(scene._bodies, scene._rigid)
+    points = torch.stack([(torch.from_numpy(w)[:, None] * x[v]).sum(0) for v, w in embedded])
     lengths = (points[1:] - points[:-1]).norm(dim=1)
     rest = np.linalg.norm(np.diff(tendon.points, axis=0), axis=1)
     shares = np.array([1.0]) if tendon.sliding else rest / rest.sum()

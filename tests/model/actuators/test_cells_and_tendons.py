@@ -192,8 +192,8 @@ def test_tendon_points_are_embedded_in_curved_elements():
     assert off_faces > 1e-3
     tendon = ms.Tendon(points, sheet, tension=1.0)
     scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(y=0.0))], actuators=[tendon])
-    assert tendon._riding(scene._bodies, ()) is not None
-    for (vertices, weights), k in zip(tendon._riding(scene._bodies, ()), (0, 7, 20), strict=True):
+    assert tendon._embedded(scene._bodies, ()) is not None
+    for (vertices, weights), k in zip(tendon._embedded(scene._bodies, ()), (0, 7, 20), strict=True):
         assert dict(zip(vertices, weights, strict=True)) == pytest.approx(
             dict(zip(mesh.elements[k], shares, strict=True)), abs=1e-9
         )

@@ -1,4 +1,4 @@
-"""What a scene's `actuators` have in common."""
+"""The base class of actuators."""
 
 from __future__ import annotations
 
@@ -14,11 +14,13 @@ if TYPE_CHECKING:
 
 
 class Actuator(Owner):
-    """Works in bodies by numbers that a controller sets: activations, pressures, volumes, tensions. They may change during
-    a motion, at once or gradually.
+    """The base class of actuators: they act in bodies by values that a controller sets, such as activations, pressures,
+    volumes
+    or tensions. The values may change during a motion, continuously or by jumps.
 
-    bodies: those that it works in. is_spring: whether it has a stiffness of its own, which that of the bodies at rest leaves
-    out.
+    bodies: those that it acts in. is_spring: whether it has a stiffness of its own, which the stiffness of the bodies
+    at rest
+    leaves out.
     """
 
     _for_all = False
@@ -31,20 +33,21 @@ class Actuator(Owner):
 
     @property
     def body(self) -> Any:
-        """The one body, or None where there are several."""
+        """The body, if there is only one, else None."""
         return self.bodies[0] if len(self.bodies) == 1 else None
 
     def _filling(self, scene: Scene) -> float:
-        """How much of a volume at rest a load factor of 1 adds to it, or takes away."""
+        """Return the fraction of a rest volume that a load factor of 1 adds or removes."""
         return 0.0
 
     def _check_in_time(self, name: str, rows: np.ndarray) -> None:
-        """Raises ValueError where it cannot have one of the numbers (n, ...) over time."""
+        """Raise ValueError if values over time, (n, ...), contain one that the actuator cannot have."""
         least, most = rows.min(axis=0), rows.max(axis=0)
         for extreme in (least,) if np.array_equal(least, most) else (least, most):
             self.replaced(**{name: extreme})
 
-    def _keep_shapes(self, changed: Actuator) -> Actuator:
+    def _check_shapes(self, changed: Actuator) -> Actuator:
+        """Return a replaced actuator. Raises ValueError if one of its values has another shape."""
         for name in self._replaceable:
             before, after = getattr(self, name), getattr(changed, name)
             if before.shape != after.shape:
@@ -53,14 +56,17 @@ class Actuator(Owner):
 
 
 def number(name: str, unit: str, value: Any, least: float | None = None, above: bool = False) -> np.ndarray:
-    """A finite number as an array (), at least `least`, or above it. Raises ValueError."""
+    """Return a finite number as an array (), at least `least`, or above it. Raises ValueError."""
     array = quantity(name, unit, value, ())
     _check_range(name, unit, array, least, above)
     return array
 
 
 def numbers(name: str, unit: str, value: Any, count: int, what: str, least: float, above: bool) -> np.ndarray:
-    """Finite numbers, one a cell (count,), given so or as one of all. Raises ValueError."""
+    """Return finite numbers (count,), from such an array or one number for all. Raises ValueError.
+
+    what: the word for one of the count in messages.
+    """
     array = real_numbers(f"{name} [{unit}]", value)
     if array.shape not in ((), (count,)):
         raise ValueError(f"{name} [{unit}] must be a number or one a {what}, ({count},), got {array.shape}")

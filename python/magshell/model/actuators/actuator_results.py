@@ -1,4 +1,6 @@
-"""What a result says of one actuator of its scene: of tensors in their graph, tensors."""
+"""The actuators of a result: volumes, pressures, lengths and tensions; tensors in their graph if the result has
+tensors.
+"""
 
 from __future__ import annotations
 
@@ -28,14 +30,16 @@ class ActuatorResult(Frozen):
         self._result, self.actuator = result, actuator
 
     def _by_law(self, law, states):
-        """law(the actuator as it was, what it is about, the load factor that it was under), of all states."""
+        """Return law(actuator, value, load factor) for the values of all states, with the actuator as it was in each
+        state.
+        """
         factors = self._result._load_factors
         if np.ndim(factors) == 0:
             return law(self._at(0), states, float(factors))
         return stacked([law(self._at(k), states[k], float(factor)) for k, factor in enumerate(factors)])
 
     def _at(self, k: int):
-        """The actuator as it was in a state."""
+        """Return the actuator as it was in a state."""
         return self._result._values_at(k).current(self.actuator)
 
     def __repr__(self) -> str:
@@ -43,16 +47,16 @@ class ActuatorResult(Frozen):
 
 
 class CavityResult(ActuatorResult):
-    """A Cavity of a result."""
+    """The volume and the pressure of a Cavity in a result."""
 
     @property
     def volume(self) -> Computed:
-        """(...) m3."""
+        """The volume of the cavity, (...) m3."""
         return self._surface.volume(self._result.positions)
 
     @property
     def pressure(self) -> Computed:
-        """(...) Pa, over that outside, as it acts under the load factor."""
+        """The pressure relative to the outside, under the load factor, (...) Pa."""
         rest = float(self._surface.volume(self._result.scene.mesh.rest_positions))
         return self._by_law(
             lambda cavity, volume, factor: cavity._pressure_at(volume, rest, factor), self.volume
@@ -64,11 +68,11 @@ class CavityResult(ActuatorResult):
 
 
 class CellsResult(ActuatorResult):
-    """Cells of a result."""
+    """The volumes and pressures of PneumaticCells in a result."""
 
     @property
     def volume_ratios(self) -> Computed:
-        """(..., k): J, the volume of each cell over that at rest."""
+        """The volume of each cell over its rest volume J, (..., k)."""
         span = self._result.scene._bodies.of(self.actuator)
         positions = self._result.positions[..., span.vertices, :]
         mesh = self.actuator.body.mesh
@@ -80,23 +84,23 @@ class CellsResult(ActuatorResult):
 
     @property
     def pressures(self) -> Computed:
-        """(..., k) Pa: K (a - J), a as the load factor has it."""
+        """The pressures K (a - J), with a under the load factor, (..., k) Pa."""
         return self._by_law(
             lambda cells, ratios, factor: cells._pressure_at(ratios, factor), self.volume_ratios
         )
 
 
 class TendonResult(ActuatorResult):
-    """A Tendon of a result."""
+    """The length and the tension of a Tendon in a result."""
 
     @property
     def positions(self) -> Computed:
-        """(..., k, 3) m, of its points."""
+        """The positions of its points, (..., k, 3) m."""
         scene = self._result.scene
         own = np.zeros((0, 3)) if not scene.rigid_parts else self._result._own_points
         vertices = self._result.positions
         n_vertices, points = len(scene._bodies.original), []
-        for at, weights in self.actuator._riding(scene._bodies, scene._rigid):
+        for at, weights in self.actuator._embedded(scene._bodies, scene._rigid):
             of_points = at[0] >= n_vertices
             rows = own[..., at - n_vertices, :] if of_points else vertices[..., at, :]
             points.append((rows * _like(weights[:, None], rows)).sum(-2))
@@ -104,18 +108,20 @@ class TendonResult(ActuatorResult):
 
     @property
     def lengths(self) -> Computed:
-        """(..., segments) m."""
+        """The lengths of its segments, (..., segments) m."""
         points = self.positions
         return ((points[..., 1:, :] - points[..., :-1, :]) ** 2).sum(-1) ** 0.5
 
     @property
     def length(self) -> Computed:
-        """(...) m."""
+        """The length of the tendon, (...) m."""
         return self.lengths.sum(-1)
 
     @property
     def tension(self) -> Computed:
-        """(...) N; of a tendon that does not slide, one a segment, (..., segments). Times the load factor."""
+        """The tension times the load factor, (...) N; of a tendon that does not slide, one per segment, (...,
+        segments).
+        """
         return self._by_law(
             lambda tendon, length, factor: factor * tendon._tension_at(length),
             self.length if self.actuator.sliding else self.lengths,

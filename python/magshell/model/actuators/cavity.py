@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from ..scene.scene import Scene
 
 
-ATMOSPHERE = 101325.0  # Pa
-WATER = 2.2e9  # Pa, its bulk modulus
+ATMOSPHERE = 101325.0  # [Pa] default outside pressure
+WATER = 2.2e9  # [Pa] bulk modulus of water, the default of a liquid
 _LAWS = {
     "pressure": ("pressure",),
     "gas": ("gas_pressure", "outside_pressure"),
@@ -30,33 +30,33 @@ _LAWS = {
 
 
 class Cavity(Actuator):
-    """A closed surface with a fluid inside, whose pressure is the same everywhere and follows the surface.
+    """A closed surface with a fluid inside, whose pressure is uniform and follows the surface.
 
     body: a Shell or a Solid, or several as [(body, faces), ...], with faces (k,) or None each.
-    faces: (k,), those around the cavity, of one body. By default all of a shell, and those of the one hollow inside a solid.
-        A solid's look into the cavity as they are; a shell's have to look out of it.
-    And what is inside, one of
+    faces: (k,), those around the cavity, if it has one body. By default all of a shell, and those around the only hollow of
+        a solid. Normals of a solid's faces point into the cavity; those of a shell's faces must point out of it.
+    The fluid is given by one of pressure, gas_pressure and volume:
 
-    pressure: Pa, over that outside, whatever the volume is. Negative: suction.
-    gas_pressure: Pa, of a gas at constant temperature, absolute and at the volume at rest: it is the amount of gas,
+    pressure: Pa, relative to the outside, at any volume. Negative: suction.
+    gas_pressure: Pa, absolute pressure at the rest volume of a gas at constant temperature; it gives the amount of gas,
         n R T over that volume. 0 is a vacuum.
         outside_pressure: Pa, that of the surroundings, by default one atmosphere.
-    volume: m3, of a liquid. Its pressure is what that takes: that of a bulk modulus (Pa, by default water's) and no
-        multiplier, so it takes bulk_modulus / pressure digits of what a double has; solves treat it as a constraint.
-        A load factor says how much of what is missing at rest is filled in: load steps fill a volume far from that.
+    volume: m3, of a liquid, whose pressure follows from its compression.
+        bulk_modulus: Pa, by default that of water. As the constraint is a penalty without a multiplier, the pressure
+        loses a factor bulk_modulus / pressure of the precision of a double. The load factor interpolates from the rest
+        volume to this volume, so load steps can reach a volume far from rest.
 
-    close_rims: close what is open by lids without stiffness, fans of triangles from one vertex of each rim,
-        flat where the rim
-        is. The pressure on them pulls at the rim.
+    close_rims: close open rims by lids without stiffness, fans of triangles from one vertex of each rim, flat if the rim
+        is flat. The pressure on them acts on the rim.
 
-    All of its numbers may change in time, and have gradients. What a result says: `result[cavity].volume` (m3) and
-    `.pressure` (Pa, over that outside). Cavities that collapse to no volume are refused, as elements turned inside out are.
+    All of its values may change in time, and have gradients. Results: `result[cavity].volume` (m3) and `.pressure` (Pa,
+    relative to the outside). States in which a cavity has no volume are refused, as those with inverted elements are.
 
-    The volume at rest is `cavity.rest_volume(scene)`.
+    The rest volume is `cavity.rest_volume(scene)`.
 
-    Raises ValueError where the surface is not closed (with the open edges) or inside out, in ms.Scene.
+    Raises ValueError, in ms.Scene, if the surface is not closed (naming the open edges) or inside out.
 
-    A box of a soft sheet, under a pressure and filled with as much liquid as that would make room for:
+    A box of a soft sheet, first under a pressure, then filled with the volume of liquid that this pressure made room for:
 
     >>> import magshell as ms
     >>> box = ms.meshes.box((0.1, 0.1, 0.1), cells=(2, 2, 1))
@@ -130,16 +130,16 @@ class Cavity(Actuator):
     def replaced(self, **values: Any) -> Cavity:
         """Returns the same cavity with other numbers of what is inside."""
         now = {name: getattr(self, name) for name in self._replaceable} | values
-        return self._keep_shapes(Cavity(self._parts, close_rims=self.close_rims, **now))
+        return self._check_shapes(Cavity(self._parts, close_rims=self.close_rims, **now))
 
     def surface(self, bodies: Bodies) -> ClosedSurface:
-        """In a scene's bodies. Raises ValueError where it is not closed."""
+        """Return the closed surface among a scene's bodies. Raises ValueError if it is not closed."""
         return of_faces(
             bodies, [(body, _chosen(body, faces)) for body, faces in self._parts], self.close_rims
         )
 
     def rest_volume(self, scene: Scene) -> float:
-        """m3, in a scene that has it."""
+        """Return the volume in the rest shape of a scene, m3."""
         return float(self.surface(scene._bodies).volume(scene.mesh.rest_positions))
 
     def _filling(self, scene: Scene) -> float:
@@ -148,7 +148,7 @@ class Cavity(Actuator):
         return abs(self.volume / self.rest_volume(scene) - 1.0)
 
     def _pressure_at(self, volume: Numbers, rest_volume: float, load_factor: float) -> Computed:
-        """Pa, over that outside, at a volume (m3)."""
+        """Return the pressure relative to the outside at a volume [m3], Pa."""
         if self.law == "pressure":
             return load_factor * self.pressure + 0.0 * volume
         if self.law == "gas":

@@ -1,4 +1,4 @@
-"""Cells of a solid that want a volume."""
+"""Pneumatic cells: groups of tetrahedra of a solid with a target volume."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ if TYPE_CHECKING:
     from ..scene.scene import Scene
 
 
-# Of the nodes of a cell: up to so many are coupled all with each other in the matrix, more are bordered.
+# Largest number of nodes of a cell whose coupling is stored in the matrix; that of larger cells is a low-rank term.
 _FEW_NODES = 40
 
 
 class PneumaticCells(Actuator):
-    """Pneumatic cells of a solid: V K/2 (J - a)^2 each, J the volume of a cell over that at rest, V, and a its target
-    ([Qiao21]: "the pneumatic activation can control the volume of a tetrahedron"). It is beside the solid's own energy: a
-    cell that wants to be larger is under pressure.
+    """Pneumatic cells of a solid with the energy V K/2 (J - a)^2 each, J = volume / rest volume V, and a the target of J
+    ([Qiao21]: "the pneumatic activation can control the volume of a tetrahedron"). It adds to the solid's own energy: a
+    cell whose target is larger than its volume is under pressure.
 
     body: the Solid.
-    groups: what each tetrahedron belongs to, (n_t,) integers from 0 up, -1 for none; or a list of arrays of tetrahedra,
-        one a cell. By default each tetrahedron is a cell. Of a group only the volume of all of it counts.
-    stiffness: K, Pa, of all cells, or one a cell, (k,).
-    volume_ratio: a, 1 by default; of all cells, or one a cell, (k,). A load factor takes it from 1 to there. Both may
+    groups: the cell of each tetrahedron, (n_t,) integers from 0 up, -1 for none; or a list of arrays of tetrahedra, one
+        per cell. By default each tetrahedron is a cell. The energy depends on the total volume of a cell only.
+    stiffness: K, Pa, of all cells, or one per cell, (k,).
+    volume_ratio: a, 1 by default; of all cells, or one per cell, (k,). The load factor interpolates from 1 to it. Both may
         change in time, (steps + 1, k), and have gradients.
 
-    What a result says: `result[cells].volume_ratios` (..., k) and `.pressures` (..., k) Pa, K (a - J).
+    Results: `result[cells].volume_ratios` (..., k) and `.pressures` (..., k) Pa, K (a - J).
 
-    A free cube that is to be an eighth larger is so:
+    A free cube reaches a volume that is larger by an eighth:
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.box((1, 1, 1), cells=(2, 2, 2))
@@ -72,19 +72,19 @@ class PneumaticCells(Actuator):
 
     @property
     def count(self) -> int:
-        """How many cells there are."""
+        """The number of cells."""
         return len(self._groups)
 
     def replaced(self, **values: Any) -> PneumaticCells:
         """Returns the same cells with other numbers."""
         now = {name: getattr(self, name) for name in self._replaceable} | values
-        return self._keep_shapes(PneumaticCells(self.body, self._groups, **now))
+        return self._check_shapes(PneumaticCells(self.body, self._groups, **now))
 
     def _filling(self, scene: Scene) -> float:
         return float(np.abs(np.asarray(self.volume_ratio) - 1.0).max(initial=0.0))
 
     def _pressure_at(self, ratios: Numbers, load_factor: float) -> Computed:
-        """(k,) Pa, at volume ratios (k,)."""
+        """Return the pressures at volume ratios (k,), (k,) Pa."""
         target = 1.0 + load_factor * (self.volume_ratio - 1.0)
         if isinstance(ratios, np.ndarray):
             return self.stiffness * (target - ratios)

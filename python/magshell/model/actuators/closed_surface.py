@@ -1,4 +1,4 @@
-"""Closed surfaces inside bodies: of the faces of several, with caps over open rims, or around groups of tetrahedra."""
+"""Closed surfaces inside bodies: of faces of several bodies with lids over open rims, or of groups of tetrahedra."""
 
 from __future__ import annotations
 
@@ -19,14 +19,17 @@ if TYPE_CHECKING:
     from ..shells.shell import Shell
 
 
-_NAMED = 4  # edges that an error names
-_NO_VOLUME = 1e-9  # of the cube of its size
+_NAMED = 4  # largest number of edges that an error names
+_NO_VOLUME = 1e-9  # [-] of the cube of its size: a smaller volume counts as none
 
 
 @dataclass(frozen=True)
 class ClosedSurface:
-    """triangles: (n, 3), curved: (m, 6), vertices of the scene; weights: (n,) and (m,), of the volume behind each face: -1
-    where it runs the other way round, and those of a cap."""
+    """A closed surface of flat and curved faces, whose volume is a weighted sum over the faces.
+
+    triangles: (n, 3), curved: (m, 6), vertices of the scene. weights: (n,), curved_weights: (m,), of the volume behind each
+    face: -1 for a face with the opposite orientation, and those of lids.
+    """
 
     triangles: np.ndarray
     weights: np.ndarray
@@ -47,7 +50,7 @@ class ClosedSurface:
         return np.unique(np.concatenate([self.triangles.ravel(), self.curved.ravel()]))
 
     def volume(self, positions: Numbers) -> Computed:
-        """(...) m3, of positions (..., n_v, 3) m, numpy's or a tensor in its graph."""
+        """Return the enclosed volume at positions (..., n_v, 3) m, of numpy or a tensor in its graph, (...) m3."""
         origin = positions[..., self.vertices[:1], :]
         total = 0.0
         for nodes, weights in self._dets():
@@ -56,7 +59,7 @@ class ClosedSurface:
         return total
 
     def _dets(self):
-        """(nodes (k, 3), weights (k,)) of the products x . (x x x) that add up to the volume."""
+        """Yield (nodes (k, 3), weights (k,)) of the products x . (x x x) whose sum is the volume."""
         yield self.triangles, self.weights / 6.0
         for triple, coefficient in _COEFFICIENTS:
             yield self.curved[:, triple], self.curved_weights * coefficient
@@ -65,18 +68,21 @@ class ClosedSurface:
 def of_faces(
     bodies: Bodies, parts: Sequence[tuple[Shell | Solid, np.ndarray | None]], close_rims: bool
 ) -> ClosedSurface:
-    """parts: [(body, faces or None)] of a scene's Bodies; the faces of a solid look into the cavity, those of a shell out of
-    it.
+    """Return the closed surface of faces of several bodies.
 
-    Raises ValueError where it is not closed, or the wrong way round.
+    parts: [(body, faces or None)] of a scene's Bodies; normals of a solid's faces point into the cavity, those of a
+    shell's
+    out of it. close_rims: close open rims by lids.
+
+    Raises ValueError if the surface is not closed, or inside out.
     """
     flat, curved, signs = [np.zeros((0, 3), int)], [np.zeros((0, 6), int)], ([np.zeros(0)], [np.zeros(0)])
     for body, faces in parts:
         span = bodies.spans[bodies.number(body)]
         nodes = bodies.original[span.vertices][_sides_of(body, faces)]
-        place = int(nodes.shape[1] == 6)
-        (flat, curved)[place].append(nodes)
-        signs[place].append(np.full(len(nodes), -1.0 if isinstance(body, Solid) else 1.0))
+        kind = int(nodes.shape[1] == 6)
+        (flat, curved)[kind].append(nodes)
+        signs[kind].append(np.full(len(nodes), -1.0 if isinstance(body, Solid) else 1.0))
     triangles, weights = np.concatenate(flat), np.concatenate(signs[0])
     curved_nodes, curved_weights = np.concatenate(curved), np.concatenate(signs[1])
     rim = _open_edges(triangles, weights, curved_nodes, curved_weights)
@@ -90,15 +96,15 @@ def of_faces(
                 "close_rims=True for flat "
                 "lids over what is open"
             )
-        caps, cap_weights = _caps(rim)
-        triangles, weights = np.concatenate([triangles, caps]), np.concatenate([weights, cap_weights])
+        lids, lid_weights = _lids(rim)
+        triangles, weights = np.concatenate([triangles, lids]), np.concatenate([weights, lid_weights])
     surface = ClosedSurface(triangles, weights, curved_nodes, curved_weights)
     _check_volume(bodies.mesh.rest_positions, surface)
     return surface
 
 
 def of_tetrahedra(tetrahedra: np.ndarray) -> ClosedSurface:
-    """Around a group of tetrahedra (k, 4 or 10)."""
+    """Return the surface of a group of tetrahedra (k, 4 or 10)."""
     ten = tetrahedra.shape[1] == 10
     every = tetrahedra[:, FACE_NODES if ten else FACES].reshape(-1, 6 if ten else 3)
     _, first, counts = np.unique(np.sort(every[:, :3], axis=1), axis=0, return_index=True, return_counts=True)
@@ -110,7 +116,7 @@ def of_tetrahedra(tetrahedra: np.ndarray) -> ClosedSurface:
 
 
 def inner_faces(solid: Solid) -> np.ndarray:
-    """The faces of the one hollow inside a solid. Raises ValueError where there is none, or more than one."""
+    """Return the faces around the only hollow inside a solid. Raises ValueError if there is none, or more than one."""
     mesh = solid.mesh
     ends = mesh.faces[:, [(0, 1), (1, 2)]].reshape(-1, 2)
     part = groups(mesh.n_vertices, ends)[mesh.faces[:, 0]]
@@ -124,7 +130,7 @@ def inner_faces(solid: Solid) -> np.ndarray:
 
 
 def _sides_of(body, faces: np.ndarray | None) -> np.ndarray:
-    """(k, 3) or (k, 6): the nodes of the sides that the faces are."""
+    """Return the nodes of the element sides that faces are on, (k, 3) or (k, 6)."""
     nodes, parts = sides(body.mesh)
     if faces is None:
         faces = inner_faces(body) if isinstance(body, Solid) else np.arange(body.mesh.n_faces)
@@ -141,7 +147,7 @@ def _sides_of(body, faces: np.ndarray | None) -> np.ndarray:
 
 
 def _directed_edges(nodes: np.ndarray, signs: np.ndarray) -> np.ndarray:
-    """(3 k, 3): from, to, and the node between or -1, as the faces run with their signs."""
+    """Return the edges of faces in their orientation, (3 k, 3): start, end, and the node between or -1."""
     around = np.array([(0, 1), (1, 2), (2, 0)])
     ends = nodes[:, around]
     ends = np.where(signs[:, None, None] < 0.0, ends[..., ::-1], ends).reshape(-1, 2)
@@ -150,7 +156,10 @@ def _directed_edges(nodes: np.ndarray, signs: np.ndarray) -> np.ndarray:
 
 
 def _open_edges(triangles, weights, curved, curved_weights) -> np.ndarray:
-    """(k, 3), as in _directed_edges. Raises ValueError where two faces run along an edge in the same direction."""
+    """Return the edges with a face on one side only, (k, 3) as in _directed_edges.
+
+    Raises ValueError if two faces have an edge in the same direction.
+    """
     edges = np.concatenate([_directed_edges(triangles, weights), _directed_edges(curved, curved_weights)])
     low, high = edges[:, :2].min(axis=1), edges[:, :2].max(axis=1)
     keys, which = np.unique(np.stack([low, high, edges[:, 2]], axis=1), axis=0, return_inverse=True)
@@ -168,9 +177,11 @@ def _open_edges(triangles, weights, curved, curved_weights) -> np.ndarray:
     return rim
 
 
-def _caps(rim: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles (k, 3) and their weights that close loops of directed edges: a fan from one vertex of each. An edge with a
-    node between is a parabola, and the area under that is one of three triangles."""
+def _lids(rim: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return triangles (k, 3) and their weights that close loops of directed edges, as a fan from one vertex of each loop.
+
+    An edge with a node between is a parabola; the area under it is a weighted sum of three triangles.
+    """
     for name, ends in (("end", rim[:, 1]), ("begin", rim[:, 0])):
         vertex, counts = np.unique(ends, return_counts=True)
         if (counts > 1).any():
@@ -184,9 +195,9 @@ def _caps(rim: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     hub = hubs[loop[numbered.reshape(-1, 2)[:, 0]]]
     a, b, m = rim.T
     straight = m < 0
-    whole = np.stack([hub, b, a], axis=1)
+    chords = np.stack([hub, b, a], axis=1)
     halves = np.stack([np.stack([hub, b, m], axis=1), np.stack([hub, m, a], axis=1)], axis=1)[~straight]
-    triangles = np.concatenate([whole, halves.reshape(-1, 3)])
+    triangles = np.concatenate([chords, halves.reshape(-1, 3)])
     weights = np.concatenate([np.where(straight, 1.0, -1.0 / 3.0), np.full(2 * len(halves), 4.0 / 3.0)])
     apart = (triangles[:, 0] != triangles[:, 1]) & (triangles[:, 0] != triangles[:, 2])
     return triangles[apart], weights[apart]
@@ -205,7 +216,9 @@ def _check_volume(rest_positions: np.ndarray, surface: ClosedSurface) -> None:
 
 
 def _coefficients() -> list[tuple[list[int], float]]:
-    """The triples of six nodes, with what their products count in the volume behind a face: energy/volume_form.h."""
+    """Return triples of six nodes with the factors of their products in the volume behind a face, as in
+    energy/volume_form.h.
+    """
     points, weights = rule(np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]))
     values, slopes = shapes(points)
     found = []
@@ -224,7 +237,7 @@ _COEFFICIENTS = _coefficients()
 
 
 def _det(a, b, c):
-    """(...): a . (b x c) of (..., 3)."""
+    """Return the triple products a . (b x c) of vectors (..., 3), (...)."""
     return (
         a[..., 0] * (b[..., 1] * c[..., 2] - b[..., 2] * c[..., 1])
         + a[..., 1] * (b[..., 2] * c[..., 0] - b[..., 0] * c[..., 2])

@@ -1,7 +1,8 @@
-"""Points that ride on the elements of bodies: where they are at rest, as weights of nodes."""
+"""Points embedded in elements of bodies: rest positions as weighted sums of nodes."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,9 +19,9 @@ if TYPE_CHECKING:
     from ..rigid.equimomental_points import RigidBodyPoints
 
 
-_OUTSIDE = 1e-6  # of a body's size: a point farther from every element is outside
-_STEPS = 30  # of Newton's method, into curved elements
-_CANDIDATES = 16  # flat faces, in whose curved elements a point is looked for
+_OUTSIDE = 1e-6  # [-] of a body's size: a point farther from every element is outside
+_STEPS = 30  # largest number of Newton steps to the coordinates in a curved element
+_CANDIDATES = 16  # number of nearest flat faces whose curved elements are searched for a point
 
 # Barycentric coordinates, in an element of six nodes, of the corners of its four flat faces.
 _CORNERS_OF_FACES = np.concatenate([np.eye(3), 0.5 * (np.eye(3) + np.roll(np.eye(3), 1, axis=1))])[
@@ -28,15 +29,18 @@ _CORNERS_OF_FACES = np.concatenate([np.eye(3), 0.5 * (np.eye(3) + np.roll(np.eye
 ]
 
 
-def riding_points(
-    points: Numbers, bodies: Bodies, places: list[RigidBodyPoints]
+def embed_points(
+    points: Numbers, bodies: Bodies, rigid_points: Sequence[RigidBodyPoints]
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """points: [(body, (3,) m)]; places: of a scene's rigid parts. Of each, vertices of the scene (then of rigid parts, ten
-    each) and weights, which add up to 1. Raises ValueError where a point lies outside its body."""
+    """Return the nodes and weights of each point; the weights add up to 1.
+
+    points: [(body, (3,) m)]. rigid_points: of the scene's rigid bodies. Nodes are vertices of the scene, followed by the
+    points of rigid bodies, ten each. Raises ValueError if a point lies outside its body.
+    """
     found = []
     for k, (body, point) in enumerate(points):
         if isinstance(body, RigidBody):
-            found.append(_on_rigid(body, point, bodies, places))
+            found.append(_on_rigid(body, point, bodies, rigid_points))
             continue
         vertices, weights, gap = _in_solid(body, point) if isinstance(body, Solid) else _on_shell(body, point)
         if not gap <= _OUTSIDE * body.mesh.size:
@@ -46,26 +50,28 @@ def riding_points(
             )
         span = bodies.spans[bodies.number(body)]
         found.append((bodies.original[span.vertices][vertices], weights))
-    return [_once(*each) for each in found]
+    return [_without_zeros(*each) for each in found]
 
 
-def _once(vertices: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Without those that have no weight."""
-    kept = np.abs(weights) > 1e-12
-    return vertices[kept], weights[kept]
+def _without_zeros(vertices: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nodes that have a weight, and their weights."""
+    nonzero = np.abs(weights) > 1e-12
+    return vertices[nonzero], weights[nonzero]
 
 
-def _on_rigid(part: RigidBody, point: np.ndarray, bodies: Bodies, places) -> tuple[np.ndarray, np.ndarray]:
-    """Of the four corners of its own points, wherever it is."""
+def _on_rigid(
+    part: RigidBody, point: np.ndarray, bodies: Bodies, rigid_points
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the four corners of a rigid body's points and their weights, wherever the point is."""
     k = bodies.rigid_number(part)
-    corners = places[k].rest[:4]
+    corners = rigid_points[k].rest[:4]
     system = np.concatenate([corners.T, np.ones((1, 4))])
     weights = np.linalg.solve(system, np.append(point, 1.0))
     return len(bodies.original) + 10 * k + np.arange(4), weights
 
 
 def _in_solid(body: Solid, point: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Nodes, weights, and how far outside the nearest element it lies (m)."""
+    """Return the nodes and weights of a point in a solid, and its distance outside the nearest element, m."""
     mesh, nodes = body.mesh, body.mesh.tetrahedra
     corners = mesh.rest_positions[nodes[:, :4]]
     edges = np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 2)
@@ -77,7 +83,7 @@ def _in_solid(body: Solid, point: np.ndarray) -> tuple[np.ndarray, np.ndarray, f
         nearest = int(np.argmin(gaps))
         return nodes[nearest], coordinates[nearest], float(gaps[nearest])
     best = None
-    for element in np.argsort(gaps)[:8]:  # curved elements reach a little beyond the plane ones
+    for element in np.argsort(gaps)[:8]:  # curved elements extend a little beyond the plane ones
         own = _curved_coordinates(mesh.rest_positions[nodes[element]], coordinates[element], point)
         gap = float(max(-own.min(), 0.0) * heights[element])
         if best is None or gap < best[2]:
@@ -88,21 +94,21 @@ def _in_solid(body: Solid, point: np.ndarray) -> tuple[np.ndarray, np.ndarray, f
 
 
 def _curved_coordinates(positions: np.ndarray, start: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """(4,), which add up to 1, of a point in an element of ten nodes (10, 3)."""
+    """Return the barycentric coordinates (4,) of a point in an element of ten nodes (10, 3), by Newton's method."""
     own = start.copy()
     for _ in range(_STEPS):
         shapes, slopes = _ten_shapes(own)
-        rest = point - shapes @ positions
-        if np.abs(rest).max() <= 1e-14 * np.abs(positions).max():
+        residual = point - shapes @ positions
+        if np.abs(residual).max() <= 1e-14 * np.abs(positions).max():
             break
         jacobian = positions.T @ slopes  # (3, 4)
-        step = np.linalg.solve(jacobian[:, 1:] - jacobian[:, :1], rest)
+        step = np.linalg.solve(jacobian[:, 1:] - jacobian[:, :1], residual)
         own = own + np.concatenate([[-step.sum()], step])
     return own
 
 
 def _ten_shapes(coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(10,) at four coordinates, and their slopes (10, 4)."""
+    """Return the shape functions (10,) at four barycentric coordinates, and their derivatives (10, 4)."""
     slopes = np.zeros((10, 4))
     slopes[:4] = np.diag(4.0 * coordinates - 1.0)
     for k, (a, b) in enumerate(EDGES):
@@ -112,40 +118,43 @@ def _ten_shapes(coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _on_shell(body, point: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Nodes and weights of the nearest face or element, and how far from it the point lies (m)."""
+    """Return the nodes and weights of the nearest point of a shell, and its distance, m."""
     weights, gaps = _to_faces(body.mesh, point)
     if not isinstance(body.mesh, QuadraticTriangleMesh):
         nearest = int(np.argmin(gaps))
         return body.mesh.faces[nearest], weights[nearest], float(gaps[nearest])
     best = None
-    for face in np.argsort(gaps)[
-        :_CANDIDATES
-    ]:  # flat faces that stand for curved elements lie a little beside them
+    # The flat faces of a curved element lie a little off it, so that several candidates are needed.
+    for face in np.argsort(gaps)[:_CANDIDATES]:
         nodes = body.mesh.elements[face // 4]
         start = weights[face] @ _CORNERS_OF_FACES[face % 4]
-        shares, gap = _onto_curved(body.mesh.rest_positions[nodes], start, point)
+        values, gap = _onto_curved(body.mesh.rest_positions[nodes], start, point)
         if best is None or gap < best[2]:
-            best = (nodes, shares, gap)
+            best = (nodes, values, gap)
     return best
 
 
 def _onto_curved(positions: np.ndarray, start: np.ndarray, point: np.ndarray) -> tuple[np.ndarray, float]:
-    """Weights (6,) of the place of an element (6, 3) that is nearest to the point, by Gauss and Newton's method from
-    barycentric coordinates (3,), and how far it is. Outside of the element it is what the element's edges reach."""
+    """Return the weights (6,) of the nearest point of a six-node element (6, 3), and its distance, m.
+
+    The Gauss-Newton method starts from barycentric coordinates (3,). A result outside the element is clipped to its edges.
+    """
     own = start[1:].copy()
     for _ in range(_STEPS):
-        shares, slopes = (each[0] for each in shapes(own[None]))
-        step = np.linalg.lstsq((slopes @ positions).T, point - shares @ positions, rcond=None)[0]
+        values, slopes = (each[0] for each in shapes(own[None]))
+        step = np.linalg.lstsq((slopes @ positions).T, point - values @ positions, rcond=None)[0]
         own = own + step
         if np.abs(step).max() <= 1e-14:
             break
     inside = np.maximum([own[0], own[1], 1.0 - own.sum()], 0.0)
-    shares = shapes((inside[:2] / inside.sum())[None])[0][0]
-    return shares, float(np.linalg.norm(point - shares @ positions))
+    values = shapes((inside[:2] / inside.sum())[None])[0][0]
+    return values, float(np.linalg.norm(point - values @ positions))
 
 
 def _to_faces(mesh, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(n_f, 3) weights of the foot of the point on each flat face, and how far it lies from them, (n_f,) m."""
+    """Return the weights (n_f, 3) of a point's projection onto each flat face, and its distances from the faces, (n_f,)
+    m.
+    """
     faces = mesh.faces
     a, b, c = np.moveaxis(mesh.rest_positions[faces], 1, 0)
     u, v, w = b - a, c - a, point - a

@@ -1,4 +1,4 @@
-"""Defines muscles, their tables of force, and what results say of them."""
+"""Muscles: fibres in a solid that contract, their force tables, and their states in results."""
 
 from __future__ import annotations
 
@@ -25,12 +25,15 @@ if TYPE_CHECKING:
 
 
 def checked_table(name: str, given: Any) -> np.ndarray:
-    """(n, 2), n > 2: places that rise by equal steps, and values that are not negative."""
+    """Return a table (n, 2), n > 2, whose first column has equal steps, and whose values are not negative.
+
+    Raises ValueError if it is another one.
+    """
     table = quantity(name, "1", given, ("n", 2))
-    places, values = table.T
+    abscissas, values = table.T
     if len(table) < 3:
         raise ValueError(f"{name} must have three rows or more, got {len(table)}")
-    steps = np.diff(places)
+    steps = np.diff(abscissas)
     if not (steps > 0).all() or np.ptp(steps) > 1e-6 * steps.mean():
         raise ValueError(
             f"{name} must have a first column that rises by equal steps, but they are {steps.min():.4g} to "
@@ -43,10 +46,10 @@ def checked_table(name: str, given: Any) -> np.ndarray:
 
 
 def checked_force_velocity(given: Any) -> np.ndarray:
-    """A table that is 1 where the rate is 0, a row of it, and nowhere falls."""
+    """Return a force-velocity table, which has a row (0, 1) and values that do not fall. Raises ValueError."""
     table = checked_table("force_velocity", given)
-    places, values = table.T
-    at_rest = np.abs(places) < 1e-9 * (places[1] - places[0])
+    rates, values = table.T
+    at_rest = np.abs(rates) < 1e-9 * (rates[1] - rates[0])
     if not at_rest.any() or abs(float(values[at_rest][0]) - 1.0) > 1e-12:
         raise ValueError("force_velocity must have a row (0, 1): the isometric force is that at rate 0")
     if (np.diff(values) < 0).any():
@@ -58,13 +61,13 @@ def checked_force_velocity(given: Any) -> np.ndarray:
 
 
 def core_curve(table: np.ndarray | None) -> tuple[float, float, list[float]] | None:
-    """(first place, step, coefficients) of the cubic B-spline through a table.
+    """Return (first abscissa, step, coefficients) of the cubic B-spline through a table; None for no table.
 
     With c_i = f_end beyond the ends,  (c_{i-1} + 4 c_i + c_{i+1})/6 = f_i  at every sample.
     """
     if table is None:
         return None
-    places, values = table.T
+    abscissas, values = table.T
     n = len(values)
     bands = np.ones((3, n))
     bands[1] = 4.0
@@ -72,44 +75,45 @@ def core_curve(table: np.ndarray | None) -> tuple[float, float, list[float]] | N
     rows[0] -= values[0]
     rows[-1] -= values[-1]
     coefficients = scipy.linalg.solve_banded((1, 1), bands, rows)
-    # The curve goes over into its constant ends by one more coefficient on either side.
-    around = np.concatenate([[values[0]], coefficients, [values[-1]]])
-    step = float((places[-1] - places[0]) / (n - 1))
-    return float(places[0]) - step, step, around.tolist()
+    # One more coefficient on either side continues the curve smoothly to its constant ends.
+    extended = np.concatenate([[values[0]], coefficients, [values[-1]]])
+    step = float((abscissas[-1] - abscissas[0]) / (n - 1))
+    return float(abscissas[0]) - step, step, extended.tolist()
 
 
 _TABLES = ("force_length", "passive", "force_velocity")
 
 
 class Muscle(Actuator):
-    """Fibres in a solid's tetrahedra that pull along themselves: one of the actuators of a scene.
+    """Muscle fibres in a solid's tetrahedra, with a tension along the fibre direction; an actuator of a scene.
 
-    body: the Solid that they are in. With F the deformation and m the unit vector along a fibre at rest, its stretch is
-        l = |F m|; the tension is a nominal one, of the rest area.
-    fibres: ms.fibres_along(...), Fibres; or their direction at rest, (3,), one a tetrahedron, (n_t, 3), or a function of
-        places (n_t, 3) m that returns such. Their length does not matter, but must not be zero: the gradient by directions
-        is that of the normalized vector. elements: the tetrahedra that have fibres, by default all (with Fibres, theirs).
-    activation: a, 1: what a solve changes, in ms.simulate also in time, as (steps + 1, ...), (steps, ...) or a function.
-        One number, or one of each segment.
-    segments: how many equal pieces of the fibres have an activation of their own, where the fibres know their coordinates;
-        or (k,), the segment of each of their tetrahedra, which may be one a tetrahedron. `places` is where they are.
+    body: the Solid that they are in. With the deformation gradient F and the unit vector m along a fibre at rest, its
+        stretch is l = |F m|; the tension is nominal, per rest area.
+    fibres: ms.fibres_along(...), Fibres; or their direction at rest, (3,), one per tetrahedron, (n_t, 3), or a function of
+        positions (n_t, 3) m that returns these. The length of a direction has no effect, but must not be zero: the gradient
+        by directions is that of the normalized vector. elements: the tetrahedra that have fibres, by default all (with
+        Fibres, theirs).
+    activation: a, 1, the input of the muscle; in ms.simulate also over time, as (steps + 1, ...), (steps, ...) or a
+        function. One number, or one per segment.
+    segments: the number of equal pieces of the fibres with an activation each, if the fibres have coordinates; or (k,), the
+        segment of each of their tetrahedra, up to one per tetrahedron. `places` has their coordinates.
     weights: (k,), of the tetrahedra with fibres, factors of the tension; by default those of Fibres.
 
-    What the fibres do is told by one of two:
+    The law of the fibres is given by one of two arguments:
 
-    stiffness: Pa. A *target stretch*: tension stiffness (l - 1 + a), so that fibres alone would shorten by a, or lengthen
-        where it is negative; a from -1 to 1. At a = 0 it is passive stiffness.
-    peak_stress: Pa. An *active stress*: tension peak_stress a l, without a rest length; a from 0 to 1.
-        force_length makes it a muscle of *Hill's* type: tension peak_stress (a f_L(l) f_V(l'/shortening_rate) + f_P(l)),
-        with tables of two columns, the first in equal steps: force_length of l, passive of l (by default none), and
+    stiffness: Pa, for a *target stretch*: tension stiffness (l - 1 + a), so that fibres alone would shorten by a, or
+        lengthen if it is negative; a from -1 to 1. At a = 0 it is a passive stiffness.
+    peak_stress: Pa, for an *active stress*: tension peak_stress a l, without a rest length; a from 0 to 1.
+        With force_length it is a muscle of *Hill's* type: tension peak_stress (a f_L(l) f_V(l'/shortening_rate) + f_P(l)),
+        with tables of two columns, the first in equal steps: force_length of l, passive of l (by default zero), and
         force_velocity, by default 1, of the rate of l over shortening_rate [1/s]: negative as it shortens, usually -1
-        to 1, with a row (0, 1). Between rows run twice differentiable curves; beyond a table its last value holds. The part
-        that depends on the rate acts in ms.simulate only; it makes the matrix of a step unsymmetric.
+        to 1, with a row (0, 1). Tables are interpolated by twice differentiable curves; beyond a table its last value
+        holds. The part that depends on the rate acts in ms.simulate only; it makes the matrix of a step unsymmetric.
 
-    Fibres that are crushed, l near 0, pull in no direction at l = 0; where they push, as with a negative activation, they
+    Fibres that are crushed to l = 0 have no direction and no force; under compression, as with a negative activation, they
     can buckle like rods.
 
-    A block with fibres along x that pull with half of its modulus shortens:
+    A block with fibres along x, with half of its modulus as active stress, shortens:
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.box((1, 1, 1), cells=(1, 1, 1))
@@ -130,7 +134,7 @@ class Muscle(Actuator):
     _replaceable = ("activation", "fibres", "weights", "stiffness", "peak_stress", "shortening_rate")
     _in_time = ("activation",)
     _units: ClassVar[dict[str, str]] = {"activation": "1"}
-    _is_spring = False  # its stiffness is there at rest, as its solid's
+    _is_spring = False  # its stiffness counts as the solid's at rest
 
     def __init__(
         self,
@@ -198,8 +202,8 @@ class Muscle(Actuator):
         if given is None:
             return None, 1
         shape = shape_of("segments", given)
-        whole = np.issubdtype(np.asarray(given).dtype, np.integer) and not isinstance(given, bool)
-        if shape not in ((), (len(self.elements),)) or not whole or np.min(given) < (0 if shape else 1):
+        integer = np.issubdtype(np.asarray(given).dtype, np.integer) and not isinstance(given, bool)
+        if shape not in ((), (len(self.elements),)) or not integer or np.min(given) < (0 if shape else 1):
             raise ValueError(
                 f"segments must be how many there are, or the segment of each of the {len(self.elements)} tetrahedra with "
                 f"fibres, got {given!r:.60}"
@@ -211,12 +215,12 @@ class Muscle(Actuator):
                 "segments can only be counted where fibres know their coordinates, as ms.fibres_along makes them"
             )
         start = min(float(self.coordinates.min()), 0.0) if self.length else 0.0
-        share = (self.coordinates - start) / self.length
-        return np.clip((share * int(given)).astype(np.int64), 0, int(given) - 1), int(given)
+        fractions = (self.coordinates - start) / self.length
+        return np.clip((fractions * int(given)).astype(np.int64), 0, int(given) - 1), int(given)
 
     @property
-    def places(self) -> np.ndarray:
-        """(segments,) m: where the middle of each is along the fibres; of segments by tetrahedra, the mean of theirs."""
+    def places(self) -> np.ndarray:  # plain-words: ok
+        """The coordinates of the segments' midpoints along the fibres, (segments,) m; of given segments, their means."""
         if self.coordinates is None:
             raise ValueError("fibres know no coordinates: ms.fibres_along makes some that do")
         if self.segments is None:
@@ -228,7 +232,7 @@ class Muscle(Actuator):
 
     @property
     def range(self) -> tuple[float, float]:
-        """Of the activation."""
+        """The smallest and the largest activation."""
         return (0.0 if self.stiffness is None else -1.0), 1.0
 
     def _activation(self, given, row: tuple[int, ...]) -> np.ndarray:
@@ -249,7 +253,7 @@ class Muscle(Actuator):
             )
 
     def replaced(self, **values: Any) -> Muscle:
-        """The same muscle with other numbers."""
+        """Return the same muscle with other values."""
         now, count = {}, len(self.elements)
         for name, value in values.items():
             if name not in self._replaceable:
@@ -322,10 +326,12 @@ class Muscle(Actuator):
 
 @immutable
 class FibreStates(NamedTuple):
-    """At the points of integration of each tetrahedron with fibres: one of linear ones, p = 4 of quadratic ones.
+    """Stretches and tensions at the integration points of each tetrahedron with fibres: p = 1 for linear ones, 4 for
+    quadratic.
 
-    stretches: |F m|, (k, p). tensions: (k, p), Pa, of the rest area across a fibre, negative where it pushes; of a motion
-    with what depends on the rate. volumes: at rest, (k, p), m3.
+    stretches: |F m|, (k, p). tensions: (k, p), Pa, per rest area across a fibre, negative under compression; in a
+    motion with
+    the part that depends on the rate. volumes: at rest, (k, p), m3.
     """
 
     stretches: np.ndarray
@@ -333,13 +339,15 @@ class FibreStates(NamedTuple):
     volumes: np.ndarray
 
     def mean(self, of_points: np.ndarray) -> np.ndarray:
-        """Of each tetrahedron, (k,), weighed by the volumes: of (k, p)."""
+        """Return the mean over the points of each tetrahedron, (k,), of values (k, p) weighted by the volumes."""
         return mean(self.volumes, of_points)
 
 
 def muscles_of(result: SolveResult, body: Solid, index: int) -> dict[str, np.ndarray] | None:
-    """Of each tetrahedron of a solid (n_t,): activation and stretch as its muscles have them in the mean, by their weights,
-    and the sum of their tensions; NaN without any. None where the solid has no muscle."""
+    """Return the state of the muscles in each tetrahedron of a solid, (n_t,) each; None if it has no muscle.
+
+    Activation and stretch are means over its muscles by their weights, the tension is their sum; NaN without a muscle.
+    """
     muscles = [each for each in muscles_in(result.scene) if each.body is body]
     if not muscles:
         return None
@@ -347,10 +355,10 @@ def muscles_of(result: SolveResult, body: Solid, index: int) -> dict[str, np.nda
     for muscle in muscles:
         found = MuscleResult(result, muscle)
         states = found.states(index)
-        share = result._values_at(index).current(muscle).weights
-        weights[muscle.elements] += share
-        sums[0][muscle.elements] += share * found.activation(index)
-        sums[1][muscle.elements] += share * states.mean(states.stretches)
+        own = result._values_at(index).current(muscle).weights
+        weights[muscle.elements] += own
+        sums[0][muscle.elements] += own * found.activation(index)
+        sums[1][muscle.elements] += own * states.mean(states.stretches)
         sums[2][muscle.elements] += states.mean(states.tensions)
     none = weights == 0
     over = np.where(none, np.nan, weights)
@@ -362,7 +370,7 @@ def muscles_of(result: SolveResult, body: Solid, index: int) -> dict[str, np.nda
 
 
 class MuscleResult(Frozen):
-    """A muscle of a result, with the values that it was found with.
+    """The fibres of a muscle in a result, with the values of the solve.
 
     muscle: as it is in the scene.
     """
@@ -377,7 +385,7 @@ class MuscleResult(Frozen):
         self._result, self.muscle = result, muscle
 
     def states(self, index: int = -1) -> FibreStates:
-        """Of its fibres; of a motion or a path in a recorded state, by default the last."""
+        """Return the states of its fibres; of a motion or a path in a recorded state, by default the last."""
         result = self._result
         scene, values = result.scene, result._values_at(index)
         number = next(k for k, each in enumerate(muscles_in(scene)) if each is self.muscle)
@@ -390,7 +398,7 @@ class MuscleResult(Frozen):
             return FibreStates(*_core.fibre_states(scene._model, number, state, velocity))
 
     def activation(self, index: int = -1) -> np.ndarray:
-        """(k,), 1, of each tetrahedron with fibres."""
+        """Return the activation of each tetrahedron with fibres, (k,)."""
         now = np.atleast_1d(self._result._values_at(index).current(self.muscle).activation)
         return now[
             np.zeros(len(self.muscle.elements), int) if self.muscle.segments is None else self.muscle.segments
@@ -398,18 +406,20 @@ class MuscleResult(Frozen):
 
     @property
     def stretches(self) -> np.ndarray:
-        """(k,), of each tetrahedron with fibres, the mean of its points, in the last state."""
+        """The mean stretch of each tetrahedron with fibres in the last state, (k,)."""
         states = self.states()
         return states.mean(states.stretches)
 
     @property
     def tensions(self) -> np.ndarray:
-        """(k,) Pa, likewise."""
+        """The mean tension of each tetrahedron with fibres in the last state, (k,) Pa."""
         states = self.states()
         return states.mean(states.tensions)
 
     def force(self, index: int = -1) -> float:
-        """N: the integral of the tension over the muscle's rest volume, over its length: the mean force along it."""
+        """Return the mean force along the muscle, N: the integral of the tension over its rest volume, divided by its
+        length.
+        """
         if self.muscle.length is None:
             raise ValueError(
                 "the force needs the length of the fibres: Fibres(..., length=...), which ms.fibres_along knows"
@@ -427,5 +437,5 @@ class MuscleResult(Frozen):
 
 
 def muscles_in(scene: Scene) -> list[Muscle]:
-    """In the core's numbers: the other actuators of a scene are not among them."""
+    """Return the muscles of a scene in the core's order."""
     return [each for each in scene.actuators if isinstance(each, Muscle)]

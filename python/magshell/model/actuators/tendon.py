@@ -1,4 +1,4 @@
-"""Tendons: strings through points that ride on bodies."""
+"""Tendons: strings through points that are embedded in bodies."""
 
 from __future__ import annotations
 
@@ -14,32 +14,33 @@ from ..shells.shell import Shell
 from ..solids.solid import Solid
 from .actuator import Actuator, number
 from .actuator_results import TendonResult
-from .embedded_points import riding_points
+from .embedded_points import embed_points
 
 if TYPE_CHECKING:
     from ..._input.kinds import Computed, Numbers
     from ..rigid.equimomental_points import RigidBodyPoints
 
 
-_SMOOTHING = 1e-3  # of the length at rest
+_SMOOTHING = 1e-3  # [-] default smoothing over the length at rest
 _KINDS = (*BODIES, RigidBody)
 
 
 class Tendon(Actuator):
-    """A string through points of bodies: it pulls, and is slack where it is shorter than its rest length.
+    """A string through points of bodies, which pulls, and is slack if it is shorter than its rest length.
 
-    points: (k, 3) m, k >= 2, where it passes at rest, in `body`: each rides on the element or face that it lies in. Or
-        [(body, (3,)), ...] for one of several bodies, links of a skeleton and rigid bodies among them.
+    points: (k, 3) m, k >= 2, its points at rest in `body`, each embedded in the element or face that it lies in. Or
+        [(body, (3,)), ...] for several bodies, links of a skeleton and rigid bodies among them.
     body: a Shell, a Solid, or a RigidBody such as a Link.
-    tension: N, which it pulls with at any length.
-    stiffness: N/m, with which it pulls beyond rest_length, as a spring of the whole tendon.
+    tension: N, at any length.
+    stiffness: N/m, of the whole tendon as a spring beyond rest_length.
     rest_length: m, by default its length at rest.
-    sliding: whether it runs through the points between its ends without friction, so that one tension acts along all of it;
-        else each segment is a spring of its own, with its share of the rest length.
-    smoothing: m, over which the pull sets in beyond the rest length; by default 0.1 % of its length at rest.
+    sliding: whether it slides through its inner points without friction, so that one tension acts along all of it; else
+        each segment is a spring of its own, with its fraction of the rest length.
+    smoothing: m, the length beyond the rest length over which the stiffness sets in; by default 0.1 % of its length at
+        rest.
 
-    All numbers may change in time, and have gradients. What a result says: `result[tendon].length` (m), `.tension` (N; of a
-    tendon that does not slide, one a segment) and `.positions` (..., k, 3).
+    All values may change in time, and have gradients. Results: `result[tendon].length` (m), `.tension` (N; of a tendon
+    that does not slide, one per segment) and `.positions` (..., k, 3).
 
     A bar of E A = 1 N under a tendon of 0.01 N along its axis:
 
@@ -76,13 +77,13 @@ class Tendon(Actuator):
             raise ValueError(f"sliding must be True or False, got {sliding!r:.60}")
         self.sliding = sliding
         self.bodies: tuple[Any, ...] = tuple({id(each): each for each, _ in self._points}.values())
-        self._shares = np.linalg.norm(np.diff([point for _, point in self._points], axis=0), axis=1)
-        length = float(self._shares.sum())
-        if not self._shares.min() > 1e-9 * length:
+        lengths = np.linalg.norm(np.diff([point for _, point in self._points], axis=0), axis=1)
+        length = float(lengths.sum())
+        if not lengths.min() > 1e-9 * length:
             raise ValueError(
-                f"points {np.argmin(self._shares)} and {np.argmin(self._shares) + 1} of the Tendon are one"
+                f"points {np.argmin(lengths)} and {np.argmin(lengths) + 1} of the Tendon are one"
             )
-        self._shares = self._shares / length
+        self._fractions = lengths / length  # of the rest length, one per segment
         self.tension: np.ndarray = number("tension", "N", tension, 0.0)
         self.stiffness: np.ndarray = number("stiffness", "N/m", stiffness, 0.0)
         rest = length if rest_length is None else rest_length
@@ -92,12 +93,12 @@ class Tendon(Actuator):
 
     @property
     def _is_spring(self) -> bool:
-        """Whether it has a stiffness; else it pulls with a tension that is given."""
+        """Return whether it has a stiffness; else its tension is a given force."""
         return bool(self.stiffness > 0.0)
 
     @property
     def points(self) -> np.ndarray:
-        """(k, 3) m, at rest."""
+        """The points at rest, (k, 3) m."""
         return np.array([point for _, point in self._points])
 
     @property
@@ -108,33 +109,35 @@ class Tendon(Actuator):
     def replaced(self, **values: Any) -> Tendon:
         """Returns the same tendon with other numbers."""
         now = {name: getattr(self, name) for name in self._replaceable} | values
-        return self._keep_shapes(Tendon(self._points, sliding=self.sliding, **now))
+        return self._check_shapes(Tendon(self._points, sliding=self.sliding, **now))
 
     def _tension_at(self, length: Numbers) -> Computed:
-        """N, at a length, m; of a tendon that does not slide, at those of its segments, (..., segments)."""
-        shares = 1.0 if self.sliding else _like(self._shares, length)
-        beyond = length - shares * float(self.rest_length)
-        smoothing = shares * float(self.smoothing)
+        """Return the tension at a length [m], N; of a tendon that does not slide, for all segments, (..., segments)."""
+        fractions = 1.0 if self.sliding else _like(self._fractions, length)
+        beyond = length - fractions * float(self.rest_length)
+        smoothing = fractions * float(self.smoothing)
         below = 0.5 * beyond**2 / smoothing
         pull = (beyond - 0.5 * smoothing) * (beyond >= smoothing) + below * (
             (beyond > 0.0) & (beyond < smoothing)
         )
-        return float(self.tension) + float(self.stiffness) / shares * pull
+        return float(self.tension) + float(self.stiffness) / fractions * pull
 
-    def _riding(
-        self, scene_bodies: Bodies, places: list[RigidBodyPoints]
+    def _embedded(
+        self, scene_bodies: Bodies, rigid_points: Sequence[RigidBodyPoints]
     ) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Of each point the core's vertices that it rides on, and their weights."""
-        return riding_points(self._points, scene_bodies, places)
+        """Return for each point the core's vertices that it is embedded in, and their weights."""
+        return embed_points(self._points, scene_bodies, rigid_points)
 
-    def _core_input(self, label: str, bodies: Bodies, places) -> dict[Any, Any]:
+    def _core_input(
+        self, label: str, bodies: Bodies, rigid_points: Sequence[RigidBodyPoints]
+    ) -> dict[Any, Any]:
         return {
             "owner": label,
             "slides": self.sliding,
-            "shares": self._shares.tolist(),
+            "shares": self._fractions.tolist(),
             "points": [
                 {"vertices": vertices.tolist(), "weights": weights.tolist()}
-                for vertices, weights in self._riding(bodies, places)
+                for vertices, weights in self._embedded(bodies, rigid_points)
             ],
         }
 
