@@ -48,7 +48,7 @@ from .model.contact.contact import Contact
 from .model.fields.adapters import CustomField, MagpylibField
 from .model.fields.field import AppliedField, Dipoles, SampledField, UniformField, residual_to_remanent
 from .model.fields.magnets import CuboidMagnet, CylinderMagnet
-from .model.fields.placed import PlacedField
+from .model.fields.posed_field import PlacedField
 from .model.loads.face_energies import SurfaceTension
 from .model.loads.loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
 from .model.loads.pressure import Pressure

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import magshell as ms
-from magshell.model.fields.magnet_overlap import told_inside
+from magshell.model.fields.magnet_overlap import describe_magnet_overlap
 
 CUBOID = ms.CuboidMagnet((0.02, 0.03, 0.04), (0, 0, 1e6), center=(0.1, 0, 0), rotation=(0, 0, np.pi / 2))
 CYLINDER = ms.CylinderMagnet(0.01, 0.04, (0, 0, 1e6), center=(0, 0.1, 0), rotation=(np.pi / 2, 0, 0))
@@ -29,13 +29,15 @@ def test_points_inside_are_those_that_magpylib_magnetizes(magnet) -> None:
     placed = ms.PlacedField(ms.MagpylibField(origin, length_scale=0.01), center=magnet.center)
     near = np.linalg.norm(points - magnet.center, axis=1) < 0.02
     np.testing.assert_array_equal(placed._in_magnets(points), near)
-    told = told_inside([magnet, placed], points, [])
+    told = describe_magnet_overlap([magnet, placed], points, [])
     assert told.startswith(f"{(wanted | near).sum()} of 500 vertices")
-    assert told_inside([ms.UniformField(), ms.Dipoles([(0, 0, 1)], [(0, 0, 1)])], points, []) == ""
+    assert (
+        describe_magnet_overlap([ms.UniformField(), ms.Dipoles([(0, 0, 1)], [(0, 0, 1)])], points, []) == ""
+    )
     end = (0.0, 0.0, 0.026) if isinstance(magnet, ms.CuboidMagnet) else (0.0, 0.026, 0.0)
     beside = magnet.center + np.array([end, [0.06, 0.06, 0.06]])
-    assert told_inside([magnet], beside, [2e-3]) == ""
-    assert told_inside([magnet], beside, [2e-2]).startswith(
+    assert describe_magnet_overlap([magnet], beside, [2e-3]) == ""
+    assert describe_magnet_overlap([magnet], beside, [2e-2]).startswith(
         "1 of 2 vertices (0) are within 0.01 m of a magnet"
     )
 

@@ -15,12 +15,10 @@ if TYPE_CHECKING:
 
 class Actuator(Owner):
     """The base class of actuators: they act in bodies by values that a controller sets, such as activations, pressures,
-    volumes
-    or tensions. The values may change during a motion, continuously or by jumps.
+    volumes or tensions. The values may change during a motion, continuously or by jumps.
 
     bodies: those that it acts in. is_spring: whether it has a stiffness of its own, which the stiffness of the bodies
-    at rest
-    leaves out.
+    at rest leaves out.
     """
 
     _for_all = False

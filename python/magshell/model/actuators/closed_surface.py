@@ -71,8 +71,7 @@ def of_faces(
     """Return the closed surface of faces of several bodies.
 
     parts: [(body, faces or None)] of a scene's Bodies; normals of a solid's faces point into the cavity, those of a
-    shell's
-    out of it. close_rims: close open rims by lids.
+    shell's out of it. close_rims: close open rims by lids.
 
     Raises ValueError if the surface is not closed, or inside out.
     """

@@ -330,8 +330,7 @@ class FibreStates(NamedTuple):
     quadratic.
 
     stretches: |F m|, (k, p). tensions: (k, p), Pa, per rest area across a fibre, negative under compression; in a
-    motion with
-    the part that depends on the rate. volumes: at rest, (k, p), m3.
+    motion with the part that depends on the rate. volumes: at rest, (k, p), m3.
     """
 
     stretches: np.ndarray

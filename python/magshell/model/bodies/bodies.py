@@ -299,8 +299,7 @@ class Bodies:
         """Return the vertices (k, 3) of the points of a contact and their weights (k, 3).
 
         Vertices are numbered as in the scene; points of fewer than three vertices are padded with -1. Points of welded
-        vertices
-        are returned once.
+        vertices are returned once.
         """
         span = self.of(contact)
         vertices, weights = contact.points(span.mesh)

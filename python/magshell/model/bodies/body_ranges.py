@@ -15,8 +15,7 @@ class Span(NamedTuple):
     """The index ranges of one body, or of all bodies together.
 
     mesh: of the body, or the joined mesh. bodies: which of the scene's bodies. The other fields are the numbers in the
-    scene
-    of the first vertex, edge, face and edge rotation, and of the first row in a magnetization of all bodies.
+    scene of the first vertex, edge, face and edge rotation, and of the first row in a magnetization of all bodies.
     """
 
     mesh: TriangleMesh

@@ -22,19 +22,15 @@ class Tie(Frozen):
     """Welds two bodies: vertices of both that have the same position in the rest shape are one vertex of the scene.
 
     Results list such a vertex for each body, with equal positions. Masses, loads and damping of both bodies add up
-    there; a
-    support of one body holds the other. A seam is a hinge: bodies that share no more than a line turn freely about it,
-    and
-    bodies that share faces (a patch on a sheet) bend together. For a seam that carries moments make one mesh,
-    `ms.weld(mesh, mesh)`, with thickness and modulus by face. A sheet on a solid's face moves with it; one that is tied
-    by
-    an edge alone can turn.
+    there; a support of one body holds the other. A seam is a hinge: bodies that share no more than a line turn freely
+    about it, and bodies that share faces (a patch on a sheet) bend together. For a seam that carries moments make one
+    mesh, `ms.weld(mesh, mesh)`, with thickness and modulus by face. A sheet on a solid's face moves with it; one that
+    is tied by an edge alone can turn.
 
     a, b: two bodies of the scene.
     vertices: those of `a` that are welded, each to one of `b`; by default all that have one within the tolerance.
     tolerance: m, largest distance of the two vertices in the rest shape; the position is that in `a`. By default 1e-6
-    of the
-        larger body.
+        of the larger body.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.02, 0.01, cells=(4, 2))

@@ -231,14 +231,10 @@ class SelfContact(BodyContact):
 
     a: a Shell or a Solid. The other arguments are as in BodyContact, which ms.Contact(a, b, ...) makes, except that the
     default min_distance of a sheet is its whole thickness. Faces that are neighbours along the surface may be nearer at
-    rest
-    than twice the minimal and the activation distance; they keep half of their rest distance, divided in the proportion
-    of the
-    two. If that is less than the minimal distance itself, a scene refuses a min_distance that was given, naming faces
-    and the
-    largest possible one, and warns (ms.MeshQualityWarning) if it comes from the thickness. A mesh that passes through
-    itself
-    at rest is refused.
+    rest than twice the minimal and the activation distance; they keep half of their rest distance, divided in the
+    proportion of the two. If that is less than the minimal distance itself, a scene refuses a min_distance that was
+    given, naming faces and the largest possible one, and warns (ms.MeshQualityWarning) if it comes from the thickness.
+    A mesh that passes through itself at rest is refused.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))

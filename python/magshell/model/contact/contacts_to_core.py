@@ -106,8 +106,7 @@ def check_neighbours(scene: Scene, warns: bool = False) -> None:
     """Raise ValueError or warn if a minimal distance is larger than the rest distance of neighbours along a surface.
 
     Neighbours cannot keep a larger distance. It is an error if the minimal distance was given; if it comes from a
-    thickness,
-    this warns if `warns` is true.
+    thickness, this warns if `warns` is true.
     """
     for k, contact in enumerate(scene._body_contacts):
         wanted = scene._in_core.current(contact).min_distance

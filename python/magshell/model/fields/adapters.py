@@ -1,4 +1,4 @@
-"""Takes fields of other programs, with derivatives by differences where they have none."""
+"""Fields given by Python functions or by magpylib, with derivatives by differences where they have none."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ AXES = np.eye(3)
 PAIRS = [(0, 1), (1, 2), (2, 0)]
 DIAGONALS = np.array([AXES[j] + AXES[k] for j, k in PAIRS])
 
-# The step in units of the length scale. For a dipole at that distance, truncation and rounding together are
+# [-] The step of the differences over the length scale. For a dipole at that distance, truncation and rounding together are
 # then below 1e-10 of the largest entry, for the first and for the second derivatives.
 RELATIVE_STEP = 4e-3
 
@@ -30,7 +30,9 @@ Function = Callable[[np.ndarray], np.ndarray]
 def along_lines(
     f: Function, points: np.ndarray, directions: np.ndarray, step: float
 ) -> tuple[np.ndarray, ...]:
-    """f at the points (n, ...), and forwards and backwards along each direction (directions, 3, n, ...)."""
+    """Evaluate f at the points, (n, ...), and in three steps forwards and backwards along directions, (directions, 3,
+    n, ...).
+    """
     moves = step * np.arange(1, 4)[:, None, None] * directions[:, None, None, :]
     lines = np.stack([points + moves, points - moves])
     values = f(np.concatenate([points[None], lines.reshape(-1, *points.shape)]).reshape(-1, 3))
@@ -40,20 +42,22 @@ def along_lines(
 
 
 def first_derivatives(forward: np.ndarray, backward: np.ndarray, step: float) -> np.ndarray:
-    """(n, ..., directions)"""
+    """Return the first derivatives along the directions, (n, ..., directions)."""
     return np.einsum("k,dk...->...d", FIRST, forward - backward) / step
 
 
 def second_derivatives(
     center: np.ndarray, forward: np.ndarray, backward: np.ndarray, step: float
 ) -> np.ndarray:
-    """(n, ..., directions)"""
+    """Return the second derivatives along the directions, (n, ..., directions)."""
     sides = np.einsum("k,dk...->...d", SECOND, forward + backward)
     return (sides + CENTER * center[..., None]) / step**2
 
 
 class FluxSampler:
-    """Samples a field of which only B is known: 19 evaluations a point up to the gradient, 37 in all."""
+    """A sampler for a field of which only B is known: 19 evaluations per point up to the gradient, 37 up to the
+    curvature.
+    """
 
     def __init__(self, flux_density: Function, step: float) -> None:
         self._flux_density = flux_density
@@ -79,7 +83,7 @@ class FluxSampler:
 
 
 class GradientSampler:
-    """Samples a field of which B and its gradient are known: the curvature takes 19 gradients a point."""
+    """A sampler for a field of which B and its gradient are known: the curvature takes 19 gradients per point."""
 
     def __init__(self, flux_density: Function, gradient: Function, step: float) -> None:
         self._flux_density = flux_density
@@ -101,8 +105,8 @@ class CustomField(AppliedField):
     """A field given by a Python function, and its gradient by another one or by differences.
 
     Derivatives that are not given are central differences of sixth order, with steps of 0.004 length
-    scales, up to three of them away from the point along the axes and their diagonals. They are right to
-    1e-10 where the field is as smooth as that of a dipole one length scale away, and to 1e-7 at a quarter
+    scales, up to three of them from the point along the axes and their diagonals. Their relative error is
+    1e-10 if the field is as smooth as that of a dipole one length scale away, and 1e-7 at a quarter
     of that distance.
 
     Args:
@@ -131,11 +135,11 @@ class CustomField(AppliedField):
 
 
 class MagpylibField(AppliedField):
-    """The field of magpylib's sources (version 5 or later, which works in SI), as they stand now.
+    """The field of magpylib's sources (version 5 or later, which works in SI) at their present positions.
 
-    The sources are copied, so that moving them later leaves this field alone; a PlacedField of it moves all as one.
-    Derivatives are differences, as in `CustomField`. B jumps at the surface of a magnet: points must keep 0.02 length
-    scales away.
+    The sources are copied, so moving them later does not change this field; a PlacedField of it moves them as one.
+    Derivatives are differences, as in `CustomField`. B jumps at the surface of a magnet: points must be at least 0.02
+    length scales away from it.
 
     Args:
         sources: a source, a collection, or a list of them
@@ -180,7 +184,7 @@ class MagpylibField(AppliedField):
 
 
 def _checked_function(name: str, unit: str, function: Function, tail: tuple[int, ...]) -> Callable[..., Any]:
-    """The function with its result checked for shape at each call; NaN may pass, as fields end somewhere."""
+    """Return the function with a check of its result's shape at each call; NaN may pass, as fields have a border."""
     if not callable(function):
         raise ValueError(f"{name} must be a function of points (n, 3) [m], got {type(function).__name__}")
 

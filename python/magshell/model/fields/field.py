@@ -1,4 +1,4 @@
-"""Applied magnetic fields: uniform, of dipoles, sampled on a grid. As functions: adapters.py."""
+"""Applied magnetic fields: uniform, of dipoles, and sampled on a grid. Fields given by functions are in adapters.py."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 
 
 def residual_to_remanent(residual_flux_density: Numbers) -> Any:
-    """The remanent magnetization M_r = B_r / mu_0 [A/m] of the residual flux density B_r [T] of a data sheet.
+    """Return the remanent magnetization M_r = B_r / mu_0 [A/m] for the residual flux density B_r [T] of a data sheet.
 
-    Numbers, sequences, numpy arrays and torch tensors; a tensor stays in its graph. Raises ValueError on
-    what is not real and finite.
+    It takes numbers, sequences, numpy arrays and torch tensors; a tensor stays in its graph. Raises ValueError for
+    numbers that are not real and finite.
 
     residual_flux_density: T, of any shape.
 
@@ -41,14 +41,14 @@ def residual_to_remanent(residual_flux_density: Numbers) -> Any:
 
 
 FIELDS = "fields of magshell (of magpylib's sources, ms.MagpylibField)"
-_MOST_SAMPLES = 10**9  # 24 GB
+_MOST_SAMPLES = 10**9  # largest number of samples of a grid; 24 GB
 
 
 class AppliedField(Owner):
-    """A flux density B(x) [T] that does not depend on the sheet.
+    """A flux density B(x) [T] that does not depend on the bodies.
 
-    `_core` is the field of the C++ core, or None where a solve supplies the value. `_made_from` are the arguments that
-    a copy, or another process, makes the field from again.
+    `_core` is the field of the C++ core, or None if a solve supplies the value. `_made_from` has the arguments from
+    which a copy, or another process, makes the field again.
     """
 
     _core: core.AppliedField | None = None
@@ -66,15 +66,19 @@ class AppliedField(Owner):
         self.__init__(**arguments)
 
     def flux_density(self, points: Numbers) -> np.ndarray:
-        """B [T], (..., 3), at points [m], (..., 3); NaN where the field has no value."""
+        """Return B [T], (..., 3), at points [m], (..., 3); NaN where the field has no value."""
         return self._samples(points, order=0)[0]
 
     def _in_magnets(self, points: np.ndarray) -> np.ndarray:
-        """(n,) whether points (n, 3) m are inside of a magnet of this field, as far as it has any."""
+        """Return whether points (n, 3) m are inside a magnet of this field, (n,) bool; False for a field without
+        magnets.
+        """
         return np.zeros(len(points), dtype=bool)
 
     def gradient(self, points: Numbers) -> np.ndarray:
-        """dB_i/dx_j [T/m], (..., 3, 3) as [..., i, j], at points [m], (..., 3); NaN as above."""
+        """Return dB_i/dx_j [T/m], (..., 3, 3) as [..., i, j], at points [m], (..., 3); NaN where the field has no
+        value.
+        """
         return self._samples(points, order=1)[1]
 
     def _samples(self, points, order: int) -> tuple[np.ndarray, ...]:
@@ -104,8 +108,8 @@ class UniformField(AppliedField):
 class Dipoles(AppliedField):
     """Point dipoles in vacuum, B = mu_0/(4 pi) sum (3 (m . r) r / |r|^5 - m / |r|^3).
 
-    A sphere magnetised uniformly is exactly one of them, seen from outside; other magnets are, from afar. The
-    field is NaN on a dipole itself.
+    Outside a uniformly magnetised sphere its field is exactly that of a dipole; that of other magnets tends to it at large
+    distances. The field is NaN on a dipole itself.
 
     Args:
         positions: (n, 3) [m]
@@ -124,7 +128,7 @@ class Dipoles(AppliedField):
         self._core = core.Dipoles(**self._made_from)
 
     def replaced(self, **values: Any) -> Dipoles:
-        """As many dipoles with other positions or moments."""
+        """Return as many dipoles with other positions or moments."""
         changed = Dipoles(**{"positions": self.positions, "moments": self.moments, **values})
         if len(changed.positions) != len(self.positions):
             raise ValueError(f"there must be {len(self.positions)} dipoles, got {len(changed.positions)}")
@@ -140,10 +144,10 @@ class SampledField(AppliedField):
 
     The interpolant is twice continuously differentiable and reproduces cubics up to the border. Its error
     falls with the fourth power of the spacing, that of its gradient with the third. Outside the grid the
-    field is NaN, and a solve that gets there fails.
+    field is NaN, and a solve in which a body leaves the grid fails.
 
-    Along an axis with one sample the field does not change: (nx, 1, nz, 3) is a field in a plane, and that
-    axis' entries in origin and spacing do not matter. Two samples are joined by a straight line, three by a
+    Along an axis with one sample the field is constant: (nx, 1, nz, 3) is a field in a plane, and that
+    axis' entries in origin and spacing have no effect. Two samples are interpolated linearly, three by a
     parabola.
 
     Args:
@@ -157,7 +161,7 @@ class SampledField(AppliedField):
 
     _core: core.SampledField
     _replaceable = ("flux_density",)
-    table_error: float | None = None  # T, of `from_table`
+    table_error: float | None = None  # [T] rms error of the interpolation by `from_table`
 
     def __init__(self, origin: Numbers, spacing: Numbers, flux_density: Numbers) -> None:
         self.origin: np.ndarray = quantity("origin", "m", origin, (3,))
@@ -183,10 +187,10 @@ class SampledField(AppliedField):
         upper: Numbers,
         counts: Sequence[int],
     ) -> SampledField:
-        """Samples a function of points (n, 3) [m] that returns B (n, 3) [T]: a slow field is worth it.
+        """Sample a function of points (n, 3) [m] that returns B (n, 3) [T]; this pays off for slow functions.
 
         `counts` (3,) samples lie along the axes between the corners lower and upper (3,) [m], both
-        included; a single one lies in the middle.
+        included; a single sample lies in the middle.
         """
         lower = quantity("lower", "m", lower, (3,))
         upper = quantity("upper", "m", upper, (3,))
@@ -214,21 +218,21 @@ class SampledField(AppliedField):
         lower: Numbers | None = None,
         upper: Numbers | None = None,
     ) -> SampledField:
-        """The field in a text file of points and B there: a CSV with names, or an export of COMSOL.
+        """Read the field from a text file of points and B there: a CSV with names, or an export of COMSOL.
 
-        Columns are parted by commas, semicolons or spaces. Their names are in the first line, or in the last one that begins
-        with % or #: x, y, z, Bx, By, Bz, also as `mf.Bx` or `B_x`, with units in brackets, "x [mm]", "Bx (T)".
-        COMSOL's "Length unit" counts.
+        Columns are separated by commas, semicolons or spaces. Their names are in the first line, or in the last one that
+        begins with % or #: x, y, z, Bx, By, Bz, also as `mf.Bx` or `B_x`, with units in brackets, "x [mm]", "Bx (T)".
+        COMSOL's "Length unit" is read, too.
 
-        length_unit: "m", "cm", "mm", "um", where the file does not say. flux_density_unit: "T", "mT", "uT", "G", likewise.
-        columns: the six columns by name, or by number from 0, where they are called otherwise.
-        counts: three integers, of a grid to be made where the points are not a regular one: its values are interpolated by
-            cubic functions of the distance to the 40 nearest points. `table_error` then has the rms error in T of every
-            tenth point, guessed from the others.
-        lower, upper: (3,) m, corners of that grid, by default of all points; it must lie within them.
+        length_unit: "m", "cm", "mm", "um", if the file has no unit. flux_density_unit: "T", "mT", "uT", "G", likewise.
+        columns: the six columns by name, or by number from 0, if they have other names.
+        counts: three integers, the samples of a new grid if the points do not lie on a regular one. Its values are
+            interpolated by cubic functions of the distance to the 40 nearest points. `table_error` is then the rms error
+            [T] at every tenth point, interpolated from the others.
+        lower, upper: (3,) m, corners of that grid, by default of all points; it must lie within the points.
 
-        The points of a regular grid, in any order, are taken as they are. Raises ValueError on a file that is something
-        else, units that are not said, and points that do not lie on a grid; OSError where it cannot be read.
+        Points on a regular grid, in any order, are used without interpolation. Raises ValueError for another kind of
+        file, missing units, and points that do not lie on a grid; OSError if the file cannot be read.
 
         >>> import tempfile, pathlib
         >>> rows = ["x [mm], y [mm], z [mm], Bx [mT], By [mT], Bz [mT]"]
@@ -258,13 +262,13 @@ class SampledField(AppliedField):
         return variant(field, table_error=grid.error)
 
     def replaced(self, *, flux_density: Numbers) -> SampledField:
-        """Other values on the same grid."""
+        """Return a field with other values on the same grid."""
         return SampledField(
             self.origin, self.spacing, quantity("flux_density", "T", flux_density, (*self.counts, 3))
         )
 
     def contains(self, points: Numbers) -> np.ndarray:
-        """Whether points [m], (..., 3), lie in the grid: bool, (...)."""
+        """Return whether points [m], (..., 3), lie in the grid, (...) bool."""
         points = quantity("points", "m", points, ("...", 3))
         return np.asarray(self._core.contains(points), dtype=np.bool_).reshape(points.shape[:-1])
 
@@ -280,7 +284,7 @@ class SampledField(AppliedField):
 
 
 def _checked_counts(counts, lower: np.ndarray, upper: np.ndarray) -> list[int]:
-    """Three, of samples between two corners."""
+    """Return three checked numbers of samples between two corners. Raises ValueError."""
     array = array_of("counts", counts, "be three integers")
     if array.shape != (3,) or array.dtype.kind not in "iu" or array.min() < 1:
         raise ValueError(f"counts must be three integers of at least 1, got {array.tolist()}")

@@ -1,4 +1,7 @@
-"""Whether bodies have come into magnets, which nothing keeps them from."""
+"""Detects vertices inside permanent magnets.
+
+A magnet has a field but no surface, so nothing stops a body from entering it.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +11,16 @@ import numpy as np
 
 from .field import AppliedField
 
-_MOST_NAMED = 4
+_MOST_NAMED = 4  # largest number of vertices in the message
 
 
-def told_inside(fields: Iterable[AppliedField], positions: np.ndarray, edge_lengths: np.ndarray) -> str:
-    """A sentence on the vertices (n_v, 3) m that are in a magnet, or as near to it as half a mean edge; or nothing."""
+def describe_magnet_overlap(
+    fields: Iterable[AppliedField], positions: np.ndarray, edge_lengths: np.ndarray
+) -> str:
+    """Return a sentence for an error message that names the vertices inside a magnet, or within half a mean edge of it.
+
+    positions: (n_v, 3) m. Returns "" if there are none.
+    """
     near = 0.5 * float(np.mean(edge_lengths)) if len(edge_lengths) else 0.0
     around = np.concatenate([np.zeros((1, 3)), near * np.eye(3), -near * np.eye(3)])
     points = (positions[:, None] + around).reshape(-1, 3)
@@ -25,6 +33,7 @@ def told_inside(fields: Iterable[AppliedField], positions: np.ndarray, edge_leng
     where = "are inside of a magnet" if found[:, 0].any() else f"are within {near:.2g} m of a magnet"
     named = ", ".join(map(str, vertices[:_MOST_NAMED])) + (", ..." if len(vertices) > _MOST_NAMED else "")
     return (
-        f"{len(vertices)} of {len(positions)} vertices ({named}) {where} or about to be, where its field is another one and "
-        "nothing stops them: give the magnet's shape to a Contact as an obstacle, or keep it farther away."
+        f"{len(vertices)} of {len(positions)} vertices ({named}) {where} or about to enter it. The field has another "
+        "formula there, and a magnet alone does not stop a body: add a Contact with an obstacle of its shape, or keep the "
+        "magnet farther away."
     )

@@ -1,4 +1,4 @@
-"""Permanent magnets of simple shapes as field sources: closed forms, as magpylib has them, with gradients."""
+"""Permanent magnets of simple shapes as field sources, by closed forms as in magpylib, with gradients."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 
 class Magnet(AppliedField):
-    """A uniformly magnetised body; make one of its subclasses.
+    """A uniformly magnetised body; the base class of magnets.
 
     A point x of the world is y = R^T (x - center) in the magnet's own frame, R = exp(rotation). The remanent
-    magnetization M_r [A/m] is given in that frame and turns with the magnet; `residual_to_remanent` makes it of the
-    residual flux density [T] of a data sheet. The magnet is ideally hard: nothing changes M_r.
+    magnetization M_r [A/m] is given in that frame and rotates with the magnet; `residual_to_remanent` computes it from the
+    residual flux density [T] of a data sheet. The magnet is ideally hard: no field changes M_r.
 
-    B = mu_0 (H + M_r) inside, mu_0 H outside; on a face the value just outside, on an edge NaN. Across a face B
-    jumps, so no sheet should reach through one: a Contact with an obstacle of the same shape keeps it out.
+    B = mu_0 (H + M_r) inside, mu_0 H outside; on a face it has the value just outside, on an edge NaN. Across a face B
+    jumps, so no sheet should pass through one: a Contact with an obstacle of the same shape keeps it out.
     """
 
     _in_time = ("remanent_magnetization", "center", "rotation")
@@ -39,7 +39,7 @@ class Magnet(AppliedField):
         self._core = getattr(core, type(self).__name__)(**self._made_from)
 
     def replaced(self, **values: Any) -> Magnet:
-        """A magnet of the same shape with other sizes, magnetization, center or rotation."""
+        """Return a magnet of the same shape with other sizes, magnetization, center or rotation."""
         if unknown := sorted(set(values) - set(self._replaceable)):
             raise ValueError(
                 f"{type(self).__name__} has no value {unknown[0]!r} to be replaced: it has "
@@ -67,10 +67,10 @@ class Magnet(AppliedField):
 class CuboidMagnet(Magnet):
     """A cuboid, magnetised uniformly in any direction.
 
-    The closed form (charges on six faces: arctangents and logarithms at eight corners, e.g. Engel-Herbert and
-    Hesjedal 2005) with its first two derivatives, in a form that holds on the lines and planes that prolong edges
-    and faces. Where it would lose digits, from some 12 half diagonals of a cube on (from 4 to 6 of a rod or a plate),
-    charges at Gauss points in the body take over.
+    The field and its first two derivatives are computed by a closed form (charges on six faces: arctangents and logarithms
+    at eight corners, e.g. Engel-Herbert and Hesjedal 2005), written so that it holds on the lines and planes that continue
+    edges and faces. Farther than about 12 half diagonals of a cube (4 to 6 of a rod or a plate), where the closed form
+    would lose digits, charges at Gauss points in the body are used instead.
 
     Args:
         dimensions: (3,) m, the lengths of its edges along the axes of its own frame.
@@ -107,10 +107,11 @@ class CuboidMagnet(Magnet):
 class CylinderMagnet(Magnet):
     """A cylinder, magnetised uniformly in any direction: along its axis, across it, or between.
 
-    Exact to round-off: the charge on its shell, integrated along the axis in closed form and around it by the
-    trapezoidal rule in Jacobi's parameter of the complete elliptic integrals that the closed forms (Derby and Olbert
-    2010, Caciagli et al. 2018) are made of. That converges exponentially, with 12 points at least and 100 a millionth
-    of the radius from an edge, and has all derivatives. From afar charges in the body take over, as for the cuboid.
+    The field is exact to round-off. The charge on its surface is integrated along the axis in closed form, and around it
+    by the trapezoidal rule in Jacobi's parameter of the complete elliptic integrals in the closed forms (Derby and Olbert
+    2010, Caciagli et al. 2018). The rule converges exponentially, with 12 points at least and 100 at a millionth of the
+    radius from an edge, and all derivatives are available. At large distances charges in the body are used, as for the
+    cuboid.
 
     Args:
         radius: m.

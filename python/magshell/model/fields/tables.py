@@ -1,4 +1,4 @@
-"""Checks tables of a field, and puts what is scattered on a grid."""
+"""Reads tables of a field, and interpolates scattered points on a regular grid."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _LENGTH_UNIT = re.compile(r"length unit\W+(\w+)", re.IGNORECASE)
 
 
 class Table(NamedTuple):
-    """points: (n, 3) m; flux_density: (n, 3) T."""
+    """The points of a table, (n, 3) m, and the flux density there, (n, 3) T."""
 
     points: np.ndarray
     flux_density: np.ndarray
@@ -31,7 +31,7 @@ class Table(NamedTuple):
 def read_table(
     path: FilePath, length_unit: str | None, flux_density_unit: str | None, columns: Sequence[str | int]
 ) -> Table:
-    """The columns x, y, z, Bx, By, Bz of a text file. Raises ValueError as SampledField.from_table says."""
+    """Read the columns x, y, z, Bx, By, Bz of a text file. Raises ValueError as SampledField.from_table does."""
     path = Path(path)
     lines = path.read_text(encoding="utf-8", errors="replace").lstrip("\ufeff").splitlines()
     lines = [(k, line.strip()) for k, line in enumerate(lines, start=1) if line.strip()]
@@ -46,7 +46,7 @@ def read_table(
     numbers = _numbers(path, rows)
     names, units = _headings(heading)
     if len(names) != numbers.shape[1]:
-        names, units = [], []  # a remark, or names with spaces
+        names, units = [], []  # the line is a remark, or has names with spaces
     chosen = _chosen(path, names, numbers.shape[1], columns)
     own = [units[k] if units else "" for k in chosen]
     lengths = [each or (said[1] if said else "") for each in own[:3]]
@@ -76,7 +76,7 @@ def _is_numbers(line: str) -> bool:
 
 
 def _numbers(path: Path, rows: list[tuple[int, str]]) -> np.ndarray:
-    """(n, columns)."""
+    """Return the numbers of all rows, (n, columns). Raises ValueError for a row that has others."""
     found, width = [], None
     for number, line in rows:
         try:
@@ -93,7 +93,7 @@ def _numbers(path: Path, rows: list[tuple[int, str]]) -> np.ndarray:
 
 
 def _headings(line: str) -> tuple[list[str], list[str]]:
-    """Names and units, the latter empty where there is none."""
+    """Return the names and the units of the columns; a unit is empty if there is none."""
     separator = next((each for each in ";,\t" if each in line), None)
     parts = line.split(separator) if separator else _HEADING.findall(line)
     if separator:
@@ -105,7 +105,7 @@ def _headings(line: str) -> tuple[list[str], list[str]]:
 
 
 def _chosen(path: Path, names: list[str], width: int, columns) -> list[int]:
-    """The numbers of the six columns."""
+    """Return the numbers of the six columns. Raises ValueError if the names do not determine them."""
     if columns is None:
         if not names:
             if width == len(_NAMES):
@@ -141,7 +141,10 @@ def _chosen(path: Path, names: list[str], width: int, columns) -> list[int]:
 
 
 def _scales(path: Path, argument: str, given, own: list[str], known: dict[str, float]) -> list[float]:
-    """One for each of three columns. What is given counts where the file says nothing, and must agree where it does."""
+    """Return the factors to SI units of three columns.
+
+    The argument `given` is the unit where the file has none; it must agree with those of the file. Raises ValueError.
+    """
     allowed = ", ".join(each for each in known if each.isascii())
     if given is not None and given not in known:
         raise ValueError(f"{argument} must be one of {allowed}, got {given!r}")
@@ -157,13 +160,15 @@ def _scales(path: Path, argument: str, given, own: list[str], known: dict[str, f
     return scales
 
 
-_SAME = 1e-6  # of the extent along an axis: as many digits as tables have
-_NEIGHBORS = 40  # that a value between scattered points is made from
-_HELD_BACK = 10  # every so many-th point tells the error
+_SAME = 1e-6  # [-] of the extent along an axis: the precision of coordinates in tables
+_NEIGHBORS = 40  # number of nearest points in the interpolation of scattered ones
+_HELD_BACK = 10  # every tenth point is left out and interpolated to estimate the error
 
 
 class Grid(NamedTuple):
-    """origin, spacing (3,) m; values (nx, ny, nz, 3); error: rms, where values are not those of the points."""
+    """A regular grid: origin and spacing, (3,) m; values (nx, ny, nz, 3) T; error: rms [T] if the values are
+    interpolated.
+    """
 
     origin: np.ndarray
     spacing: np.ndarray
@@ -172,13 +177,13 @@ class Grid(NamedTuple):
 
 
 def as_they_lie(points: np.ndarray, values: np.ndarray) -> Grid | None:
-    """Where the points are a regular grid in any order; None where they are not."""
+    """Return the grid if the points are a regular one in any order, else None."""
     extent = np.ptp(points, axis=0)
     lower = points.min(axis=0)
     numbers, counts, spacing = [], [], []
     for axis in range(3):
-        places = np.unique(np.rint((points[:, axis] - lower[axis]) / max(_SAME * extent[axis], 1e-300)))
-        count = len(places)
+        steps = np.rint((points[:, axis] - lower[axis]) / max(_SAME * extent[axis], 1e-300))
+        count = len(np.unique(steps))
         step = extent[axis] / max(count - 1, 1)
         number = np.rint((points[:, axis] - lower[axis]) / step) if count > 1 else np.zeros(len(points))
         off = np.abs(points[:, axis] - lower[axis] - number * step).max()
@@ -200,9 +205,10 @@ def as_they_lie(points: np.ndarray, values: np.ndarray) -> Grid | None:
 def interpolated(
     points: np.ndarray, values: np.ndarray, lower: Numbers, upper: Numbers, counts: Sequence[int]
 ) -> Grid:
-    """On a grid of `counts` between two corners, by cubic functions of the distance to the nearest points.
+    """Interpolate values on a grid of `counts` points between two corners, by cubic functions of the distance to near
+    points.
 
-    Raises ValueError where points lie on each other, or where the grid goes beyond them.
+    Raises ValueError if two points are the same, or if the grid extends beyond the points.
     """
     extent = np.ptp(points, axis=0)
     axes = np.flatnonzero(extent > _SAME * extent.max(initial=0.0))
@@ -244,7 +250,7 @@ def _refuse_beyond(points: np.ndarray, wanted: np.ndarray, grid: np.ndarray, axe
     else:
         outside = scipy.spatial.Delaunay(points).find_simplex(wanted, tol=_SAME) < 0
     if outside.any():
-        place = ", ".join(f"{value:.4g}" for value in grid[int(np.argmax(outside))])
+        point = ", ".join(f"{value:.4g}" for value in grid[int(np.argmax(outside))])
         raise ValueError(
-            f"the grid's point ({place}) m lies outside the points of the table: give `lower` and `upper` [m] within them"
+            f"the grid's point ({point}) m lies outside the points of the table: give `lower` and `upper` [m] within them"
         )

@@ -22,8 +22,7 @@ class FaceEnergy(Owner):
     """An energy that the core sums over faces. It is a load, so the load factor scales it.
 
     A subclass names its values in `_replaceable`, their units in `_units`, and the core's energy in `_energy`; the
-    core's
-    kernel has the same names. Each value is one number for all faces, or one per face.
+    core's kernel has the same names. Each value is one number for all faces, or one per face.
     faces: those with the energy; by default all of the body.
     body: the Shell or Solid that it acts on, in a scene of several.
     """

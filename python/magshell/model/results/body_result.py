@@ -1,4 +1,4 @@
-"""What a result says of one body of its scene."""
+"""Results of one body of a scene."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 
 class BodyResult(Frozen):
-    """One body of a result: its share of each array, of a tensor in its graph, with the body's own numbers.
+    """The part of a result that belongs to one body, with the body's own numbers of vertices and edges; tensors stay in
+    their graph.
 
     body: Shell, as it is in the scene. mesh: its own.
     """
@@ -30,45 +31,48 @@ class BodyResult(Frozen):
 
     @property
     def mesh(self) -> TriangleMesh:
-        """Of the body."""
+        """The mesh of the body."""
         return self.body.mesh
 
     @property
     def positions(self) -> Computed:
-        """(..., n_v, 3) m."""
+        """The positions of the vertices, (..., n_v, 3) m."""
         return self._result.positions[..., self._span.vertices, :]
 
     @property
     def displacements(self) -> Computed:
-        """(..., n_v, 3) m, from the rest shape."""
+        """The displacements from the rest shape, (..., n_v, 3) m."""
         return self._result.displacements[..., self._span.vertices, :]
 
     @property
     def edge_rotations(self) -> Computed:
-        """(..., n_e) rad, zero where an edge has none; of a QuadraticTriangleMesh (..., 2 n_e), two an edge,
-        at its Gauss points from
-        the lower to the higher corner."""
+        """The rotations of the edges, (..., n_e) rad, zero for edges that have none.
+
+        Of a QuadraticTriangleMesh (..., 2 n_e): two per edge, at its Gauss points from the lower to the higher corner.
+        """
         return self._result.edge_rotations[..., self._span.rotations]
 
     @property
     def velocities(self) -> Computed:
-        """(n, n_v, 3) m/s, of a motion."""
+        """The velocities of the vertices in a motion, (n, n_v, 3) m/s."""
         return self._result.velocities[..., self._span.vertices, :]
 
     def strains(self, index: int = -1) -> Strains:
-        """The principal strains of its faces (of a QuadraticTriangleMesh at the middles of its flat faces,
-        four an element), as
-        `strains` of the result has them for all sheets; of a motion or a path in a recorded state, by default the last."""
+        """Return the principal strains of its faces, as `strains` of the result does for all sheets.
+
+        Of a QuadraticTriangleMesh they are at the midpoints of its flat faces, four per element. index: a recorded
+        state of a motion or a path, by default the last.
+        """
         arguments = () if np.ndim(self._result.positions) == 2 else (index,)
         rows = slice(self._first_row, self._first_row + self.mesh.n_faces)
         return Strains(*(each[rows] for each in self._result.strains(*arguments)))
 
     def stresses(self, index: int = -1) -> ShellStresses:
-        """Membrane force and bending moment of its faces (of a QuadraticTriangleMesh at the middles of its
-        flat faces) with the strain
-        and curvature that make them, stress at the surfaces, von Mises stress, with the values that the result was found
-        with; of a motion or a path in a recorded state, by default the last. Of a solid, `stresses` has the same names where
-        they mean the same.
+        """Return membrane forces and bending moments of its faces with their strains and curvatures, and the stresses at the
+        surfaces, for the values of the solve.
+
+        Of a QuadraticTriangleMesh they are at the midpoints of its flat faces. index: a recorded state of a motion or a
+        path, by default the last. `stresses` of a solid uses the same names for the same quantities.
 
         >>> import magshell as ms
         >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -82,7 +86,9 @@ class BodyResult(Frozen):
 
     @property
     def remanent_magnetization(self) -> Computed:
-        """(n_f, 3), of a QuadraticTriangleMesh one an element, or (3,) A/m, or None."""
+        """The magnetization of its faces, (n_f, 3), or (3,) A/m, or None; of a QuadraticTriangleMesh one row per
+        element.
+        """
         given = self._result.remanent_magnetization
         return given if np.ndim(given) < 2 else given[self._span.rows]
 

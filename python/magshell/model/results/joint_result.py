@@ -1,4 +1,4 @@
-"""What a result says of one joint of a skeleton."""
+"""Results of one joint of a skeleton."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
 
 class JointResult(Frozen):
-    """A joint of a result. Of tensors in their graph, tensors."""
+    """The coordinate, the rate and the motor of a joint in a result. If the result has tensors, these are tensors in
+    the same graph.
+    """
 
     joint: Joint
 
@@ -29,39 +31,41 @@ class JointResult(Frozen):
 
     @property
     def angle(self) -> Computed:
-        """(...) rad, of a Revolute, with its full turns over a motion; of a Ball, that of its rotation."""
+        """The angle of a Revolute, with full turns over a motion, or that of the rotation of a Ball, (...) rad."""
         kind = self.joint._kind
         if kind not in ("revolute", "ball"):
             raise ValueError(f"a {type(self.joint).__name__} has no angle")
-        turn = self._relative
-        xp = np if isinstance(turn, np.ndarray) else __import__("torch")
+        rotation = self._relative
+        xp = np if isinstance(rotation, np.ndarray) else __import__("torch")
         if kind == "ball":
-            trace = turn[..., 0, 0] + turn[..., 1, 1] + turn[..., 2, 2]
+            trace = rotation[..., 0, 0] + rotation[..., 1, 1] + rotation[..., 2, 2]
             return 2.0 * xp.arcsin(xp.sqrt(xp.clip(0.25 * (3.0 - trace), 0.0, 1.0)))
-        axis = _like(self._axis, turn)
+        axis = _like(self._axis, rotation)
         # R = cos I + sin [a] + (1 - cos) a a^T
         twice_sine = sum(
-            axis[..., k] * (turn[..., (k + 2) % 3, (k + 1) % 3] - turn[..., (k + 1) % 3, (k + 2) % 3])
+            axis[..., k] * (rotation[..., (k + 2) % 3, (k + 1) % 3] - rotation[..., (k + 1) % 3, (k + 2) % 3])
             for k in range(3)
         )
-        trace = turn[..., 0, 0] + turn[..., 1, 1] + turn[..., 2, 2]
+        trace = rotation[..., 0, 0] + rotation[..., 1, 1] + rotation[..., 2, 2]
         angle = xp.arctan2(twice_sine, trace - 1.0)
         return _unwrapped(angle)
 
     @property
     def displacement(self) -> Computed:
-        """(...) m, of a Prismatic."""
+        """The displacement of a Prismatic, (...) m."""
         if self.joint._kind != "prismatic":
             raise ValueError(f"a {type(self.joint).__name__} has no displacement")
         along = _like(self._axis, self._child.center)
         if self._parent is not None:
-            along = _turned(self._parent.rotation, along)
-        return (along * (self.place - self._place_of(self._parent))).sum(-1)
+            along = _rotated(self._parent.rotation, along)
+        return (along * (self.place - self._position_on(self._parent))).sum(-1)
 
     @property
     def rate(self) -> Computed:
-        """(n,) rad/s of a Revolute, m/s of a Prismatic: how fast its coordinate changes, in a motion. Of a Ball (n, 3)
-        rad/s, how its child turns to its parent, axes of the world."""
+        """The rate of its coordinate in a motion: (n,) rad/s of a Revolute, m/s of a Prismatic.
+
+        Of a Ball it is the angular velocity of the child relative to the parent, in the world's axes, (n, 3) rad/s.
+        """
         kind = self.joint._kind
         if kind not in ("revolute", "prismatic", "ball"):
             raise ValueError(f"a {type(self.joint).__name__} has no rate")
@@ -71,24 +75,27 @@ class JointResult(Frozen):
         axis, spin = _like(self._axis, self._child.center), 0.0
         velocity = self._velocity_of(self._child) - self._velocity_of(self._parent)
         if self._parent is not None:
-            axis, spin = _turned(self._parent.rotation, axis), self._parent.angular_velocity
+            axis, spin = _rotated(self._parent.rotation, axis), self._parent.angular_velocity
         if kind == "revolute":
             return (axis * (self._child.angular_velocity - spin)).sum(-1)
-        slid = self.place - self._place_of(self._parent)
+        slid = self.place - self._position_on(self._parent)
         turned = 0.0 if self._parent is None else (_cross(spin, axis) * slid).sum(-1)
         return (axis * velocity).sum(-1) + turned
 
     @property
     def motor_torque(self) -> Computed:
-        """(...) N m, with which the motor of a Revolute turns its child about the axis, against its parent; (..., 3) of a
-        Ball, axes of the world. In a motion NaN in the state that it starts from."""
+        """The motor torque of a Revolute on its child about the axis, (...) N m; of a Ball (..., 3), in the world's
+        axes.
+
+        The parent has the opposite torque. It is NaN in the state that a motion starts from.
+        """
         if self.joint._kind == "ball":
             return self._motor("ball", "motor_rotation")
         return self._motor("revolute", "motor_angle")
 
     @property
     def motor_force(self) -> Computed:
-        """(...) N, likewise of a Prismatic, along the axis."""
+        """The motor force of a Prismatic on its child along the axis, (...) N, like `motor_torque`."""
         return self._motor("prismatic", "motor_displacement")
 
     def _motor(self, kind: str, value: str):
@@ -97,20 +104,28 @@ class JointResult(Frozen):
         return self._result._driving[..., motor_rows(self._result.scene._bodies.skeletons, self.joint)]
 
     @property
-    def place(self) -> Computed:
-        """(..., 3) m, of the joint as the scene has it, on its child: that point where a solve has another origin."""
-        return self._place_of(self._child)
+    def place(self) -> Computed:  # plain-words: ok
+        """The position of the joint's origin on its child, (..., 3) m.
+
+        It is the origin in the scene; in a solve with another origin it is still this material point.
+        """
+        return self._position_on(self._child)
 
     @property
     def gap(self) -> Computed:
-        """(...) m, between its place on the child and on the parent: what is left of a Closure, and round-off of others but
-        a Prismatic, whose displacement it is. Where a solve has another origin, that of the place as the scene has it."""
-        return ((self.place - self._place_of(self._parent)) ** 2).sum(-1) ** 0.5
+        """The distance of the joint's origin on the child from that on the parent, (...) m.
+
+        It is the remaining gap of a LoopClosure, the displacement of a Prismatic, and round-off of other joints. The
+        origin is that in the scene, also in a solve with another origin.
+        """
+        return ((self.place - self._position_on(self._parent)) ** 2).sum(-1) ** 0.5
 
     @property
     def _axis(self) -> np.ndarray:
-        """(3,), or (n, 3) of states that have their own, as solves may give it others. What is read off with it feels it
-        only by where the links are: it needs no gradient of its own."""
+        """The axis of the joint at rest, (3,), or (n, 3) if the states of the result have different ones.
+
+        Results depend on it through the positions of the links only, so it needs no gradient of its own.
+        """
         result = self._result
         if np.ndim(result.positions) == 2 or hasattr(result, "_values"):
             return result._values_at(0).current(self.joint).axis
@@ -124,9 +139,9 @@ class JointResult(Frozen):
     def _velocity_of(self, link: RigidBodyResult | None):
         if link is None:
             return 0.0
-        return link.velocity + _cross(link.angular_velocity, self._place_of(link) - link.center)
+        return link.velocity + _cross(link.angular_velocity, self._position_on(link) - link.center)
 
-    def _place_of(self, link: RigidBodyResult | None):
+    def _position_on(self, link: RigidBodyResult | None):
         if link is None:
             return _like(self.joint.origin, self._child.center)
         middle = link._points.center
@@ -136,9 +151,9 @@ class JointResult(Frozen):
         return f"{type(self._result).__name__} of {self.joint!r}"
 
 
-def _turned(turns, vectors):
-    """(..., 3), by matrices (..., 3, 3)."""
-    return (turns * vectors[..., None, :]).sum(-1)
+def _rotated(rotations, vectors):
+    """Return vectors (..., 3) rotated by matrices (..., 3, 3)."""
+    return (rotations * vectors[..., None, :]).sum(-1)
 
 
 def _like(array: np.ndarray, other):
@@ -146,7 +161,7 @@ def _like(array: np.ndarray, other):
 
 
 def _unwrapped(angle):
-    """Over the first axis, where there is one."""
+    """Return angles unwrapped over the first axis, if there is one."""
     if angle.ndim == 0:
         return angle
     numbers = angle if isinstance(angle, np.ndarray) else angle.detach().numpy()

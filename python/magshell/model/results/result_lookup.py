@@ -1,4 +1,4 @@
-"""What a result says of one body, whatever it is."""
+"""Finds the result of one body, joint or actuator of a scene."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def result_of(
     result: SolveResult, body: Shell | Solid | RigidBody | Joint | Muscle
 ) -> BodyResult | SolidResult | RigidBodyResult | JointResult | MuscleResult:
-    """`result[body]`, `result[joint]` or `result[actuator]`. Raises ValueError where the scene has no such one."""
+    """Return `result[body]`, `result[joint]` or `result[actuator]`. Raises ValueError if it is not in the scene."""
     if hasattr(body, "_result_in"):  # an actuator
         return body._result_in(result)
     if isinstance(body, Joint):
@@ -33,20 +33,22 @@ def result_of(
 
 
 class OfOneBody:
-    """A result that says of the one body of its scene what `result[body]` does."""
+    """A mixin for results of scenes with one body, which gives them the methods of `result[body]`."""
 
     scene: Any
 
     def stresses(self, index: int = -1) -> Any:
-        """Returns the stresses of the scene's one body, as result[body].stresses(); of a motion or a path in a recorded
-        state, of several equilibria in one of them, by default the last. Raises ValueError where there are several bodies.
+        """Return the stresses of the scene's only body, as result[body].stresses(). Raises ValueError if there are
+        several bodies.
+
+        index: a recorded state of a motion or a path, or one of several equilibria, by default the last.
 
         >>> import magshell as ms
         >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
         >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0)
         >>> ends = [ms.Pin(mesh.vertices_at(x=0.0)), ms.Pin(mesh.vertices_at(x=0.1), displacement=(0.001, 0, 0))]
-        >>> rest = ms.equilibrium(ms.Scene(sheet, supports=ends))
-        >>> abs(rest.stresses().principal_membrane_forces[0]).round(3)
+        >>> shape = ms.equilibrium(ms.Scene(sheet, supports=ends))
+        >>> abs(shape.stresses().principal_membrane_forces[0]).round(3)
         array([10.05,  0.  ])
         """
         bodies = self.scene.bodies
@@ -55,6 +57,6 @@ class OfOneBody:
         return result_of(self, bodies[0]).stresses(index)
 
     def _one_solid(self) -> SolidResult | None:
-        """What `strains` asks where there are no sheets but one solid."""
+        """Return the result of the only solid, which `strains` needs if the scene has no sheets; else None."""
         bodies = self.scene.bodies
         return SolidResult(self, bodies[0]) if len(bodies) == 1 and isinstance(bodies[0], Solid) else None

@@ -1,4 +1,4 @@
-"""What a result says of one solid of its scene: strain and stress of its tetrahedra too."""
+"""Results of one solid of a scene, with strains and stresses of its tetrahedra."""
 
 from __future__ import annotations
 
@@ -14,16 +14,18 @@ from .body_result import BodyResult
 if TYPE_CHECKING:
     from ..._input.kinds import SolveResult
 
-# Tetrahedra that are looked at unasked, when a result is printed: some 30 ms.
+# Largest number of tetrahedra whose stresses are computed when a result is printed; that takes about 30 ms.
 AFFORDABLE_TETRAHEDRA = 20_000
 
 
 class SolidResult(BodyResult):
-    """A solid of a result: as of any body, and what its tetrahedra go through."""
+    """The part of a result that belongs to one solid, with strains and stresses of its tetrahedra."""
 
     def strains(self, index: int = -1) -> SolidStates:
-        """Deformation, Green strain, J, Cauchy and von Mises stress of every tetrahedron, with the material values that
-        the result was found with; of a motion or a path in a recorded state, by default the last.
+        """Return the deformation, Green strain, J, Cauchy and von Mises stress of every tetrahedron, for the values of
+        the solve.
+
+        index: a recorded state of a motion or a path, by default the last.
 
         >>> import magshell as ms
         >>> mesh = ms.meshes.box((0.1, 0.02, 0.02), cells=(5, 1, 1))
@@ -40,13 +42,15 @@ class SolidResult(BodyResult):
         return SolidStates(*found[:3], muscles=muscles_of(self._result, self.body, index))
 
     def stresses(self, index: int = -1) -> SolidStates:
-        """As `strains`, which has both: `green_strains`, `cauchy_stresses`, `von_mises_stresses` and `mean` are those of
-        a shell's `stresses` too."""
+        """Return the same as `strains`, which has both.
+
+        `green_strains`, `cauchy_stresses`, `von_mises_stresses` and `mean` have the same names in a shell's `stresses`.
+        """
         return self.strains(index)
 
 
-def told_strains(result: SolveResult, of_sheets: str) -> str:
-    """For a repr, one line for all sheets and one a solid, of the last state. of_sheets: what is said of the sheets."""
+def describe_strains(result: SolveResult, of_sheets: str) -> str:
+    """Return lines of a repr on the last state: one for all sheets and one per solid. of_sheets: the line for the sheets."""
     bodies = result.scene._bodies
     lines = [str(of_sheets)] if bodies.sheets or not bodies.solids else []
     last = "" if np.ndim(result.positions) == 2 else ", in the last state"

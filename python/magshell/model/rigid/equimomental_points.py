@@ -1,10 +1,8 @@
 """Represents a rigid body by ten point masses, so that the core needs no inertia other than that of points.
 
 The points are the four corners and the six edge midpoints of a regular tetrahedron. Ten point masses there have ten
-moments
-(total mass, first moments, second moments), so exactly one choice of masses, some of them possibly negative, reproduces
-a
-given mass, center of mass and inertia tensor.
+moments (total mass, first moments, second moments), so exactly one choice of masses, some of them possibly negative,
+reproduces a given mass, center of mass and inertia tensor.
 """
 
 from __future__ import annotations

@@ -17,8 +17,7 @@ class Link(RigidBody):
     """A rigid body of a skeleton. It may be a point mass, or have no mass, as its joints keep it from spinning.
 
     The arguments are those of `RigidBody`; without vertices it needs its center. Pictures show a link without a `shape`
-    as
-    rods between its joints. Link.of computes mass, inertia and center from a shape.
+    as rods between its joints. Link.of computes mass, inertia and center from a shape.
 
     magnetic_moment, velocity, angular_velocity, body: as in `RigidBody`.
 

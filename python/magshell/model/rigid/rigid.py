@@ -38,8 +38,7 @@ def moments_of(shape: TriangleMesh) -> tuple[float, np.ndarray, np.ndarray]:
     """Return the volume, the center and the second moments about it of the interior of a closed surface.
 
     They are sums over tetrahedra from each face to the mean of the vertices. Raises ValueError if the surface is open,
-    or its
-    faces look inwards.
+    or its faces look inwards.
     """
     faces, points = shape.faces, shape.rest_positions
     edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
@@ -273,8 +272,7 @@ class RigidBodyResult(Frozen):
     """The motion of a rigid body in a result. If the result has tensors, these are tensors in the same graph.
 
     rotation: (..., 3, 3), from the orientation at rest. center: (..., 3) m, of its own mass as the scene has it: this
-    stays the
-        same material point in a solve with another center.
+        stays the same material point in a solve with another center.
     """
 
     body: RigidBody

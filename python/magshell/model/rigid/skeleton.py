@@ -27,14 +27,11 @@ class Skeleton(Frozen):
         LoopClosure objects close loops.
 
     Soft material is attached to a link by vertices, Link(vertices=..., body=solid). Joints hold to round-off, also over
-    many
-    steps. Values of joints are given by the joint, values={hinge: {"torque": ...}}, and may change in time;
+    many steps. Values of joints are given by the joint, values={hinge: {"torque": ...}}, and may change in time;
     `result[hinge].angle` and `result[link]` describe the motion. ms.simulate integrates a skeleton by TRBDF2 or
     ImplicitEuler. There are gradients by all values of joints, also by their origins and axes. In motions of long
-    chains (200
-    links) the angles come from positions far from the origin, and their round-off exceeds the default tolerance of
-    solvers:
-    use ms.MixedNewton(tolerance=1e-8).
+    chains (200 links) the angles come from positions far from the origin, and their round-off exceeds the default
+    tolerance of solvers: use ms.MixedNewton(tolerance=1e-8).
 
     >>> import numpy as np
     >>> import magshell as ms
@@ -82,10 +79,8 @@ class Skeleton(Frozen):
         """Read a skeleton from a URDF file; this needs the extra `urdf`.
 
         Links have masses and inertias and are at rest where all joint coordinates are zero. Revolute, continuous,
-        prismatic and
-        fixed joints are read with axes, limits and damping; a link on a floating joint is free.
-        `skeleton.named["elbow"]` is the
-        link or joint of that name.
+        prismatic and fixed joints are read with axes, limits and damping; a link on a floating joint is free.
+        `skeleton.named["elbow"]` is the link or joint of that name.
 
         fixed_base: the root is fixed to the world; else it is free.
         limit_stiffness, limit_smoothing: of all joints that have limits, in their units (see Revolute, Prismatic);

@@ -106,23 +106,18 @@ class ContactState:
 
     pairs: (k, 4), vertices of the scene. A pair of bodies is a vertex and a face, or two edges. Pairs of three or two
         vertices, padded with -1, are a vertex with an edge or with another vertex; they correct for contacts that
-        several
-        faces would count more than once. A pair with an obstacle is a point of the body: one vertex, or three of a
-        face.
+        several faces would count more than once. A pair with an obstacle is a point of the body: one vertex, or three
+        of a face.
     distances: (k,) m, between the two parts of each pair. normals: (k, 3), from the second part, or the obstacle, to
-    the
-        first.
+        the first.
     normal_forces: (k,) N, repulsive; negative for correction pairs.
     friction_forces: (k, 3) N, on the first part; the second has the opposite. sliding_velocities: (k, 3) m/s, of the
-    first
-        part along the second. Both are zero at rest. With lagged friction these are the forces for the normal forces of
-        this
-        state, not for those of the beginning of the step.
+        first part along the second. Both are zero at rest. With lagged friction these are the forces for the normal
+        forces of this state, not for those of the beginning of the step.
     coefficient: the largest ratio of friction to normal force; zero without friction. sticking_speed: m/s.
     forces: (n_v, 3) N, the contact forces on every vertex of the scene. They include the moments on nearly parallel
-    edges,
-        where the energy of a pair fades out; these have no resultant on an edge. friction: (n_v, 3) N, the friction
-        forces.
+        edges, where the energy of a pair fades out; these have no resultant on an edge. friction: (n_v, 3) N, the
+        friction forces.
     normal_force_magnitudes: (n_v,) N, the normal forces that act on each vertex, added without regard to direction.
     """
 

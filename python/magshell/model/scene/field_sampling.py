@@ -6,11 +6,9 @@ changes, the mean of F at six points (Dunavant, degree 4) shows how far the one 
     error = |sum F(x_b) - sum mean F| / max(|sum mean F|, sum |mean F| / 10, sum |m x B| / extent),
 
 for each body: relative to the resultant force, or to the forces and moments that act where these cancel in it. The
-error
-of one point falls with the square of the edge length, that of six points with its fourth power: for two parallel
-magnets
-10 mm wide and 0.2 mm apart the estimate is 16.4, 5.0, 1.96 and 1.04 % with 16, 32, 48 and 64 cells, the error itself
-15.7, 5.0, 1.97 and 1.04 %.
+error of one point falls with the square of the edge length, that of six points with its fourth power: for two parallel
+magnets 10 mm wide and 0.2 mm apart the estimate is 16.4, 5.0, 1.96 and 1.04 % with 16, 32, 48 and 64 cells, the error
+itself 15.7, 5.0, 1.97 and 1.04 %.
 """
 
 from __future__ import annotations

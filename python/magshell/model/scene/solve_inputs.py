@@ -28,8 +28,7 @@ class Leaf(NamedTuple):
     """An input tensor that requires a gradient.
 
     owner: the object whose value it is; None for an argument of the solve itself. An owner with a method `by_knots`
-    stands
-    for a value over time. refusal: why there is no gradient; NoGradient says so when it is asked for.
+    stands for a value over time. refusal: why there is no gradient; NoGradient says so when it is asked for.
     """
 
     tensor: Any
@@ -50,8 +49,7 @@ class Inputs:
 
     `replaced`: {object of the scene: {name: value}}. `leaves`: the tensors that gradients are computed for; unless
     `differentiable` is true, such tensors are refused. `moving`: the solve is a motion. `without_forces_of_motion`:
-    leave
-    friction and water out, if there are any.
+    leave friction and water out, if there are any.
     """
 
     def __init__(

@@ -2,8 +2,7 @@
 
 Such a face, a cap, of height H stands on an edge of length b. If the sheet bends with curvature k along that edge, the
 cap's tip leaves the edge by k b^2 / 8: the face tilts by p = k b^2 / (8 H) and, as it is flat, stretches by p^2 / 2
-across
-the edge. The sheet itself does not stretch. If that takes more energy than bending does around the cap,
+across the edge. The sheet itself does not stretch. If that takes more energy than bending does around the cap,
 
     L = (A_cap Y h p^4 / 8) / (A Y h^3 k^2 / 24) = 3 (A_cap / A) p^4 / (h k)^2   beyond 1,
 

@@ -20,21 +20,18 @@ class ShellStresses(NamedTuple):
     They are elastic and as in the energies: caps are measured on other triangles, and curvature_scale is included.
 
     membrane_strains: Green's strain E of the middle surface, (n_f, 2, 2). curvatures: K, the change of curvature from
-    the rest
-        shape, (n_f, 2, 2), 1/m, positive where the normals lean together.
+        the rest shape, (n_f, 2, 2), 1/m, positive where the normals lean together.
     membrane_forces: N, (n_f, 2, 2), N/m, for a uniform material Y h/(1 - nu^2) ((1 - nu) E + nu tr E).
     bending_moments: M, (n_f, 2, 2), N, likewise Y h^3/(12 (1 - nu^2)) ((1 - nu) K + nu tr K) times curvature_scale^2.
         All four have their components in `rest_axes`; N and M are conjugate to E and K: the energy of a face changes by
         its
         rest area times N : dE + M : dK. `in_space` returns them in the deformed state.
     rest_axes, axes: (n_f, 2, 3), unit vectors in the face at rest and in this state; the first one at rest along the
-    first
-        edge, the second to its left. With their cross product, the normal, they rotate with the face.
+        first edge, the second to its left. With their cross product, the normal, they rotate with the face.
     thickness: (n_f,), m. areas: at rest, (n_f,), m2.
 
     For a sheet that has grown, the rest state is the stress-free shape of each face by itself; its rest axes are those
-    of the
-    mesh.
+    of the mesh.
 
     Values at the surfaces, (n_f, 2, ...), are first at the top, on the side of the normal, then at the bottom.
     """
@@ -91,8 +88,7 @@ class ShellStresses(NamedTuple):
         """Push membrane forces or moments (n_f, 2, 2) forward to the deformed state, (n_f, 3, 3) in world axes.
 
         They are F T F^T / det F, per deformed length across which they act, with F the membrane stretch and the
-        rotation of the
-        face.
+        rotation of the face.
         """
         stretches = _square_roots(np.eye(2) + 2.0 * self.membrane_strains)
         gradients = np.einsum("fai,fab->fib", self.axes, stretches)

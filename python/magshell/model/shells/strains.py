@@ -24,13 +24,11 @@ _MOST_NAMED = 5  # faces in a warning
 @immutable
 class Strains(NamedTuple):
     """Principal strains of every face, (n_f, 2) each, dimensionless, the larger value first; one shell after another.
-    Solids
-    between them have no rows.
+    Solids between them have no rows.
 
     membrane: of Green's strain of the middle surface, (F^T F - 1)/2: a stretch s gives (s^2 - 1)/2.
     bending: half the thickness times the change of curvature from the rest shape: the strain by bending at the outer
-    fibres,
-        positive where the normals lean together. It does not include curvature_scale.
+        fibres, positive where the normals lean together. It does not include curvature_scale.
 
     The outer fibres have the strains membrane + bending and membrane - bending if both have the same axes.
     """

@@ -28,8 +28,8 @@ class Fibres:
     """Fibres of some of a solid's tetrahedra, found by ms.fibres_along or made by hand.
 
     elements: (k,), the tetrahedra, each once. directions: (k, 3), at rest, of any length except zero. weights: (k,),
-    the
-    density of a muscle's fibres there, 1 by default. coordinates: (k,) m, of each tetrahedron along its fibre, or None.
+    the density of a muscle's fibres there, 1 by default. coordinates: (k,) m, of each tetrahedron along its fibre, or
+    None.
     length: m, of the fibres, by default the range of the coordinates.
 
     >>> import magshell as ms
@@ -95,15 +95,12 @@ def fibres_along(
     """Find fibres along a line through a solid.
 
     Each tetrahedron near the line gets the line's direction at the nearest point, the weight exp(-distance/reach), and
-    its
-    coordinate along the line; the distance is that of its center.
+    its coordinate along the line; the distance is that of its center.
 
     line: (n, 3) m, the corners of a polyline, n > 1. Its direction is interpolated between the midpoints of its pieces,
-    so
-        that fibres have no kinks.
+        so that fibres have no kinks.
     body: Solid or TetMesh. reach: m. elements: the tetrahedra that may get fibres, by default all; those with a weight
-    of
-        0.001 and more do.
+        of 0.001 and more do.
 
     Raises ValueError if no tetrahedron does: the line misses the solid.
 

@@ -5,21 +5,15 @@ meshes let much volume move.
 
 Slender regions with one cell through the thickness, and no vertex inside: bars and plates bend 14 to 18 % too far at a
 Poisson's ratio of 0.45, with two cells, or a vertex in the middle of each, 2 to 5 %, with four below 1 %. Such regions
-are
-connected sets of tetrahedra with all corners on the surface, which have little area in common with the other tetrahedra
-and
-are long or wide relative to their thickness. There are such tetrahedra along the edges of thick bodies too, but these
-have
-much area in common with the others.
+are connected sets of tetrahedra with all corners on the surface, which have little area in common with the other
+tetrahedra and are long or wide relative to their thickness. There are such tetrahedra along the edges of thick bodies
+too, but these have much area in common with the others.
 
 Bodies of isochoric material whose elements' centers lie in one plane, on a line or at one point: of six tetrahedra
-around a
-diagonal, or of one to three. The isochoric energy does not change under conformal maps. To first order these are,
-besides
-rigid motions and growth, u = 2 (b.x) x - |x|^2 b, a quadratic that ten-node elements represent exactly. Its change of
-volume 6 b.x has mean zero in each element if b is perpendicular to all centers, seen from the origin. As many
-directions
-as are perpendicular to all centers cost no energy, whatever the quadrature.
+around a diagonal, or of one to three. The isochoric energy does not change under conformal maps. To first order these
+are, besides rigid motions and growth, u = 2 (b.x) x - |x|^2 b, a quadratic that ten-node elements represent exactly.
+Its change of volume 6 b.x has mean zero in each element if b is perpendicular to all centers, seen from the origin. As
+many directions as are perpendicular to all centers cost no energy, whatever the quadrature.
 """
 
 from __future__ import annotations
@@ -53,8 +47,7 @@ def warn_of_thin_regions(mesh: TetMesh, held: np.ndarray) -> None:
     thickness.
 
     mesh: of a solid whose elements take the mean volume. held: (n_v, 3, 3), projections onto the directions that
-    supports
-    hold.
+    supports hold.
     """
     thin = [each for each in thin_regions(mesh) if not _is_slice(mesh, each, held)]
     if thin:

@@ -30,8 +30,7 @@ class Skin(Owner):
     faces: (k,), of the mesh that the solid is made of; by default all. `solid.skin` has them in the numbers of
         `solid.mesh`, whose quadratic tetrahedra have four flat triangles per face, and rows for each of these.
     mass_density: kg/m3, positive, a number or (k,); times the thickness on each face it adds to the mass of the solid,
-    which
-        needs a density too. By default the layer has no mass.
+        which needs a density too. By default the layer has no mass.
     remanent_magnetization: (3,) or (k, 3) A/m, at rest, in world axes; if it is None, a solve gives it:
         `values={solid.skin: {"remanent_magnetization": ...}}`.
 

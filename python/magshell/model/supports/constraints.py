@@ -191,8 +191,7 @@ def _frame(constraints: list[VertexConstraint]) -> tuple[np.ndarray, int, list[R
     """Return an orthonormal frame (columns) of a vertex, the number of its held directions, and their moves.
 
     The held directions come first. Where a fixed support and a moving one hold the same direction, the move counts.
-    Held world
-    axes stay world axes.
+    Held world axes stay world axes.
     """
     directions = np.concatenate([each.along for each in constraints])
     moving = [each for each in constraints if each.move is not None]

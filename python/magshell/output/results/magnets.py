@@ -12,7 +12,7 @@ from ...model.contact.obstacles import Box, Capsule, Sphere
 from ...model.fields.adapters import MagpylibField
 from ...model.fields.field import AppliedField
 from ...model.fields.magnets import CuboidMagnet, CylinderMagnet, Magnet
-from ...model.fields.placed import PlacedField
+from ...model.fields.posed_field import PlacedField
 from .link_surfaces import joined
 
 _AROUND = 32  # cells around what is round

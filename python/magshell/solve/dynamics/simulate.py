@@ -15,7 +15,7 @@ from ..._runtime.progress import SolveBar
 from ..._runtime.solver_entry_point import grouped, solve_entry
 from ...errors import Interrupted, NotConverged
 from ...model.contact.contacts_to_core import check_apart
-from ...model.fields.magnet_overlap import told_inside
+from ...model.fields.magnet_overlap import describe_magnet_overlap
 from ...model.scene.field_sampling import warn_of_sampling
 from ...model.scene.replacements import requested
 from ...model.scene.scene import Scene
@@ -231,7 +231,7 @@ def _advice(result: Trajectory) -> str:
     """What would help after a step that failed."""
     fields = map(result._values_at(len(result) - 1).current, result.scene.fields)
     positions = np.asarray(detached(result.positions[-1]), dtype=np.float64)
-    return told_inside(fields, positions, result.scene.mesh.edge_lengths) or "Take shorter steps."
+    return describe_magnet_overlap(fields, positions, result.scene.mesh.edge_lengths) or "Take shorter steps."
 
 
 def _with_strains(result: Trajectory) -> Trajectory:

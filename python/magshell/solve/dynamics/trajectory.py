@@ -23,7 +23,7 @@ from ...model.contact.contact import Contact
 from ...model.contact.contacts_to_core import near_kinks
 from ...model.fields.field import AppliedField
 from ...model.results.result_lookup import OfOneBody, result_of
-from ...model.results.solid_result import told_strains
+from ...model.results.solid_result import describe_strains
 from ...model.scene.contact_state import ContactState, compute_contact_state
 from ...model.scene.nonsmooth_contacts import near_body_kinks
 from ...model.scene.reactions import Reaction, reaction_in
@@ -312,7 +312,7 @@ class Trajectory(AnimateMixin, OfOneBody):
         return (
             f"Trajectory: {self.steps_done}{stopped} steps{halved}, {self.times[-1]:.4g} s, {len(self)} states, "
             f"{type(self.integrator).__name__}\n"
-            f"  {told_strains(self, strain)}\n"
+            f"  {describe_strains(self, strain)}\n"
             f"  {crossings}\n"
             f"  {self.iterations} iterations, {self.factorizations} factorizations\n"
             f"  {self.wall_time:.3g} s, {a_step:.3g} ms a step; for gradients: {self.adjoint_storage}, "

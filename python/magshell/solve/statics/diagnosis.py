@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...model.bodies.words import called
-from ...model.fields.magnet_overlap import told_inside
+from ...model.fields.magnet_overlap import describe_magnet_overlap
 from ...model.shells.obtuse_faces import describe_faces
 from ...model.supports.constraints import free_rigid_motions
 from .load_strain import strain_of_loads
@@ -49,7 +49,7 @@ def why_not(inputs: Inputs, found: _core.StaticsResult, at_rest: bool) -> str:
         sentences += told
         positions = scene._model.positions(failed.state)
         fields = map(inputs.values.current, scene.fields)
-        if inside := told_inside(fields, positions, scene.mesh.edge_lengths):
+        if inside := describe_magnet_overlap(fields, positions, scene.mesh.edge_lengths):
             return " ".join([*sentences, inside, kept])
     return " ".join([*sentences, _advice(inputs, found, at_rest, near), kept])
 

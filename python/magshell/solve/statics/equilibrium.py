@@ -14,7 +14,7 @@ from ...mesh.triangles.self_intersections import describe_self_intersections
 from ...model.contact.body_contact import BodyContact
 from ...model.contact.contact import Contact
 from ...model.results.result_lookup import OfOneBody, result_of
-from ...model.results.solid_result import told_strains
+from ...model.results.solid_result import describe_strains
 from ...model.scene.contact_state import ContactState, compute_contact_state
 from ...model.scene.reactions import Reaction, reaction_in
 from ...model.scene.scene import Scene
@@ -165,7 +165,7 @@ class Equilibrium(SaveMixin, OfOneBody):
         ended = " at round-off" if self.at_roundoff else ""
         return (
             f"Equilibrium: {kind}; largest displacement {moved:.4g} m\n"
-            f"  {told_strains(self, strain)}\n"
+            f"  {describe_strains(self, strain)}\n"
             f"  {crossings}\n"
             f"  energy {self.energy:.6g} J ({energies})\n"
             f"  {self.iterations} iterations, {self.factorizations} factorizations, {self.load_steps} load steps{extra}\n"

@@ -20,7 +20,7 @@ from ..._runtime.solver_entry_point import grouped, solve_entry
 from ...errors import Interrupted, NotConverged
 from ...mesh.triangles.self_intersections import describe_self_intersections
 from ...model.results.result_lookup import OfOneBody, result_of
-from ...model.results.solid_result import told_strains
+from ...model.results.solid_result import describe_strains
 from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs, plain_inputs
 from ...model.scene.values import Values
@@ -177,7 +177,7 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
             for point in self.critical
         ]
         strain = StrainHistory(self.largest_membrane_strain, self.largest_bending_strain)
-        lines.append(f"  {told_strains(self, strain)}")
+        lines.append(f"  {describe_strains(self, strain)}")
         lines.append(f"  {describe_self_intersections(self.scene.mesh, self.positions)}")
         lines.append(
             f"  {self.iterations} iterations, {self.factorizations} factorizations, {self.wall_time:.3g} s"

@@ -53,8 +53,7 @@ def swept_surface(points: np.ndarray, radii: np.ndarray, closed: bool) -> tuple[
     """Return the envelope of balls whose centers move through points (k, 3) m while their radii (k,) m change.
 
     A ball of the curve c and the radius r touches the envelope where the normal n has n . c' = - r'. The radius of an
-    open one
-    becomes constant towards its ends.
+    open one becomes constant towards its ends.
     """
     from scipy.interpolate import CubicSpline  # when needed, as loading it takes long
 

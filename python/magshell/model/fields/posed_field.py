@@ -1,4 +1,4 @@
-"""Fields of any kind that are put somewhere, and move."""
+"""Fields of any kind with a prescribed pose, which may change in time."""
 
 from __future__ import annotations
 
@@ -16,20 +16,19 @@ if TYPE_CHECKING:
     from ..._input.kinds import Numbers
 
 
-class PlacedField(AppliedField):
-    """A field that is given in a frame of its own, put somewhere: B(x) = R B_own(R^T (x - center)), R = exp(rotation).
+class PlacedField(AppliedField):  # plain-words: ok
+    """A field in a frame of its own that is moved and rotated: B(x) = R B_own(R^T (x - center)), R = exp(rotation).
 
-    For what has no place of its own: SampledField, CustomField, MagpylibField, and Dipoles that move as one. Its center
+    It is for fields without a pose: SampledField, CustomField, MagpylibField, and Dipoles that move as one. Its center
     and rotation may be replaced in a solve and differentiated by, and given over time in ms.simulate, and so may the
-    field's own values. Derivatives are made from the field's samples; where those are differences, so are they, to 1e-7 or
-    so.
+    field's own values. Derivatives come from those of the field; if these are differences, they have errors of about 1e-7.
 
     Args:
         field: a SampledField, CustomField, MagpylibField or Dipoles.
-        center: (3,) m, where the origin of its own frame is.
+        center: (3,) m, the position of the origin of its own frame.
         rotation: rotation vector (3,) rad, about the center.
 
-    Raises ValueError on a UniformField, which is the same everywhere, and on a magnet, which has a center of its own.
+    Raises ValueError for a UniformField, which does not depend on the position, and for a magnet, which has a center.
 
     >>> from math import pi
     >>> from magshell import Dipoles
@@ -64,18 +63,18 @@ class PlacedField(AppliedField):
         numbers[label, "center"], numbers[label, "rotation"] = self.center, self.rotation
 
     def replaced(self, **values: Any) -> PlacedField:
-        """The field elsewhere, or with other values of its own."""
-        place = {name: values.pop(name, getattr(self, name)) for name in ("center", "rotation")}
+        """Return the field with another pose, or with other values of its own."""
+        pose = {name: values.pop(name, getattr(self, name)) for name in ("center", "rotation")}
         if unknown := sorted(set(values) - set(self._replaceable)):
             raise ValueError(
                 f"{type(self.field).__name__} has no value {unknown[0]!r} to be replaced: it has "
                 f"{', '.join(self._replaceable)}"
             )
-        return PlacedField(self.field.replaced(**values) if values else self.field, **place)
+        return PlacedField(self.field.replaced(**values) if values else self.field, **pose)
 
     def _in_magnets(self, points: np.ndarray) -> np.ndarray:
-        turn = scipy.spatial.transform.Rotation.from_rotvec(np.array(self.rotation)).inv()
-        return self.field._in_magnets(turn.apply(points - self.center))
+        to_own = scipy.spatial.transform.Rotation.from_rotvec(np.array(self.rotation)).inv()
+        return self.field._in_magnets(to_own.apply(points - self.center))
 
     def __repr__(self) -> str:
         parts = [repr(self.field)]
