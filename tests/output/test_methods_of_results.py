@@ -35,7 +35,7 @@ def test_plot(what) -> None:
 
 def test_a_wrong_keyword_is_told() -> None:
     with pytest.raises(
-        TypeError, match=r"plot\(\) has no keyword 'backend': .* style=ms.Style\(backend=...\)"
+        TypeError, match=r"plot\(\) has no keyword 'backend'; use style=ms.Style\(backend=...\)"
     ):
         REST.plot(backend="matplotlib")
 
