@@ -17,16 +17,17 @@ py::tuple pull_back_to_inputs(Model& model, const StaticsResult& equilibrium, co
         gradient = equilibrium_vjp(model, equilibrium, model.bodies().gradient_by_state(positions, rotations),
                                    by_driving);
     }
-    return py::make_tuple(values_to_user(model, gradient.values), gradient.controls);
+    return py::make_tuple(values_to_user(model, gradient.values), gradient.load_parameters);
 }
 
 // Returns lambda . dg/dk at a state for all parameters, in the caller's order.
-VectorXd by_values(Model& model, const VectorXd& q, const Controls& controls, const VectorXd& lambda) {
+VectorXd by_values(Model& model, const VectorXd& q, const LoadParameters& load_parameters,
+                   const VectorXd& lambda) {
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());
     Gradient gradient(model.registry());
-    model.evaluate(q, controls);
-    model.vjp(q, controls, lambda, gradient);
+    model.evaluate(q, load_parameters);
+    model.vjp(q, load_parameters, lambda, gradient);
     return model.registry().values.to_user(gradient.values);
 }
 

@@ -78,7 +78,7 @@ Pairs pairs_of(const std::string& kind, double area, double parallel, const py::
 // Returns energy (n,), gradient (n, 4, 3), Hessian (n, 12, 12), normal force (n,) and its derivative by
 // positions (n, 4, 3).
 py::dict pair_energies_of(const std::string& kind, const Array& places, double area, double parallel,
-                          const py::dict& law, bool cautious, double room) {
+                          const py::dict& law, bool positive_definite, double room) {
     const Pairs with = pairs_of(kind, area, parallel, law, room);
     const PairRows x(places, "places [m]");
     const py::ssize_t n = x.count();
@@ -96,7 +96,7 @@ py::dict pair_energies_of(const std::string& kind, const Array& places, double a
         copy_rows(at.acts() ? at.normal_force_by_position() : zero, by_place.mutable_data(k, 0, 0));
         if (!at.acts()) continue;
         PairBlocks blocks;
-        at.hessian(cautious, blocks);
+        at.hessian(positive_definite, blocks);
         for (int i = 0, b = 0; i < nodes_of(with.pair.kind); ++i)
             for (int j = 0; j <= i; ++j, ++b) {
                 full.block<3, 3>(3 * i, 3 * j) = blocks[b];
@@ -110,7 +110,7 @@ py::dict pair_energies_of(const std::string& kind, const Array& places, double a
 // Returns the sums over pairs of their gradients (4, 3) and of the lower blocks of their Hessians (10, 3, 3),
 // to measure their time.
 py::tuple sums(const std::string& kind, const Array& places, double area, double parallel,
-               const py::dict& law, bool cautious) {
+               const py::dict& law, bool positive_definite) {
     const Pairs with = pairs_of(kind, area, parallel, law);
     const PairRows x(places, "places [m]");
     Array gradient({py::ssize_t{4}, py::ssize_t{3}}),
@@ -125,7 +125,7 @@ py::tuple sums(const std::string& kind, const Array& places, double area, double
         if (!at.acts()) continue;
         const PairVectors by = at.gradient();
         PairBlocks blocks;
-        at.hessian(cautious, blocks);
+        at.hessian(positive_definite, blocks);
         for (int i = 0; i < count; ++i) slope[i] += by[i];
         for (int b = 0; b < count * (count + 1) / 2; ++b) sum[b] += blocks[b];
     }

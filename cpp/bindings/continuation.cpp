@@ -3,17 +3,17 @@
 
 #include "bindings/arrays.h"
 #include "bindings/call_python.h"
-#include "bindings/controls.h"
+#include "bindings/load_parameters.h"
 #include "bindings/watch.h"
 
 namespace magshell::bindings {
 namespace {
 
 PathResult follow(Model& model, const VectorXd& start, const Model::AngleBranches& turns,
-                  const Controls& from, const Controls& to, const PathOptions& options,
+                  const LoadParameters& from, const LoadParameters& to, const PathOptions& options,
                   const std::vector<Index>& entries, const py::object& until, const py::object& progress) {
     const TimeVaryingParameters varying(model.registry(), entries);
-    check_controls(model, varying, from, to);
+    check_load_parameters(model, varying, from, to);
     const Watch watch(progress);
     Until ends;
     if (!until.is_none())

@@ -24,21 +24,21 @@ Tableau tableau_of(const std::string& name) {
 // Converts load parameters with one row per time point.
 using Knots = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-std::vector<Controls> controls_of(const Model& model, const TimeVaryingParameters& varying,
-                                  const Array& rows) {
-    const Index width = model.registry().controls.size() + varying.size();
+std::vector<LoadParameters> load_parameters_of(const Model& model, const TimeVaryingParameters& varying,
+                                               const Array& rows) {
+    const Index width = model.registry().load_parameters.size() + varying.size();
     if (rows.ndim() != 2 || rows.shape(1) != width)
         throw InvalidInput("controls must have one row per time point, of " + std::to_string(width) +
                            " numbers");
-    std::vector<Controls> controls;
+    std::vector<LoadParameters> load_parameters;
     for (py::ssize_t k = 0; k < rows.shape(0); ++k)
-        controls.push_back(Eigen::Map<const VectorXd>(rows.data(k, 0), width));
-    return controls;
+        load_parameters.push_back(Eigen::Map<const VectorXd>(rows.data(k, 0), width));
+    return load_parameters;
 }
 
-Knots rows_of(const std::vector<Controls>& controls) {
-    Knots rows(controls.size(), controls.empty() ? 0 : controls.front().size());
-    for (std::size_t k = 0; k < controls.size(); ++k) rows.row(k) = controls[k].transpose();
+Knots rows_of(const std::vector<LoadParameters>& load_parameters) {
+    Knots rows(load_parameters.size(), load_parameters.empty() ? 0 : load_parameters.front().size());
+    for (std::size_t k = 0; k < load_parameters.size(); ++k) rows.row(k) = load_parameters[k].transpose();
     return rows;
 }
 
@@ -88,7 +88,7 @@ MotionInput input_of(Model& model, const py::dict& given) {
     input.time_step = given["time_step"].cast<double>();
     input.steps = given["steps"].cast<Index>();
     input.varying = TimeVaryingParameters(model.registry(), given["varying"].cast<std::vector<Index>>());
-    input.controls = controls_of(model, input.varying, array("controls"));
+    input.load_parameters = load_parameters_of(model, input.varying, array("controls"));
     input.newton = given["newton"].cast<NewtonOptions>();
     if (const py::object projective = given["projective"]; !projective.is_none()) {
         const auto [iterations, tolerance, history, coulomb] =
@@ -209,7 +209,7 @@ py::dict back(Model& model, const MotionInput& input, const MotionResult& motion
     }
     py::dict result;
     result["values"] = values_to_user(model, gradient.values);
-    result["controls"] = rows_of(gradient.controls);
+    result["controls"] = rows_of(gradient.load_parameters);
     result["positions"] = model.bodies().gradient_by_vectors(gradient.positions);
     result["edge_rotations"] = model.bodies().edge_rotations(gradient.positions);
     result["velocities"] = model.bodies().gradient_by_vectors(gradient.velocities);

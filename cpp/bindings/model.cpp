@@ -25,16 +25,16 @@ std::unique_ptr<Model> make_model(const py::kwargs& given) {
 py::list entries_of(const Parameters& parameters) {
     py::list entries;
     for (const Parameters::Entry& entry : parameters.entries())
-        entries.append(py::make_tuple(entry.owner, entry.name, entry.unit, entry.slot.first, entry.slot.rows,
-                                      entry.slot.width));
+        entries.append(py::make_tuple(entry.owner, entry.name, entry.unit, entry.slice.first,
+                                      entry.slice.rows, entry.slice.width));
     return entries;
 }
 
-py::dict energies(const Model& model, const VectorXd& q, const Controls& controls) {
+py::dict energies(const Model& model, const VectorXd& q, const LoadParameters& load_parameters) {
     std::vector<std::pair<std::string_view, double>> of_terms;
     {
         const py::gil_scoped_release unlocked;
-        of_terms = model.energies(q, controls);
+        of_terms = model.energies(q, load_parameters);
     }
     py::dict energies;
     for (const auto& [name, value] : of_terms) {  // terms of the same name, of several bodies, are summed
@@ -46,13 +46,13 @@ py::dict energies(const Model& model, const VectorXd& q, const Controls& control
 
 // Returns [(name, J)] for each term; terms of the same name, of several bodies, are consecutive.
 py::list term_energies(Model& model, const VectorXd& q, const Model::AngleBranches& turns,
-                       const Controls& controls) {
+                       const LoadParameters& load_parameters) {
     std::vector<std::pair<std::string_view, double>> of_terms;
     {
         const py::gil_scoped_release unlocked;
         const std::lock_guard lock(model.in_use());
         model.set_angle_branches(turns);
-        of_terms = model.energies(q, controls);
+        of_terms = model.energies(q, load_parameters);
     }
     py::list energies;
     for (const auto& [name, value] : of_terms)
@@ -62,14 +62,14 @@ py::list term_energies(Model& model, const VectorXd& q, const Model::AngleBranch
 
 // Returns the lower triangle as (size, column starts, rows, values), of all degrees of freedom or of the free
 // ones.
-py::tuple hessian(Model& model, const VectorXd& q, const Controls& controls, bool reduced) {
+py::tuple hessian(Model& model, const VectorXd& q, const LoadParameters& load_parameters, bool reduced) {
     LargeVector<double> values;
     SparsePattern pattern;
     {
         const py::gil_scoped_release unlocked;
         const std::lock_guard lock(model.in_use());
-        model.evaluate(q, controls);
-        model.assemble(q, controls, false);
+        model.evaluate(q, load_parameters);
+        model.assemble(q, load_parameters, false);
         model.require_symmetric();
         if (reduced) {
             model.reduce_matrix(values);
@@ -123,7 +123,7 @@ void register_model(py::module_& module) {
             "parameters", [](const Model& m) { return entries_of(m.registry().values); },
             "(owner, name, unit, first, rows, width) of each, in the flat vector of set_values.")
         .def_property_readonly(
-            "controls", [](const Model& m) { return entries_of(m.registry().controls); },
+            "controls", [](const Model& m) { return entries_of(m.registry().load_parameters); },
             "Likewise, in the flat vectors of controls.")
         .def(
             "set_values",
@@ -202,8 +202,8 @@ void register_model(py::module_& module) {
             "evaluated last.")
         .def(
             "driven_increment",
-            [](const Model& m, const VectorXd& q, const Controls& controls) {
-                return m.dof_map().prescribed_increment(q, controls);
+            [](const Model& m, const VectorXd& q, const LoadParameters& load_parameters) {
+                return m.dof_map().prescribed_increment(q, load_parameters);
             },
             py::arg("q"), py::arg("controls"),
             "How far from a state what motors and supports prescribe at these controls is, of all unknowns, "
@@ -211,7 +211,9 @@ void register_model(py::module_& module) {
             "elsewhere.")
         .def(
             "prescribed_rate",
-            [](const Model& m, const Controls& controls) { return m.dof_map().prescribed_rate(controls); },
+            [](const Model& m, const LoadParameters& load_parameters) {
+                return m.dof_map().prescribed_rate(load_parameters);
+            },
             "d(all unknowns)/d(progress) of what moving supports hold; zero elsewhere.")
         .def("energy", &Model::energy, py::call_guard<py::gil_scoped_release>())
         .def_property_readonly("term_names",
@@ -229,18 +231,19 @@ void register_model(py::module_& module) {
              py::call_guard<py::gil_scoped_release>())
         .def(
             "gradient",
-            [](Model& model, const VectorXd& q, const Controls& controls) {
+            [](Model& model, const VectorXd& q, const LoadParameters& load_parameters) {
                 const std::lock_guard lock(model.in_use());
-                model.evaluate(q, controls);
+                model.evaluate(q, load_parameters);
                 return model.residual().gradient;
             },
             py::call_guard<py::gil_scoped_release>())
         .def(
             "driving",
-            [](Model& model, const VectorXd& q, const Controls& controls, const Model::AngleBranches& turns) {
+            [](Model& model, const VectorXd& q, const LoadParameters& load_parameters,
+               const Model::AngleBranches& turns) {
                 const std::lock_guard lock(model.in_use());
                 model.set_angle_branches(turns);
-                model.evaluate(q, controls);
+                model.evaluate(q, load_parameters);
                 return model.dof_map().motor_forces(model.residual().gradient);
             },
             py::arg("q"), py::arg("controls"), py::arg("turns"),
@@ -248,20 +251,21 @@ void register_model(py::module_& module) {
             py::call_guard<py::gil_scoped_release>())
         .def(
             "held_forces",
-            [](Model& model, const VectorXd& q, const Model::AngleBranches& turns, const Controls& controls) {
+            [](Model& model, const VectorXd& q, const Model::AngleBranches& turns,
+               const LoadParameters& load_parameters) {
                 const std::lock_guard lock(model.in_use());
                 model.set_angle_branches(turns);
-                model.evaluate(q, controls);
+                model.evaluate(q, load_parameters);
                 return model.dof_map().along_supports(model.residual().gradient);
             },
             "(3 m,) [N], with which supports pull at the held nodes of a scene at rest.", py::arg("q"),
             py::arg("turns"), py::arg("controls"), py::call_guard<py::gil_scoped_release>())
         .def(
             "assemble",
-            [](Model& model, const VectorXd& q, const Controls& controls) {
+            [](Model& model, const VectorXd& q, const LoadParameters& load_parameters) {
                 const std::lock_guard lock(model.in_use());
-                model.evaluate(q, controls);
-                model.assemble(q, controls, false);
+                model.evaluate(q, load_parameters);
+                model.assemble(q, load_parameters, false);
             },
             "Gradient and Hessian, left in the core: what `python -m benchmarks kernels` times.",
             py::call_guard<py::gil_scoped_release>())
@@ -289,10 +293,10 @@ void register_model(py::module_& module) {
         .def("hessian", &hessian, py::arg("q"), py::arg("controls"), py::arg("reduced") = true)
         .def(
             "small_deflection",
-            [](Model& model, const VectorXd& q, const Controls& unloaded, const Controls& controls,
-               const std::optional<VectorXd>& at_rest) {
+            [](Model& model, const VectorXd& q, const LoadParameters& unloaded,
+               const LoadParameters& load_parameters, const std::optional<VectorXd>& at_rest) {
                 const std::lock_guard lock(model.in_use());
-                return small_deflection(model, q, unloaded, controls, at_rest);
+                return small_deflection(model, q, unloaded, load_parameters, at_rest);
             },
             py::arg("q"), py::arg("unloaded"), py::arg("controls"), py::arg("at_rest") = py::none(),
             py::call_guard<py::gil_scoped_release>(),

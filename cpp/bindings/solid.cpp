@@ -4,7 +4,7 @@
 #include <map>
 
 #include "bindings/arrays.h"
-#include "magshell/core/pack_functions.h"
+#include "magshell/core/simd_functions.h"
 #include "magshell/scene/model.h"
 
 namespace magshell::bindings {
@@ -57,17 +57,17 @@ std::vector<SkinInput> skins_of(const py::list& given) {
     return skins;
 }
 
-// Returns the logarithms of numbers as the SIMD function computes them; the last pack is filled up with ones.
+// Returns the logarithms of numbers as the SIMD function computes them; the last SIMD vector is filled up with ones.
 py::array_t<double> lane_logarithms(const Array& numbers) {
     py::array_t<double> out(numbers.size());
     const double* from = numbers.data();
     double* to = out.mutable_data();
-    for (py::ssize_t first = 0; first < numbers.size(); first += Pack::width) {
-        Pack pack(1.0);
-        const int lanes = static_cast<int>(std::min<py::ssize_t>(Pack::width, numbers.size() - first));
-        for (int lane = 0; lane < lanes; ++lane) pack.set(lane, from[first + lane]);
-        pack = log(pack);
-        for (int lane = 0; lane < lanes; ++lane) to[first + lane] = pack[lane];
+    for (py::ssize_t first = 0; first < numbers.size(); first += SimdDouble::width) {
+        SimdDouble group(1.0);
+        const int lanes = static_cast<int>(std::min<py::ssize_t>(SimdDouble::width, numbers.size() - first));
+        for (int lane = 0; lane < lanes; ++lane) group.set(lane, from[first + lane]);
+        group = log(group);
+        for (int lane = 0; lane < lanes; ++lane) to[first + lane] = group[lane];
     }
     return out;
 }

@@ -2,7 +2,7 @@
 #include "magshell/solve/statics.h"
 
 #include "bindings/arrays.h"
-#include "bindings/controls.h"
+#include "bindings/load_parameters.h"
 #include "bindings/watch.h"
 #include "magshell/solve/linear_response.h"
 #include "magshell/solve/modes.h"
@@ -11,11 +11,11 @@ namespace magshell::bindings {
 namespace {
 
 StaticsResult solve(Model& model, const VectorXd& start, const Model::AngleBranches& turns,
-                    const Controls& from, const Controls& to, const StaticsOptions& options,
+                    const LoadParameters& from, const LoadParameters& to, const StaticsOptions& options,
                     const py::object& progress, const std::vector<Index>& entries) {
     const Watch watch(progress);
     const TimeVaryingParameters varying(model.registry(), entries);
-    check_controls(model, varying, from, to);
+    check_load_parameters(model, varying, from, to);
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());
     return find_equilibrium(
@@ -23,7 +23,7 @@ StaticsResult solve(Model& model, const VectorXd& start, const Model::AngleBranc
         varying);
 }
 
-VectorXd change(Model& model, const StaticsResult& equilibrium, const Controls& to) {
+VectorXd change(Model& model, const StaticsResult& equilibrium, const LoadParameters& to) {
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());
     return first_order_change(model, equilibrium, to);
@@ -32,7 +32,7 @@ VectorXd change(Model& model, const StaticsResult& equilibrium, const Controls& 
 // Returns the lowest eigenmodes of all degrees of freedom about an equilibrium, their eigenvalues [N/m3], and
 // the number of negative ones.
 py::tuple lowest_modes(Model& model, const VectorXd& state, const Model::AngleBranches& turns,
-                       const Controls& controls, int count, const py::object& progress) {
+                       const LoadParameters& load_parameters, int count, const py::object& progress) {
     const Watch watch(progress);
     std::vector<Mode> modes;
     Index negative = 0;
@@ -41,7 +41,7 @@ py::tuple lowest_modes(Model& model, const VectorXd& state, const Model::AngleBr
         const std::lock_guard lock(model.in_use());
         model.set_angle_branches(turns);
         Newton newton(model, {}, [&](double residual) { watch(1.0, residual); });
-        const FactorReport report = newton.factorize_at(state, controls);
+        const FactorReport report = newton.factorize_at(state, load_parameters);
         negative = report.negative_pivots;
         if (report.succeeded && report.perturbed_pivots == 0)
             modes = modes_near_zero(newton, count + static_cast<int>(negative));
@@ -96,7 +96,7 @@ void register_statics(py::module_& module) {
 
     py::class_<FailedAttempt>(module, "FailedAttempt")
         .def_readonly("state", &FailedAttempt::state)
-        .def_readonly("controls", &FailedAttempt::controls)
+        .def_readonly("controls", &FailedAttempt::load_parameters)
         .def_readonly("shortest_step", &FailedAttempt::shortest_step)
         .def_readonly("last_move", &FailedAttempt::last_displacement)
         .def_readonly("falling", &FailedAttempt::descent_direction);
@@ -105,7 +105,7 @@ void register_statics(py::module_& module) {
         .def_readonly("outcome", &StaticsResult::outcome)
         .def_readonly("state", &StaticsResult::state)
         .def_readonly("turns", &StaticsResult::angle_branches)
-        .def_readonly("controls", &StaticsResult::controls)
+        .def_readonly("controls", &StaticsResult::load_parameters)
         .def_readonly("load_fraction", &StaticsResult::progress)
         .def_readonly("reason", &StaticsResult::reason)
         .def_readonly("effort_spent", &StaticsResult::effort_spent)

@@ -27,9 +27,9 @@ class Backward {
           by_(by),
           stepper_(newton, input.tableau, input.inertia, input.viscosity, input.projective),
           scene_(model_.registry()) {
-        scene_.controls = model_.no_controls();
+        scene_.load_parameters = model_.zero_load_parameters();
         g_.positions = g_.velocities = g_.mass = g_.damping = VectorXd::Zero(model_.size());
-        g_.controls.assign(input.controls.size(), model_.no_controls());
+        g_.load_parameters.assign(input.load_parameters.size(), model_.zero_load_parameters());
     }
 
     MotionGradient run() {
@@ -127,11 +127,18 @@ class Backward {
         by_v.back() = std::move(g_.velocities);
         if (by_w_.size() > 0) by_w.back() = std::move(by_w_);
         g_.positions = g_.velocities = VectorXd::Zero(model_.size());
-        const std::vector<Controls> controls = stage_controls(input_, tableau, step, substep);
-        Viscous viscous{
-            {model_, model_.elastic(), input_.viscosity, &StageRates::elastic, algebra, record, controls,
-             by_strains_},
-            {model_, model_.dampers(), damper_law, &StageRates::joints, algebra, record, controls, {}}};
+        const std::vector<LoadParameters> load_parameters =
+            stage_load_parameters(input_, tableau, step, substep);
+        Viscous viscous{{model_, model_.elastic(), input_.viscosity, &StageRates::elastic, algebra, record,
+                         load_parameters, by_strains_},
+                        {model_,
+                         model_.dampers(),
+                         damper_law,
+                         &StageRates::joints,
+                         algebra,
+                         record,
+                         load_parameters,
+                         {}}};
         double by_dt = 0.0;
         const VectorXd by_earlier = std::move(by_v_before_);
         by_v_before_ = VectorXd();
@@ -170,14 +177,14 @@ class Backward {
             by_w_ = std::move(by_w.front());
         }
         if (input_.viscosity.any()) {
-            model_.set_time_varying(controls.front());
-            model_.evaluate(record.begin.q, model_.no_controls());
+            model_.set_time_varying(load_parameters.front());
+            model_.evaluate(record.begin.q, model_.zero_load_parameters());
             ViscousAdjoint& strains = viscous.strains;
             g_.positions += model_.elastic().forces(strains.by_d_begin, model_.size());
-            scene_.controls.setZero();
+            scene_.load_parameters.setZero();
             model_.elastic().strains_vjp(strains.by_d_begin, scene_);
             model_.time_varying().move_gradient(scene_);
-            add_by_controls(step, substep.begin, scene_.controls);
+            add_by_load_parameters(step, substep.begin, scene_.load_parameters);
             by_strains_ = std::move(strains.by_begin);
             by_dt += strains.by_dt;
             g_.viscosity.stiffness_damping += strains.by_law.stiffness_damping;
@@ -185,7 +192,7 @@ class Backward {
             g_.viscosity.maxwell_time += strains.by_law.maxwell_time;
         }
         if (!model_.dampers().empty()) {
-            if (!input_.viscosity.any()) model_.evaluate(record.begin.q, model_.no_controls());
+            if (!input_.viscosity.any()) model_.evaluate(record.begin.q, model_.zero_load_parameters());
             g_.positions += model_.dampers().forces(viscous.joints.by_d_begin, model_.size());
             by_dt += viscous.joints.by_dt;
             if (tableau.begins_explicitly)
@@ -197,14 +204,14 @@ class Backward {
     }
 
     // Solves with the transposed Hessian at a state, evaluated last: by GMRES with a nearby factorization if there is one.
-    VectorXd solve(const VectorXd& q, const Factor* nearby, const Controls& controls,
+    VectorXd solve(const VectorXd& q, const Factor* nearby, const LoadParameters& load_parameters,
                    const ProximalTerm& proximal, const VectorXd& rhs) {
         newton_.watch(0.0);
         VectorXd solution = rhs;
-        if (nearby && newton_.solve_gmres_adjoint(q, controls, proximal, *nearby, solution).converged)
+        if (nearby && newton_.solve_gmres_adjoint(q, load_parameters, proximal, *nearby, solution).converged)
             return solution;
         Eigen::MatrixXd no_moves(q.size(), 0);
-        const FactorReport factor = newton_.factorize(q, controls, false, proximal, no_moves);
+        const FactorReport factor = newton_.factorize(q, load_parameters, false, proximal, no_moves);
         if (!factor.succeeded)
             throw InvalidInput("the gradient of a time step cannot be computed: " + factor.reason);
         return newton_.solve_transposed(rhs);
@@ -212,10 +219,10 @@ class Backward {
 
     // Sets the model to the conditions under which a stage was solved.
     void set_stage(const SubstepRecord& record, int i, Index step, const Substep& substep,
-                   const Controls& controls, const Viscous& viscous) {
-        model_.set_time_varying(controls);
+                   const LoadParameters& load_parameters, const Viscous& viscous) {
+        model_.set_time_varying(load_parameters);
         model_.set_angle_branches(record.stages[i].angle_branches);
-        model_.begin_step(record.begin.q, input_.controls_at(step, substep.begin));
+        model_.begin_step(record.begin.q, input_.load_parameters_at(step, substep.begin));
         viscous.strains.set_history(i);
         viscous.joints.set_history(i);
     }
@@ -228,18 +235,19 @@ class Backward {
         const StageState& stage = record.stages[i];
         const ScopedStrainHistory elastic_afterwards(model_);
         const double fraction = substep.begin + algebra.tableau().time(i) * substep.fraction();
-        const Controls controls = input_.controls_at(step, fraction);
+        const LoadParameters load_parameters = input_.load_parameters_at(step, fraction);
         const VectorXd target = algebra.target(at.x_hat[i], at.v_hat[i]);
         const StageMotion motion{&at.x_hat[i], &at.v_hat[i], algebra.stage_time()};
-        set_stage(record, i, step, substep, controls, viscous);
+        set_stage(record, i, step, substep, load_parameters, viscous);
         const ProximalTerm proximal{&algebra.weights(), &target, &motion};
-        newton_.evaluate(stage.q, controls, proximal);
+        newton_.evaluate(stage.q, load_parameters, proximal);
         viscous.strains.before_solve(i, by_x, scene_);
         viscous.joints.before_solve(i, by_x, scene_);
-        const VectorXd lambda = solve(stage.q, stage.factor.get(), controls, proximal, -by_x);
+        const VectorXd lambda = solve(stage.q, stage.factor.get(), load_parameters, proximal, -by_x);
         viscous.strains.after_solve(i, lambda);
         viscous.joints.after_solve(i, lambda);
-        return {lambda, by_scene(stage.q, controls, proximal, step, substep, fraction, lambda, {}, by_x)};
+        return {lambda,
+                by_scene(stage.q, load_parameters, proximal, step, substep, fraction, lambda, {}, by_x)};
     }
 
     // Adds the gradients through the motor forces at the end of a substep: by the scene and the load parameters, by the state next to the
@@ -250,33 +258,34 @@ class Backward {
         const int i = algebra.tableau().stages - 1;
         const StageState& stage = record.stages[i];
         const ScopedStrainHistory elastic_afterwards(model_);
-        const Controls controls = input_.controls_at(step, substep.end);
+        const LoadParameters load_parameters = input_.load_parameters_at(step, substep.end);
         const VectorXd target = algebra.target(at.x_hat[i], at.v_hat[i]);
         const StageMotion motion{&at.x_hat[i], &at.v_hat[i], algebra.stage_time()};
-        set_stage(record, i, step, substep, controls, viscous);
+        set_stage(record, i, step, substep, load_parameters, viscous);
         const ProximalTerm there{&algebra.weights(), &target, &motion};
-        const MotorReactions end(newton_, input_.inertia, record.begin, algebra.dt(), stage.q, controls,
-                                 there, at.all.back());
+        const MotorReactions end(newton_, input_.inertia, record.begin, algebra.dt(), stage.q,
+                                 load_parameters, there, at.all.back());
         if (!end.converged())
             throw InvalidInput(
                 "the motor forces have no gradient in a step in which they could not be computed (NaN)");
         const ProximalTerm proximal = end.proximal();
         const VectorXd& q = end.q();
-        newton_.evaluate(q, controls, proximal);
-        model_.assemble(q, controls, false);
-        if (model_.has_forces()) model_.assemble_forces(controls);
+        newton_.evaluate(q, load_parameters, proximal);
+        model_.assemble(q, load_parameters, false);
+        if (model_.has_forces()) model_.assemble_forces(load_parameters);
         const VectorXd motors = model_.dof_map().motor_motion(by_motor_forces);
         const VectorXd by_q = product(motors, algebra.weights());
         VectorXd by_free = by_q;
         model_.dof_map().add_motor_force_change(newton_.gradient(q, proximal), by_motor_forces, by_free);
         const std::shared_ptr<Factor> nearby = newton_.factor();
         const bool serves = nearby && nearby->pattern() == model_.dof_map().pattern();
-        const VectorXd lambda = solve(q, serves ? nearby.get() : nullptr, controls, proximal, -by_free),
+        const VectorXd lambda =
+                           solve(q, serves ? nearby.get() : nullptr, load_parameters, proximal, -by_free),
                        all = lambda + motors;
         viscous.strains.at_nearby_state(i, q, all);
         viscous.joints.at_nearby_state(i, q, all);
         const KinematicsGradient by_forces =
-            by_scene(q, controls, proximal, step, substep, substep.end, lambda, by_motor_forces, by_q);
+            by_scene(q, load_parameters, proximal, step, substep, substep.end, lambda, by_motor_forces, by_q);
         VectorXd v = VectorXd::Zero(model_.size());
         v.head(model_.n_coordinates()) =
             (q - at.x_hat[i]).head(model_.n_coordinates()) / algebra.stage_time();
@@ -302,59 +311,61 @@ class Backward {
 
     // Adds the gradients by the scene and the load parameters for an adjoint at the evaluated state, plus the motion along the motors if the
     // loss depends on their forces. Returns the gradient by the kinematics.
-    KinematicsGradient by_scene(const VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
-                                Index step, const Substep& substep, double fraction, const VectorXd& lambda,
-                                const VectorXd& by_motor_forces, const VectorXd& by_q) {
+    KinematicsGradient by_scene(const VectorXd& q, const LoadParameters& load_parameters,
+                                const ProximalTerm& proximal, Index step, const Substep& substep,
+                                double fraction, const VectorXd& lambda, const VectorXd& by_motor_forces,
+                                const VectorXd& by_q) {
         const DofMap& dof_map = model_.dof_map();
         const VectorXd all =
             by_motor_forces.size() > 0 ? VectorXd(lambda + dof_map.motor_motion(by_motor_forces)) : lambda;
-        scene_.controls.setZero();
-        model_.vjp(q, controls, all, scene_);
+        scene_.load_parameters.setZero();
+        model_.vjp(q, load_parameters, all, scene_);
         KinematicsGradient by_forces;
-        if (model_.has_forces()) by_forces = model_.forces_vjp(controls, all, scene_);
+        if (model_.has_forces()) by_forces = model_.forces_vjp(load_parameters, all, scene_);
         if (dof_map.has_values()) {
             // Assembles again, because the factorization has rotated the blocks of rotated nodes.
-            model_.assemble(q, controls, false);
-            if (model_.has_forces()) model_.assemble_forces(controls);
+            model_.assemble(q, load_parameters, false);
+            if (model_.has_forces()) model_.assemble_forces(load_parameters);
             const VectorXd reaction = product(lambda, *proximal.weights) + by_q;
-            dof_map.vjp(reaction, lambda, newton_.gradient(q, proximal), controls, scene_, by_motor_forces);
+            dof_map.vjp(reaction, lambda, newton_.gradient(q, proximal), load_parameters, scene_,
+                        by_motor_forces);
         }
         model_.time_varying().move_gradient(scene_);
-        add_by_controls(step, fraction, scene_.controls);
-        if (model_.has_forces()) add_by_controls(step, substep.begin, by_forces.begin_controls);
+        add_by_load_parameters(step, fraction, scene_.load_parameters);
+        if (model_.has_forces()) add_by_load_parameters(step, substep.begin, by_forces.begin_load_parameters);
         return by_forces;
     }
 
     // Distributes a gradient by the load parameters at a fraction of a step to the two entries that they are interpolated from.
-    void add_by_controls(Index step, double fraction, const Controls& by) {
+    void add_by_load_parameters(Index step, double fraction, const LoadParameters& by) {
         const auto [first, weight] = input_.between(step, fraction);
-        g_.controls[first] += (1.0 - weight) * by;
-        g_.controls[first + 1] += weight * by;
+        g_.load_parameters[first] += (1.0 - weight) * by;
+        g_.load_parameters[first + 1] += weight * by;
     }
 
     // Continues to the inputs of the start: edge rotations in equilibrium depend on all others.
     void back_to_start() {
         const VectorXd& q = motion_.start.q;
-        model_.set_time_varying(input_.controls_at(0, 0.0));
+        model_.set_time_varying(input_.load_parameters_at(0, 0.0));
         if (input_.viscosity.maxwell() && input_.start.e.empty()) {
-            model_.evaluate(q, input_.controls_at(0, 0.0));
+            model_.evaluate(q, input_.load_parameters_at(0, 0.0));
             g_.positions += model_.elastic().forces(by_strains_.e, model_.size());
-            scene_.controls.setZero();
+            scene_.load_parameters.setZero();
             model_.elastic().strains_vjp(by_strains_.e, scene_);
             model_.time_varying().move_gradient(scene_);
-            g_.controls[0] += scene_.controls;
+            g_.load_parameters[0] += scene_.load_parameters;
         }
         if (input_.rotations_given) return;
         model_.set_angle_branches(input_.start.angle_branches);
-        const Controls controls = input_.controls_at(0, 0.0);
-        const VectorXd lambda = EdgeRotationEquilibrium(model_, q, controls).adjoint(g_.positions);
+        const LoadParameters load_parameters = input_.load_parameters_at(0, 0.0);
+        const VectorXd lambda = EdgeRotationEquilibrium(model_, q, load_parameters).adjoint(g_.positions);
         VectorXd reaction(model_.size());
         model_.multiply(lambda, reaction);
         g_.positions += reaction;
-        scene_.controls.setZero();
-        model_.vjp(q, controls, lambda, scene_);
+        scene_.load_parameters.setZero();
+        model_.vjp(q, load_parameters, lambda, scene_);
         model_.time_varying().move_gradient(scene_);
-        g_.controls[0] += scene_.controls;
+        g_.load_parameters[0] += scene_.load_parameters;
     }
 
     // Adds the gradient of the loss by the state at the beginning of a step.

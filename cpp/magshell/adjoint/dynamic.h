@@ -21,9 +21,9 @@ struct MotionGradient {
     VectorXd mass, damping;          // of all dofs
     double time_step = 0.0;
     Viscosity viscosity{0.0, 0.0, 0.0};
-    VectorXd values;                 // of the scene
-    std::vector<Controls> controls;  // as MotionInput::controls
-    int factorizations = 0;          // that the adjoint took, including those of repeated steps
+    VectorXd values;                              // of the scene
+    std::vector<LoadParameters> load_parameters;  // as MotionInput::load_parameters
+    int factorizations = 0;                       // that the adjoint took, including those of repeated steps
 };
 
 /// The gradient of a loss by the recorded states of a motion.

@@ -10,13 +10,13 @@ Gradient equilibrium_vjp(Model& model, const StaticsResult& equilibrium, const V
     if (!equilibrium.factor)
         throw InvalidInput("the equilibrium has no factorization: it was solved without gradients");
     const VectorXd& q = equilibrium.state;
-    const Controls& controls = equilibrium.controls;
+    const LoadParameters& load_parameters = equilibrium.load_parameters;
     const DofMap& dof_map = model.dof_map();
     const bool has_motor_gradient = !by_motor_forces.isZero(0.0);
 
     model.set_angle_branches(equilibrium.angle_branches);
-    model.evaluate(q, controls);
-    if (model.has_follower_loads() || dof_map.has_values()) model.assemble(q, controls, false);
+    model.evaluate(q, load_parameters);
+    if (model.has_follower_loads() || dof_map.has_values()) model.assemble(q, load_parameters, false);
     const auto add_product = [&](const VectorXd& motion, VectorXd& forces) {
         VectorXd product(q.size());
         model.multiply(motion, product);
@@ -35,10 +35,10 @@ Gradient equilibrium_vjp(Model& model, const StaticsResult& equilibrium, const V
     solve_at_equilibrium(model, *equilibrium.factor, true, reduced);
     const VectorXd lambda = dof_map.expand(reduced);
     Gradient gradient(model.registry());
-    model.vjp(q, controls, lambda + motors, gradient);
+    model.vjp(q, load_parameters, lambda + motors, gradient);
     if (dof_map.has_values()) {
         add_product(lambda, by_q);
-        dof_map.vjp(by_q, lambda, model.residual().gradient, controls, gradient,
+        dof_map.vjp(by_q, lambda, model.residual().gradient, load_parameters, gradient,
                     has_motor_gradient ? by_motor_forces : VectorXd());
     }
     return gradient;

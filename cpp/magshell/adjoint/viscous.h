@@ -13,10 +13,10 @@ struct ViscousGradient {
 class ViscousAdjoint {
   public:
     /// Recomputes the strains of the stages. kind: selects the rates of `terms`. by_end: gradient by the end of the step, from later
-    /// steps. controls: load parameters at the beginning of the step and at its stages.
+    /// steps. load_parameters: load parameters at the beginning of the step and at its stages.
     ViscousAdjoint(Model& model, ViscousTerms& terms, const Viscosity& law, ViscousStage::Kind kind,
-                   const StepAlgebra& step, const SubstepRecord& substep, std::span<const Controls> controls,
-                   const ViscousGradient& by_end);
+                   const StepAlgebra& step, const SubstepRecord& substep,
+                   std::span<const LoadParameters> load_parameters, const ViscousGradient& by_end);
 
     /// Sets the strain history of stage i in the terms.
     void set_history(int i) const;

@@ -1,4 +1,4 @@
-// Dihedral angles between the faces of a shell, a pack at a time, from all dofs.
+// Dihedral angles between the faces of a shell, a SIMD vector at a time, from all dofs.
 #pragma once
 
 #include <algorithm>
@@ -10,16 +10,16 @@
 
 namespace magshell {
 
-/// Returns the dihedral angles [first, last), at most a pack of them. Lanes past the last one repeat it.
+/// Returns the dihedral angles [first, last), at most a SIMD vector of them. Lanes past the last one repeat it.
 inline DihedralAngle dihedral_angles_at(const Shell& shell, Index first, Index last, const double* q) {
-    const DihedralStencil* at[Pack::width];
-    for (int lane = 0; lane < Pack::width; ++lane)
+    const DihedralStencil* at[SimdDouble::width];
+    for (int lane = 0; lane < SimdDouble::width; ++lane)
         at[lane] = &shell.dihedrals[std::min(first + lane, last - 1)];
     const auto place = [&](int k) {
         return vectors_of([&](int lane) { return q + 3 * at[lane]->nodes[k]; });
     };
     const auto right_is_point = [&](int lane) { return at[lane]->right_is_point ? 1.0 : 0.0; };
-    return DihedralAngle(place(0), place(1), place(2), place(3), pack_of(right_is_point));
+    return DihedralAngle(place(0), place(1), place(2), place(3), simd_of(right_is_point));
 }
 
 /// Returns the change of an angle since rest, theta - theta~, in (-pi, pi]. Without this wrap, the rest angle of a shell rolled into a closed

@@ -2,40 +2,43 @@
 
 #include <algorithm>
 
-#include "magshell/core/pack.h"
 #include "magshell/core/parallel.h"
+#include "magshell/core/simd_double.h"
 
 namespace magshell {
 namespace {
 
-// Returns the number of elements of a chunk, a multiple of the pack width. 512 faces have about 600 kB of Hessian, slots and element
-// data; a small body gets at least a few chunks of each colour. Tetrahedra of four nodes take a quarter of the memory of a
-// face and share more nodes with neighbouring chunks, so their chunks are longer if there are enough elements.
+// Returns the number of elements of a block, a multiple of the SIMD width. 512 faces have about 600 kB of Hessian, slots and element
+// data; a small body gets at least a few blocks of each colour. Tetrahedra of four nodes take a quarter of the memory of a
+// face and share more nodes with neighbouring blocks, so their blocks are longer if there are enough elements.
 Index part_length(const Body& of) {
-    // Elements per chunk, and chunks per body; only speed depends on them. See test_any_number_of_threads_gives_the_same_bits_on_a_large_sheet.
-    constexpr Index shortest = 128, longest = 512, chunks = 8, longest_of_four = 2048, chunks_of_four = 32;
+    // Elements per block, and blocks per body; only speed depends on them. See test_any_number_of_threads_gives_the_same_bits_on_a_large_sheet.
+    constexpr Index shortest = 128, longest = 512, element_blocks = 8, longest_of_four = 2048,
+                    blocks_of_four = 32;
     const Index elements = of.n_elements();
-    Index length = std::clamp(elements / chunks, shortest, longest);
+    Index length = std::clamp(elements / element_blocks, shortest, longest);
     if (elements > 0 && of.n_dihedrals() == 0 && of.nodes_of(0).size() == 4)
-        length = std::max(length, std::min(elements / chunks_of_four, longest_of_four));
-    return length / Pack::width * Pack::width;
+        length = std::max(length, std::min(elements / blocks_of_four, longest_of_four));
+    return length / SimdDouble::width * SimdDouble::width;
 }
 
-// Finds which chunks share nodes.
+// Finds which blocks share nodes.
 class Neighbours {
   public:
-    Neighbours(Index nodes, const std::vector<const Body*>& bodies, const std::vector<Chunk>& chunks)
-        : chunks_at_(nodes), nodes_in_(chunks.size()) {
-        for (const Chunk& chunk : chunks)
-            for (Index element = chunk.first; element < chunk.last; ++element)
-                for (const Index node : bodies[chunk.body]->nodes_of(element))
-                    if (node >= 0 && (chunks_at_[node].empty() || chunks_at_[node].back() != chunk.number)) {
-                        chunks_at_[node].push_back(chunk.number);
-                        nodes_in_[chunk.number].push_back(node);
+    Neighbours(Index nodes, const std::vector<const Body*>& bodies,
+               const std::vector<ElementBlock>& element_blocks)
+        : element_blocks_at_(nodes), nodes_in_(element_blocks.size()) {
+        for (const ElementBlock& element_block : element_blocks)
+            for (Index element = element_block.first; element < element_block.last; ++element)
+                for (const Index node : bodies[element_block.body]->nodes_of(element))
+                    if (node >= 0 && (element_blocks_at_[node].empty() ||
+                                      element_blocks_at_[node].back() != element_block.number)) {
+                        element_blocks_at_[node].push_back(element_block.number);
+                        nodes_in_[element_block.number].push_back(node);
                     }
     }
 
-    /// Returns the colour of each chunk: the first that no neighbour has had before (greedy colouring).
+    /// Returns the colour of each block: the first that no neighbour has had before (greedy colouring).
     std::vector<Index> colours() const {
         std::vector<Index> colour_of(nodes_in_.size(), -1);
         Index count = 0;
@@ -50,7 +53,7 @@ class Neighbours {
         return colour_of;
     }
 
-    /// Returns the chunks by number, but each after its neighbours of earlier colours.
+    /// Returns the blocks by number, but each after its neighbours of earlier colours.
     std::vector<Index> order(const std::vector<Index>& colour_of) const {
         std::vector<Index> order;
         std::vector<bool> taken(nodes_in_.size(), false);
@@ -71,16 +74,16 @@ class Neighbours {
     template <class Visit>
     void each_beside(std::size_t p, const Visit& visit) const {
         for (const Index node : nodes_in_[p])
-            for (const Index other : chunks_at_[node]) visit(other);
+            for (const Index other : element_blocks_at_[node]) visit(other);
     }
 
-    std::vector<std::vector<Index>> chunks_at_, nodes_in_;
+    std::vector<std::vector<Index>> element_blocks_at_, nodes_in_;
 };
 
-// Cuts an order into segments, and each segment into its colours. A segment holds enough chunks of a colour for several threads.
+// Cuts an order into segments, and each segment into its colours. A segment holds enough blocks of a colour for several threads.
 std::vector<std::vector<Index>> rounds(const std::vector<Index>& order, const std::vector<Index>& colour_of) {
     constexpr std::size_t stretch =
-        32;  // chunks per segment; see test_more_threads_than_processors_give_the_same_bits
+        32;  // blocks per segment; see test_more_threads_than_processors_give_the_same_bits
     std::vector<std::vector<Index>> rounds;
     for (std::size_t first = 0; first < order.size(); first += stretch) {
         std::vector<std::vector<Index>> of_colours;
@@ -89,8 +92,8 @@ std::vector<std::vector<Index>> rounds(const std::vector<Index>& order, const st
             if (colour >= of_colours.size()) of_colours.resize(colour + 1);
             of_colours[colour].push_back(order[k]);
         }
-        for (std::vector<Index>& chunks : of_colours)
-            if (!chunks.empty()) rounds.push_back(std::move(chunks));
+        for (std::vector<Index>& element_blocks : of_colours)
+            if (!element_blocks.empty()) rounds.push_back(std::move(element_blocks));
     }
     return rounds;
 }
@@ -110,21 +113,21 @@ void ElementColoring::cut(const Body& of, Index body) {
         const Index last = std::min(elements, first + length);
         const Index first_dihedral = dihedral;
         while (dihedral < dihedrals && of.element_of_dihedral(dihedral) < last) ++dihedral;
-        const Chunk chunk{
-            static_cast<Index>(all_.chunks_.size()), body, first, last, first_dihedral, dihedral};
-        all_.chunks_.push_back(chunk);
-        loops_[body].chunks_.push_back(chunk);
+        const ElementBlock element_block{
+            static_cast<Index>(all_.element_blocks_.size()), body, first, last, first_dihedral, dihedral};
+        all_.element_blocks_.push_back(element_block);
+        loops_[body].element_blocks_.push_back(element_block);
     }
 }
 
 void ElementColoring::set_order(Index nodes, const std::vector<const Body*>& bodies) {
-    const Neighbours neighbours(nodes, bodies, all_.chunks_);
+    const Neighbours neighbours(nodes, bodies, all_.element_blocks_);
     const std::vector<Index> colour_of = neighbours.colours();
     all_.order_ = neighbours.order(colour_of);
     all_.rounds_ = rounds(all_.order_, colour_of);
-    for (ChunkLoop& loop : loops_) {
-        if (loop.chunks_.empty()) continue;
-        const Index first = loop.chunks_.front().number, last = loop.chunks_.back().number;
+    for (ColoredLoop& loop : loops_) {
+        if (loop.element_blocks_.empty()) continue;
+        const Index first = loop.element_blocks_.front().number, last = loop.element_blocks_.back().number;
         const auto own = [&](const std::vector<Index>& of_all) {
             std::vector<Index> of_body;
             for (const Index p : of_all)
@@ -138,32 +141,34 @@ void ElementColoring::set_order(Index nodes, const std::vector<const Body*>& bod
     }
 }
 
-std::vector<Chunk> ElementColoring::in_order() const {
-    std::vector<Chunk> order;
-    for (const Index p : all_.order_) order.push_back(all_.chunks_[p]);
+std::vector<ElementBlock> ElementColoring::in_order() const {
+    std::vector<ElementBlock> order;
+    for (const Index p : all_.order_) order.push_back(all_.element_blocks_[p]);
     return order;
 }
 
 std::size_t ElementColoring::bytes() const {
-    return 2 * all_.chunks_.size() * (sizeof(Chunk) + 2 * sizeof(Index));
+    return 2 * all_.element_blocks_.size() * (sizeof(ElementBlock) + 2 * sizeof(Index));
 }
 
-void ChunkLoop::scatter(const std::function<void(const Chunk&)>& body) const {
+void ColoredLoop::scatter(const std::function<void(const ElementBlock&)>& body) const {
     if (num_threads() == 1) {
-        for (const Index p : order_) body(chunks_[p]);
+        for (const Index p : order_) body(element_blocks_[p]);
         return;
     }
-    for (const std::vector<Index>& chunks : rounds_)
-        parallel_for(static_cast<int>(chunks.size()), [&](int k) { body(chunks_[chunks[k]]); });
+    for (const std::vector<Index>& element_blocks : rounds_)
+        parallel_for(static_cast<int>(element_blocks.size()),
+                     [&](int k) { body(element_blocks_[element_blocks[k]]); });
 }
 
-void ChunkLoop::each(const std::function<void(const Chunk&)>& body) const {
-    parallel_for(static_cast<int>(chunks_.size()), [&](int p) { body(chunks_[p]); });
+void ColoredLoop::each(const std::function<void(const ElementBlock&)>& body) const {
+    parallel_for(static_cast<int>(element_blocks_.size()), [&](int p) { body(element_blocks_[p]); });
 }
 
-double ChunkLoop::sum(const std::function<double(const Chunk&)>& body) const {
-    std::vector<double> shares(chunks_.size());
-    parallel_for(static_cast<int>(chunks_.size()), [&](int p) { shares[p] = body(chunks_[p]); });
+double ColoredLoop::sum(const std::function<double(const ElementBlock&)>& body) const {
+    std::vector<double> shares(element_blocks_.size());
+    parallel_for(static_cast<int>(element_blocks_.size()),
+                 [&](int p) { shares[p] = body(element_blocks_[p]); });
     double total = 0.0;
     for (const double share : shares) total += share;
     return total;

@@ -1,4 +1,4 @@
-// Gathers the nodes of a pack of elements with N nodes, and scatters their forces and Hessian blocks.
+// Gathers the nodes of a SIMD vector of elements with N nodes, and scatters their forces and Hessian blocks.
 #pragma once
 
 #include <cstdint>
@@ -11,41 +11,43 @@ namespace magshell {
 template <int N>
 class ElementLoop {
   public:
-    ElementLoop(const std::vector<std::array<Index, N>>& nodes, const ChunkLoop& chunks,
+    ElementLoop(const std::vector<std::array<Index, N>>& nodes, const ColoredLoop& element_blocks,
                 const SystemMatrix& matrix)
-        : elements_(static_cast<Index>(nodes.size())), nodes_(&nodes), chunks_(chunks) {
+        : elements_(static_cast<Index>(nodes.size())), nodes_(&nodes), element_blocks_(element_blocks) {
         slots_.reserve(elements_);
         for (const std::array<Index, N>& each : nodes) slots_.push_back(pair_slots<N>(matrix, each));
-        turned_.resize(packs(), {});
-        for (Index pack = 0; pack < packs(); ++pack)
-            for (std::size_t pair = 0; pair < turned_[pack].size(); ++pair)
-                for (int lane = 0; lane < lanes_in(pack); ++lane)
-                    turned_[pack][pair] |= (slots_[element(pack, lane)][pair] & 1) << lane;
+        turned_.resize(groups(), {});
+        for (Index group = 0; group < groups(); ++group)
+            for (std::size_t pair = 0; pair < turned_[group].size(); ++pair)
+                for (int lane = 0; lane < lanes_in(group); ++lane)
+                    turned_[group][pair] |= (slots_[element(group, lane)][pair] & 1) << lane;
     }
 
-    Index packs() const { return packs_for(elements_); }
-    int lanes_in(Index pack) const { return std::min(Pack::width, elements_ - pack * Pack::width); }
-    Index element(Index pack, int lane) const { return element_of(pack, lane, elements_); }
+    Index groups() const { return groups_for(elements_); }
+    int lanes_in(Index group) const {
+        return std::min(SimdDouble::width, elements_ - group * SimdDouble::width);
+    }
+    Index element(Index group, int lane) const { return element_of(group, lane, elements_); }
 
-    void gather(Index pack, const double* q, Pack3 x[N]) const {
-        const std::array<Index, N>* at[Pack::width];
-        for (int lane = 0; lane < Pack::width; ++lane) at[lane] = &(*nodes_)[element(pack, lane)];
+    void gather(Index group, const double* q, SimdVec3 x[N]) const {
+        const std::array<Index, N>* at[SimdDouble::width];
+        for (int lane = 0; lane < SimdDouble::width; ++lane) at[lane] = &(*nodes_)[element(group, lane)];
         for (int k = 0; k < N; ++k) x[k] = vectors_of([&](int lane) { return q + 3 * (*at[lane])[k]; });
     }
 
-    void scatter(Index pack, const Pack3 g[N], Residual& out) const {
-        for (int lane = 0; lane < lanes_in(pack); ++lane)
-            for (int k = 0; k < N; ++k) scatter_node(out, (*nodes_)[element(pack, lane)][k], g[k], lane);
+    void scatter(Index group, const SimdVec3 g[N], Residual& out) const {
+        for (int lane = 0; lane < lanes_in(group); ++lane)
+            for (int k = 0; k < N; ++k) scatter_node(out, (*nodes_)[element(group, lane)][k], g[k], lane);
     }
 
     /// Adds the lower blocks (row, column), stored at lower_index(row, column). Blocks that belong to the upper triangle of the matrix
     /// are transposed in place first.
-    void scatter(Index pack, Pack33 h[N * (N + 1) / 2], SystemMatrix& out) const {
+    void scatter(Index group, SimdMat3 h[N * (N + 1) / 2], SystemMatrix& out) const {
         for (int i = 1; i < N; ++i)
             for (int j = 0; j < i; ++j)
-                transpose_in(turned_[pack][lower_index(i - 1, j)], h[lower_index(i, j)]);
-        for (int lane = 0; lane < lanes_in(pack); ++lane) {
-            const Index e = element(pack, lane);
+                transpose_in(turned_[group][lower_index(i - 1, j)], h[lower_index(i, j)]);
+        for (int lane = 0; lane < lanes_in(group); ++lane) {
+            const Index e = element(group, lane);
             const std::array<Index, N>& nodes = (*nodes_)[e];
             Index length[N];
             for (int i = 0; i < N; ++i) length[i] = out.column_length(nodes[i]);
@@ -53,7 +55,7 @@ class ElementLoop {
                 out.add_diagonal_block(nodes[i], h[lower_index(i, i)], lane);
                 for (int j = 0; j < i; ++j) {
                     const SystemMatrix::Slot slot = slots_[e][lower_index(i - 1, j)];
-                    const Pack33& block = h[lower_index(i, j)];
+                    const SimdMat3& block = h[lower_index(i, j)];
                     if (slot == same_node)
                         out.add_block_and_transpose(nodes[i], block, lane);
                     else  // length without a branch, because whether a block is transposed is unpredictable
@@ -63,32 +65,34 @@ class ElementLoop {
         }
     }
 
-    /// Calls body(pack) for the packs of a chunk.
+    /// Calls body(group) for the SIMD vectors of a block.
     template <class Body>
-    static void over_packs(const Chunk& chunk, const Body& body) {
-        for (Index pack = chunk.first / Pack::width; pack < packs_for(chunk.last); ++pack) body(pack);
+    static void over_groups(const ElementBlock& element_block, const Body& body) {
+        for (Index group = element_block.first / SimdDouble::width; group < groups_for(element_block.last);
+             ++group)
+            body(group);
     }
 
-    /// Calls body(pack) for all packs in the order of the element coloring, so that body may scatter.
+    /// Calls body(group) for all SIMD vectors in the order of the element coloring, so that body may scatter.
     template <class Body>
-    void scatter_packs(const Body& body) const {
-        chunks_.scatter([&](const Chunk& chunk) { over_packs(chunk, body); });
+    void scatter_groups(const Body& body) const {
+        element_blocks_.scatter([&](const ElementBlock& element_block) { over_groups(element_block, body); });
     }
 
-    /// Calls body(pack) for all packs in any order; body may write only what belongs to the pack.
+    /// Calls body(group) for all SIMD vectors in any order; body may write only what belongs to the SIMD vector.
     template <class Body>
-    void each_pack(const Body& body) const {
-        chunks_.each([&](const Chunk& chunk) { over_packs(chunk, body); });
+    void each_group(const Body& body) const {
+        element_blocks_.each([&](const ElementBlock& element_block) { over_groups(element_block, body); });
     }
 
-    /// Returns the sum of energy(pack) over the elements [J].
+    /// Returns the sum of energy(group) over the elements [J].
     template <class Energy>
     double sum(const Energy& energy) const {
-        return chunks_.sum([&](const Chunk& chunk) {
+        return element_blocks_.sum([&](const ElementBlock& element_block) {
             double total = 0.0;
-            over_packs(chunk, [&](Index pack) {
-                const Pack shares = energy(pack);
-                for (int lane = 0; lane < lanes_in(pack); ++lane) total += shares[lane];
+            over_groups(element_block, [&](Index group) {
+                const SimdDouble shares = energy(group);
+                for (int lane = 0; lane < lanes_in(group); ++lane) total += shares[lane];
             });
             return total;
         });
@@ -99,9 +103,9 @@ class ElementLoop {
   private:
     Index elements_;
     const std::vector<std::array<Index, N>>* nodes_;
-    const ChunkLoop& chunks_;
+    const ColoredLoop& element_blocks_;
     LargeVector<PairSlots<N>> slots_;
-    // Per pack and pair of nodes: a bit for each lane whose block has its rows at the node with the lower number.
+    // Per SIMD vector and pair of nodes: a bit for each lane whose block has its rows at the node with the lower number.
     std::vector<std::array<std::uint8_t, N*(N - 1) / 2>> turned_;
 };
 
@@ -110,7 +114,7 @@ class FaceLoop : public ElementLoop<3> {
   public:
     using ElementLoop<3>::ElementLoop;
 
-    Index face(Index pack, int lane) const { return element(pack, lane); }
+    Index face(Index group, int lane) const { return element(group, lane); }
 };
 
 }  // namespace magshell

@@ -61,11 +61,11 @@ class SystemMatrix {
     void add_diagonal(VectorXd& out) const;
 
     /// Adds one lane of block (i, j), i != j; length: column length of the node whose columns the slot is in.
-    void add_block(Slot slot, Index length, const Pack33& block, int lane) {
+    void add_block(Slot slot, Index length, const SimdMat3& block, int lane) {
         const double* from = reinterpret_cast<const double*>(&block) + lane;
         const bool transposed = slot & 1;
-        const Index row_stride = (transposed ? 1 : 3) * Pack::width,
-                    column_stride = (transposed ? 3 : 1) * Pack::width;
+        const Index row_stride = (transposed ? 1 : 3) * SimdDouble::width,
+                    column_stride = (transposed ? 3 : 1) * SimdDouble::width;
         double* to = values_.data() + (slot >> 1);
         for (int column = 0; column < 3; ++column) {
             const double* entry = from + column * column_stride;
@@ -77,9 +77,9 @@ class SystemMatrix {
     }
 
     /// Adds one lane of a block that is stored untransposed, at its position, in columns of this length.
-    void add_lower_block(Index position, Index length, const Pack33& block, int lane) {
+    void add_lower_block(Index position, Index length, const SimdMat3& block, int lane) {
         const double* from = reinterpret_cast<const double*>(&block) + lane;
-        constexpr int w = Pack::width;
+        constexpr int w = SimdDouble::width;
         double* to = values_.data() + position;
         for (int column = 0; column < 3; ++column) {
             to[0] += from[column * w];
@@ -90,9 +90,9 @@ class SystemMatrix {
     }
 
     /// Adds one lane of a symmetric diagonal block of a node.
-    void add_diagonal_block(Index node, const Pack33& block, int lane) {
+    void add_diagonal_block(Index node, const SimdMat3& block, int lane) {
         const double* from = reinterpret_cast<const double*>(&block) + lane;
-        constexpr int w = Pack::width;
+        constexpr int w = SimdDouble::width;
         double* to = values_.data() + column_starts_[3 * node];
         const Index length = column_length(node);
         to[0] += from[0];
@@ -124,13 +124,13 @@ class SystemMatrix {
     }
 
     /// Adds one lane of the block (i, j) of two places i > j of an element that the same node takes, and of its transpose.
-    void add_block_and_transpose(Index node, const Pack33& block, int lane) {
-        const Pack33 sum = block + transpose(block);
+    void add_block_and_transpose(Index node, const SimdMat3& block, int lane) {
+        const SimdMat3 sum = block + transpose(block);
         add_diagonal_block(node, sum, lane);
     }
 
     /// Adds one lane of a row of three entries at a rotation_slot.
-    void add_rotation_row(Index slot, Index length, const Pack3& row, int lane) {
+    void add_rotation_row(Index slot, Index length, const SimdVec3& row, int lane) {
         double* to = values_.data() + slot;
         to[0] += row.x[lane];
         to[length - 1] += row.y[lane];

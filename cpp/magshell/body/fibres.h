@@ -1,4 +1,4 @@
-// The muscle fibres in some elements of a solid, with chunks of their own: their contributions are added to those of the solid.
+// The muscle fibres in some elements of a solid, with blocks of their own: their contributions are added to those of the solid.
 #pragma once
 
 #include <array>

@@ -8,7 +8,7 @@ Index Shell::add_dihedral(const Nodes& at, const std::array<Index, 4>& nodes, bo
     const std::vector<Vec3>& rest = at.rest;
     const DihedralAngle dihedral(broadcast(rest[nodes[0]]), broadcast(rest[nodes[1]]),
                                  broadcast(rest[nodes[2]]), broadcast(rest[nodes[3]]),
-                                 Pack(right_is_point ? 1.0 : 0.0));
+                                 SimdDouble(right_is_point ? 1.0 : 0.0));
     dihedrals.push_back({nodes, right_is_point, dihedral.angle()[0], {}, {}});
     return static_cast<Index>(dihedrals.size()) - 1;
 }

@@ -10,9 +10,9 @@ namespace magshell {
 namespace {
 
 std::array<double, 2> angles_at_rest(const Nodes& at, const std::array<Index, 9>& nodes, bool right_is_face) {
-    Pack3 x[9];
+    SimdVec3 x[9];
     for (int a = 0; a < 9; ++a) x[a] = broadcast(nodes[a] < 0 ? Vec3::Zero() : at.rest[nodes[a]]);
-    const Pack face(right_is_face ? 1.0 : 0.0);
+    const SimdDouble face(right_is_face ? 1.0 : 0.0);
     return {DihedralAngleSix(x, face, 0).angle()[0], DihedralAngleSix(x, face, 1).angle()[0]};
 }
 

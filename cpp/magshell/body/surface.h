@@ -39,7 +39,7 @@ class Surface {
     std::vector<std::array<Vec3, 3>> rest_corners_;
 };
 
-/// A surface as a body with chunks of its own: what is assembled on its triangles is added to the body whose nodes they have.
+/// A surface as a body with blocks of its own: what is assembled on its triangles is added to the body whose nodes they have.
 class SurfaceBody final : public Body {
   public:
     /// The surface must outlive this object.

@@ -6,18 +6,18 @@
 
 namespace magshell {
 
-Slot Parameters::add(const std::string& owner, const std::string& name, const std::string& unit, Index rows,
-                     Index width, const Renumbering* order) {
+ParameterSlice Parameters::add(const std::string& owner, const std::string& name, const std::string& unit,
+                               Index rows, Index width, const Renumbering* order) {
     for (const Entry& entry : entries_) {
         if (entry.owner != owner || entry.name != name) continue;
-        if (entry.slot.rows != rows || entry.slot.width != width || entry.order != order)
+        if (entry.slice.rows != rows || entry.slice.width != width || entry.order != order)
             throw std::logic_error("the " + name + " of " + owner + " is registered with two shapes");
-        return entry.slot;
+        return entry.slice;
     }
-    const Slot slot{static_cast<Index>(entries_.size()), size_, rows, width};
-    entries_.push_back({owner, name, unit, slot, order});
-    size_ += slot.size();
-    return slot;
+    const ParameterSlice slice{static_cast<Index>(entries_.size()), size_, rows, width};
+    entries_.push_back({owner, name, unit, slice, order});
+    size_ += slice.size();
+    return slice;
 }
 
 // Calls move(position in the caller's order, position in ours, width, whether an earlier row has that position) for all rows.
@@ -25,16 +25,16 @@ template <class Move>
 void Parameters::each_row(const Move& move) const {
     for (const Entry& entry : entries_) {
         if (!entry.order) {
-            move(entry.slot.first, entry.slot.first, entry.slot.size(), false);
+            move(entry.slice.first, entry.slice.first, entry.slice.size(), false);
             continue;
         }
         const Renumbering& order = *entry.order;
         for (Index row = 0; row < order.size(); ++row)
-            move(entry.slot.at(order.user[row]), entry.slot.at(row), entry.slot.width, false);
+            move(entry.slice.at(order.user[row]), entry.slice.at(row), entry.slice.width, false);
         if (order.size() == order.user_size()) continue;
         for (Index row = 0; row < order.user_size(); ++row)
             if (order.is_copy(row))
-                move(entry.slot.at(row), entry.slot.at(order.core[row]), entry.slot.width, true);
+                move(entry.slice.at(row), entry.slice.at(order.core[row]), entry.slice.width, true);
     }
 }
 
@@ -61,9 +61,9 @@ void Values::set(const Parameters& parameters, VectorXd numbers) {
     changed_.assign(parameters.entries().size(), 1);
     if (numbers_.size() == numbers.size())
         for (const Parameters::Entry& entry : parameters.entries()) {
-            const double* before = numbers_.data() + entry.slot.first;
-            changed_[entry.slot.entry] =
-                !std::equal(before, before + entry.slot.size(), numbers.data() + entry.slot.first);
+            const double* before = numbers_.data() + entry.slice.first;
+            changed_[entry.slice.entry] =
+                !std::equal(before, before + entry.slice.size(), numbers.data() + entry.slice.first);
         }
     numbers_ = std::move(numbers);
 }

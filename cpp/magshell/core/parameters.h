@@ -12,7 +12,7 @@
 namespace magshell {
 
 /// The position of a parameter in the flat vectors: `rows` rows of `width` numbers.
-struct Slot {
+struct ParameterSlice {
     Index entry = -1, first = 0, rows = 0, width = 1;
 
     Index size() const { return rows * width; }
@@ -24,15 +24,15 @@ class Parameters {
   public:
     struct Entry {
         std::string owner, name, unit;
-        Slot slot;
+        ParameterSlice slice;
         const Renumbering* order;  // of its rows; nullptr: the order of the caller
     };
 
-    /// Registers a parameter, or returns its slot if its owner has registered it already: several objects may read it. `order` must outlive the
+    /// Registers a parameter, or returns its slice if its owner has registered it already: several objects may read it. `order` must outlive the
     /// list. If several rows of the caller are one of ours, ours is their sum, and our last rows are empty. Throws std::logic_error
     /// if the shapes differ.
-    Slot add(const std::string& owner, const std::string& name, const std::string& unit, Index rows,
-             Index width, const Renumbering* order = nullptr);
+    ParameterSlice add(const std::string& owner, const std::string& name, const std::string& unit, Index rows,
+                       Index width, const Renumbering* order = nullptr);
 
     const std::vector<Entry>& entries() const { return entries_; }
     Index size() const { return size_; }
@@ -52,13 +52,15 @@ class Parameters {
 /// The values of all parameters, with marks of those that the last change affected.
 class Values {
   public:
-    const double* operator[](const Slot& slot) const { return numbers_.data() + slot.first; }
-    double number(const Slot& slot, Index row = 0) const { return numbers_[slot.at(row)]; }
-    Vec3 vector(const Slot& slot, Index row = 0) const { return numbers_.segment<3>(slot.at(row)); }
+    const double* operator[](const ParameterSlice& slice) const { return numbers_.data() + slice.first; }
+    double number(const ParameterSlice& slice, Index row = 0) const { return numbers_[slice.at(row)]; }
+    Vec3 vector(const ParameterSlice& slice, Index row = 0) const {
+        return numbers_.segment<3>(slice.at(row));
+    }
 
-    template <class... Slots>
-    bool changed(const Slots&... slots) const {
-        return (changed_[slots.entry] || ...);
+    template <class... ParameterSlices>
+    bool changed(const ParameterSlices&... slices) const {
+        return (changed_[slices.entry] || ...);
     }
     const VectorXd& numbers() const { return numbers_; }
 
@@ -72,10 +74,10 @@ class Values {
 
 /// The load parameters of a state: load factors, uniform field, amplitude of supports, and values that vary during the solve. A path or a
 /// motion interpolates them. They form one flat vector with a list of their own.
-using Controls = VectorXd;
+using LoadParameters = VectorXd;
 
 /// Returns the load parameters at `parameter` on the straight line from `from` (0) to `to` (1).
-inline Controls interpolate(const Controls& from, const Controls& to, double parameter) {
+inline LoadParameters interpolate(const LoadParameters& from, const LoadParameters& to, double parameter) {
     return (1.0 - parameter) * from + parameter * to;
 }
 
@@ -86,17 +88,17 @@ struct FaceInput {
 
 /// The parameters and load parameters that the terms of a scene read.
 struct Registry {
-    Parameters values, controls;
+    Parameters values, load_parameters;
 };
 
 /// The gradient of a function by all values and all load parameters, in the order of the core. Each object adds its part.
 struct Gradient {
-    VectorXd values, controls;
+    VectorXd values, load_parameters;
 
     Gradient() = default;
     explicit Gradient(const Registry& registry)
         : values(VectorXd::Zero(registry.values.size())),
-          controls(VectorXd::Zero(registry.controls.size())) {}
+          load_parameters(VectorXd::Zero(registry.load_parameters.size())) {}
 };
 
 }  // namespace magshell

@@ -8,12 +8,12 @@ namespace magshell {
 DofMap::DofMap(const SystemMatrix& matrix, std::vector<PrescribedNode> held, const Nodes& nodes, Index moves,
                Registry& registry, ReducedCoordinatesList reduced)
     : held_(std::move(held)), nodes_(nodes), moves_(moves), full_size_(matrix.size()) {
-    support_factor_ = registry.controls.add("scene", "support_factor", "1", 1, 1);
+    support_factor_ = registry.load_parameters.add("scene", "support_factor", "1", 1, 1);
     for (Index k = 0; k < moves; ++k) {
         const std::string owner = "move " + std::to_string(k);
-        slots_.push_back({registry.values.add(owner, "center", "m", 1, 3),
-                          registry.values.add(owner, "rotation", "rad", 1, 3),
-                          registry.values.add(owner, "displacement", "m", 1, 3)});
+        slices_.push_back({registry.values.add(owner, "center", "m", 1, 3),
+                           registry.values.add(owner, "rotation", "rad", 1, 3),
+                           registry.values.add(owner, "displacement", "m", 1, 3)});
     }
     std::vector<char> is_held(matrix.size(), 0);
     held_at_.assign(matrix.nodes(), -1);
@@ -95,15 +95,15 @@ bool DofMap::axis_aligned(const PrescribedNode& h) const {
 }
 
 void DofMap::set_values(const Values& values) {
-    for (std::size_t k = 0; k < slots_.size(); ++k)
-        moves_[k] = {values.vector(slots_[k].center), values.vector(slots_[k].rotation),
-                     values.vector(slots_[k].displacement)};
+    for (std::size_t k = 0; k < slices_.size(); ++k)
+        moves_[k] = {values.vector(slices_[k].center), values.vector(slices_[k].rotation),
+                     values.vector(slices_[k].displacement)};
     if (reduced_) reduced_->set_values(values);
 }
 
-VectorXd DofMap::prescribed_increment(const VectorXd& q, const Controls& controls) const {
+VectorXd DofMap::prescribed_increment(const VectorXd& q, const LoadParameters& load_parameters) const {
     VectorXd increment = VectorXd::Zero(q.size());
-    const double t = support_factor(controls);
+    const double t = support_factor(load_parameters);
     for (const PrescribedNode& h : held_)
         increment.segment<3>(3 * h.node) = held_part(
             h, [&](Index move) -> Vec3 { return position(h.node, move, t) - q.segment<3>(3 * h.node); });
@@ -137,9 +137,9 @@ bool DofMap::acts_on_free_motion(Index a, Index b, const Vec3& axis) const {
     return (free_motions(a) * across * free_motions(b)).norm() > round_off * axis.norm();
 }
 
-VectorXd DofMap::prescribed_rate(const Controls& controls) const {
+VectorXd DofMap::prescribed_rate(const LoadParameters& load_parameters) const {
     VectorXd out = VectorXd::Zero(full_size_);
-    const double t = support_factor(controls);
+    const double t = support_factor(load_parameters);
     for (const PrescribedNode& h : held_)
         out.segment<3>(3 * h.node) = held_part(h, [&](Index move) { return rate(h.node, move, t); });
     return out;
@@ -160,9 +160,10 @@ Vec3 DofMap::rate(Index node, Index move, double support_factor) const {
 }
 
 void DofMap::vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
-                 const Controls& controls, Gradient& out, const VectorXd& by_motor_forces) const {
+                 const LoadParameters& load_parameters, Gradient& out,
+                 const VectorXd& by_motor_forces) const {
     if (reduced_) reduced_->vjp(by_state, lambda, gradient, by_motor_forces, out);
-    const double t = support_factor(controls);
+    const double t = support_factor(load_parameters);
     std::vector<SupportMove> by_move(moves_.size());
     for (const PrescribedNode& h : held_)
         for (int axis = 0; axis < h.n_prescribed; ++axis) {
@@ -175,12 +176,12 @@ void DofMap::vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorX
                 moves_[move].point_vjp(rest, t, by_position, by_move[move]);
             else
                 moves_[move].direction_vjp(rest, t, by_position, by_move[move]);
-            out.controls[support_factor_.first] += by_position.dot(rate(h.node, move, t));
+            out.load_parameters[support_factor_.first] += by_position.dot(rate(h.node, move, t));
         }
-    for (std::size_t k = 0; k < slots_.size(); ++k) {
-        out.values.segment<3>(slots_[k].center.first) += by_move[k].center;
-        out.values.segment<3>(slots_[k].rotation.first) += by_move[k].rotation_vector;
-        out.values.segment<3>(slots_[k].displacement.first) += by_move[k].translation;
+    for (std::size_t k = 0; k < slices_.size(); ++k) {
+        out.values.segment<3>(slices_[k].center.first) += by_move[k].center;
+        out.values.segment<3>(slices_[k].rotation.first) += by_move[k].rotation_vector;
+        out.values.segment<3>(slices_[k].displacement.first) += by_move[k].translation;
     }
 }
 

@@ -46,7 +46,9 @@ class DofMap {
     bool is_rotated(Index node) const { return !frame_of_.empty() && frame_of_[node] >= 0; }
 
     /// Returns the amplitude of the prescribed support moves: 0 at rest, 1 at their end.
-    double support_factor(const Controls& controls) const { return controls[support_factor_.first]; }
+    double support_factor(const LoadParameters& load_parameters) const {
+        return load_parameters[support_factor_.first];
+    }
 
     Index size() const { return pattern_->size; }
     const std::shared_ptr<const SparsePattern>& pattern() const { return pattern_; }
@@ -55,16 +57,17 @@ class DofMap {
     void set_pattern(const SystemMatrix& matrix, const SystemMatrix* layer);
 
     /// Returns the increment of all dofs to the targets of supports and motors; zero elsewhere.
-    VectorXd prescribed_increment(const VectorXd& q, const Controls& controls) const;
+    VectorXd prescribed_increment(const VectorXd& q, const LoadParameters& load_parameters) const;
 
     /// Returns d(prescribed positions of supports)/d(support factor).
-    VectorXd prescribed_rate(const Controls& controls) const;
+    VectorXd prescribed_rate(const LoadParameters& load_parameters) const;
 
     /// Adds the gradients by the support moves, the support factor, motors and joint parameters. by_state: gradient by the prescribed
     /// positions. lambda: adjoint. gradient: of the energy, with inertia in a motion. by_motor_forces: gradient by the motor forces, empty if
     /// none; by_state includes its contribution through the state.
     void vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
-             const Controls& controls, Gradient& out, const VectorXd& by_motor_forces = {}) const;
+             const LoadParameters& load_parameters, Gradient& out,
+             const VectorXd& by_motor_forces = {}) const;
     /// Adds to the forces K p of a prescribed increment those due to the curved paths of motor-driven nodes.
     void add_motor_increment_forces(const VectorXd& gradient, const VectorXd& move, VectorXd& forces) const {
         if (has_motors()) reduced_->add_motor_increment_forces(gradient, move, forces);
@@ -160,12 +163,12 @@ class DofMap {
 
     std::vector<PrescribedNode> held_;
     const Nodes& nodes_;
-    struct MoveSlots {
-        Slot center, rotation, displacement;
+    struct MoveSlices {
+        ParameterSlice center, rotation, displacement;
     };
-    std::vector<MoveSlots> slots_;
+    std::vector<MoveSlices> slices_;
     std::vector<SupportMove> moves_;
-    Slot support_factor_;
+    ParameterSlice support_factor_;
     Index full_size_;
     std::vector<Index>
         frame_of_;  // per node: its index in held_ if it is rotated, else -1; empty if no node is

@@ -48,10 +48,10 @@ auto solver_of(const MatrixXd& rows) {
 }  // namespace
 
 SkeletonCoordinates::SkeletonCoordinates(std::vector<RigidNodes> links, std::vector<Joint> joints,
-                                         std::vector<Slots> slots)
+                                         std::vector<ParameterSlices> slices)
     : ReducedCoordinates(nodes_of(links)), links_(std::move(links)), joints_(std::move(joints)) {
-    slots.resize(links_.size());
-    slots_ = std::move(slots);
+    slices.resize(links_.size());
+    slices_ = std::move(slices);
     Index row = 0;
     bool vertices = false;
     for (Index k = 0; k < n_links(); ++k) {
@@ -61,7 +61,7 @@ SkeletonCoordinates::SkeletonCoordinates(std::vector<RigidNodes> links, std::vec
         row += links_[k].size();
         vertices |= links_[k].has_vertices();
         if (!joints_[k].has_motor) continue;
-        motors_.push_back({k, slots_[k].motor, n_motor_coordinates_});
+        motors_.push_back({k, slices_[k].motor, n_motor_coordinates_});
         n_motor_coordinates_ += joints_[k].freedom();
     }
     Index free = 0, held = coordinates();
@@ -199,10 +199,10 @@ double SkeletonCoordinates::coordinate(Index link, const std::vector<Pose>& pose
 
 void SkeletonCoordinates::set_values(const Values& values) {
     for (Motor& motor : motors_)
-        for (Index c = 0; c < motor.slot.size(); ++c) motor.target[c] = values[motor.slot][c];
+        for (Index c = 0; c < motor.slice.size(); ++c) motor.target[c] = values[motor.slice][c];
     for (Index k = 0; k < n_links(); ++k) {
-        if (slots_[k].origin.size() > 0) joints_[k].origin = values.vector(slots_[k].origin);
-        if (slots_[k].axis.size() > 0) joints_[k].axis = values.vector(slots_[k].axis);
+        if (slices_[k].origin.size() > 0) joints_[k].origin = values.vector(slices_[k].origin);
+        if (slices_[k].axis.size() > 0) joints_[k].axis = values.vector(slices_[k].axis);
     }
 }
 
@@ -395,11 +395,11 @@ void SkeletonCoordinates::motor_vjp(const VectorXd& q, const VectorXd& by_motors
     const std::vector<Pose> poses = this->poses(q);
     for (const Motor& motor : motors_) {
         if (joints_[motor.link].kind != JointKind::ball) {
-            out.values[motor.slot.first] += by_units[motor.first];
+            out.values[motor.slice.first] += by_units[motor.first];
             continue;
         }
         const Vec3 moment = frame(motor.link, poses).transpose() * by_units.segment<3>(motor.first);
-        out.values.segment<3>(motor.slot.first) += transposed_jacobian_times(motor.target, moment);
+        out.values.segment<3>(motor.slice.first) += transposed_jacobian_times(motor.target, moment);
     }
 }
 
@@ -452,8 +452,9 @@ VectorXd SkeletonCoordinates::motor_force_change(const VectorXd& q, const Vector
 // and its rate do not change.
 
 bool SkeletonCoordinates::has_joint_parameters() const {
-    return std::ranges::any_of(
-        slots_, [](const Slots& slots) { return slots.origin.size() > 0 || slots.axis.size() > 0; });
+    return std::ranges::any_of(slices_, [](const ParameterSlices& slices) {
+        return slices.origin.size() > 0 || slices.axis.size() > 0;
+    });
 }
 
 void SkeletonCoordinates::Beyond::add(const Beyond& later) {
@@ -529,12 +530,12 @@ void SkeletonCoordinates::joint_parameters_vjp(const VectorXd& q, const VectorXd
         const auto by_point = [&](const Mat3& turn, const Vec3& rate) -> Vec3 {
             return turn.transpose() * (sums[k].slide + sums[k].force.cross(rate));
         };
-        if (slots_[k].origin.size() > 0 &&
+        if (slices_[k].origin.size() > 0 &&
             (joint.kind == JointKind::revolute || joint.kind == JointKind::ball))
-            out.values.segment<3>(slots_[k].origin.first) +=
+            out.values.segment<3>(slices_[k].origin.first) +=
                 by_point(frame(k, poses), parent_rate) - by_point(poses[k].rotation, sums[k].rate);
-        if (slots_[k].axis.size() > 0 && joint.has_axis())
-            out.values.segment<3>(slots_[k].axis.first) +=
+        if (slices_[k].axis.size() > 0 && joint.has_axis())
+            out.values.segment<3>(slices_[k].axis.first) +=
                 axis_gradient(k, sums[k], parent_rate, z, poses, columns);
     }
 }

@@ -19,12 +19,12 @@ namespace magshell {
 class SkeletonCoordinates final : public ReducedCoordinates {
   public:
     /// The parameters of a joint, empty if it has none: the target of its motor, its origin and its axis.
-    struct Slots {
-        Slot motor, origin, axis;
+    struct ParameterSlices {
+        ParameterSlice motor, origin, axis;
     };
     /// joints[k] connects links[k] to its parent; parents come first.
     SkeletonCoordinates(std::vector<RigidNodes> links, std::vector<Joint> joints,
-                        std::vector<Slots> slots = {});
+                        std::vector<ParameterSlices> slices = {});
 
     Index coordinates() const override { return coordinates_ - n_motor_coordinates(); }
     Index n_motor_coordinates() const override { return n_motor_coordinates_; }
@@ -101,14 +101,14 @@ class SkeletonCoordinates final : public ReducedCoordinates {
         column_of_;  // per coordinate, joint by joint: its column of B; those of motors come last
     struct Motor {
         Index link;
-        Slot slot;
+        ParameterSlice slice;
         Index first;                 // among the motor coordinates
         Vec3 target = Vec3::Zero();  // a rotation vector for a ball joint, else one number
     };
     std::vector<Motor> motors_;
     Index n_motor_coordinates_ = 0;
-    std::vector<Slots> slots_;    // per joint
-    std::vector<Index> leading_;  // the nodes that a start prescribes
+    std::vector<ParameterSlices> slices_;  // per joint
+    std::vector<Index> leading_;           // the nodes that a start prescribes
     Index coordinates_ = 0;
     std::shared_ptr<const LinkPaths> paths_;
 };

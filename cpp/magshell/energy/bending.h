@@ -22,20 +22,20 @@ namespace magshell {
 struct BendingFace {
     // d delta_i / d(node): `corner[i][k]` for the face's own vertex k, `beyond[i]` for the vertex across edge
     // i.
-    Pack3 corner[3][3];
-    Pack3 beyond[3];
-    Pack sign[3];  // d delta_i / d phi_i
+    SimdVec3 corner[3][3];
+    SimdVec3 beyond[3];
+    SimdDouble sign[3];  // d delta_i / d phi_i
 
     /// Computes the blocks between the six nodes (corners 0-2, vertices across the edges 3-5) at
     /// lower_index(row, column).
-    void node_blocks(const Symmetric3& stiffness, Pack33 h[21], Pack3 stiff_corner[3][3]) const {
+    void node_blocks(const Symmetric3& stiffness, SimdMat3 h[21], SimdVec3 stiff_corner[3][3]) const {
         for (int j = 0; j < 3; ++j)
             for (int k = 0; k < 3; ++k)
                 stiff_corner[j][k] = stiffness(j, 0) * corner[0][k] + stiffness(j, 1) * corner[1][k] +
                                      stiffness(j, 2) * corner[2][k];
         for (int k = 0; k < 3; ++k)
             for (int l = 0; l <= k; ++l) {
-                Pack33& block = h[lower_index(k, l)];
+                SimdMat3& block = h[lower_index(k, l)];
                 block = outer(corner[0][k], stiff_corner[0][l]);
                 block += outer(corner[1][k], stiff_corner[1][l]);
                 block += outer(corner[2][k], stiff_corner[2][l]);
@@ -48,7 +48,8 @@ struct BendingFace {
     }
 
     /// Computes the rows of phi_i against the six nodes: rows[i][node].
-    void rotation_rows(const Symmetric3& stiffness, const Pack3 stiff_corner[3][3], Pack3 rows[3][6]) const {
+    void rotation_rows(const Symmetric3& stiffness, const SimdVec3 stiff_corner[3][3],
+                       SimdVec3 rows[3][6]) const {
         for (int i = 0; i < 3; ++i)
             for (int k = 0; k < 3; ++k) {
                 rows[i][k] = sign[i] * stiff_corner[i][k];

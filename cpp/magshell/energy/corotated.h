@@ -20,55 +20,60 @@ struct Corotated : LameSolid {
     static constexpr bool refuses_inversion = false;
     static constexpr bool keeps_measures = false;
 
-    Pack33 f;
+    SimdMat3 f;
     Polar polar;
 
-    explicit Corotated(const Pack33& gradient) : f(gradient), polar(f) {}
+    explicit Corotated(const SimdMat3& gradient) : f(gradient), polar(f) {}
 
-    static Volumetric volumetric(const Pack c[], const Pack& v) { return quadratic_volume(c[0], v); }
+    static Volumetric volumetric(const SimdDouble c[], const SimdDouble& v) {
+        return quadratic_volume(c[0], v);
+    }
 
-    Pack volume_measure() const { return polar.trace() - Pack(2.0); }
-    Pack volume_rate(const Pack33& d) const { return double_dot(polar.rotation, d); }
-    Pack3 volume_gradient(const Pack3& g) const { return multiply(polar.rotation, g); }
-    Pack33 volume_piola() const { return polar.rotation; }
+    SimdDouble volume_measure() const { return polar.trace() - SimdDouble(2.0); }
+    SimdDouble volume_rate(const SimdMat3& d) const { return double_dot(polar.rotation, d); }
+    SimdVec3 volume_gradient(const SimdVec3& g) const { return multiply(polar.rotation, g); }
+    SimdMat3 volume_piola() const { return polar.rotation; }
 
-    Pack energy(const Pack c[]) const {
-        Pack sum(0.0);
-        for (const Pack& stretch : polar.stretch) sum += (stretch - Pack(1.0)) * (stretch - Pack(1.0));
+    SimdDouble energy(const SimdDouble c[]) const {
+        SimdDouble sum(0.0);
+        for (const SimdDouble& stretch : polar.stretch)
+            sum += (stretch - SimdDouble(1.0)) * (stretch - SimdDouble(1.0));
         return c[1] * sum;
     }
 
-    void stress(const Pack c[], const Pack& pressure, Pack s[]) const { s[0] = pressure - Pack(2.0) * c[1]; }
+    void stress(const SimdDouble c[], const SimdDouble& pressure, SimdDouble s[]) const {
+        s[0] = pressure - SimdDouble(2.0) * c[1];
+    }
 
-    void stress_rate(const Pack[], const Pack33&, Pack pressure_rate, Pack s[]) const {
+    void stress_rate(const SimdDouble[], const SimdMat3&, SimdDouble pressure_rate, SimdDouble s[]) const {
         s[0] = pressure_rate;
     }
 
-    Pack33 piola(const Pack c[], const Pack s[]) const {
-        return Pack(2.0) * c[1] * f + s[0] * polar.rotation;
+    SimdMat3 piola(const SimdDouble c[], const SimdDouble s[]) const {
+        return SimdDouble(2.0) * c[1] * f + s[0] * polar.rotation;
     }
 
-    void work_by_constants(const Pack[], const Pack33& d, Pack work[]) const {
-        work[0] = Pack(0.0);
-        work[1] = Pack(2.0) * double_dot(f - polar.rotation, d);
+    void work_by_constants(const SimdDouble[], const SimdMat3& d, SimdDouble work[]) const {
+        work[0] = SimdDouble(0.0);
+        work[1] = SimdDouble(2.0) * double_dot(f - polar.rotation, d);
     }
-    static void pressure_by_constants(const Pack[], const Pack& v, Pack by[]) {
-        by[0] = v - Pack(1.0);
-        by[1] = Pack(0.0);
+    static void pressure_by_constants(const SimdDouble[], const SimdDouble& v, SimdDouble by[]) {
+        by[0] = v - SimdDouble(1.0);
+        by[1] = SimdDouble(0.0);
     }
 
     template <int N>
     class Tangent {
       public:
-        Tangent(const Corotated& at, const Pack c[], const Pack s[], const Pack& bulk, const Pack& volume,
-                const Pack3* gradients)
-            : g_(gradients), bulk_(volume * bulk), shear_(Pack(2.0) * volume * c[1]) {
-            const Pack* stretch = at.polar.stretch;
-            const Pack least = Pack(1e-10) * stretch[0] + Pack(1e-100);
-            Pack33 spin;  // s (tr U I - U)^-1 in the current frame
-            for (Pack& entry : spin.at) entry = Pack(0.0);
+        Tangent(const Corotated& at, const SimdDouble c[], const SimdDouble s[], const SimdDouble& bulk,
+                const SimdDouble& volume, const SimdVec3* gradients)
+            : g_(gradients), bulk_(volume * bulk), shear_(SimdDouble(2.0) * volume * c[1]) {
+            const SimdDouble* stretch = at.polar.stretch;
+            const SimdDouble least = SimdDouble(1e-10) * stretch[0] + SimdDouble(1e-100);
+            SimdMat3 spin;  // s (tr U I - U)^-1 in the current frame
+            for (SimdDouble& entry : spin.at) entry = SimdDouble(0.0);
             for (int i = 0; i < 3; ++i) {
-                const Pack sum = max(stretch[(i + 1) % 3] + stretch[(i + 2) % 3], least);
+                const SimdDouble sum = max(stretch[(i + 1) % 3] + stretch[(i + 2) % 3], least);
                 spin += (volume * s[0] / sum) * outer(at.polar.u[i], at.polar.u[i]);
             }
             for (int k = 0; k < N; ++k) {
@@ -77,18 +82,18 @@ struct Corotated : LameSolid {
             }
         }
 
-        Pack33 block(int k, int l) const {
-            Pack33 h = multiply(turned_[k], cross_matrix(r_[l]));
+        SimdMat3 block(int k, int l) const {
+            SimdMat3 h = multiply(turned_[k], cross_matrix(r_[l]));
             h += outer(bulk_ * r_[k], r_[l]);
             add_to_diagonal(h, shear_ * dot(g_[k], g_[l]));
             return h;
         }
 
       private:
-        const Pack3* g_;
-        Pack bulk_, shear_;
-        Pack3 r_[N];
-        Pack33 turned_[N];
+        const SimdVec3* g_;
+        SimdDouble bulk_, shear_;
+        SimdVec3 r_[N];
+        SimdMat3 turned_[N];
     };
 };
 

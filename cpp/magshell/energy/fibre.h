@@ -15,11 +15,11 @@
 // its mean over all directions, and T/l to T'. One element per SIMD lane.
 #pragma once
 
-#include "magshell/core/pack_functions.h"
+#include "magshell/core/simd_functions.h"
 #include "magshell/core/vector3.h"
 #include "magshell/energy/fibre_curve.h"
 #include "magshell/strain/deformation.h"
-#include "magshell/strain/pushed_forward_vector.h"
+#include "magshell/strain/push_forward.h"
 
 namespace magshell {
 
@@ -32,19 +32,19 @@ struct FibreLaw {
     FibreCurve force_velocity;         // f_V(u), u: rate of l over its largest; empty: 1
 
     struct Response {
-        Pack energy, tension, slope;  // psi, T, T'
-        Pack by_activation;           // dT/da
+        SimdDouble energy, tension, slope;  // psi, T, T'
+        SimdDouble by_activation;           // dT/da
     };
 
-    Response at(const Pack& length, const Pack& activation) const {
+    Response at(const SimdDouble& length, const SimdDouble& activation) const {
         if (form == FibreForm::target_stretch) {
-            const Pack off = length - Pack(1.0) + activation;
-            return {Pack(0.5) * off * off, off, Pack(1.0), Pack(1.0)};
+            const SimdDouble off = length - SimdDouble(1.0) + activation;
+            return {SimdDouble(0.5) * off * off, off, SimdDouble(1.0), SimdDouble(1.0)};
         }
         if (form == FibreForm::active_stress)
-            return {Pack(0.5) * activation * length * length, activation * length, activation, length};
+            return {SimdDouble(0.5) * activation * length * length, activation * length, activation, length};
         Response all;
-        for (int lane = 0; lane < Pack::width; ++lane) {
+        for (int lane = 0; lane < SimdDouble::width; ++lane) {
             const FibreCurve::Sample active = force_length.at(length[lane]);
             const FibreCurve::Sample rest =
                 passive.empty() ? FibreCurve::Sample{0.0, 0.0, 0.0} : passive.at(length[lane]);
@@ -67,29 +67,29 @@ struct FibreLaw {
 
 /// The current vector y of a fibre, its direction n and its stretch.
 struct DeformedFibre {
-    Pack3 y, n;
-    Pack length, inverse;  // l, and 1/l, which is zero where l is
+    SimdVec3 y, n;
+    SimdDouble length, inverse;  // l, and 1/l, which is zero where l is
 
-    explicit DeformedFibre(const Pack3& pushed_forward)
+    explicit DeformedFibre(const SimdVec3& pushed_forward)
         : y(pushed_forward), length(sqrt(squared_norm(pushed_forward))) {
-        for (int lane = 0; lane < Pack::width; ++lane)
+        for (int lane = 0; lane < SimdDouble::width; ++lane)
             inverse.set(lane, length[lane] > 0.0 ? 1.0 / length[lane] : 0.0);
         n = inverse * y;
     }
 
     /// Returns T/l, or T' where l is zero.
-    Pack over_length(const FibreLaw::Response& law) const {
-        return law.tension * inverse + (Pack(1.0) - length * inverse) * law.slope;
+    SimdDouble over_length(const FibreLaw::Response& law) const {
+        return law.tension * inverse + (SimdDouble(1.0) - length * inverse) * law.slope;
     }
 
     /// Returns along n n^T + across (I - n n^T).
-    Pack33 stiffness(const Pack& along, const Pack& across) const {
-        Pack33 m = outer((along - across) * n, n);
+    SimdMat3 stiffness(const SimdDouble& along, const SimdDouble& across) const {
+        SimdMat3 m = outer((along - across) * n, n);
         add_to_diagonal(m, across);
         return m;
     }
     /// Returns the part of v perpendicular to the fibre.
-    Pack3 across(const Pack3& v) const { return v - dot(n, v) * n; }
+    SimdVec3 across(const SimdVec3& v) const { return v - dot(n, v) * n; }
 };
 
 }  // namespace magshell

@@ -15,22 +15,22 @@
 //     volumetric(c, J)                U, U', U''
 #pragma once
 
-#include "magshell/core/pack_functions.h"
+#include "magshell/core/simd_functions.h"
 #include "magshell/strain/deformation.h"
 
 namespace magshell {
 
 /// The Lame constants of a material for small strains, which its viscosity uses.
 struct RestModuli {
-    Pack lambda, mu;  // [Pa]
+    SimdDouble lambda, mu;  // [Pa]
 };
 
 /// The base of materials whose constants are lambda and mu.
 struct LameSolid {
     static constexpr int constants = 2;
 
-    static RestModuli rest_moduli(const Pack c[]) { return {c[0], c[1]}; }
-    static void rest_moduli_vjp(const Pack[], const RestModuli& by, Pack out[]) {
+    static RestModuli rest_moduli(const SimdDouble c[]) { return {c[0], c[1]}; }
+    static void rest_moduli_vjp(const SimdDouble[], const RestModuli& by, SimdDouble out[]) {
         out[0] += by.lambda;
         out[1] += by.mu;
     }
@@ -38,12 +38,12 @@ struct LameSolid {
 
 /// w, and its derivatives by I1 and J.
 struct InvariantDerivatives {
-    Pack w, by_i, by_j, by_ii, by_ij, by_jj;
+    SimdDouble w, by_i, by_j, by_ii, by_ij, by_jj;
 };
 
 /// The part of the energy that depends on the measure of volume only, with its first and second derivatives.
 struct Volumetric {
-    Pack energy, pressure, bulk;
+    SimdDouble energy, pressure, bulk;
 };
 
 template <class Law>
@@ -52,68 +52,72 @@ struct InvariantSolid : LameSolid {
     static constexpr bool refuses_inversion = Law::refuses_inversion;
     static constexpr bool keeps_measures = Law::refuses_inversion;
 
-    Pack33 f, cof;
-    Pack i1, j, trial;  // trial: det F, even if j was replaced
+    SimdMat3 f, cof;
+    SimdDouble i1, j, trial;  // trial: det F, even if j was replaced
 
-    explicit InvariantSolid(const Pack33& gradient)
+    explicit InvariantSolid(const SimdMat3& gradient)
         : f(gradient), cof(cofactor(f)), i1(double_dot(f, f)), j(determinant(f, cof)), trial(j) {}
 
-    static Volumetric volumetric(const Pack c[], const Pack& measure) { return Law::volumetric(c, measure); }
+    static Volumetric volumetric(const SimdDouble c[], const SimdDouble& measure) {
+        return Law::volumetric(c, measure);
+    }
 
     /// Returns U'' as a secant of U' between two volumes.
-    static Pack bulk_between(const Pack c[], const Pack& now, const Pack& before) {
-        const Pack change = before - now, middle = Pack(0.5) * (now + before);
-        const Pack secant = (Law::volumetric(c, before).pressure - Law::volumetric(c, now).pressure) / change;
-        return where_negative(abs(change) - Pack(1e-3), Law::volumetric(c, middle).bulk, secant);
+    static SimdDouble bulk_between(const SimdDouble c[], const SimdDouble& now, const SimdDouble& before) {
+        const SimdDouble change = before - now, middle = SimdDouble(0.5) * (now + before);
+        const SimdDouble secant =
+            (Law::volumetric(c, before).pressure - Law::volumetric(c, now).pressure) / change;
+        return where_negative(abs(change) - SimdDouble(1e-3), Law::volumetric(c, middle).bulk, secant);
     }
 
-    Pack volume_measure() const { return j; }
-    Pack volume_rate(const Pack33& d) const { return double_dot(cof, d); }
-    Pack3 volume_gradient(const Pack3& g) const { return multiply(cof, g); }
-    Pack33 volume_piola() const { return cof; }
+    SimdDouble volume_measure() const { return j; }
+    SimdDouble volume_rate(const SimdMat3& d) const { return double_dot(cof, d); }
+    SimdVec3 volume_gradient(const SimdVec3& g) const { return multiply(cof, g); }
+    SimdMat3 volume_piola() const { return cof; }
 
-    Pack energy(const Pack c[]) const { return Law::derivatives(c, i1, j).w; }
+    SimdDouble energy(const SimdDouble c[]) const { return Law::derivatives(c, i1, j).w; }
 
-    void stress(const Pack c[], const Pack& pressure, Pack s[]) const {
+    void stress(const SimdDouble c[], const SimdDouble& pressure, SimdDouble s[]) const {
         const InvariantDerivatives w = Law::derivatives(c, i1, j);
         s[0] = w.by_j + pressure;
-        if constexpr (stresses == 2) s[1] = Pack(2.0) * w.by_i;
+        if constexpr (stresses == 2) s[1] = SimdDouble(2.0) * w.by_i;
     }
 
-    void stress_rate(const Pack c[], const Pack33& d, Pack pressure_rate, Pack s[]) const {
+    void stress_rate(const SimdDouble c[], const SimdMat3& d, SimdDouble pressure_rate,
+                     SimdDouble s[]) const {
         const InvariantDerivatives w = Law::derivatives(c, i1, j);
-        const Pack di = Pack(2.0) * double_dot(f, d), dj = double_dot(cof, d);
+        const SimdDouble di = SimdDouble(2.0) * double_dot(f, d), dj = double_dot(cof, d);
         s[0] = w.by_jj * dj + pressure_rate;
         if constexpr (stresses == 2) {
             s[0] += w.by_ij * di;
-            s[1] = Pack(2.0) * (w.by_ii * di + w.by_ij * dj);
+            s[1] = SimdDouble(2.0) * (w.by_ii * di + w.by_ij * dj);
         }
     }
 
-    Pack33 piola(const Pack c[], const Pack s[]) const { return shear(c, s) * f + s[0] * cof; }
+    SimdMat3 piola(const SimdDouble c[], const SimdDouble s[]) const { return shear(c, s) * f + s[0] * cof; }
 
     /// Computes J and I1 at the end of a linearized step, at least a tenth of their current values.
-    void measures_after(const Pack33& d, Pack out[2]) const {
-        out[0] = max(j + double_dot(cof, d), Pack(0.1) * j);
-        out[1] = max(i1 + Pack(2.0) * double_dot(f, d), Pack(0.1) * i1);
+    void measures_after(const SimdMat3& d, SimdDouble out[2]) const {
+        out[0] = max(j + double_dot(cof, d), SimdDouble(0.1) * j);
+        out[1] = max(i1 + SimdDouble(2.0) * double_dot(f, d), SimdDouble(0.1) * i1);
     }
     /// Evaluates the law at these measures from now on.
-    void take_measures(const Pack given[2]) {
+    void take_measures(const SimdDouble given[2]) {
         j = given[0];
         i1 = given[1];
     }
 
     /// Computes dP/dc : d of w for each constant c; these energies are linear in their constants.
-    void work_by_constants(const Pack[], const Pack33& d, Pack work[]) const {
+    void work_by_constants(const SimdDouble[], const SimdMat3& d, SimdDouble work[]) const {
         for (int k = 0; k < constants; ++k) {
-            const Pack unit[2] = {Pack(k == 0 ? 1.0 : 0.0), Pack(k == 1 ? 1.0 : 0.0)};
+            const SimdDouble unit[2] = {SimdDouble(k == 0 ? 1.0 : 0.0), SimdDouble(k == 1 ? 1.0 : 0.0)};
             const InvariantDerivatives w = Law::derivatives(unit, i1, j);
-            work[k] = Pack(2.0) * w.by_i * double_dot(f, d) + w.by_j * double_dot(cof, d);
+            work[k] = SimdDouble(2.0) * w.by_i * double_dot(f, d) + w.by_j * double_dot(cof, d);
         }
     }
-    static void pressure_by_constants(const Pack[], const Pack& measure, Pack by[]) {
+    static void pressure_by_constants(const SimdDouble[], const SimdDouble& measure, SimdDouble by[]) {
         for (int k = 0; k < constants; ++k) {
-            const Pack unit[2] = {Pack(k == 0 ? 1.0 : 0.0), Pack(k == 1 ? 1.0 : 0.0)};
+            const SimdDouble unit[2] = {SimdDouble(k == 0 ? 1.0 : 0.0), SimdDouble(k == 1 ? 1.0 : 0.0)};
             by[k] = Law::volumetric(unit, measure).pressure;
         }
     }
@@ -123,19 +127,20 @@ struct InvariantSolid : LameSolid {
     template <int N>
     class Tangent {
       public:
-        Tangent(const InvariantSolid& at, const Pack c[], const Pack s[], const Pack& bulk,
-                const Pack& volume, const Pack3* gradients)
+        Tangent(const InvariantSolid& at, const SimdDouble c[], const SimdDouble s[], const SimdDouble& bulk,
+                const SimdDouble& volume, const SimdVec3* gradients)
             : g_(gradients), f_(volume * (s[0] * at.f)), shear_(volume * at.shear(c, s)) {
             const InvariantDerivatives w = Law::derivatives(c, at.i1, at.j);
             // The secant of -mu/J, for laws whose w depends on J only through it.
-            const Pack own = stresses == 1 && keeps_measures ? w.by_jj * (at.j / at.trial) : w.by_jj;
-            const Pack jj = volume * (own + bulk);
+            const SimdDouble own = stresses == 1 && keeps_measures ? w.by_jj * (at.j / at.trial) : w.by_jj;
+            const SimdDouble jj = volume * (own + bulk);
             for (int k = 0; k < N; ++k) {
                 c_[k] = multiply(at.cof, g_[k]);
                 to_c_[k] = jj * c_[k];
             }
             if constexpr (stresses == 2) {
-                const Pack ii = Pack(4.0) * volume * w.by_ii, ij = Pack(2.0) * volume * w.by_ij;
+                const SimdDouble ii = SimdDouble(4.0) * volume * w.by_ii,
+                                 ij = SimdDouble(2.0) * volume * w.by_ij;
                 for (int k = 0; k < N; ++k) {
                     i_[k] = multiply(at.f, g_[k]);
                     to_i_[k] = ii * i_[k] + ij * c_[k];
@@ -144,8 +149,8 @@ struct InvariantSolid : LameSolid {
             }
         }
 
-        Pack33 block(int k, int l) const {
-            Pack33 h = outer(to_c_[k], c_[l]);
+        SimdMat3 block(int k, int l) const {
+            SimdMat3 h = outer(to_c_[k], c_[l]);
             if constexpr (stresses == 2) h += outer(to_i_[k], i_[l]);
             add_to_diagonal(h, shear_ * dot(g_[k], g_[l]));
             if (k != l) add_cross_matrix(h, multiply(f_, cross(g_[l], g_[k])));
@@ -153,7 +158,7 @@ struct InvariantSolid : LameSolid {
         }
 
       private:
-        static void add_cross_matrix(Pack33& h, const Pack3& v) {
+        static void add_cross_matrix(SimdMat3& h, const SimdVec3& v) {
             h.at[1] -= v.z;
             h.at[2] += v.y;
             h.at[3] += v.z;
@@ -162,14 +167,14 @@ struct InvariantSolid : LameSolid {
             h.at[7] += v.x;
         }
 
-        const Pack3* g_;
-        Pack33 f_;
-        Pack shear_;
-        Pack3 c_[N], to_c_[N], i_[stresses == 2 ? N : 1], to_i_[stresses == 2 ? N : 1];
+        const SimdVec3* g_;
+        SimdMat3 f_;
+        SimdDouble shear_;
+        SimdVec3 c_[N], to_c_[N], i_[stresses == 2 ? N : 1], to_i_[stresses == 2 ? N : 1];
     };
 
   private:
-    static Pack shear(const Pack c[], const Pack s[]) {
+    static SimdDouble shear(const SimdDouble c[], const SimdDouble s[]) {
         if constexpr (stresses == 2) return s[1];
         return c[1];
     }

@@ -19,87 +19,90 @@ class MagneticSix {
     static constexpr int points = 6;
     using Element = Magnetic::Element;
 
-    MagneticSix(const Pack3 x[6], int point) : point_(point), frame_(of(x, point)) {}
+    MagneticSix(const SimdVec3 x[6], int point) : point_(point), frame_(of(x, point)) {}
 
-    static Pack3 position(const Pack3 x[6], int point) {
-        Pack3 at = Pack(shapes_[point][0]) * x[0];
-        for (int k = 1; k < 6; ++k) at += Pack(shapes_[point][k]) * x[k];
+    static SimdVec3 position(const SimdVec3 x[6], int point) {
+        SimdVec3 at = SimdDouble(shapes_[point][0]) * x[0];
+        for (int k = 1; k < 6; ++k) at += SimdDouble(shapes_[point][k]) * x[k];
         return at;
     }
 
     const Magnetic& frame() const { return frame_; }
     /// Computes the rates of a_1, a_2 and n for given nodal velocities.
-    void rates(const Pack3 along[6], Pack3 rate[3]) const {
-        const Pack3 zero = {Pack(0.0), Pack(0.0), Pack(0.0)};
-        const Pack3 ends[3] = {zero, combination(first(), along), combination(second(), along)};
+    void rates(const SimdVec3 along[6], SimdVec3 rate[3]) const {
+        const SimdVec3 zero = {SimdDouble(0.0), SimdDouble(0.0), SimdDouble(0.0)};
+        const SimdVec3 ends[3] = {zero, combination(first(), along), combination(second(), along)};
         rate[0] = ends[1];
         rate[1] = ends[2];
         rate[2] = frame_.normal_rate(ends);
     }
 
-    void add_gradient(const Element& e, const Pack3& flux, Pack3 g[6]) const {
-        Pack3 d1, d2;
+    void add_gradient(const Element& e, const SimdVec3& flux, SimdVec3 g[6]) const {
+        SimdVec3 d1, d2;
         frame_.by_edges(e, flux, d1, d2);
-        for (int k = 0; k < 6; ++k) g[k] += (-e.volume) * (Pack(first()[k]) * d1 + Pack(second()[k]) * d2);
+        for (int k = 0; k < 6; ++k)
+            g[k] += (-e.volume) * (SimdDouble(first()[k]) * d1 + SimdDouble(second()[k]) * d2);
     }
 
     /// Adds the part of the gradient that is due to the gradient of the field.
-    void add_gradient_by_position(const Element& e, const Magnetic::Field& field, Pack3 g[6]) const {
-        const Pack3 pull = -e.volume * multiply(transpose(field.gradient), frame_.magnetization(e));
-        for (int k = 0; k < 6; ++k) g[k] += Pack(shapes_[point_][k]) * pull;
+    void add_gradient_by_position(const Element& e, const Magnetic::Field& field, SimdVec3 g[6]) const {
+        const SimdVec3 pull = -e.volume * multiply(transpose(field.gradient), frame_.magnetization(e));
+        for (int k = 0; k < 6; ++k) g[k] += SimdDouble(shapes_[point_][k]) * pull;
     }
 
     /// Adds lower blocks at lower_index(k, l) in a field taken as uniform.
-    void add_hessian(const Element& e, const Pack3& flux, Pack33 h[21]) const {
-        Pack33 by_ends[6];
+    void add_hessian(const Element& e, const SimdVec3& flux, SimdMat3 h[21]) const {
+        SimdMat3 by_ends[6];
         frame_.hessian(e, flux, by_ends);
-        const Pack33 &h11 = by_ends[lower_index(1, 1)], &h21 = by_ends[lower_index(2, 1)],
-                     &h22 = by_ends[lower_index(2, 2)], h12 = transpose(h21);
+        const SimdMat3 &h11 = by_ends[lower_index(1, 1)], &h21 = by_ends[lower_index(2, 1)],
+                       &h22 = by_ends[lower_index(2, 2)], h12 = transpose(h21);
         for (int l = 0; l < 6; ++l) {
-            const Pack g1(first()[l]), g2(second()[l]);
-            const Pack33 by_first = g1 * h11 + g2 * h12, by_second = g1 * h21 + g2 * h22;
+            const SimdDouble g1(first()[l]), g2(second()[l]);
+            const SimdMat3 by_first = g1 * h11 + g2 * h12, by_second = g1 * h21 + g2 * h22;
             for (int k = l; k < 6; ++k)
-                h[lower_index(k, l)] += Pack(first()[k]) * by_first + Pack(second()[k]) * by_second;
+                h[lower_index(k, l)] +=
+                    SimdDouble(first()[k]) * by_first + SimdDouble(second()[k]) * by_second;
         }
     }
 
     /// Adds the part due to the variation of the field in space: d2(M . B(x_p)) with one or two derivatives by
     /// x_p.
-    void add_hessian_by_position(const Element& e, const Magnetic::Field& field, Pack33 h[21]) const {
-        Pack33 by_first, by_second;  // d(M . dB/dx_j)/da, row = component of a, column = j
+    void add_hessian_by_position(const Element& e, const Magnetic::Field& field, SimdMat3 h[21]) const {
+        SimdMat3 by_first, by_second;  // d(M . dB/dx_j)/da, row = component of a, column = j
         for (int j = 0; j < 3; ++j) {
-            Pack3 d1, d2;
+            SimdVec3 d1, d2;
             frame_.by_edges(e, {field.gradient.at[j], field.gradient.at[3 + j], field.gradient.at[6 + j]}, d1,
                             d2);
             set_column(by_first, j, d1);
             set_column(by_second, j, d2);
         }
         const std::array<double, 6>& shape = shapes_[point_];
-        Pack33 by_node[6];
-        for (int k = 0; k < 6; ++k) by_node[k] = Pack(first()[k]) * by_first + Pack(second()[k]) * by_second;
+        SimdMat3 by_node[6];
+        for (int k = 0; k < 6; ++k)
+            by_node[k] = SimdDouble(first()[k]) * by_first + SimdDouble(second()[k]) * by_second;
         for (int k = 0; k < 6; ++k)
             for (int l = 0; l <= k; ++l)
-                h[lower_index(k, l)] +=
-                    (-e.volume) * (Pack(shape[l]) * by_node[k] + Pack(shape[k]) * transpose(by_node[l]) +
-                                   Pack(shape[k] * shape[l]) * field.curvature);
+                h[lower_index(k, l)] += (-e.volume) * (SimdDouble(shape[l]) * by_node[k] +
+                                                       SimdDouble(shape[k]) * transpose(by_node[l]) +
+                                                       SimdDouble(shape[k] * shape[l]) * field.curvature);
     }
 
   private:
     const std::array<double, 6>& first() const { return firsts_[point_]; }
     const std::array<double, 6>& second() const { return seconds_[point_]; }
 
-    static Pack3 combination(const std::array<double, 6>& by_node, const Pack3 x[6]) {
-        Pack3 sum = Pack(by_node[0]) * x[0];
-        for (int k = 1; k < 6; ++k) sum += Pack(by_node[k]) * x[k];
+    static SimdVec3 combination(const std::array<double, 6>& by_node, const SimdVec3 x[6]) {
+        SimdVec3 sum = SimdDouble(by_node[0]) * x[0];
+        for (int k = 1; k < 6; ++k) sum += SimdDouble(by_node[k]) * x[k];
         return sum;
     }
-    static Magnetic of(const Pack3 x[6], int point) {
-        const Pack3 corners[3] = {{Pack(0.0), Pack(0.0), Pack(0.0)},
-                                  combination(firsts_[point], x),
-                                  combination(seconds_[point], x)};
+    static Magnetic of(const SimdVec3 x[6], int point) {
+        const SimdVec3 corners[3] = {{SimdDouble(0.0), SimdDouble(0.0), SimdDouble(0.0)},
+                                     combination(firsts_[point], x),
+                                     combination(seconds_[point], x)};
         return Magnetic(corners);
     }
-    static void set_column(Pack33& matrix, int j, const Pack3& column) {
+    static void set_column(SimdMat3& matrix, int j, const SimdVec3& column) {
         matrix.at[j] = column.x;
         matrix.at[3 + j] = column.y;
         matrix.at[6 + j] = column.z;

@@ -17,47 +17,49 @@
 #include "magshell/core/vector3.h"
 #include "magshell/energy/magnetic.h"
 #include "magshell/strain/deformation.h"
-#include "magshell/strain/pushed_forward_vector.h"
+#include "magshell/strain/push_forward.h"
 
 namespace magshell {
 
 template <int N>
-struct MagneticSolid : PushedForwardVector<N> {  // alpha_k [A/m2]
-    using PushedForwardVector<N>::alpha;
+struct MagneticSolid : PushForward<N> {  // alpha_k [A/m2]
+    using PushForward<N>::alpha;
 
-    Pack volume;  // V_p [m3]
+    SimdDouble volume;  // V_p [m3]
 
-    Pack3 magnetization(const Pack3 x[N]) const { return this->at(x); }
+    SimdVec3 magnetization(const SimdVec3 x[N]) const { return this->at(x); }
 
-    static Pack3 position(const std::array<double, N>& shapes, const Pack3 x[N]) {
-        Pack3 at = Pack(shapes[0]) * x[0];
-        for (int k = 1; k < N; ++k) at += Pack(shapes[k]) * x[k];
+    static SimdVec3 position(const std::array<double, N>& shapes, const SimdVec3 x[N]) {
+        SimdVec3 at = SimdDouble(shapes[0]) * x[0];
+        for (int k = 1; k < N; ++k) at += SimdDouble(shapes[k]) * x[k];
         return at;
     }
 
-    Pack energy(const Pack3 x[N], const Pack3& flux) const { return -volume * dot(magnetization(x), flux); }
+    SimdDouble energy(const SimdVec3 x[N], const SimdVec3& flux) const {
+        return -volume * dot(magnetization(x), flux);
+    }
 
     /// Adds the nodal gradients of a field taken as uniform.
-    void add_gradient(const Pack3& flux, Pack3 g[N]) const {
+    void add_gradient(const SimdVec3& flux, SimdVec3 g[N]) const {
         for (int k = 0; k < N; ++k) g[k] += (-volume * alpha[k]) * flux;
     }
 
     /// Adds the part of the gradient that is due to the gradient of the field.
-    void add_gradient_by_position(const std::array<double, N>& shapes, const Pack3 x[N],
-                                  const Magnetic::Field& field, Pack3 g[N]) const {
-        const Pack3 pull = -volume * multiply(transpose(field.gradient), magnetization(x));
-        for (int k = 0; k < N; ++k) g[k] += Pack(shapes[k]) * pull;
+    void add_gradient_by_position(const std::array<double, N>& shapes, const SimdVec3 x[N],
+                                  const Magnetic::Field& field, SimdVec3 g[N]) const {
+        const SimdVec3 pull = -volume * multiply(transpose(field.gradient), magnetization(x));
+        for (int k = 0; k < N; ++k) g[k] += SimdDouble(shapes[k]) * pull;
     }
 
     /// Adds lower blocks at lower_index(k, l).
-    void add_hessian(const std::array<double, N>& shapes, const Magnetic::Field& field, Pack33 h[]) const {
-        const Pack33 along = -volume * field.gradient, across = transpose(along),
-                     twice = -volume * field.curvature;
+    void add_hessian(const std::array<double, N>& shapes, const Magnetic::Field& field, SimdMat3 h[]) const {
+        const SimdMat3 along = -volume * field.gradient, across = transpose(along),
+                       twice = -volume * field.curvature;
         for (int k = 0; k < N; ++k)
             for (int l = 0; l <= k; ++l)
-                h[lower_index(k, l)] += (Pack(shapes[l]) * alpha[k]) * along +
-                                        (Pack(shapes[k]) * alpha[l]) * across +
-                                        Pack(shapes[k] * shapes[l]) * twice;
+                h[lower_index(k, l)] += (SimdDouble(shapes[l]) * alpha[k]) * along +
+                                        (SimdDouble(shapes[k]) * alpha[l]) * across +
+                                        SimdDouble(shapes[k] * shapes[l]) * twice;
     }
 };
 

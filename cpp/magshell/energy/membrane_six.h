@@ -14,8 +14,8 @@ namespace magshell {
 /// for the mean.
 class MembraneSix {
   public:
-    explicit MembraneSix(const Pack3 places[6]) {
-        const std::array<Pack3, 6> x = relative_to_first_node<6>(places);
+    explicit MembraneSix(const SimdVec3 places[6]) {
+        const std::array<SimdVec3, 6> x = relative_to_first_node<6>(places);
         for (int i = 0; i < 3; ++i) {
             for (int g = 0; g < 2; ++g) {
                 each_along(i, g, [&](int a, double c) { add(on_edge_[i][g], c, x[a]); });
@@ -27,32 +27,34 @@ class MembraneSix {
     }
 
     /// Computes the measures; the caller subtracts their reference values.
-    void measures(Pack d[9]) const {
+    void measures(SimdDouble d[9]) const {
         for (int i = 0; i < 3; ++i) {
             for (int g = 0; g < 2; ++g) d[3 * i + g] = squared_norm(on_edge_[i][g]);
             d[3 * i + 2] =
-                Pack(1.0 / 3.0) * (squared_norm(at_middle_[i][0]) + squared_norm(at_middle_[i][1]) +
-                                   squared_norm(at_middle_[i][2]));
+                SimdDouble(1.0 / 3.0) * (squared_norm(at_middle_[i][0]) + squared_norm(at_middle_[i][1]) +
+                                         squared_norm(at_middle_[i][2]));
         }
     }
 
     void rows(SixNodeRows& out) const {
         for (int i = 0; i < 3; ++i) {
             for (int g = 0; g < 2; ++g) {
-                for (Pack3& by_node : out.at[3 * i + g]) by_node = {Pack(0.0), Pack(0.0), Pack(0.0)};
-                each_along(i, g,
-                           [&](int a, double c) { out.at[3 * i + g][a] = Pack(2.0 * c) * on_edge_[i][g]; });
+                for (SimdVec3& by_node : out.at[3 * i + g])
+                    by_node = {SimdDouble(0.0), SimdDouble(0.0), SimdDouble(0.0)};
+                each_along(i, g, [&](int a, double c) {
+                    out.at[3 * i + g][a] = SimdDouble(2.0 * c) * on_edge_[i][g];
+                });
             }
             for (int a = 0; a < 6; ++a) {
-                Pack3& by_node = out.at[3 * i + 2][a];
-                by_node = {Pack(0.0), Pack(0.0), Pack(0.0)};
+                SimdVec3& by_node = out.at[3 * i + 2][a];
+                by_node = {SimdDouble(0.0), SimdDouble(0.0), SimdDouble(0.0)};
                 for (int m = 0; m < 3; ++m) add(by_node, 2.0 / 3.0 * of_middle(i, m)[a], at_middle_[i][m]);
             }
         }
     }
 
     /// Adds sum_r stress_r d2d_r.
-    static void add_curvature(const Pack stress[9], Pack33 h[21]) {
+    static void add_curvature(const SimdDouble stress[9], SimdMat3 h[21]) {
         for (int i = 0; i < 3; ++i) {
             const int nodes[3] = {(i + 1) % 3, (i + 2) % 3, six_nodes::middle(i)};
             for (int g = 0; g < 2; ++g) {
@@ -61,19 +63,19 @@ class MembraneSix {
                     for (int q = 0; q <= p; ++q)
                         add_to_diagonal(
                             h[lower_index(std::max(nodes[p], nodes[q]), std::min(nodes[p], nodes[q]))],
-                            Pack(2.0 * c[p] * c[q]) * stress[3 * i + g]);
+                            SimdDouble(2.0 * c[p] * c[q]) * stress[3 * i + g]);
             }
             for (int a = 0; a < 6; ++a)
                 for (int b = 0; b <= a; ++b) {
                     double sum = 0.0;
                     for (int m = 0; m < 3; ++m) sum += of_middle(i, m)[a] * of_middle(i, m)[b];
-                    add_to_diagonal(h[lower_index(a, b)], Pack(2.0 / 3.0 * sum) * stress[3 * i + 2]);
+                    add_to_diagonal(h[lower_index(a, b)], SimdDouble(2.0 / 3.0 * sum) * stress[3 * i + 2]);
                 }
         }
     }
 
   private:
-    static void add(Pack3& to, double factor, const Pack3& x) { to += Pack(factor) * x; }
+    static void add(SimdVec3& to, double factor, const SimdVec3& x) { to += SimdDouble(factor) * x; }
 
     /// Calls take(node, coefficient) for the derivative along edge i at its Gauss point g.
     template <class Take>
@@ -97,7 +99,7 @@ class MembraneSix {
         return all;
     }();
 
-    Pack3 on_edge_[3][2] = {}, at_middle_[3][3] = {};
+    SimdVec3 on_edge_[3][2] = {}, at_middle_[3][3] = {};
 };
 
 }  // namespace magshell

@@ -7,60 +7,65 @@
 // The last summand may be evaluated at the mean J of an element.
 #pragma once
 
-#include "magshell/core/pack_functions.h"
+#include "magshell/core/simd_functions.h"
 #include "magshell/energy/invariant_solid.h"
 
 namespace magshell {
 
 /// Returns mu/2 (I1 - 3) - mu ln J and its derivatives.
-inline InvariantDerivatives shear_and_logarithm(const Pack& mu, const Pack& i1, const Pack& j) {
-    const Pack inverse = Pack(1.0) / j, half = Pack(0.5) * mu;
-    return {half * (i1 - Pack(3.0)) - mu * log(j),
+inline InvariantDerivatives shear_and_logarithm(const SimdDouble& mu, const SimdDouble& i1,
+                                                const SimdDouble& j) {
+    const SimdDouble inverse = SimdDouble(1.0) / j, half = SimdDouble(0.5) * mu;
+    return {half * (i1 - SimdDouble(3.0)) - mu * log(j),
             half,
             -mu * inverse,
-            Pack(0.0),
-            Pack(0.0),
+            SimdDouble(0.0),
+            SimdDouble(0.0),
             mu * inverse * inverse};
 }
 
 /// Returns k/2 (v - 1)^2 and its derivatives.
-inline Volumetric quadratic_volume(const Pack& k, const Pack& v) {
-    const Pack change = v - Pack(1.0);
-    return {Pack(0.5) * k * change * change, k * change, k};
+inline Volumetric quadratic_volume(const SimdDouble& k, const SimdDouble& v) {
+    const SimdDouble change = v - SimdDouble(1.0);
+    return {SimdDouble(0.5) * k * change * change, k * change, k};
 }
 
 struct NeoHookeanLogarithm {
     static constexpr bool refuses_inversion = true, constant_shear = true;
 
-    static InvariantDerivatives derivatives(const Pack c[], const Pack& i1, const Pack& j) {
+    static InvariantDerivatives derivatives(const SimdDouble c[], const SimdDouble& i1, const SimdDouble& j) {
         return shear_and_logarithm(c[1], i1, j);
     }
-    static Volumetric volumetric(const Pack c[], const Pack& j) {
-        const Pack ln = log(j), inverse = Pack(1.0) / j;
-        return {Pack(0.5) * c[0] * ln * ln, c[0] * ln * inverse, c[0] * (Pack(1.0) - ln) * inverse * inverse};
+    static Volumetric volumetric(const SimdDouble c[], const SimdDouble& j) {
+        const SimdDouble ln = log(j), inverse = SimdDouble(1.0) / j;
+        return {SimdDouble(0.5) * c[0] * ln * ln, c[0] * ln * inverse,
+                c[0] * (SimdDouble(1.0) - ln) * inverse * inverse};
     }
 };
 
 struct NeoHookeanVolume {
     static constexpr bool refuses_inversion = true, constant_shear = true;
 
-    static InvariantDerivatives derivatives(const Pack c[], const Pack& i1, const Pack& j) {
+    static InvariantDerivatives derivatives(const SimdDouble c[], const SimdDouble& i1, const SimdDouble& j) {
         return shear_and_logarithm(c[1], i1, j);
     }
-    static Volumetric volumetric(const Pack c[], const Pack& j) { return quadratic_volume(c[0], j); }
+    static Volumetric volumetric(const SimdDouble c[], const SimdDouble& j) {
+        return quadratic_volume(c[0], j);
+    }
 };
 
 struct NeoHookeanIsochoric {
     static constexpr bool refuses_inversion = true, constant_shear = false;
 
-    static InvariantDerivatives derivatives(const Pack c[], const Pack& i1, const Pack& j) {
-        const Pack inverse = Pack(1.0) / j, root = cbrt(inverse), half = Pack(0.5) * c[1] * root * root;
-        const Pack by_ij = Pack(-2.0 / 3.0) * half * inverse, by_j = by_ij * i1;
-        return {half * i1 - Pack(1.5) * c[1],     half, by_j, Pack(0.0), by_ij,
-                Pack(-5.0 / 3.0) * by_j * inverse};
+    static InvariantDerivatives derivatives(const SimdDouble c[], const SimdDouble& i1, const SimdDouble& j) {
+        const SimdDouble inverse = SimdDouble(1.0) / j, root = cbrt(inverse),
+                         half = SimdDouble(0.5) * c[1] * root * root;
+        const SimdDouble by_ij = SimdDouble(-2.0 / 3.0) * half * inverse, by_j = by_ij * i1;
+        return {half * i1 - SimdDouble(1.5) * c[1],     half, by_j, SimdDouble(0.0), by_ij,
+                SimdDouble(-5.0 / 3.0) * by_j * inverse};
     }
-    static Volumetric volumetric(const Pack c[], const Pack& j) {
-        return quadratic_volume(c[0] + Pack(2.0 / 3.0) * c[1], j);
+    static Volumetric volumetric(const SimdDouble c[], const SimdDouble& j) {
+        return quadratic_volume(c[0] + SimdDouble(2.0 / 3.0) * c[1], j);
     }
 };
 

@@ -26,93 +26,99 @@ struct Projective : LameSolid {
     static constexpr bool refuses_inversion = false;
     static constexpr bool keeps_measures = false;
 
-    static RestModuli rest_moduli(const Pack c[]) { return {Pack(1.0 / 3.0) * c[0], c[1]}; }
-    static void rest_moduli_vjp(const Pack[], const RestModuli& by, Pack out[]) {
-        out[0] += Pack(1.0 / 3.0) * by.lambda;
+    static RestModuli rest_moduli(const SimdDouble c[]) { return {SimdDouble(1.0 / 3.0) * c[0], c[1]}; }
+    static void rest_moduli_vjp(const SimdDouble[], const RestModuli& by, SimdDouble out[]) {
+        out[0] += SimdDouble(1.0 / 3.0) * by.lambda;
         out[1] += by.mu;
     }
     /// Returns a weight that bounds the Hessian from above: the squared distance to a set grows no faster than
     /// the squared distance to one of its points.
-    static Pack projective_weight(const Pack c[]) { return Pack(2.0) * c[1] + c[0]; }
+    static SimdDouble projective_weight(const SimdDouble c[]) { return SimdDouble(2.0) * c[1] + c[0]; }
 
-    Pack33 f;
+    SimdMat3 f;
     Polar polar;
     UnitDeterminant nearest;
 
-    explicit Projective(const Pack33& gradient) : f(gradient), polar(f), nearest(polar.stretch) {}
+    explicit Projective(const SimdMat3& gradient) : f(gradient), polar(f), nearest(polar.stretch) {}
 
     /// The energy has no part that depends on a measure of volume.
-    static Volumetric volumetric(const Pack[], const Pack&) { return {Pack(0.0), Pack(0.0), Pack(0.0)}; }
-    Pack volume_measure() const { return Pack(1.0); }
-    Pack volume_rate(const Pack33&) const { return Pack(0.0); }
-    static void pressure_by_constants(const Pack[], const Pack&, Pack by[]) { by[0] = by[1] = Pack(0.0); }
+    static Volumetric volumetric(const SimdDouble[], const SimdDouble&) {
+        return {SimdDouble(0.0), SimdDouble(0.0), SimdDouble(0.0)};
+    }
+    SimdDouble volume_measure() const { return SimdDouble(1.0); }
+    SimdDouble volume_rate(const SimdMat3&) const { return SimdDouble(0.0); }
+    static void pressure_by_constants(const SimdDouble[], const SimdDouble&, SimdDouble by[]) {
+        by[0] = by[1] = SimdDouble(0.0);
+    }
 
-    Pack energy(const Pack c[]) const {
-        Pack shear(0.0), volume(0.0);
+    SimdDouble energy(const SimdDouble c[]) const {
+        SimdDouble shear(0.0), volume(0.0);
         for (int i = 0; i < 3; ++i) {
-            const Pack from_rotation = polar.stretch[i] - Pack(1.0);
-            const Pack from_volume = polar.stretch[i] - nearest.d[i];
+            const SimdDouble from_rotation = polar.stretch[i] - SimdDouble(1.0);
+            const SimdDouble from_volume = polar.stretch[i] - nearest.d[i];
             shear += from_rotation * from_rotation;
             volume += from_volume * from_volume;
         }
-        return c[1] * shear + Pack(0.5) * c[0] * volume;
+        return c[1] * shear + SimdDouble(0.5) * c[0] * volume;
     }
 
-    void stress(const Pack c[], const Pack&, Pack t[]) const {
-        for (int i = 0; i < 3; ++i) t[i] = Pack(2.0) * c[1] + c[0] * nearest.d[i];
+    void stress(const SimdDouble c[], const SimdDouble&, SimdDouble t[]) const {
+        for (int i = 0; i < 3; ++i) t[i] = SimdDouble(2.0) * c[1] + c[0] * nearest.d[i];
     }
 
-    void stress_rate(const Pack c[], const Pack33& along, const Pack&, Pack t[]) const {
-        Pack rate[3];
+    void stress_rate(const SimdDouble c[], const SimdMat3& along, const SimdDouble&, SimdDouble t[]) const {
+        SimdDouble rate[3];
         for (int i = 0; i < 3; ++i)
             rate[i] = dot(polar.u[i], multiply(along, multiply(transpose(polar.rotation), polar.u[i])));
         for (int i = 0; i < 3; ++i) {
-            Pack sum(0.0);
+            SimdDouble sum(0.0);
             for (int j = 0; j < 3; ++j) sum += by_stretch(i, j) * rate[j];
             t[i] = c[0] * sum;
         }
     }
 
     // sum_i t_i u_i v_i^T = (sum_i t_i u_i u_i^T) R
-    Pack33 piola(const Pack c[], const Pack t[]) const {
-        return (Pack(2.0) * c[1] + c[0]) * f - multiply(along_directions(t), polar.rotation);
+    SimdMat3 piola(const SimdDouble c[], const SimdDouble t[]) const {
+        return (SimdDouble(2.0) * c[1] + c[0]) * f - multiply(along_directions(t), polar.rotation);
     }
 
-    void work_by_constants(const Pack[], const Pack33& d, Pack work[]) const {
+    void work_by_constants(const SimdDouble[], const SimdMat3& d, SimdDouble work[]) const {
         work[0] = double_dot(f - multiply(along_directions(nearest.d), polar.rotation), d);
-        work[1] = Pack(2.0) * double_dot(f - polar.rotation, d);
+        work[1] = SimdDouble(2.0) * double_dot(f - polar.rotation, d);
     }
 
     template <int N>
     class Tangent {
       public:
-        Tangent(const Projective& at, const Pack c[], const Pack t[], const Pack&, const Pack& volume,
-                const Pack3* gradients) {
-            const Pack* s = at.polar.stretch;
-            const Pack all = Pack(2.0) * c[1] + c[0];
+        Tangent(const Projective& at, const SimdDouble c[], const SimdDouble t[], const SimdDouble&,
+                const SimdDouble& volume, const SimdVec3* gradients) {
+            const SimdDouble* s = at.polar.stretch;
+            const SimdDouble all = SimdDouble(2.0) * c[1] + c[0];
             for (int i = 0; i < 3; ++i)
                 for (int j = 0; j < 3; ++j)
-                    stretch_[3 * i + j] = volume * ((i == j ? all : Pack(0.0)) - c[0] * at.by_stretch(i, j));
-            const Pack least = Pack(1e-10) * s[0] + Pack(1e-100);
+                    stretch_[3 * i + j] =
+                        volume * ((i == j ? all : SimdDouble(0.0)) - c[0] * at.by_stretch(i, j));
+            const SimdDouble least = SimdDouble(1e-10) * s[0] + SimdDouble(1e-100);
             for (int l = 0; l < 3; ++l) {
                 const int i = (l + 1) % 3, j = (l + 2) % 3;
-                const Pack shear =
-                    all - c[0] / max(Pack(1.0) + at.nearest.multiplier * at.nearest.d[l], Pack(1e-10));
-                const Pack turn = all - (t[i] + t[j]) / max(s[i] + s[j], least);
-                same_[l] = Pack(0.5) * volume * (shear + turn);
-                other_[l] = Pack(0.5) * volume * (shear - turn);
+                const SimdDouble shear =
+                    all -
+                    c[0] / max(SimdDouble(1.0) + at.nearest.multiplier * at.nearest.d[l], SimdDouble(1e-10));
+                const SimdDouble turn = all - (t[i] + t[j]) / max(s[i] + s[j], least);
+                same_[l] = SimdDouble(0.5) * volume * (shear + turn);
+                other_[l] = SimdDouble(0.5) * volume * (shear - turn);
             }
             for (int i = 0; i < 3; ++i) u_[i] = at.polar.u[i];
             for (int k = 0; k < N; ++k) {
-                const Pack3 turned = multiply(at.polar.rotation, gradients[k]);  // v_i . g = u_i . R g
+                const SimdVec3 turned = multiply(at.polar.rotation, gradients[k]);  // v_i . g = u_i . R g
                 for (int i = 0; i < 3; ++i) g_[k][i] = dot(u_[i], turned);
             }
         }
 
         // In the frames of u and v: dF_ij = x_i g_j for a node that moves along x.
-        Pack33 block(int k, int l) const {
-            const Pack *a = g_[k], *b = g_[l];
-            Pack33 h;
+        SimdMat3 block(int k, int l) const {
+            const SimdDouble *a = g_[k], *b = g_[l];
+            SimdMat3 h;
             for (int i = 0; i < 3; ++i)
                 for (int j = 0; j < 3; ++j) {
                     const int rest = 3 - i - j;
@@ -123,37 +129,37 @@ struct Projective : LameSolid {
                         h.at[3 * i + j] += same_[(i + 1) % 3] * a[(i + 2) % 3] * b[(i + 2) % 3] +
                                            same_[(i + 2) % 3] * a[(i + 1) % 3] * b[(i + 1) % 3];
                 }
-            Pack33 turned = outer(u_[0], Pack3{h.at[0], h.at[1], h.at[2]});
-            turned += outer(u_[1], Pack3{h.at[3], h.at[4], h.at[5]});
-            turned += outer(u_[2], Pack3{h.at[6], h.at[7], h.at[8]});
-            const Pack33 directions{
+            SimdMat3 turned = outer(u_[0], SimdVec3{h.at[0], h.at[1], h.at[2]});
+            turned += outer(u_[1], SimdVec3{h.at[3], h.at[4], h.at[5]});
+            turned += outer(u_[2], SimdVec3{h.at[6], h.at[7], h.at[8]});
+            const SimdMat3 directions{
                 {u_[0].x, u_[0].y, u_[0].z, u_[1].x, u_[1].y, u_[1].z, u_[2].x, u_[2].y, u_[2].z}};
             return multiply(turned, directions);
         }
 
       private:
-        Pack stretch_[9], same_[3], other_[3];
-        Pack3 u_[3];
-        Pack g_[N][3];
+        SimdDouble stretch_[9], same_[3], other_[3];
+        SimdVec3 u_[3];
+        SimdDouble g_[N][3];
     };
 
   private:
-    Pack33 along_directions(const Pack t[]) const {
-        Pack33 sum = outer(t[0] * polar.u[0], polar.u[0]);
+    SimdMat3 along_directions(const SimdDouble t[]) const {
+        SimdMat3 sum = outer(t[0] * polar.u[0], polar.u[0]);
         for (int i = 1; i < 3; ++i) sum += outer(t[i] * polar.u[i], polar.u[i]);
         return sum;
     }
 
     /// Returns dd_i/ds_j.
-    Pack by_stretch(int i, int j) const {
-        Pack n[3], b[3];
+    SimdDouble by_stretch(int i, int j) const {
+        SimdDouble n[3], b[3];
         for (int l = 0; l < 3; ++l) {
-            n[l] = Pack(1.0) / nearest.d[l];
-            b[l] = Pack(1.0) + nearest.multiplier * n[l] * n[l];
+            n[l] = SimdDouble(1.0) / nearest.d[l];
+            b[l] = SimdDouble(1.0) + nearest.multiplier * n[l] * n[l];
         }
-        Pack determinant(0.0);
+        SimdDouble determinant(0.0);
         for (int l = 0; l < 3; ++l) determinant += b[(l + 1) % 3] * b[(l + 2) % 3] * n[l] * n[l];
-        determinant = max(determinant, Pack(1e-10) * n[2] * n[2]);
+        determinant = max(determinant, SimdDouble(1e-10) * n[2] * n[2]);
         if (i != j) return -(b[3 - i - j] * n[i] * n[j]) / determinant;
         const int p = (i + 1) % 3, q = (i + 2) % 3;
         return (b[p] * n[q] * n[q] + b[q] * n[p] * n[p]) / determinant;

@@ -8,7 +8,7 @@
 //       m/2 (I1 - 3) - m/2 ln((I1 + 1)/4) - mu (J - 1) + 5/12 mu (J - 1)^2     + lam/2 (J - 1)^2
 #pragma once
 
-#include "magshell/core/pack_functions.h"
+#include "magshell/core/simd_functions.h"
 #include "magshell/energy/invariant_solid.h"
 #include "magshell/energy/neo_hookean.h"
 
@@ -17,33 +17,38 @@ namespace magshell {
 struct StableNeoHookean {
     static constexpr bool refuses_inversion = false, constant_shear = true;
 
-    static InvariantDerivatives derivatives(const Pack c[], const Pack& i1, const Pack& j) {
-        const Pack &mu = c[1], change = j - Pack(1.0), half = Pack(0.5) * mu;
-        return {half * (i1 - Pack(3.0)) - mu * change + half * change * change,
+    static InvariantDerivatives derivatives(const SimdDouble c[], const SimdDouble& i1, const SimdDouble& j) {
+        const SimdDouble &mu = c[1], change = j - SimdDouble(1.0), half = SimdDouble(0.5) * mu;
+        return {half * (i1 - SimdDouble(3.0)) - mu * change + half * change * change,
                 half,
-                mu * (change - Pack(1.0)),
-                Pack(0.0),
-                Pack(0.0),
+                mu * (change - SimdDouble(1.0)),
+                SimdDouble(0.0),
+                SimdDouble(0.0),
                 mu};
     }
-    static Volumetric volumetric(const Pack c[], const Pack& j) { return quadratic_volume(c[0], j); }
+    static Volumetric volumetric(const SimdDouble c[], const SimdDouble& j) {
+        return quadratic_volume(c[0], j);
+    }
 };
 
 struct StableNeoHookeanBarrier {
     static constexpr bool refuses_inversion = false, constant_shear = false;
 
-    static InvariantDerivatives derivatives(const Pack c[], const Pack& i1, const Pack& j) {
-        const Pack half = Pack(2.0 / 3.0) * c[1], above = i1 + Pack(1.0), inverse = Pack(1.0) / above;
-        const Pack change = j - Pack(1.0), resists = Pack(5.0 / 6.0) * c[1];
-        return {half * (i1 - Pack(3.0) - log(Pack(0.25) * above)) +
-                    (Pack(0.5) * resists * change - c[1]) * change,
-                half * (Pack(1.0) - inverse),
+    static InvariantDerivatives derivatives(const SimdDouble c[], const SimdDouble& i1, const SimdDouble& j) {
+        const SimdDouble half = SimdDouble(2.0 / 3.0) * c[1], above = i1 + SimdDouble(1.0),
+                         inverse = SimdDouble(1.0) / above;
+        const SimdDouble change = j - SimdDouble(1.0), resists = SimdDouble(5.0 / 6.0) * c[1];
+        return {half * (i1 - SimdDouble(3.0) - log(SimdDouble(0.25) * above)) +
+                    (SimdDouble(0.5) * resists * change - c[1]) * change,
+                half * (SimdDouble(1.0) - inverse),
                 resists * change - c[1],
                 half * inverse * inverse,
-                Pack(0.0),
+                SimdDouble(0.0),
                 resists};
     }
-    static Volumetric volumetric(const Pack c[], const Pack& j) { return quadratic_volume(c[0], j); }
+    static Volumetric volumetric(const SimdDouble c[], const SimdDouble& j) {
+        return quadratic_volume(c[0], j);
+    }
 };
 
 }  // namespace magshell

@@ -21,33 +21,33 @@ struct SurfaceTension {
     static constexpr std::string_view name = "surface tension";
     static constexpr FaceInput inputs[] = {{"surface_tension", "N/m"}};
 
-    Pack3 a1, a2, normal;
-    Pack area2;  // |a_1 x a_2|
+    SimdVec3 a1, a2, normal;
+    SimdDouble area2;  // |a_1 x a_2|
 
-    explicit SurfaceTension(const Pack3 x[3]) : a1(x[1] - x[0]), a2(x[2] - x[0]) {
-        const Pack3 across = cross(a1, a2);
+    explicit SurfaceTension(const SimdVec3 x[3]) : a1(x[1] - x[0]), a2(x[2] - x[0]) {
+        const SimdVec3 across = cross(a1, a2);
         area2 = sqrt(squared_norm(across));
-        normal = (Pack(1.0) / area2) * across;
+        normal = (SimdDouble(1.0) / area2) * across;
     }
 
-    Pack energy(const Pack in[1]) const { return Pack(0.5) * in[0] * area2; }
+    SimdDouble energy(const SimdDouble in[1]) const { return SimdDouble(0.5) * in[0] * area2; }
 
-    void gradient(const Pack in[1], Pack3 g[3]) const {
-        const Pack half = Pack(0.5) * in[0];
+    void gradient(const SimdDouble in[1], SimdVec3 g[3]) const {
+        const SimdDouble half = SimdDouble(0.5) * in[0];
         g[1] = half * cross(a2, normal);
         g[2] = half * cross(normal, a1);
         g[0] = -(g[1] + g[2]);
     }
 
     /// Computes the lower blocks at lower_index(k, l).
-    void hessian(const Pack in[1], Pack33 h[6]) const {
-        const Pack half = Pack(0.5) * in[0];
-        Pack33 k = Pack(-1.0) * outer(normal, normal);
-        add_to_diagonal(k, Pack(1.0));
+    void hessian(const SimdDouble in[1], SimdMat3 h[6]) const {
+        const SimdDouble half = SimdDouble(0.5) * in[0];
+        SimdMat3 k = SimdDouble(-1.0) * outer(normal, normal);
+        add_to_diagonal(k, SimdDouble(1.0));
         k = (half / area2) * k;
-        const Pack33 c1 = cross_matrix(a1), c2 = cross_matrix(a2), kc1 = multiply(k, c1);
-        const Pack33 h11 = -multiply(c2, multiply(k, c2)), h22 = -multiply(c1, kc1);
-        const Pack33 h12 = multiply(c2, kc1) - half * cross_matrix(normal), h21 = transpose(h12);
+        const SimdMat3 c1 = cross_matrix(a1), c2 = cross_matrix(a2), kc1 = multiply(k, c1);
+        const SimdMat3 h11 = -multiply(c2, multiply(k, c2)), h22 = -multiply(c1, kc1);
+        const SimdMat3 h12 = multiply(c2, kc1) - half * cross_matrix(normal), h21 = transpose(h12);
         h[lower_index(1, 1)] = h11;
         h[lower_index(2, 1)] = h21;
         h[lower_index(2, 2)] = h22;
@@ -57,8 +57,8 @@ struct SurfaceTension {
     }
 
     /// Computes d(rate . gradient)/d(input) for each input.
-    void rate_by_inputs(const Pack[1], const Pack3 rate[3], Pack out[1]) const {
-        out[0] = Pack(0.5) *
+    void rate_by_inputs(const SimdDouble[1], const SimdVec3 rate[3], SimdDouble out[1]) const {
+        out[0] = SimdDouble(0.5) *
                  (dot(rate[1] - rate[0], cross(a2, normal)) + dot(rate[2] - rate[0], cross(normal, a1)));
     }
 };

@@ -1,4 +1,4 @@
-// Symmetric: a symmetric matrix of SIMD packs, such as the stiffness C of an element's strain measures, stored
+// Symmetric: a symmetric matrix of SIMD vectors, such as the stiffness C of an element's strain measures, stored
 // as its lower triangle 00 10 11 20 21 22 ...
 #pragma once
 
@@ -12,11 +12,13 @@ constexpr int lower_index(int row, int column) {
 
 template <int N>
 struct Symmetric {
-    Pack at[N * (N + 1) / 2];
+    SimdDouble at[N * (N + 1) / 2];
 
-    const Pack& operator()(int i, int j) const { return at[i >= j ? lower_index(i, j) : lower_index(j, i)]; }
+    const SimdDouble& operator()(int i, int j) const {
+        return at[i >= j ? lower_index(i, j) : lower_index(j, i)];
+    }
 
-    void times(const Pack d[N], Pack product[N]) const {
+    void times(const SimdDouble d[N], SimdDouble product[N]) const {
         for (int i = 0; i < N; ++i) {
             product[i] = (*this)(i, 0) * d[0];
             for (int j = 1; j < N; ++j) product[i] += (*this)(i, j) * d[j];

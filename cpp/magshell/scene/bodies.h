@@ -27,14 +27,14 @@ class Bodies {
     /// Shells, then solids, then the surfaces of solids on which something acts, then skins, then six-node shells, then the surfaces of
     /// those on which something acts, then the fibres of muscles.
     const std::vector<const Body*>& all() const { return all_; }
-    /// The triangles of a body, and the index in all() of the body that has their chunks: for shells, for solids (null if nothing acts on
+    /// The triangles of a body, and the index in all() of the body that has their blocks: for shells, for solids (null if nothing acts on
     /// them), for skins, and for six-node shells (as for solids).
     struct Faces {
         const Surface* surface = nullptr;
         Index body = -1;
     };
     const std::vector<Faces>& faces() const { return faces_; }
-    /// The fibres of a muscle, and the index in all() of the body that has their chunks.
+    /// The fibres of a muscle, and the index in all() of the body that has their blocks.
     struct OfMuscle {
         const Fibres* fibres;
         Index body;

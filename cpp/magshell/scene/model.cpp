@@ -42,22 +42,22 @@ ReducedCoordinatesList reduced_coordinates_of(const Bodies& bodies,
             links.push_back(link(part));
             joined[part] = 1;
         }
-        std::vector<SkeletonCoordinates::Slots> slots(skeleton.joints.size());
-        for (std::size_t k = 0; k < slots.size(); ++k) {
+        std::vector<SkeletonCoordinates::ParameterSlices> slices(skeleton.joints.size());
+        for (std::size_t k = 0; k < slices.size(); ++k) {
             const Joint& joint = skeleton.joints[k];
             const auto add = [&](const char* name, const char* unit, Index width) {
                 return registry.values.add(skeleton.labels[k], name, unit, 1, width);
             };
             if (joint.kind == JointKind::free) continue;
             if (joint.has_motor)
-                slots[k].motor = joint.kind == JointKind::ball       ? add("motor_rotation", "rad", 3)
-                                 : joint.kind == JointKind::revolute ? add("motor_angle", "SI", 1)
-                                                                     : add("motor_displacement", "SI", 1);
-            slots[k].origin = add("origin", "m", 3);
-            if (joint.has_axis()) slots[k].axis = add("axis", "1", 3);
+                slices[k].motor = joint.kind == JointKind::ball       ? add("motor_rotation", "rad", 3)
+                                  : joint.kind == JointKind::revolute ? add("motor_angle", "SI", 1)
+                                                                      : add("motor_displacement", "SI", 1);
+            slices[k].origin = add("origin", "m", 3);
+            if (joint.has_axis()) slices[k].axis = add("axis", "1", 3);
         }
         all.push_back(
-            std::make_unique<SkeletonCoordinates>(std::move(links), skeleton.joints, std::move(slots)));
+            std::make_unique<SkeletonCoordinates>(std::move(links), skeleton.joints, std::move(slices)));
     }
     for (Index part = 0; part < static_cast<Index>(joined.size()); ++part)
         if (!joined[part])
@@ -80,9 +80,9 @@ Model::Model(const SceneInput& input)
       extent_(bodies_.extent()),
       rest_reach_(bodies_.reach()) {
     // These load parameters exist in every scene, whether a term reads them or not.
-    registry_.controls.add("scene", "applied_flux_density", "T", 1, 3);
+    registry_.load_parameters.add("scene", "applied_flux_density", "T", 1, 3);
     for (const char* factor : {"field_factor", "load_factor", "gravity_factor"})
-        registry_.controls.add("scene", factor, "1", 1, 1);
+        registry_.load_parameters.add("scene", factor, "1", 1, 1);
     for (Index body = 0; body < static_cast<Index>(bodies_.shells().size()); ++body)
         add_loops(body, input.shells[body].curvature_scale);
     for (std::size_t k = bodies_.shells().size(); k < bodies_.faces().size(); ++k) {
@@ -112,10 +112,10 @@ void Model::vary(TimeVaryingParameters time_varying) {
     distribute_values();
 }
 
-void Model::set_time_varying(const Controls& controls) {
+void Model::set_time_varying(const LoadParameters& load_parameters) {
     if (varying_.empty()) return;
     VectorXd numbers = values_.numbers();
-    if (!varying_.update(controls, numbers)) return;
+    if (!varying_.update(load_parameters, numbers)) return;
     values_.set(registry_.values, std::move(numbers));
     distribute_values();
 }
@@ -169,8 +169,9 @@ VectorXd Model::cancelling_forces(const VectorXd& q) {
     return forces;
 }
 
-void Model::vjp(const VectorXd& q, const Controls& controls, const VectorXd& lambda, Gradient& out) {
-    for (const std::unique_ptr<Term>& term : terms_) term->vjp(q.data(), controls, lambda.data(), out);
+void Model::vjp(const VectorXd& q, const LoadParameters& load_parameters, const VectorXd& lambda,
+                Gradient& out) {
+    for (const std::unique_ptr<Term>& term : terms_) term->vjp(q.data(), load_parameters, lambda.data(), out);
 }
 
 StrainSet Model::damper_rates(const VectorXd& q, const VectorXd& v) const {
@@ -205,9 +206,9 @@ void Model::store_spare_factor(std::shared_ptr<Factor> factor) {
     factors_.store(std::move(factor));
 }
 
-double Model::energy(const VectorXd& q, const Controls& controls) const {
+double Model::energy(const VectorXd& q, const LoadParameters& load_parameters) const {
     double total = 0.0;
-    for (const std::unique_ptr<Term>& term : terms_) total += term->energy(q.data(), controls);
+    for (const std::unique_ptr<Term>& term : terms_) total += term->energy(q.data(), load_parameters);
     return total;
 }
 
@@ -217,26 +218,26 @@ std::vector<std::string_view> Model::term_names() const {
     return names;
 }
 
-std::vector<std::pair<std::string_view, double>> Model::energies(const VectorXd& q,
-                                                                 const Controls& controls) const {
+std::vector<std::pair<std::string_view, double>> Model::energies(
+    const VectorXd& q, const LoadParameters& load_parameters) const {
     std::vector<std::pair<std::string_view, double>> of_terms;
     for (const std::unique_ptr<Term>& term : terms_)
-        of_terms.emplace_back(term->name(), term->energy(q.data(), controls));
+        of_terms.emplace_back(term->name(), term->energy(q.data(), load_parameters));
     return of_terms;
 }
 
-void Model::evaluate(const VectorXd& q, const Controls& controls) {
+void Model::evaluate(const VectorXd& q, const LoadParameters& load_parameters) {
     dof_map_.linearize(q);
     residual_.reset(size());
-    for (const std::unique_ptr<Term>& term : terms_) term->evaluate(q.data(), controls, residual_);
+    for (const std::unique_ptr<Term>& term : terms_) term->evaluate(q.data(), load_parameters, residual_);
 }
 
-std::string Model::not_finite(const VectorXd& q, const Controls& controls) {
+std::string Model::not_finite(const VectorXd& q, const LoadParameters& load_parameters) {
     if (std::string reason = invalid_state_reason(q); !reason.empty()) return reason;
     Residual residual;
     for (const std::unique_ptr<Term>& term : terms_) {
         residual.reset(size());
-        term->evaluate(q.data(), controls, residual);
+        term->evaluate(q.data(), load_parameters, residual);
         for (Index k = 0; k < size(); ++k)
             if (!std::isfinite(residual.gradient[k])) {
                 const std::string of = "the " + std::string(term->name()) + " force";
@@ -247,31 +248,32 @@ std::string Model::not_finite(const VectorXd& q, const Controls& controls) {
     return {};
 }
 
-void Model::assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
+void Model::assemble(const VectorXd& q, const LoadParameters& load_parameters, bool extrapolated_stress,
                      bool project_psd) {
-    const auto clear = [&](std::size_t chunk) {
-        for (const auto& [first, last] : first_columns_[chunk]) matrix_.clear_columns(first, last);
+    const auto clear = [&](std::size_t element_block) {
+        for (const auto& [first, last] : first_columns_[element_block]) matrix_.clear_columns(first, last);
     };
     clear(first_columns_.size() - 1);
-    // Assembles all terms of a chunk before the next chunk, while its part of the matrix is in the cache.
+    // Assembles all terms of a block before the next block, while its part of the matrix is in the cache.
     for (LowRankTerm* term : borders_) term->take_extrapolated(extrapolated_stress, project_psd);
     for (const std::unique_ptr<Term>& term : terms_) {
         term->set_psd_projection(project_psd);
-        term->prepare_assembly(q.data(), controls);
+        term->prepare_assembly(q.data(), load_parameters);
     }
     if (const std::int64_t coupled = layer_ && layer_->used() ? layer_->version() : 0; coupled != coupled_) {
         dof_map_.set_pattern(matrix_, coupled > 0 ? &layer_->matrix() : nullptr);
         coupled_ = coupled;
     }
-    coloring_.scatter([&](const Chunk& chunk) {
-        clear(chunk.number);
-        for (const Term* term : of_body_[chunk.body])
-            term->assemble(chunk, q.data(), controls, extrapolated_stress, matrix_);
+    coloring_.scatter([&](const ElementBlock& element_block) {
+        clear(element_block.number);
+        for (const Term* term : of_body_[element_block.body])
+            term->assemble(element_block, q.data(), load_parameters, extrapolated_stress, matrix_);
     });
-    for (const std::unique_ptr<Term>& term : terms_) term->finish_assembly(q.data(), controls, matrix_);
+    for (const std::unique_ptr<Term>& term : terms_)
+        term->finish_assembly(q.data(), load_parameters, matrix_);
     low_rank_.clear();
-    for (const LowRankTerm* term : borders_) term->add_low_rank(controls, low_rank_);
-    collect_nonsymmetric_tangent(q, controls);
+    for (const LowRankTerm* term : borders_) term->add_low_rank(load_parameters, low_rank_);
+    collect_nonsymmetric_tangent(q, load_parameters);
 }
 
 SystemMatrix* Model::contact_matrix() {
@@ -304,9 +306,9 @@ void Model::reduce_matrix(Factor& factor) {
 }
 
 void Model::assign_columns() {
-    const std::vector<Chunk> chunks = coloring_.in_order();
+    const std::vector<ElementBlock> element_blocks = coloring_.in_order();
     std::vector<bool> taken(matrix_.size(), false);
-    first_columns_.resize(chunks.size() + 1);
+    first_columns_.resize(element_blocks.size() + 1);
     std::vector<Index> columns;
     const auto set_time_varying = [&](Index first, Index count) {
         for (Index column = first; column < first + count; ++column) {
@@ -323,15 +325,15 @@ void Model::assign_columns() {
                 runs.push_back({column, column + 1});
         columns.clear();
     };
-    for (const Chunk& chunk : chunks) {
-        const Body& body = *bodies_.all()[chunk.body];
-        for (Index element = chunk.first; element < chunk.last; ++element) {
+    for (const ElementBlock& element_block : element_blocks) {
+        const Body& body = *bodies_.all()[element_block.body];
+        for (Index element = element_block.first; element < element_block.last; ++element) {
             for (const Index node : body.nodes_of(element))
                 if (node >= 0) set_time_varying(3 * node, 3);
             for (const Index r : body.scalars_of(element))
                 if (r >= 0) set_time_varying(3 * matrix_.nodes() + r, 1);
         }
-        hand_over(first_columns_[chunk.number]);
+        hand_over(first_columns_[element_block.number]);
     }
     set_time_varying(0, 3 * matrix_.nodes());
     hand_over(first_columns_.back());
@@ -412,12 +414,12 @@ std::size_t Model::bytes() const {
     return total;
 }
 
-void Model::collect_nonsymmetric_tangent(const VectorXd& q, const Controls& controls) {
+void Model::collect_nonsymmetric_tangent(const VectorXd& q, const LoadParameters& load_parameters) {
     nonsymmetric_.clear();
     unsymmetric_ = false;
     if (!follows_) return;
     for (const std::unique_ptr<Term>& term : terms_)
-        term->add_nonsymmetric_tangent(q.data(), controls, nonsymmetric_);
+        term->add_nonsymmetric_tangent(q.data(), load_parameters, nonsymmetric_);
     unsymmetric_ = skew_blocks_act(0);
 }
 
@@ -445,19 +447,21 @@ void Model::require_symmetric() const {
         "and followed paths cannot: close the surface, hold its border, or give one pressure to all of it");
 }
 
-void Model::begin_step(const VectorXd& q, const Controls& controls) {
-    for (const std::unique_ptr<ForceTerm>& force : forces_) force->begin_step(q, controls);
+void Model::begin_step(const VectorXd& q, const LoadParameters& load_parameters) {
+    for (const std::unique_ptr<ForceTerm>& force : forces_) force->begin_step(q, load_parameters);
 }
 
-std::string Model::crossing_reason(const VectorXd& q, const Controls& controls, const VectorXd& end,
-                                   const Controls& controls_at_end) const {
-    const Index node = contact_ ? contact_->passes_through(q, controls, end, controls_at_end) : -1;
+std::string Model::crossing_reason(const VectorXd& q, const LoadParameters& load_parameters,
+                                   const VectorXd& end, const LoadParameters& load_parameters_at_end) const {
+    const Index node =
+        contact_ ? contact_->passes_through(q, load_parameters, end, load_parameters_at_end) : -1;
     if (node < 0) return {};
     return "vertex " + std::to_string(nodes().user_vertex(node)) +
            " passes through an obstacle within a step";
 }
 
-void Model::evaluate_forces(const VectorXd& q, const Controls& controls, const StageMotion& stage) {
+void Model::evaluate_forces(const VectorXd& q, const LoadParameters& load_parameters,
+                            const StageMotion& stage) {
     const Index coordinates = n_coordinates();
     kinematics_.q = q;
     kinematics_.rate = 1.0 / stage.time;
@@ -465,7 +469,8 @@ void Model::evaluate_forces(const VectorXd& q, const Controls& controls, const S
     kinematics_.w.setZero(size());
     kinematics_.v.head(coordinates) = kinematics_.rate * (q - *stage.x_hat).head(coordinates);
     kinematics_.w.head(coordinates) = kinematics_.rate * (kinematics_.v - *stage.v_hat).head(coordinates);
-    for (const std::unique_ptr<ForceTerm>& force : forces_) force->evaluate(kinematics_, controls, residual_);
+    for (const std::unique_ptr<ForceTerm>& force : forces_)
+        force->evaluate(kinematics_, load_parameters, residual_);
 }
 
 std::vector<PairStiffness> Model::contact_pair_stiffness() const {
@@ -488,30 +493,32 @@ void Model::freeze_normal_forces(bool held) {
     for (const std::unique_ptr<ForceTerm>& force : forces_) force->set_frozen(held);
 }
 
-void Model::assemble_forces(const Controls& controls, bool project_psd) {
+void Model::assemble_forces(const LoadParameters& load_parameters, bool project_psd) {
     const std::size_t before = nonsymmetric_.skew_blocks().size();
     for (const std::unique_ptr<ForceTerm>& force : forces_)
-        force->assemble(kinematics_, controls, project_psd, matrix_, nonsymmetric_);
+        force->assemble(kinematics_, load_parameters, project_psd, matrix_, nonsymmetric_);
     unsymmetric_ = unsymmetric_ || nonsymmetric_.has_rate_forces() || skew_blocks_act(before);
 }
 
-KinematicsGradient Model::forces_vjp(const Controls& controls, const VectorXd& lambda, Gradient& out) const {
+KinematicsGradient Model::forces_vjp(const LoadParameters& load_parameters, const VectorXd& lambda,
+                                     Gradient& out) const {
     KinematicsGradient by{VectorXd::Zero(size()), VectorXd::Zero(size()), VectorXd::Zero(size()),
-                          no_controls()};
+                          zero_load_parameters()};
     for (const std::unique_ptr<ForceTerm>& force : forces_)
-        force->vjp(kinematics_, controls, lambda, by, out);
+        force->vjp(kinematics_, load_parameters, lambda, by, out);
     return by;
 }
 
 // Parameters may enter in any way, for example as the position of a magnet. Fourth-order differences lose no more digits than a gradient
 // has lost already, and continuation uses them only as a predictor.
 template <class Function>
-VectorXd Model::rate_by_varying(const Controls& at, const Controls& rate, const Function& function) {
+VectorXd Model::rate_by_varying(const LoadParameters& at, const LoadParameters& rate,
+                                const Function& function) {
     const Index n = varying_.size();
     VectorXd sum = VectorXd::Zero(size());
     if (rate.tail(n).isZero(0.0)) return sum;
     const auto beside = [&](double way) {
-        Controls there = at;
+        LoadParameters there = at;
         there.tail(n) += way * rate.tail(n);
         set_time_varying(there);
         return function(there);
@@ -524,9 +531,9 @@ VectorXd Model::rate_by_varying(const Controls& at, const Controls& rate, const 
     return sum;
 }
 
-VectorXd Model::gradient_rate(const VectorXd& q, const Controls& at, const Controls& rate) {
+VectorXd Model::gradient_rate(const VectorXd& q, const LoadParameters& at, const LoadParameters& rate) {
     // The difference removes the part that does not depend on the load parameters, such as that of target volumes.
-    const Controls none = Controls::Zero(rate.size());
+    const LoadParameters none = LoadParameters::Zero(rate.size());
     Residual change, constant, dropped;
     for (Residual* each : {&change, &constant, &dropped}) each->reset(size());
     for (const std::unique_ptr<Term>& term : terms_) {
@@ -537,7 +544,7 @@ VectorXd Model::gradient_rate(const VectorXd& q, const Controls& at, const Contr
     }
     change.gradient -= constant.gradient;
     if (varying_.empty()) return change.gradient;
-    return change.gradient + rate_by_varying(at, rate, [&](const Controls& there) {
+    return change.gradient + rate_by_varying(at, rate, [&](const LoadParameters& there) {
                Residual gradient;
                gradient.reset(size());
                for (const std::unique_ptr<Term>& term : terms_)
@@ -546,10 +553,10 @@ VectorXd Model::gradient_rate(const VectorXd& q, const Controls& at, const Contr
            });
 }
 
-VectorXd Model::prescribed_rate(const VectorXd& q, const Controls& at, const Controls& rate) {
+VectorXd Model::prescribed_rate(const VectorXd& q, const LoadParameters& at, const LoadParameters& rate) {
     const VectorXd held = dof_map_.support_factor(rate) * dof_map_.prescribed_rate(at);
     if (varying_.empty()) return held;
-    return held + rate_by_varying(at, rate, [&](const Controls& there) {
+    return held + rate_by_varying(at, rate, [&](const LoadParameters& there) {
                return dof_map_.prescribed_increment(q, there);
            });
 }

@@ -39,17 +39,19 @@ class Model {
     Model& operator=(const Model&) = delete;
     ~Model();
 
-    /// Lists the parameters (values) and load parameters (controls) that its terms read.
+    /// Lists the parameters (values) and load parameters that its terms read.
     const Registry& registry() const { return registry_; }
     /// Sets all parameters, in the row order of the caller; required once before a solve.
     void set_values(const VectorXd& in_user_order);
-    Controls no_controls() const { return Controls::Zero(registry_.controls.size() + varying_.size()); }
+    LoadParameters zero_load_parameters() const {
+        return LoadParameters::Zero(registry_.load_parameters.size() + varying_.size());
+    }
 
     /// Lets some parameters vary with the load parameters from now on. With none, those that varied return to their former values.
     void vary(TimeVaryingParameters time_varying);
     const TimeVaryingParameters& time_varying() const { return varying_; }
     /// Applies the varying parameters at these load parameters to the next evaluations.
-    void set_time_varying(const Controls& controls);
+    void set_time_varying(const LoadParameters& load_parameters);
 
     const Bodies& bodies() const { return bodies_; }
     const Nodes& nodes() const { return bodies_.nodes(); }
@@ -79,18 +81,18 @@ class Model {
     /// Adds the part of these forces that depends on the last evaluated state, with the forces of a time stage if in_motion.
     void add_cancelling_forces_here(bool in_motion, VectorXd& out) const;
 
-    double energy(const VectorXd& q, const Controls& controls) const;
+    double energy(const VectorXd& q, const LoadParameters& load_parameters) const;
     /// Returns the names of the terms in the order of energies(); terms with the same name, of several bodies, follow each other.
     std::vector<std::string_view> term_names() const;
     std::vector<std::pair<std::string_view, double>> energies(const VectorXd& q,
-                                                              const Controls& controls) const;
+                                                              const LoadParameters& load_parameters) const;
 
     /// Evaluates the residual at q, and stores what assemble and extrapolate need.
-    void evaluate(const VectorXd& q, const Controls& controls);
+    void evaluate(const VectorXd& q, const LoadParameters& load_parameters);
     /// Returns a sentence that names the term and vertex whose force is not finite at q; empty if all forces are finite.
-    std::string not_finite(const VectorXd& q, const Controls& controls);
+    std::string not_finite(const VectorXd& q, const LoadParameters& load_parameters);
     /// Assembles the Hessian at the last evaluated state. project_psd: contact between bodies and low-rank terms contribute positive semidefinite parts.
-    void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
+    void assemble(const VectorXd& q, const LoadParameters& load_parameters, bool extrapolated_stress,
                   bool project_psd = false);
     /// Returns true if there are follower loads, which may make the Hessian nonsymmetric; and true if the Hessian assembled last is
     /// nonsymmetric on the free dofs: it is then matrix() plus nonsymmetric_tangent(), and there is no energy.
@@ -102,14 +104,14 @@ class Model {
     void extrapolate(const VectorXd& p);
     /// Returns the derivative of the gradient at q along the load path: load parameters `at`, changing at `rate`. It is exact for those that
     /// enter linearly, and by fourth-order differences for varying parameters. Leaves the model evaluated elsewhere.
-    VectorXd gradient_rate(const VectorXd& q, const Controls& at, const Controls& rate);
+    VectorXd gradient_rate(const VectorXd& q, const LoadParameters& at, const LoadParameters& rate);
     /// Returns the derivative of the prescribed positions in the same way; zero for all other dofs.
-    VectorXd prescribed_rate(const VectorXd& q, const Controls& at, const Controls& rate);
+    VectorXd prescribed_rate(const VectorXd& q, const LoadParameters& at, const LoadParameters& rate);
 
     /// Forces without an energy act only within the stages of time steps. A step begins at q. At a stage they are added to the residual
     /// after evaluate(), and to matrix() and nonsymmetric_tangent() after assemble(), at the same q.
     bool has_forces() const { return !forces_.empty(); }
-    void begin_step(const VectorXd& q, const Controls& controls);
+    void begin_step(const VectorXd& q, const LoadParameters& load_parameters);
     bool has_contact() const { return contact_ != nullptr; }
     /// The contact with obstacles; nullptr if there is none.
     ContactTerm* contact() const { return contact_; }
@@ -119,19 +121,20 @@ class Model {
     /// Returns true if a pair of faces or edges is in contact at the last evaluated state.
     bool has_active_body_contact() const;
     /// Returns why a step from q to `end` is impossible: a point would cross an obstacle. Empty if no point does.
-    std::string crossing_reason(const VectorXd& q, const Controls& controls, const VectorXd& end,
-                                const Controls& controls_at_end) const;
-    void evaluate_forces(const VectorXd& q, const Controls& controls, const StageMotion& stage);
-    void assemble_forces(const Controls& controls, bool project_psd = false);
+    std::string crossing_reason(const VectorXd& q, const LoadParameters& load_parameters, const VectorXd& end,
+                                const LoadParameters& load_parameters_at_end) const;
+    void evaluate_forces(const VectorXd& q, const LoadParameters& load_parameters, const StageMotion& stage);
+    void assemble_forces(const LoadParameters& load_parameters, bool project_psd = false);
     /// Freezes the normal forces of friction, or releases them.
     void freeze_normal_forces(bool held);
     const NonsymmetricTangent& nonsymmetric_tangent() const { return nonsymmetric_; }
     /// Adds - lambda . df/dk to the gradient; returns the gradient of lambda . f by the kinematics.
-    KinematicsGradient forces_vjp(const Controls& controls, const VectorXd& lambda, Gradient& out) const;
+    KinematicsGradient forces_vjp(const LoadParameters& load_parameters, const VectorXd& lambda,
+                                  Gradient& out) const;
 
     /// Adds lambda . dg/dk at the last evaluated state for all parameters k except those of supports; lambda is zero where nodes are
     /// prescribed.
-    void vjp(const VectorXd& q, const Controls& controls, const VectorXd& lambda, Gradient& out);
+    void vjp(const VectorXd& q, const LoadParameters& load_parameters, const VectorXd& lambda, Gradient& out);
 
     /// The terms to which viscosity applies: elastic terms, and joint dampers (which may be none).
     ViscousTerms& elastic() { return elastic_; }
@@ -199,31 +202,31 @@ class Model {
     void add_moments(const SceneInput& input);
     void add_joints(const SceneInput& input);
     void add_solids(const SceneInput& input);
-    void add_couples(const SceneInput& input);
+    void add_edge_moments(const SceneInput& input);
     void add_volumes(const SceneInput& input);
     void add_contacts(const SceneInput& input);
     void add_body_contacts(const SceneInput& input);
     void assign_columns();
     void add_muscles(const SceneInput& input);
-    void collect_nonsymmetric_tangent(const VectorXd& q, const Controls& controls);
+    void collect_nonsymmetric_tangent(const VectorXd& q, const LoadParameters& load_parameters);
     bool skew_blocks_act(std::size_t from) const;  // nonsymmetric_, from that block on
     void distribute_values();
     template <class Function>
-    VectorXd rate_by_varying(const Controls& at, const Controls& rate, const Function& function);
+    VectorXd rate_by_varying(const LoadParameters& at, const LoadParameters& rate, const Function& function);
 
     Registry registry_;
     Bodies bodies_;
     SystemMatrix matrix_;
     DofMap dof_map_;
     ElementColoring coloring_;
-    std::vector<std::unique_ptr<FaceLoop>> loops_;  // of each of Bodies::faces(); nullptr if it has no chunks
+    std::vector<std::unique_ptr<FaceLoop>> loops_;  // of each of Bodies::faces(); nullptr if it has no blocks
     std::vector<std::unique_ptr<MembraneFaces>> membrane_faces_;
     std::vector<std::unique_ptr<FaceLoop>>
         membrane_loops_;  // nullptr if the membrane uses the shell's own faces
     FieldSources sources_;
     std::vector<std::unique_ptr<Term>> terms_;
     std::vector<std::vector<const Term*>>
-        of_body_;  // the terms that are assembled by the chunks of each body
+        of_body_;  // the terms that are assembled by the blocks of each body
     ViscousTerms elastic_, dampers_;
     const DamperTerm* damper_term_ = nullptr;
     std::vector<const SolidTerm*> solid_terms_;
@@ -235,7 +238,7 @@ class Model {
     BodyContactTerm* body_contact_ = nullptr;
     std::unique_ptr<ContactLayer> layer_;  // nullptr without contact between bodies
     std::int64_t coupled_ = 0;             // version of layer_ in the reduced pattern; 0: it has none
-    // By chunk: ranges of matrix columns that this chunk is the first to add to, and therefore clears. Last entry: columns of no chunk.
+    // By block: ranges of matrix columns that this block is the first to add to, and therefore clears. Last entry: columns of no block.
     std::vector<std::vector<std::array<Index, 2>>> first_columns_;  // from, to
     Values values_;
     TimeVaryingParameters varying_;

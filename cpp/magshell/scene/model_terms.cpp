@@ -13,7 +13,7 @@
 #include "magshell/terms/joint/ball_torque_term.h"
 #include "magshell/terms/joint/damper_term.h"
 #include "magshell/terms/joint/joint_term.h"
-#include "magshell/terms/load/couple_term.h"
+#include "magshell/terms/load/edge_moment_term.h"
 #include "magshell/terms/load/load_term.h"
 #include "magshell/terms/load/pressure_term.h"
 #include "magshell/terms/load/water_term.h"
@@ -29,8 +29,8 @@
 namespace magshell {
 namespace {
 
-CoupleTerm::Couple couple_of(const EdgeMomentInput& given, const TriangleMesh& mesh, const Shell& shell,
-                             const Nodes& at) {
+EdgeMomentTerm::EdgeMoment couple_of(const EdgeMomentInput& given, const TriangleMesh& mesh,
+                                     const Shell& shell, const Nodes& at) {
     const bool forward = mesh.edge_faces()(given.edge, 0) != TriangleMesh::none;
     const Index f = shell.faces.core[mesh.edge_faces()(given.edge, forward ? 0 : 1)];
     int i = 0;
@@ -39,7 +39,7 @@ CoupleTerm::Couple couple_of(const EdgeMomentInput& given, const TriangleMesh& m
     const std::array<Index, 4> nodes = {c[(i + 1) % 3], c[(i + 2) % 3], c[i],
                                         at.direction_node(given.direction)};
     const DihedralAngle fold(broadcast(at.rest[nodes[0]]), broadcast(at.rest[nodes[1]]),
-                             broadcast(at.rest[nodes[2]]), broadcast(at.rest[nodes[3]]), Pack(0.0));
+                             broadcast(at.rest[nodes[2]]), broadcast(at.rest[nodes[3]]), SimdDouble(0.0));
     return {{nodes[0], nodes[1], nodes[2], nodes[3], -1, -1, -1, -1, -1},
             -1,
             fold.angle()[0],
@@ -49,8 +49,8 @@ CoupleTerm::Couple couple_of(const EdgeMomentInput& given, const TriangleMesh& m
 }
 
 // Returns the edge moment at both Gauss points of an edge of a six-node shell, weighted by the length of the edge there.
-std::array<CoupleTerm::Couple, 2> couples_of(const EdgeMomentInput& given, const TriangleMesh& mesh,
-                                             const SixNodeShell& shell, const Nodes& at) {
+std::array<EdgeMomentTerm::EdgeMoment, 2> couples_of(const EdgeMomentInput& given, const TriangleMesh& mesh,
+                                                     const SixNodeShell& shell, const Nodes& at) {
     using six_nodes::middle;
     const Index user = mesh.edge_faces().row(given.edge).maxCoeff(), f = shell.faces.core[user];
     int i = 0;
@@ -66,7 +66,7 @@ std::array<CoupleTerm::Couple, 2> couples_of(const EdgeMomentInput& given, const
                                         at.direction_node(given.direction),
                                         -1,
                                         -1};
-    Pack3 x[9] = {};
+    SimdVec3 x[9] = {};
     for (int k = 0; k < 7; ++k) x[k] = broadcast(at.rest[nodes[k]]);
     const FaceSideSix& side = shell.sides[f][i];
     double lengths[2];
@@ -76,9 +76,13 @@ std::array<CoupleTerm::Couple, 2> couples_of(const EdgeMomentInput& given, const
         lengths[g] = (along[0] * rest[from] + along[1] * rest[to] + along[2] * rest[middle(i)]).norm();
     }
     const auto at_point = [&](int g) {
-        return CoupleTerm::Couple{
-            nodes,     g, DihedralAngleSix(x, Pack(0.0), g).angle()[0], side.rotation[g],
-            side.sign, 0, lengths[g] / (lengths[0] + lengths[1])};
+        return EdgeMomentTerm::EdgeMoment{nodes,
+                                          g,
+                                          DihedralAngleSix(x, SimdDouble(0.0), g).angle()[0],
+                                          side.rotation[g],
+                                          side.sign,
+                                          0,
+                                          lengths[g] / (lengths[0] + lengths[1])};
     };
     return {at_point(0), at_point(1)};
 }
@@ -87,12 +91,13 @@ std::array<CoupleTerm::Couple, 2> couples_of(const EdgeMomentInput& given, const
 
 void Model::add_loops(Index body, const VectorXd& curvature_scale) {
     const Shell& shell = *bodies_.shells()[body];
-    const ChunkLoop& chunks = coloring_.of(body);
-    loops_.push_back(std::make_unique<FaceLoop>(shell.corners, chunks, matrix_));
+    const ColoredLoop& element_blocks = coloring_.of(body);
+    loops_.push_back(std::make_unique<FaceLoop>(shell.corners, element_blocks, matrix_));
     membrane_faces_.push_back(std::make_unique<MembraneFaces>(shell, nodes(), curvature_scale));
     const MembraneFaces& faces = *membrane_faces_.back();
-    membrane_loops_.push_back(
-        faces.is_unchanged() ? nullptr : std::make_unique<FaceLoop>(faces.corners(), chunks, matrix_));
+    membrane_loops_.push_back(faces.is_unchanged()
+                                  ? nullptr
+                                  : std::make_unique<FaceLoop>(faces.corners(), element_blocks, matrix_));
 }
 
 void Model::add_terms(const SceneInput& input) {
@@ -131,7 +136,7 @@ void Model::add_terms(const SceneInput& input) {
     if (input.gravity)
         terms_.push_back(std::make_unique<LoadTerm>("gravity", "gravity_factor", nodes(), registry_));
     if (input.loads) terms_.push_back(std::make_unique<LoadTerm>("loads", "load_factor", nodes(), registry_));
-    if (!input.couples.empty()) add_couples(input);
+    if (!input.couples.empty()) add_edge_moments(input);
     if (!input.contacts.empty()) add_contacts(input);
     if (!input.body_contacts.empty()) add_body_contacts(input);
     if (input.water) add_water(input);
@@ -153,9 +158,9 @@ void Model::add_six_node_shell(std::size_t number, const GrowthForm& growth) {
         elastic_.add(term.get());
         terms_.push_back(std::move(term));
     };
-    const ChunkLoop& chunks = coloring_.of(body);
-    add(std::make_unique<MembraneSixTerm>(shell, body, chunks, nodes(), growth, matrix_, registry_));
-    add(std::make_unique<BendingSixTerm>(shell, body, chunks, nodes(), growth, matrix_, registry_));
+    const ColoredLoop& element_blocks = coloring_.of(body);
+    add(std::make_unique<MembraneSixTerm>(shell, body, element_blocks, nodes(), growth, matrix_, registry_));
+    add(std::make_unique<BendingSixTerm>(shell, body, element_blocks, nodes(), growth, matrix_, registry_));
 }
 
 void Model::add_magnetic_terms(const SceneInput& input) {
@@ -258,8 +263,8 @@ void Model::add_muscles(const SceneInput& input) {
     }
 }
 
-void Model::add_couples(const SceneInput& input) {
-    std::vector<CoupleTerm::Couple> couples;
+void Model::add_edge_moments(const SceneInput& input) {
+    std::vector<EdgeMomentTerm::EdgeMoment> couples;
     const Index flat = static_cast<Index>(input.shells.size());
     Index row = 0;
     std::size_t numbered = 0;
@@ -268,14 +273,14 @@ void Model::add_couples(const SceneInput& input) {
             couples.push_back(
                 couple_of(given, *input.shells[given.shell].mesh, *bodies_.shells()[given.shell], nodes()));
         else
-            for (const CoupleTerm::Couple& couple :
+            for (const EdgeMomentTerm::EdgeMoment& couple :
                  couples_of(given, *input.six_node_shells[given.shell - flat].mesh.corners,
                             *bodies_.six_node_shells()[given.shell - flat], nodes()))
                 couples.push_back(couple);
         for (; numbered < couples.size(); ++numbered) couples[numbered].row = row;
         ++row;
     }
-    terms_.push_back(std::make_unique<CoupleTerm>(nodes(), matrix_, std::move(couples), row, registry_));
+    terms_.push_back(std::make_unique<EdgeMomentTerm>(nodes(), matrix_, std::move(couples), row, registry_));
 }
 
 void Model::add_contacts(const SceneInput& input) {

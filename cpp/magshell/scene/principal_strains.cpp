@@ -15,11 +15,11 @@ using shell_loops::over_blocks;
 
 /// A symmetric 2 x 2 tensor in each lane.
 struct Tensor2 {
-    Pack xx, xy, yy;
+    SimdDouble xx, xy, yy;
 
-    void principal(Pack& larger, Pack& smaller) const {
-        const Pack middle = Pack(0.5) * (xx + yy), half = Pack(0.5) * (xx - yy);
-        const Pack radius = sqrt(half * half + xy * xy);
+    void principal(SimdDouble& larger, SimdDouble& smaller) const {
+        const SimdDouble middle = SimdDouble(0.5) * (xx + yy), half = SimdDouble(0.5) * (xx - yy);
+        const SimdDouble radius = sqrt(half * half + xy * xy);
         larger = middle + radius;
         smaller = middle - radius;
     }
@@ -27,32 +27,32 @@ struct Tensor2 {
 
 /// A face at rest in axes of its own: x0 at the origin, x1 = (along, 0), x2 = (across, height).
 struct FlatFace {
-    Pack along, across, height;
+    SimdDouble along, across, height;
 
-    explicit FlatFace(const Pack3 rest[3]) {
-        const Pack3 d1 = rest[1] - rest[0], d2 = rest[2] - rest[0];
+    explicit FlatFace(const SimdVec3 rest[3]) {
+        const SimdVec3 d1 = rest[1] - rest[0], d2 = rest[2] - rest[0];
         along = sqrt(squared_norm(d1));
         across = dot(d1, d2) / along;
         height = sqrt(squared_norm(cross(d1, d2))) / along;
     }
 
     /// Returns Green's strain from the change of the inner products of its two edges at x0.
-    Tensor2 green(const Pack3 rest[3], const Pack3 x[3]) const {
-        const Pack3 d1 = rest[1] - rest[0], d2 = rest[2] - rest[0], e1 = x[1] - x[0], e2 = x[2] - x[0];
-        const Pack c11 = squared_norm(e1) - squared_norm(d1), c12 = dot(e1, e2) - dot(d1, d2),
-                   c22 = squared_norm(e2) - squared_norm(d2);
-        const Pack slant = across / along, half(0.5);
+    Tensor2 green(const SimdVec3 rest[3], const SimdVec3 x[3]) const {
+        const SimdVec3 d1 = rest[1] - rest[0], d2 = rest[2] - rest[0], e1 = x[1] - x[0], e2 = x[2] - x[0];
+        const SimdDouble c11 = squared_norm(e1) - squared_norm(d1), c12 = dot(e1, e2) - dot(d1, d2),
+                         c22 = squared_norm(e2) - squared_norm(d2);
+        const SimdDouble slant = across / along, half(0.5);
         return {half * c11 / (along * along), half * (c12 - slant * c11) / (along * height),
-                half * (c22 - Pack(2.0) * slant * c12 + slant * slant * c11) / (height * height)};
+                half * (c22 - SimdDouble(2.0) * slant * c12 + slant * slant * c11) / (height * height)};
     }
 
     /// Returns the curvature from the bending strains of the edges. Edge i is opposite corner i: t~ = (y, -x) for an edge (x, y).
-    Tensor2 curvature(const Pack delta[3]) const {
-        const Pack x[3] = {across - along, -across, along}, y[3] = {height, -height, Pack(0.0)};
-        const Pack inverse_area = Pack(2.0) / (along * height);
-        Tensor2 sum{Pack(0.0), Pack(0.0), Pack(0.0)};
+    Tensor2 curvature(const SimdDouble delta[3]) const {
+        const SimdDouble x[3] = {across - along, -across, along}, y[3] = {height, -height, SimdDouble(0.0)};
+        const SimdDouble inverse_area = SimdDouble(2.0) / (along * height);
+        Tensor2 sum{SimdDouble(0.0), SimdDouble(0.0), SimdDouble(0.0)};
         for (int i = 0; i < 3; ++i) {
-            const Pack weight = delta[i] * inverse_area / sqrt(x[i] * x[i] + y[i] * y[i]);
+            const SimdDouble weight = delta[i] * inverse_area / sqrt(x[i] * x[i] + y[i] * y[i]);
             sum.xx += weight * y[i] * y[i];
             sum.xy -= weight * x[i] * y[i];
             sum.yy += weight * x[i] * x[i];
@@ -73,10 +73,10 @@ void add_shell(const Model& model, Index body, const VectorXd& q, const VectorXd
     const auto change_of = [&](Index dihedral) { return changes[dihedral]; };
     const double* rotations = q.data() + first_scalar;
     over_blocks(shell.n_faces(), [&](Index from, Index to) {
-        for (Index first = from; first < to; first += Pack::width) {
-            Pack3 own_rest[3], rest[3], x[3];
-            Pack delta[3], half_thickness;
-            for (int lane = 0; lane < Pack::width; ++lane) {
+        for (Index first = from; first < to; first += SimdDouble::width) {
+            SimdVec3 own_rest[3], rest[3], x[3];
+            SimdDouble delta[3], half_thickness;
+            for (int lane = 0; lane < SimdDouble::width; ++lane) {
                 const Index f = std::min(first + lane, to - 1);
                 const std::array<Vec3, 3> corners = stretching.grows() ? stretching.grown(f).corners()
                                                                        : membrane.rest_corners(f),
@@ -91,10 +91,10 @@ void add_shell(const Model& model, Index body, const VectorXd& q, const VectorXd
                 }
                 half_thickness.set(lane, 0.5 * thickness[first_row + shell.faces.user[f]]);
             }
-            Pack values[4];
+            SimdDouble values[4];
             FlatFace(rest).green(rest, x).principal(values[0], values[1]);
             FlatFace(own_rest).curvature(delta).principal(values[2], values[3]);
-            for (int lane = 0; lane < std::min(Pack::width, to - first); ++lane) {
+            for (int lane = 0; lane < std::min(SimdDouble::width, to - first); ++lane) {
                 const Index row = first_row + shell.faces.user[first + lane];
                 for (int k = 0; k < 4; ++k)
                     out(row, k) = k < 2 ? values[k][lane] : half_thickness[lane] * values[k][lane];

@@ -9,7 +9,7 @@
 
 namespace magshell::shell_loops {
 
-constexpr Index block = 1024;  // number of angles or faces; a multiple of the pack width
+constexpr Index block = 1024;  // number of angles or faces; a multiple of the SIMD width
 
 /// Calls body(first, last) on blocks that cover [0, count), on all threads.
 template <class Body>
@@ -22,9 +22,9 @@ void over_blocks(Index count, const Body& body) {
 inline std::vector<double> angle_changes(const Shell& shell, const double* q) {
     std::vector<double> changes(shell.dihedrals.size());
     over_blocks(static_cast<Index>(changes.size()), [&](Index from, Index to) {
-        for (Index first = from; first < to; first += Pack::width) {
-            const Index last = std::min(first + Pack::width, to);
-            const Pack angle = dihedral_angles_at(shell, first, last, q).angle();
+        for (Index first = from; first < to; first += SimdDouble::width) {
+            const Index last = std::min(first + SimdDouble::width, to);
+            const SimdDouble angle = dihedral_angles_at(shell, first, last, q).angle();
             for (Index h = first; h < last; ++h)
                 changes[h] = angle_change(shell.dihedrals[h], angle[h - first]);
         }

@@ -15,17 +15,17 @@ class TimeVaryingParameters {
     /// entries: indices of registered values, each once. Throws InvalidInput if one cannot vary.
     TimeVaryingParameters(const Registry& registry, const std::vector<Index>& entries);
 
-    bool empty() const { return slots_.empty(); }
+    bool empty() const { return slices_.empty(); }
     /// Returns the total number of components.
     Index size() const { return size_; }
 
     /// Copies the numbers from load parameters into the vector of all values. Returns true if any of them changed.
-    bool update(const Controls& controls, VectorXd& values) const;
+    bool update(const LoadParameters& load_parameters, VectorXd& values) const;
     /// Moves the gradient by these values to the gradient by load parameters.
     void move_gradient(Gradient& gradient) const;
 
   private:
-    std::vector<Slot> slots_;  // positions among the values
+    std::vector<ParameterSlice> slices_;  // positions among the values
     Index first_ = 0, size_ = 0;
 };
 

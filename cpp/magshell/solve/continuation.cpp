@@ -40,7 +40,7 @@ struct Tangent {
 
 class Follower {
   public:
-    Follower(Newton& newton, const Controls& from, const Controls& to, const PathOptions& options,
+    Follower(Newton& newton, const LoadParameters& from, const LoadParameters& to, const PathOptions& options,
              const Until& until, PathResult& result)
         : newton_(newton),
           model_(newton.model()),
@@ -58,7 +58,7 @@ class Follower {
 
     bool run(const VectorXd& start) {
         PathPoint here{start, 0.0, {}, 0};
-        const NewtonReport at_rest = newton_.solve(here.state, controls(0.0));
+        const NewtonReport at_rest = newton_.solve(here.state, load_parameters(0.0));
         if (!at_rest.converged) return fail("the start is not an equilibrium: " + at_rest.reason);
         here.angle_branches = model_.angle_branches();
         Tangent tangent;
@@ -81,8 +81,8 @@ class Follower {
 
   private:
     /// Returns the load parameters at a path parameter and applies the values that vary with them to the model.
-    Controls controls(double parameter) const {
-        Controls there = interpolate(from_, to_, parameter);
+    LoadParameters load_parameters(double parameter) const {
+        LoadParameters there = interpolate(from_, to_, parameter);
         model_.set_time_varying(there);
         return there;
     }
@@ -111,14 +111,14 @@ class Follower {
     }
 
     // Returns dq/dlambda from K dq = -(dR/dlambda + K dq_held), with the last factorization; pull: K dq_held.
-    VectorXd response(const VectorXd& q, const Controls& at, const VectorXd& held,
+    VectorXd response(const VectorXd& q, const LoadParameters& at, const VectorXd& held,
                       const VectorXd& pull) const {
         return held + newton_.solve_with_factor(-model_.gradient_rate(q, at, rate_) - pull);
     }
 
     // Factorizes at a point; sets its tangent, not normalized, and its number of unstable directions.
     bool find_tangent(PathPoint& point, Tangent& tangent) {
-        const Controls at = controls(point.parameter);
+        const LoadParameters at = load_parameters(point.parameter);
         model_.evaluate(point.state, at);
         const VectorXd held = model_.prescribed_rate(point.state, at, rate_);
         Eigen::MatrixXd pull = held;
@@ -142,7 +142,7 @@ class Follower {
             if (model_.has_body_contact()) increment *= model_.admissible_step_length(q, increment);
             if (newton_.options().mixed) model_.extrapolate(increment);
             model_.dof_map().retract(q, increment);
-            const Controls at = controls(parameter);
+            const LoadParameters at = load_parameters(parameter);
             model_.evaluate(q, at);
             const double residual = newton_.relative_residual(q, {});
             newton_.watch(residual);
@@ -172,16 +172,16 @@ class Follower {
         const double shortest = min_step_ratio * step_;
         bool at_base = true;  // whether the model was last evaluated at the base point
         std::string through;  // the obstacle that the last trial step would pass through
-        sides_.remember(base.state, controls(base.parameter));
+        sides_.remember(base.state, load_parameters(base.parameter));
         for (step_ = std::min(step_, options_.largest_step);; step_ *= 0.5, at_base = false) {
             if (step_ < shortest)
                 return fail(through.empty() ? "no step along the path converges, however short" : through);
-            if (!at_base) model_.evaluate(base.state, controls(base.parameter));
+            if (!at_base) model_.evaluate(base.state, load_parameters(base.parameter));
             PathPoint next;
             Tangent there;
             int iterations = 0;
             if (!correct(base, tangent, step_, next, iterations) || !end_in_range(next)) continue;
-            const Controls at = controls(next.parameter);
+            const LoadParameters at = load_parameters(next.parameter);
             through = sides_.crossed(next.state, at);
             if (!through.empty() || sides_.turned(at) > max_obstacle_rotation || !find_tangent(next, there))
                 continue;
@@ -195,7 +195,7 @@ class Follower {
             if (options_.locate_critical && next.unstable_directions != base.unstable_directions)
                 locate({0.0, base}, {step_, next}, tangent);
             model_.set_angle_branches(next.angle_branches);
-            model_.evaluate(next.state, controls(next.parameter));
+            model_.evaluate(next.state, load_parameters(next.parameter));
             result_.points.push_back(std::move(next));
             tangent = std::move(there);
             step_ *= std::clamp(std::sqrt(double(target_iterations) / std::max(iterations, 1)), 0.5, 2.0);
@@ -207,7 +207,7 @@ class Follower {
     bool end_in_range(PathPoint& point) {
         const double end = std::clamp(point.parameter, options_.lowest_parameter, options_.highest_parameter);
         if (end == point.parameter) return true;
-        if (!newton_.solve(point.state, controls(end)).converged) return false;
+        if (!newton_.solve(point.state, load_parameters(end)).converged) return false;
         point.parameter = end;
         point.angle_branches = model_.angle_branches();
         return true;
@@ -232,7 +232,7 @@ class Follower {
         Probe found{step, base};
         Tangent unused;
         int iterations = 0;
-        model_.evaluate(base.state, controls(base.parameter));
+        model_.evaluate(base.state, load_parameters(base.parameter));
         const bool there = step == 0.0 || correct(base, along, step, found.point, iterations);
         return there && find_tangent(found.point, unused) ? std::optional(found) : std::nullopt;
     }
@@ -280,7 +280,7 @@ class Follower {
                 side = -1;
             }
         }
-        const VectorXd drive = model_.gradient_rate(best.state, controls(best.parameter), rate_);
+        const VectorXd drive = model_.gradient_rate(best.state, load_parameters(best.parameter), rate_);
         const VectorXd free_drive = model_.dof_map().vector(drive), free_mode = model_.dof_map().vector(mode);
         const double alignment =
             std::abs(free_drive.dot(free_mode)) / (free_drive.norm() * free_mode.norm() + no_norm);
@@ -291,7 +291,7 @@ class Follower {
 
     Newton& newton_;
     Model& model_;
-    const Controls from_, to_, rate_;
+    const LoadParameters from_, to_, rate_;
     const PathOptions& options_;
     const Until& until_;
     PathResult& result_;
@@ -303,7 +303,7 @@ class Follower {
 }  // namespace
 
 PathResult follow_path(Model& model, const VectorXd& start, const Model::AngleBranches& angle_branches,
-                       const Controls& from, const Controls& to, const PathOptions& options,
+                       const LoadParameters& from, const LoadParameters& to, const PathOptions& options,
                        const Until& until, const StaticsWatch& watch, const TimeVaryingParameters& varying) {
     const ScopedTimeVarying while_varying(model, varying);
     model.set_angle_branches(angle_branches);

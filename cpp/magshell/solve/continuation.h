@@ -56,7 +56,7 @@ using Until = std::function<bool(const PathPoint&)>;
 
 /// Follows the path from an equilibrium at the load parameters `from` towards `to`. The values of `varying` are appended to both.
 PathResult follow_path(Model& model, const VectorXd& start, const Model::AngleBranches& angle_branches,
-                       const Controls& from, const Controls& to, const PathOptions& options,
+                       const LoadParameters& from, const LoadParameters& to, const PathOptions& options,
                        const Until& until, const StaticsWatch& watch = {},
                        const TimeVaryingParameters& varying = {});
 

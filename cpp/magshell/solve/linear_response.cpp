@@ -65,16 +65,17 @@ std::unique_ptr<Factor> analysed(const Model& model, const std::vector<Index>& u
 }
 
 // Returns the motion of supports and motors.
-VectorXd prescribed(const Model& model, const VectorXd& q, const Controls& unloaded,
-                    const Controls& controls) {
+VectorXd prescribed(const Model& model, const VectorXd& q, const LoadParameters& unloaded,
+                    const LoadParameters& load_parameters) {
     const DofMap& dof_map = model.dof_map();
-    return dof_map.support_factor(controls) * dof_map.prescribed_rate(unloaded) +
+    return dof_map.support_factor(load_parameters) * dof_map.prescribed_rate(unloaded) +
            dof_map.prescribed_increment(q, unloaded);
 }
 
 // Returns K times a motion, at the last evaluated state.
-VectorXd stiffness_times(const VectorXd& motion, Model& model, const VectorXd& q, const Controls& controls) {
-    model.assemble(q, controls, false);
+VectorXd stiffness_times(const VectorXd& motion, Model& model, const VectorXd& q,
+                         const LoadParameters& load_parameters) {
+    model.assemble(q, load_parameters, false);
     model.require_symmetric();
     VectorXd forces(motion.size());
     model.matrix().multiply(motion.data(), forces.data());
@@ -85,10 +86,11 @@ VectorXd stiffness_times(const VectorXd& motion, Model& model, const VectorXd& q
 
 }  // namespace
 
-SmallDeflection small_deflection(Model& model, const VectorXd& q, const Controls& unloaded,
-                                 const Controls& controls, const std::optional<VectorXd>& at_rest) {
-    const VectorXd moved = prescribed(model, q, unloaded, controls);
-    model.evaluate(q, controls);
+SmallDeflection small_deflection(Model& model, const VectorXd& q, const LoadParameters& unloaded,
+                                 const LoadParameters& load_parameters,
+                                 const std::optional<VectorXd>& at_rest) {
+    const VectorXd moved = prescribed(model, q, unloaded, load_parameters);
+    model.evaluate(q, load_parameters);
     const VectorXd loaded = model.residual().gradient;
     model.evaluate(q, unloaded);
     VectorXd forces = at_rest.value_or(model.residual().gradient) - loaded;
@@ -115,7 +117,7 @@ SmallDeflection small_deflection(Model& model, const VectorXd& q, const Controls
     return found;
 }
 
-VectorXd first_order_change(Model& model, const StaticsResult& equilibrium, const Controls& to) {
+VectorXd first_order_change(Model& model, const StaticsResult& equilibrium, const LoadParameters& to) {
     if (!equilibrium.factor)
         throw InvalidInput("the equilibrium has no factorization: it was solved without gradients");
     const VectorXd& q = equilibrium.state;

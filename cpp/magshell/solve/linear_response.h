@@ -15,14 +15,15 @@ struct SmallDeflection {
     Index unknowns = 0;   // size of the matrix that was factorized
 };
 
-/// Returns dm + du, where K du = g(unloaded) - g(controls) - K dm, all of all dofs: K is the Hessian and g the gradient at the
+/// Returns dm + du, where K du = g(unloaded) - g(load_parameters) - K dm, all of all dofs: K is the Hessian and g the gradient at the
 /// reference shape q, K without loads, and dm the motion of supports and motors. at_rest replaces g(unloaded) if given.
 /// Parts that no stiffness couples to a force stay in place and need no support. Throws InvalidInput if K is not symmetric.
-SmallDeflection small_deflection(Model& model, const VectorXd& q, const Controls& unloaded,
-                                 const Controls& controls, const std::optional<VectorXd>& at_rest = {});
+SmallDeflection small_deflection(Model& model, const VectorXd& q, const LoadParameters& unloaded,
+                                 const LoadParameters& load_parameters,
+                                 const std::optional<VectorXd>& at_rest = {});
 
 /// Returns the change of all dofs from an equilibrium with a stored factorization to the load parameters `to` and to the parameters
 /// that the model has now: the first Newton step with the old Hessian. Throws InvalidInput if no factorization was stored.
-VectorXd first_order_change(Model& model, const StaticsResult& equilibrium, const Controls& to);
+VectorXd first_order_change(Model& model, const StaticsResult& equilibrium, const LoadParameters& to);
 
 }  // namespace magshell

@@ -89,7 +89,8 @@ std::vector<Mode> modes_near_zero(Newton& newton, int count) {
     return modes;
 }
 
-Mode most_unstable_mode(Newton& newton, const VectorXd& q, const Controls& controls, Index negative_pivots) {
+Mode most_unstable_mode(Newton& newton, const VectorXd& q, const LoadParameters& load_parameters,
+                        Index negative_pivots) {
     // Modes computed at most, and beyond the number of negative pivots; see test_more_unstable_directions_than_modes_asked_for.
     constexpr Index most = 12, spare = 6;
     const int count = std::min(negative_pivots, most) + spare;
@@ -103,7 +104,7 @@ Mode most_unstable_mode(Newton& newton, const VectorXd& q, const Controls& contr
         shift *= 4.0;
         if (!std::isfinite(shift)) return modes.front();
         const VectorXd weights = shift * newton.model().metric();
-        factor = newton.factorize(q, controls, false, {&weights, &q}, no_moves);
+        factor = newton.factorize(q, load_parameters, false, {&weights, &q}, no_moves);
     }
     Mode mode = modes_near_zero(newton, 1).front();
     mode.eigenvalue -= shift;

@@ -16,6 +16,7 @@ std::vector<Mode> modes_near_zero(Newton& newton, int count);
 
 /// Returns the mode with the most negative eigenvalue at q, where the model was evaluated last and the factorization has this number of
 /// negative pivots; without negative pivots, the lowest mode. May leave the factorization of a shifted Hessian behind.
-Mode most_unstable_mode(Newton& newton, const VectorXd& q, const Controls& controls, Index negative_pivots);
+Mode most_unstable_mode(Newton& newton, const VectorXd& q, const LoadParameters& load_parameters,
+                        Index negative_pivots);
 
 }  // namespace magshell

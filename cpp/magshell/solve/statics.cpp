@@ -36,8 +36,8 @@ void project_onto_joints(const Model& model, VectorXd& q) {
 
 class Statics {
   public:
-    Statics(Newton& newton, const Controls& from, const Controls& to, const StaticsOptions& options,
-            StaticsResult& result)
+    Statics(Newton& newton, const LoadParameters& from, const LoadParameters& to,
+            const StaticsOptions& options, StaticsResult& result)
         : newton_(newton),
           from_(from),
           to_(to),
@@ -68,7 +68,7 @@ class Statics {
         if (!inexact_) return;
         VectorXd trial = result_.state;
         newton_.model().set_angle_branches(result_.angle_branches);
-        const NewtonReport report = newton_.solve(trial, controls_at(result_.progress));
+        const NewtonReport report = newton_.solve(trial, load_parameters_at(result_.progress));
         inexact_ = false;
         if (!report.converged) return newton_.model().set_angle_branches(result_.angle_branches);
         result_.state = trial;
@@ -78,7 +78,7 @@ class Statics {
 
   private:
     bool search() {
-        controls_at(0.0);
+        load_parameters_at(0.0);
         project_onto_joints(newton_.model(), result_.state);
         sides_.remember(result_.state, from_);
         result_.reason = newton_.model().invalid_state_reason(result_.state);
@@ -97,8 +97,8 @@ class Statics {
     }
 
     // Returns the load parameters at a fraction of the load path, and applies the values that vary to the model.
-    Controls controls_at(double progress) {
-        Controls there = interpolate(from_, to_, progress);
+    LoadParameters load_parameters_at(double progress) {
+        LoadParameters there = interpolate(from_, to_, progress);
         newton_.model().set_time_varying(there);
         return there;
     }
@@ -107,7 +107,7 @@ class Statics {
         if (options_.start_at_rest && from_ == to_ && newton_.is_equilibrium(result_.state, to_))
             accept(result_.state, to_, 1.0, newton_.relative_residual(result_.state, {}));
         const DofMap& dof_map = newton_.model().dof_map();
-        controls_at(1.0);
+        load_parameters_at(1.0);
         const double support_rotation =
             std::abs(dof_map.support_factor(to_) - dof_map.support_factor(from_)) *
             dof_map.largest_rotation();
@@ -121,14 +121,16 @@ class Statics {
             const double left = 1.0 - result_.progress, step = clear_step(steps.propose(left));
             if (step == 0.0) return false;
             const double target = step < left ? result_.progress + step : 1.0;
-            const Controls controls = controls_at(target);
+            const LoadParameters load_parameters = load_parameters_at(target);
             VectorXd trial = result_.state;
-            NewtonReport report = solve_load_step(trial, controls, target - result_.progress, target < 1.0);
+            NewtonReport report =
+                solve_load_step(trial, load_parameters, target - result_.progress, target < 1.0);
             if (report.converged && jumped_branch(report, step)) {
                 report.converged = false;
                 report.reason = "a load step converged to another branch, which is unstable";
             }
-            const std::string through = report.converged ? sides_.crossed(trial, controls) : std::string();
+            const std::string through =
+                report.converged ? sides_.crossed(trial, load_parameters) : std::string();
             if (!through.empty()) {
                 report.converged = false;
                 report.reason = through;
@@ -137,7 +139,7 @@ class Statics {
                 halvings = 0;
                 was_stable_ = report.factor.negative_pivots == 0;
                 predictor_.record(result_.state, report.tangent, target - result_.progress);
-                accept(trial, controls, target, report.residual);
+                accept(trial, load_parameters, target, report.residual);
                 inexact_ = report.inexact;
                 last_ = std::move(report.stress_predictor);
                 factor = report.factor_is_current ? report.factor : FactorReport();
@@ -176,7 +178,7 @@ class Statics {
         if (!newton_.model().has_contact()) return step;
         const double wanted = step;
         for (; step >= min_clear_step * std::min(1.0, wanted); step *= 0.5) {
-            const Controls there = controls_at(std::min(1.0, result_.progress + step));
+            const LoadParameters there = load_parameters_at(std::min(1.0, result_.progress + step));
             VectorXd moved = result_.state;
             newton_.model().linearize(moved);
             const VectorXd move = newton_.model().dof_map().prescribed_increment(moved, there);
@@ -188,14 +190,15 @@ class Statics {
     }
 
     // Solves one load step; intermediate states need not be exact.
-    NewtonReport solve_load_step(VectorXd& q, const Controls& controls, double step, bool on_the_way) {
-        if (!allows_inexact_steps()) return newton_.solve(q, controls);
+    NewtonReport solve_load_step(VectorXd& q, const LoadParameters& load_parameters, double step,
+                                 bool on_the_way) {
+        if (!allows_inexact_steps()) return newton_.solve(q, load_parameters);
         LoadStep load{on_the_way, predicts_stresses() ? &last_ : nullptr};
-        if (!stop_on_instability_) return newton_.solve_load(q, controls, load);
+        if (!stop_on_instability_) return newton_.solve_load(q, load_parameters, load);
         load.correction = [&](const VectorXd& tangent) {
             return predictor_.correction(result_.state, tangent, step);
         };
-        return newton_.solve_until_unstable(q, controls, load);
+        return newton_.solve_until_unstable(q, load_parameters, load);
     }
 
     bool allows_inexact_steps() const {
@@ -212,7 +215,7 @@ class Statics {
     bool find_other_equilibrium() {
         // of the usual limit of iterations; see test_its_saddles_if_asked_for
         constexpr int iteration_factor = 3;
-        controls_at(1.0);
+        load_parameters_at(1.0);
         VectorXd trial = result_.state;
         const NewtonReport report =
             solve_away_from(newton_, trial, to_, {options_.away_from, options_.away_length},
@@ -225,8 +228,8 @@ class Statics {
 
     // Returns true if a long step from a stable state converged to an unstable branch, which a shorter step may avoid.
     bool jumped_branch(const NewtonReport& report, double step) const {
-        constexpr double long_step =
-            0.125;  // [-] of the load path; see test_a_semi_cylinder_pulled_and_pushed
+        // [-] Load step above which a shorter one is tried, of the load path; see test_a_semi_cylinder_pulled_and_pushed.
+        constexpr double long_step = 0.125;
         constexpr int quick_iterations = 8;  // see test_a_semi_cylinder_pulled_and_pushed
         return options_.start_at_rest && options_.require_stable && was_stable_ && step > long_step &&
                report.iterations > quick_iterations && report.factor.negative_pivots > 0;
@@ -236,23 +239,24 @@ class Statics {
     bool try_standard_newton(double target) {
         if (!newton_.options().mixed) return false;
         VectorXd trial = result_.state;
-        const Controls controls = controls_at(target);
-        const NewtonReport report = newton_.solve_standard(trial, controls);
-        const bool found = report.converged && sides_.crossed(trial, controls).empty();
+        const LoadParameters load_parameters = load_parameters_at(target);
+        const NewtonReport report = newton_.solve_standard(trial, load_parameters);
+        const bool found = report.converged && sides_.crossed(trial, load_parameters).empty();
         if (found)
-            accept(trial, controls, target, report.residual);
+            accept(trial, load_parameters, target, report.residual);
         else
             newton_.model().set_angle_branches(result_.angle_branches);
         return found;
     }
 
-    void accept(const VectorXd& state, const Controls& controls, double progress, double residual) {
+    void accept(const VectorXd& state, const LoadParameters& load_parameters, double progress,
+                double residual) {
         result_.state = state;
         result_.angle_branches = newton_.model().angle_branches();
-        result_.controls = controls;
+        result_.load_parameters = load_parameters;
         result_.progress = progress;
         result_.residual = residual;
-        sides_.remember(state, controls);
+        sides_.remember(state, load_parameters);
         update_at_roundoff();
         ++result_.load_steps;
     }
@@ -264,7 +268,7 @@ class Statics {
     }
 
     // Decides about stability by the factorization at the solution, with its own stresses.
-    bool check_stability() { return judge(newton_.factorize_at(result_.state, result_.controls)); }
+    bool check_stability() { return judge(newton_.factorize_at(result_.state, result_.load_parameters)); }
 
     bool judge(const FactorReport& factor) {
         result_.unstable_directions = factor.negative_pivots;
@@ -279,14 +283,14 @@ class Statics {
         constexpr int attempts = 5;  // see test_a_compressed_strip_leaves_the_saddle
         for (int k = 0; k < attempts; ++k) {
             VectorXd trial = result_.state;
-            const Controls controls = controls_at(target);
+            const LoadParameters load_parameters = load_parameters_at(target);
             RelaxationReport report;
             try {
-                report =
-                    relax(newton_, trial, controls, options_.max_relaxation_steps, options_.start_at_rest);
+                report = relax(newton_, trial, load_parameters, options_.max_relaxation_steps,
+                               options_.start_at_rest);
             } catch (const EffortSpent&) {
                 result_.failed.state = std::move(trial);
-                result_.failed.controls = controls;
+                result_.failed.load_parameters = load_parameters;
                 throw;
             }
             result_.relaxation_steps += report.steps;
@@ -295,12 +299,12 @@ class Statics {
                 newton_.model().set_angle_branches(result_.angle_branches);
                 result_.reason = report.reason;
                 result_.failed.state = std::move(trial);
-                result_.failed.controls = controls;
+                result_.failed.load_parameters = load_parameters;
                 result_.failed.last_displacement = report.last_displacement;
                 result_.failed.descent_direction = report.descent_direction;
                 return false;
             }
-            accept(trial, controls, target, report.residual);
+            accept(trial, load_parameters, target, report.residual);
             if (!check_stability()) return false;
             if (result_.stable) refine_solution();
             if (result_.stable) return true;
@@ -322,7 +326,7 @@ class Statics {
         const VectorXd p = newton_.solve_with_factor(-newton_.gradient(result_.state, {}));
         VectorXd trial = result_.state;
         newton_.model().dof_map().retract(trial, p);
-        newton_.evaluate(trial, result_.controls, {});
+        newton_.evaluate(trial, result_.load_parameters, {});
         const double after = newton_.relative_residual(trial, {}, false);
         // Below the floor, round-off decides which residual is smaller; for a step this short the matrix is more reliable.
         constexpr double rounding = 1e-9;  // [-] over the extent; see test_fine_roof_takes_small_steps
@@ -339,7 +343,7 @@ class Statics {
     }
 
     Newton& newton_;
-    const Controls from_, to_;
+    const LoadParameters from_, to_;
     const StaticsOptions& options_;
     StaticsResult& result_;
     const bool stop_on_instability_;  // load steps end at once when they leave the stable states
@@ -353,15 +357,15 @@ class Statics {
 }  // namespace
 
 StaticsResult find_equilibrium(Model& model, const VectorXd& start,
-                               const Model::AngleBranches& angle_branches, const Controls& from,
-                               const Controls& to, const StaticsOptions& options, const StaticsWatch& watch,
-                               const TimeVaryingParameters& varying) {
+                               const Model::AngleBranches& angle_branches, const LoadParameters& from,
+                               const LoadParameters& to, const StaticsOptions& options,
+                               const StaticsWatch& watch, const TimeVaryingParameters& varying) {
     const ScopedTimeVarying while_varying(model, varying);
     model.set_angle_branches(angle_branches);
     StaticsResult result;
     result.state = start;
     result.angle_branches = angle_branches;
-    result.controls = from;
+    result.load_parameters = from;
     Newton newton(model, options.newton, [&](double residual) {
         if (watch) watch(result.progress, residual);
     });
@@ -373,7 +377,7 @@ StaticsResult find_equilibrium(Model& model, const VectorXd& start,
         result.outcome = Outcome::interrupted;
         result.reason = "interrupted";
     }
-    for (Controls* each : {&result.controls, &result.failed.controls})
+    for (LoadParameters* each : {&result.load_parameters, &result.failed.load_parameters})
         each->conservativeResize(std::max<Index>(0, each->size() - varying.size()));
     result.iterations = newton.iterations();
     result.factorizations = newton.factorizations();

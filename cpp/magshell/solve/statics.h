@@ -8,8 +8,8 @@ namespace magshell {
 struct StaticsOptions {
     NewtonOptions newton;
     double first_step = 1.0;  // initial load step, of the path from the old load parameters to the new ones
-    double smallest_step = 1.0 / 64.0;
-    bool require_stable = true;  // false: return what Newton found, even if it is a saddle
+    double smallest_step = 0.015625;  // 1/64 of the path
+    bool require_stable = true;       // false: return what Newton found, even if it is a saddle
     bool start_at_rest =
         true;  // the start is an equilibrium at the old load parameters, so load steps may be shortened
     int max_relaxation_steps = 500;
@@ -26,7 +26,7 @@ enum class Outcome { converged, failed, interrupted };
 /// The state at which the last attempt gave up, for error messages.
 struct FailedAttempt {
     VectorXd state;                  // empty if there is none
-    Controls controls;               // the load parameters that were to be reached
+    LoadParameters load_parameters;  // the load parameters that were to be reached
     double shortest_step = 1.0;      // the smallest load step that was tried, of the load path
     double last_displacement = 0.0;  // [m], of the last relaxation step
     VectorXd descent_direction;      // a direction of all dofs in which the energy falls there, or empty
@@ -36,7 +36,7 @@ struct StaticsResult {
     Outcome outcome = Outcome::failed;
     VectorXd state;                       // the equilibrium, or the last good state
     Model::AngleBranches angle_branches;  // of the angles of the terms at `state`
-    Controls controls;                    // the load parameters at which `state` is an equilibrium
+    LoadParameters load_parameters;       // the load parameters at which `state` is an equilibrium
     double progress = 0.0;                // load fraction reached, 0 to 1
     bool effort_spent = false;            // whether the budget of factorizations ended the solve
     std::string reason;
@@ -60,8 +60,8 @@ using StaticsWatch = std::function<void(double progress, double residual)>;
 /// Solves from an equilibrium `start` at `from`, whose angles have these branches, to one at `to`. The values of `varying` are appended to
 /// both, and removed from those of the result.
 StaticsResult find_equilibrium(Model& model, const VectorXd& start,
-                               const Model::AngleBranches& angle_branches, const Controls& from,
-                               const Controls& to, const StaticsOptions& options,
+                               const Model::AngleBranches& angle_branches, const LoadParameters& from,
+                               const LoadParameters& to, const StaticsOptions& options,
                                const StaticsWatch& watch = {}, const TimeVaryingParameters& varying = {});
 
 }  // namespace magshell

@@ -25,38 +25,38 @@
 namespace magshell {
 
 struct HalfPlane {
-    Pack3 edge_direction;  // e^, unit vector along the edge
-    Pack3 normal;          // n
-    Pack3 away;            // t
-    Pack edge_length;      // |e| [m]
-    Pack height;           // h, distance of the point from the edge [m]
-    Pack foot;             // s, foot of the point on the edge: 0 at x0, 1 at x1
+    SimdVec3 edge_direction;  // e^, unit vector along the edge
+    SimdVec3 normal;          // n
+    SimdVec3 away;            // t
+    SimdDouble edge_length;   // |e| [m]
+    SimdDouble height;        // h, distance of the point from the edge [m]
+    SimdDouble foot;          // s, foot of the point on the edge: 0 at x0, 1 at x1
 
-    HalfPlane(const Pack3& e, const Pack3& r) {
-        const Pack e2 = squared_norm(e);
+    HalfPlane(const SimdVec3& e, const SimdVec3& r) {
+        const SimdDouble e2 = squared_norm(e);
         edge_length = sqrt(e2);
-        const Pack3 across = cross(e, r);
-        const Pack across_length = sqrt(squared_norm(across));
-        edge_direction = (Pack(1.0) / edge_length) * e;
-        normal = (Pack(1.0) / across_length) * across;
+        const SimdVec3 across = cross(e, r);
+        const SimdDouble across_length = sqrt(squared_norm(across));
+        edge_direction = (SimdDouble(1.0) / edge_length) * e;
+        normal = (SimdDouble(1.0) / across_length) * across;
         away = cross(normal, edge_direction);
         height = across_length / edge_length;
         foot = dot(r, e) / e2;
     }
 
-    Pack3 by_point() const { return (Pack(1.0) / height) * normal; }
+    SimdVec3 by_point() const { return (SimdDouble(1.0) / height) * normal; }
 };
 
 /// Computes factor d2α of one half-plane in its variables (r, e); the (e, r) block is the transpose of
 /// `point_edge`. The (e, e) block is added, so that those of both half-planes of an edge accumulate.
-inline void add_half_plane_hessian(const HalfPlane& w, const Pack& factor, Pack33& point_point,
-                                   Pack33& point_edge, Pack33& edge_edge) {
-    const Pack inverse_h = Pack(1.0) / w.height;
-    const Pack inverse_e = Pack(1.0) / w.edge_length;
-    const Pack33 rotation = symmetric_outer(w.normal, w.away);
-    const Pack33 shift = outer(w.edge_direction, w.normal);
-    const Pack a = factor * inverse_h * inverse_h, b = w.foot * a, c = factor * inverse_e * inverse_h;
-    const Pack d = w.foot * b + Pack(0.5) * factor * inverse_e * inverse_e, f = w.foot * c;
+inline void add_half_plane_hessian(const HalfPlane& w, const SimdDouble& factor, SimdMat3& point_point,
+                                   SimdMat3& point_edge, SimdMat3& edge_edge) {
+    const SimdDouble inverse_h = SimdDouble(1.0) / w.height;
+    const SimdDouble inverse_e = SimdDouble(1.0) / w.edge_length;
+    const SimdMat3 rotation = symmetric_outer(w.normal, w.away);
+    const SimdMat3 shift = outer(w.edge_direction, w.normal);
+    const SimdDouble a = factor * inverse_h * inverse_h, b = w.foot * a, c = factor * inverse_e * inverse_h;
+    const SimdDouble d = w.foot * b + SimdDouble(0.5) * factor * inverse_e * inverse_e, f = w.foot * c;
     for (int row = 0; row < 3; ++row)
         for (int column = 0; column < 3; ++column) {
             const int k = 3 * row + column, transposed = 3 * column + row;
@@ -69,25 +69,25 @@ inline void add_half_plane_hessian(const HalfPlane& w, const Pack& factor, Pack3
 /// The dihedral angle at the edge x0-x1 between the half-planes of x2 (left) and x3 (right).
 struct DihedralAngle {
     HalfPlane left, right;
-    Pack right_is_point;  // 1: x3 is a point, r = x3 - x0;  0: x3 is a director, r = x3
+    SimdDouble right_is_point;  // 1: x3 is a point, r = x3 - x0;  0: x3 is a director, r = x3
 
-    DihedralAngle(const Pack3& x0, const Pack3& x1, const Pack3& x2, const Pack3& x3,
-                  const Pack& right_is_point_)
+    DihedralAngle(const SimdVec3& x0, const SimdVec3& x1, const SimdVec3& x2, const SimdVec3& x3,
+                  const SimdDouble& right_is_point_)
         : left(x1 - x0, x2 - x0),
           right(x1 - x0, x3 - right_is_point_ * x0),
           right_is_point(right_is_point_) {}
 
     /// Returns theta in (-π, π]. The right normal belongs to a face of reversed orientation, hence the minus
     /// sign.
-    Pack angle() const {
-        const Pack cosine = -dot(left.normal, right.normal);
-        const Pack sine = dot(left.normal, right.away);
+    SimdDouble angle() const {
+        const SimdDouble cosine = -dot(left.normal, right.normal);
+        const SimdDouble sine = dot(left.normal, right.away);
         return atan2(sine, cosine);
     }
 
-    void gradient(Pack3 g[4]) const {
-        const Pack3 l = left.by_point(), r = -right.by_point();
-        const Pack3 e = -(left.foot * l) - right.foot * r;
+    void gradient(SimdVec3 g[4]) const {
+        const SimdVec3 l = left.by_point(), r = -right.by_point();
+        const SimdVec3 e = -(left.foot * l) - right.foot * r;
         g[0] = -(e + l + right_is_point * r);
         g[1] = e;
         g[2] = l;
@@ -99,10 +99,10 @@ struct DihedralAngle {
 /// column. The block (3, 2) is zero.
 struct DihedralHessian {
     enum Block { B00, B10, B11, B20, B21, B22, B30, B31, B32, B33, count };
-    Pack33 block[count];
+    SimdMat3 block[count];
 
-    explicit DihedralHessian(const DihedralAngle& dihedral, const Pack& moment) {
-        const Pack p = dihedral.right_is_point;
+    explicit DihedralHessian(const DihedralAngle& dihedral, const SimdDouble& moment) {
+        const SimdDouble p = dihedral.right_is_point;
         // theta depends on x1 through e, on x2 through r_left, on x3 through r_right, and on x0 through minus
         // their sum (r_right only if x3 is a point).
         block[B11] = block[B32] = {};

@@ -20,18 +20,19 @@ namespace magshell {
 
 class DihedralAngleSix {
   public:
-    DihedralAngleSix(const Pack3 x[9], const Pack& right_is_face, int point)
+    DihedralAngleSix(const SimdVec3 x[9], const SimdDouble& right_is_face, int point)
         : point_(point), right_is_face_(right_is_face), dihedral_(angle_of(x, right_is_face, point)) {}
 
-    Pack angle() const { return dihedral_.angle(); }
+    SimdDouble angle() const { return dihedral_.angle(); }
 
-    void gradient(Pack3 g[9]) const {
-        Pack3 by[4];
+    void gradient(SimdVec3 g[9]) const {
+        SimdVec3 by[4];
         dihedral_.gradient(by);
         for (int a = 0; a < 3; ++a)
-            g[a] = Pack(tangent(a)) * by[1] + Pack(inward_weight(a)) * (by[2] + right_is_face_ * by[3]);
+            g[a] = SimdDouble(tangent(a)) * by[1] +
+                   SimdDouble(inward_weight(a)) * (by[2] + right_is_face_ * by[3]);
         for (int a = 3; a < 6; ++a) {
-            g[a] = Pack(inward_weight(a)) * by[2];
+            g[a] = SimdDouble(inward_weight(a)) * by[2];
             g[a + 3] = right(a) * by[3];
         }
     }
@@ -40,8 +41,8 @@ class DihedralAngleSix {
     /// along . sum_a weight_a x_a, with its own nodes 0, 1, 2 and 3, 4, 5 (left) or 6, 7, 8 (right). The sum of
     /// both sides is the gradient.
     struct Side {
-        Pack3 along;
-        Pack foot;
+        SimdVec3 along;
+        SimdDouble foot;
     };
     std::array<Side, 2> sides() const {
         return {{{dihedral_.left.by_point(), dihedral_.left.foot},
@@ -54,33 +55,33 @@ class DihedralAngleSix {
     }
 
     /// Adds moment d2theta as lower blocks of the nine nodes at lower_index.
-    void add_curvature(const Pack& moment, Pack33 h[45]) const {
+    void add_curvature(const SimdDouble& moment, SimdMat3 h[45]) const {
         const DihedralHessian c(dihedral_, moment);
-        const Pack33 &tt = c.block[DihedralHessian::B11], &lt = c.block[DihedralHessian::B21],
-                     &rt = c.block[DihedralHessian::B31], &ll = c.block[DihedralHessian::B22],
-                     &rr = c.block[DihedralHessian::B33];
+        const SimdMat3 &tt = c.block[DihedralHessian::B11], &lt = c.block[DihedralHessian::B21],
+                       &rt = c.block[DihedralHessian::B31], &ll = c.block[DihedralHessian::B22],
+                       &rr = c.block[DihedralHessian::B33];
         // Blocks of the edge's nodes, which enter through t, and through u on both sides alike.
-        const Pack33 both_t = lt + right_is_face_ * rt, both = ll + right_is_face_ * rr,
-                     t_both = transpose(both_t);
+        const SimdMat3 both_t = lt + right_is_face_ * rt, both = ll + right_is_face_ * rr,
+                       t_both = transpose(both_t);
         for (int a = 0; a < 3; ++a)
             for (int b = 0; b <= a; ++b) {
-                Pack33& into = h[lower_index(a, b)];
-                into += Pack(tangent(a) * tangent(b)) * tt;
-                into += Pack(inward_weight(a) * tangent(b)) * both_t;
-                into += Pack(tangent(a) * inward_weight(b)) * t_both;
-                into += Pack(inward_weight(a) * inward_weight(b)) * both;
+                SimdMat3& into = h[lower_index(a, b)];
+                into += SimdDouble(tangent(a) * tangent(b)) * tt;
+                into += SimdDouble(inward_weight(a) * tangent(b)) * both_t;
+                into += SimdDouble(tangent(a) * inward_weight(b)) * t_both;
+                into += SimdDouble(inward_weight(a) * inward_weight(b)) * both;
             }
         for (int a = 3; a < 6; ++a)
             for (int b = 0; b < 3; ++b) {
-                Pack33 &left = h[lower_index(a, b)], &opposite = h[lower_index(a + 3, b)];
-                left += Pack(inward_weight(a) * tangent(b)) * lt;
-                left += Pack(inward_weight(a) * inward_weight(b)) * ll;
-                opposite += (Pack(tangent(b)) * right(a)) * rt;
-                opposite += (Pack(inward_weight(b)) * right(a) * right_is_face_) * rr;
+                SimdMat3 &left = h[lower_index(a, b)], &opposite = h[lower_index(a + 3, b)];
+                left += SimdDouble(inward_weight(a) * tangent(b)) * lt;
+                left += SimdDouble(inward_weight(a) * inward_weight(b)) * ll;
+                opposite += (SimdDouble(tangent(b)) * right(a)) * rt;
+                opposite += (SimdDouble(inward_weight(b)) * right(a) * right_is_face_) * rr;
             }
         for (int a = 3; a < 6; ++a)
             for (int b = 3; b <= a; ++b) {
-                h[lower_index(a, b)] += Pack(inward_weight(a) * inward_weight(b)) * ll;
+                h[lower_index(a, b)] += SimdDouble(inward_weight(a) * inward_weight(b)) * ll;
                 h[lower_index(a + 3, b + 3)] += (right(a) * right(b)) * rr;
             }
     }
@@ -93,33 +94,33 @@ class DihedralAngleSix {
     double tangent(int a) const { return tangents_[point_][a]; }
     double inward_weight(int a) const { return inward_weights_[point_][a]; }
     /// Weight of node a + 3 in the right half-plane; a director is the half-plane's vector itself.
-    Pack right(int a) const {
+    SimdDouble right(int a) const {
         const double alone = a == 3 ? 1.0 : 0.0;
-        return Pack(alone) + right_is_face_ * Pack(inward_weight(a) - alone);
+        return SimdDouble(alone) + right_is_face_ * SimdDouble(inward_weight(a) - alone);
     }
 
-    static DihedralAngle angle_of(const Pack3 places[9], const Pack& right_is_face, int point) {
+    static DihedralAngle angle_of(const SimdVec3 places[9], const SimdDouble& right_is_face, int point) {
         const std::array<double, 3>& t = tangents_[point];
         const std::array<double, 6>& u = inward_weights_[point];
-        std::array<Pack3, 9> x = relative_to_first_node<9>(places);
+        std::array<SimdVec3, 9> x = relative_to_first_node<9>(places);
         x[6] = places[6] - right_is_face * places[0];  // a director does not depend on the origin
-        Pack3 tangent = {Pack(0.0), Pack(0.0), Pack(0.0)}, shared = tangent;
+        SimdVec3 tangent = {SimdDouble(0.0), SimdDouble(0.0), SimdDouble(0.0)}, shared = tangent;
         for (int a = 1; a < 3; ++a) {
-            tangent += Pack(t[a]) * x[a];
-            shared += Pack(u[a]) * x[a];
+            tangent += SimdDouble(t[a]) * x[a];
+            shared += SimdDouble(u[a]) * x[a];
         }
-        Pack3 left = shared, right = right_is_face * shared;
+        SimdVec3 left = shared, right = right_is_face * shared;
         for (int a = 3; a < 6; ++a) {
             const double alone = a == 3 ? 1.0 : 0.0;
-            left += Pack(u[a]) * x[a];
-            right += (Pack(alone) + right_is_face * Pack(u[a] - alone)) * x[a + 3];
+            left += SimdDouble(u[a]) * x[a];
+            right += (SimdDouble(alone) + right_is_face * SimdDouble(u[a] - alone)) * x[a + 3];
         }
-        const Pack3 zero = {Pack(0.0), Pack(0.0), Pack(0.0)};
-        return DihedralAngle(zero, tangent, left, right, Pack(0.0));
+        const SimdVec3 zero = {SimdDouble(0.0), SimdDouble(0.0), SimdDouble(0.0)};
+        return DihedralAngle(zero, tangent, left, right, SimdDouble(0.0));
     }
 
     const int point_;
-    const Pack right_is_face_;
+    const SimdDouble right_is_face_;
     const DihedralAngle dihedral_;
 };
 

@@ -6,27 +6,28 @@
 // too. For an element that has shrunk to a line or a point, any fitting rotation is returned.
 #pragma once
 
-#include "magshell/core/pack_functions.h"
+#include "magshell/core/simd_functions.h"
 #include "magshell/strain/deformation.h"
 
 namespace magshell {
 
 struct Polar {
-    Pack stretch[3];  // signed; the third has the smallest magnitude
-    Pack3 u[3];       // current principal directions
-    Pack33 rotation;  // R
+    SimdDouble stretch[3];  // signed; the third has the smallest magnitude
+    SimdVec3 u[3];          // current principal directions
+    SimdMat3 rotation;      // R
 
-    explicit Polar(const Pack33& f) {
-        Pack3 b[3] = {{f.at[0], f.at[3], f.at[6]}, {f.at[1], f.at[4], f.at[7]}, {f.at[2], f.at[5], f.at[8]}};
-        const Pack one(1.0), zero(0.0);
-        Pack3 v[3] = {{one, zero, zero}, {zero, one, zero}, {zero, zero, one}};
+    explicit Polar(const SimdMat3& f) {
+        SimdVec3 b[3] = {
+            {f.at[0], f.at[3], f.at[6]}, {f.at[1], f.at[4], f.at[7]}, {f.at[2], f.at[5], f.at[8]}};
+        const SimdDouble one(1.0), zero(0.0);
+        SimdVec3 v[3] = {{one, zero, zero}, {zero, one, zero}, {zero, zero, one}};
         for (int sweep = 0; sweep < sweeps; ++sweep) {
             bool turned = false;
             for (const auto& [i, j] : {std::pair{0, 1}, std::pair{0, 2}, std::pair{1, 2}})
                 turned |= orthogonalize(b[i], b[j], v[i], v[j]);
             if (!turned) break;
         }
-        Pack squared[3] = {squared_norm(b[0]), squared_norm(b[1]), squared_norm(b[2])};
+        SimdDouble squared[3] = {squared_norm(b[0]), squared_norm(b[1]), squared_norm(b[2])};
         for (const auto& [i, j] : {std::pair{0, 2}, std::pair{1, 2}, std::pair{0, 1}})
             larger_first(squared[i], squared[j], b[i], b[j], v[i], v[j]);
         directions(b);
@@ -36,57 +37,60 @@ struct Polar {
         rotation = outer(u[0], v[0]) + outer(u[1], v[1]) + outer(u[2], v[2]);
     }
 
-    Pack trace() const { return stretch[0] + stretch[1] + stretch[2]; }
+    SimdDouble trace() const { return stretch[0] + stretch[1] + stretch[2]; }
 
   private:
     static constexpr int sweeps = 6;
 
     // Rotates two columns so that they become orthogonal; returns true if any lane was rotated. Lanes that are
     // orthogonal already stay unchanged, whatever the others do.
-    static bool orthogonalize(Pack3& a, Pack3& b, Pack3& va, Pack3& vb) {
-        const Pack of_a = squared_norm(a), of_b = squared_norm(b), gamma = Pack(2.0) * dot(a, b);
-        const Pack negligible = gamma * gamma - Pack(1e-30) * of_a * of_b;
+    static bool orthogonalize(SimdVec3& a, SimdVec3& b, SimdVec3& va, SimdVec3& vb) {
+        const SimdDouble of_a = squared_norm(a), of_b = squared_norm(b), gamma = SimdDouble(2.0) * dot(a, b);
+        const SimdDouble negligible = gamma * gamma - SimdDouble(1e-30) * of_a * of_b;
         if (none_positive(negligible)) return false;
-        const Pack delta = of_b - of_a;
-        const Pack root = sqrt(delta * delta + gamma * gamma) + Pack(1e-300);
-        const Pack wanted = where_negative(delta, Pack(-1.0) * gamma, gamma) / (abs(delta) + root);
-        const Pack tangent = where_negative(negligible, Pack(0.0), wanted);
-        const Pack c = Pack(1.0) / sqrt(Pack(1.0) + tangent * tangent), s = c * tangent;
+        const SimdDouble delta = of_b - of_a;
+        const SimdDouble root = sqrt(delta * delta + gamma * gamma) + SimdDouble(1e-300);
+        const SimdDouble wanted =
+            where_negative(delta, SimdDouble(-1.0) * gamma, gamma) / (abs(delta) + root);
+        const SimdDouble tangent = where_negative(negligible, SimdDouble(0.0), wanted);
+        const SimdDouble c = SimdDouble(1.0) / sqrt(SimdDouble(1.0) + tangent * tangent), s = c * tangent;
         rotate(c, s, a, b);
         rotate(c, s, va, vb);
         return true;
     }
 
-    static bool none_positive(const Pack& a) {
+    static bool none_positive(const SimdDouble& a) {
         bool none = true;
-        for (int lane = 0; lane < Pack::width; ++lane) none &= !(a[lane] > 0.0);
+        for (int lane = 0; lane < SimdDouble::width; ++lane) none &= !(a[lane] > 0.0);
         return none;
     }
 
-    static void rotate(const Pack& c, const Pack& s, Pack3& a, Pack3& b) {
-        const Pack3 turned = c * a - s * b;
+    static void rotate(const SimdDouble& c, const SimdDouble& s, SimdVec3& a, SimdVec3& b) {
+        const SimdVec3 turned = c * a - s * b;
         b = s * a + c * b;
         a = turned;
     }
 
     // Swaps two columns where the first is shorter, by a rotation of 90 degrees, which keeps V a rotation.
-    static void larger_first(Pack& sa, Pack& sb, Pack3& a, Pack3& b, Pack3& va, Pack3& vb) {
-        const Pack swap = where_negative(sa - sb, Pack(1.0), Pack(0.0)), stay = Pack(1.0) - swap;
-        const Pack larger = max(sa, sb);
+    static void larger_first(SimdDouble& sa, SimdDouble& sb, SimdVec3& a, SimdVec3& b, SimdVec3& va,
+                             SimdVec3& vb) {
+        const SimdDouble swap = where_negative(sa - sb, SimdDouble(1.0), SimdDouble(0.0)),
+                         stay = SimdDouble(1.0) - swap;
+        const SimdDouble larger = max(sa, sb);
         sb = sa + sb - larger;
         sa = larger;
         rotate(stay, -swap, a, b);
         rotate(stay, -swap, va, vb);
     }
 
-    void directions(const Pack3 b[3]) {
-        const Pack length = sqrt(squared_norm(b[0]));
-        u[0] = (Pack(1.0) / length) * b[0];
-        const Pack3 across = b[1] - dot(u[0], b[1]) * u[0];
-        const Pack width = sqrt(squared_norm(across));
-        u[1] = (Pack(1.0) / width) * across;
+    void directions(const SimdVec3 b[3]) {
+        const SimdDouble length = sqrt(squared_norm(b[0]));
+        u[0] = (SimdDouble(1.0) / length) * b[0];
+        const SimdVec3 across = b[1] - dot(u[0], b[1]) * u[0];
+        const SimdDouble width = sqrt(squared_norm(across));
+        u[1] = (SimdDouble(1.0) / width) * across;
         u[2] = cross(u[0], u[1]);
-        for (int lane = 0; lane < Pack::width; ++lane) {
+        for (int lane = 0; lane < SimdDouble::width; ++lane) {
             // the element is a line or a point
             if (length[lane] > 0.0 && width[lane] > 1e-15 * length[lane]) continue;
             Vec3 first(b[0].x[lane], b[0].y[lane], b[0].z[lane]), second;

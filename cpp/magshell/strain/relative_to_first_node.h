@@ -9,9 +9,9 @@
 namespace magshell {
 
 template <int count>
-std::array<Pack3, count> relative_to_first_node(const Pack3 x[count]) {
-    std::array<Pack3, count> seen;
-    seen[0] = {Pack(0.0), Pack(0.0), Pack(0.0)};
+std::array<SimdVec3, count> relative_to_first_node(const SimdVec3 x[count]) {
+    std::array<SimdVec3, count> seen;
+    seen[0] = {SimdDouble(0.0), SimdDouble(0.0), SimdDouble(0.0)};
     for (int a = 1; a < count; ++a) seen[a] = x[a] - x[0];
     return seen;
 }

@@ -27,7 +27,7 @@ struct LinearTetrahedron {
     }
     static constexpr double reference_weight = 1.0 / 6.0;
 
-    static void gradients(const Pack3 a[3], int, Pack3 g[nodes]) {
+    static void gradients(const SimdVec3 a[3], int, SimdVec3 g[nodes]) {
         g[0] = -(a[0] + a[1] + a[2]);
         for (int k = 0; k < 3; ++k) g[k + 1] = a[k];
     }
@@ -56,14 +56,14 @@ struct QuadraticTetrahedron {
         return d;
     }
 
-    static void gradients(const Pack3 a[3], int point, Pack3 g[nodes]) {
-        Pack3 corner[4];
+    static void gradients(const SimdVec3 a[3], int point, SimdVec3 g[nodes]) {
+        SimdVec3 corner[4];
         LinearTetrahedron::gradients(a, 0, corner);
-        for (int i = 0; i < 4; ++i) g[i] = Pack(4.0 * barycentric(point, i) - 1.0) * corner[i];
+        for (int i = 0; i < 4; ++i) g[i] = SimdDouble(4.0 * barycentric(point, i) - 1.0) * corner[i];
         for (int m = 0; m < 6; ++m) {
             const auto [i, j] = middle_of[m];
-            g[4 + m] =
-                Pack(4.0 * barycentric(point, i)) * corner[j] + Pack(4.0 * barycentric(point, j)) * corner[i];
+            g[4 + m] = SimdDouble(4.0 * barycentric(point, i)) * corner[j] +
+                       SimdDouble(4.0 * barycentric(point, j)) * corner[i];
         }
     }
 };

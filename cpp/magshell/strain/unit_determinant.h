@@ -11,32 +11,32 @@
 
 #include <cmath>
 
-#include "magshell/core/pack_functions.h"
+#include "magshell/core/simd_functions.h"
 
 namespace magshell {
 
 struct UnitDeterminant {
-    Pack d[3], multiplier;
+    SimdDouble d[3], multiplier;
 
     /// Computes d. s: stretches sorted by magnitude; only the last one may be negative.
-    explicit UnitDeterminant(const Pack s[3]) : multiplier(0.0) {
+    explicit UnitDeterminant(const SimdDouble s[3]) : multiplier(0.0) {
         constexpr int most = 12;
-        Pack root[3];
+        SimdDouble root[3];
         for (int iteration = 0;; ++iteration) {
             for (int i = 0; i < 3; ++i) {
-                root[i] = sqrt(max(s[i] * s[i] + Pack(4.0) * multiplier, Pack(0.0)));
-                d[i] = Pack(0.5) * (s[i] + root[i]);
+                root[i] = sqrt(max(s[i] * s[i] + SimdDouble(4.0) * multiplier, SimdDouble(0.0)));
+                d[i] = SimdDouble(0.5) * (s[i] + root[i]);
             }
-            const Pack off = d[0] * d[1] * d[2] - Pack(1.0);
-            const Pack open = abs(off) - Pack(settled);
+            const SimdDouble off = d[0] * d[1] * d[2] - SimdDouble(1.0);
+            const SimdDouble open = abs(off) - SimdDouble(settled);
             if (iteration == most || all_negative(open)) break;
-            Pack slope[3];
+            SimdDouble slope[3];
             for (int i = 0; i < 3; ++i) slope[i] = d[i] * root[i];
-            const Pack sum = slope[0] * slope[1] + slope[1] * slope[2] + slope[2] * slope[0];
-            const Pack step = off * root[0] * root[1] * root[2] / sum;
+            const SimdDouble sum = slope[0] * slope[1] + slope[1] * slope[2] + slope[2] * slope[0];
+            const SimdDouble step = off * root[0] * root[1] * root[2] / sum;
             multiplier = where_negative(open, multiplier, multiplier - step);
         }
-        for (int lane = 0; lane < Pack::width; ++lane) {
+        for (int lane = 0; lane < SimdDouble::width; ++lane) {
             const bool found = std::abs(d[0][lane] * d[1][lane] * d[2][lane] - 1.0) < 4.0 * settled &&
                                d[2][lane] > 0.0 && s[2][lane] * s[2][lane] + 4.0 * multiplier[lane] >= 0.0;
             if (!found) search(lane, s);
@@ -46,14 +46,14 @@ struct UnitDeterminant {
   private:
     static constexpr double settled = 2e-15;
 
-    static bool all_negative(const Pack& a) {
+    static bool all_negative(const SimdDouble& a) {
         bool all = true;
-        for (int lane = 0; lane < Pack::width; ++lane) all &= a[lane] < 0.0;
+        for (int lane = 0; lane < SimdDouble::width; ++lane) all &= a[lane] < 0.0;
         return all;
     }
 
     // Finds the multiplier of one lane by bisection, on the branch that contains the product 1.
-    void search(int lane, const Pack s[3]) {
+    void search(int lane, const SimdDouble s[3]) {
         const double at[3] = {s[0][lane], s[1][lane], s[2][lane]};
         double k[3];
         const auto product = [&](double multiplier_, bool upper) {

@@ -31,7 +31,7 @@ struct Kinematics {
 /// Gradients by the arguments of a force other than the end of the stage.
 struct KinematicsGradient {
     VectorXd velocity, acceleration, begin;
-    Controls begin_controls;  // load parameters at the beginning of the step
+    LoadParameters begin_load_parameters;  // load parameters at the beginning of the step
 };
 
 class ForceTerm {
@@ -43,15 +43,15 @@ class ForceTerm {
     virtual void set_values(const Values& values) = 0;
 
     /// Begins a step at q. Lagged friction takes its normal forces from this state.
-    virtual void begin_step(const VectorXd& /*q*/, const Controls&) {}
+    virtual void begin_step(const VectorXd& /*q*/, const LoadParameters&) {}
 
     /// Subtracts the force from `out`, after all energies were evaluated at the same state.
-    virtual void evaluate(const Kinematics& at, const Controls& controls, Residual& out) = 0;
+    virtual void evaluate(const Kinematics& at, const LoadParameters& load_parameters, Residual& out) = 0;
 
-    /// Adds K at the last evaluated state. convexified: adds a majorant of the force's dissipation potential
+    /// Adds K at the last evaluated state. positive_definite: adds a majorant of the force's dissipation potential
     /// instead of the exact derivatives where there is one, which keeps Newton's iteration from overshooting.
-    virtual void assemble(const Kinematics& at, const Controls& controls, bool convexified, SystemMatrix& out,
-                          NonsymmetricTangent& rest) const = 0;
+    virtual void assemble(const Kinematics& at, const LoadParameters& load_parameters, bool positive_definite,
+                          SystemMatrix& out, NonsymmetricTangent& rest) const = 0;
 
     /// Adds, for each frictional pair at the last evaluated state, a positive semidefinite stiffness that
     /// bounds its exact one from above.
@@ -59,7 +59,7 @@ class ForceTerm {
 
     /// Adds, at the last evaluated state, lambda . df/dv, lambda . df/dw and lambda . df/d(begin) to `by`, and
     /// - lambda . df/dk to the gradient by parameters.
-    virtual void vjp(const Kinematics& at, const Controls& controls, const VectorXd& lambda,
+    virtual void vjp(const Kinematics& at, const LoadParameters& load_parameters, const VectorXd& lambda,
                      KinematicsGradient& by, Gradient& out) const = 0;
 
     /// Freezes the quantities that make the force nonsymmetric (normal forces and normals) at their values of

@@ -11,7 +11,7 @@ namespace magshell {
 class LowRankTerm : public Term {
   public:
     /// Adds the low-rank part of the Hessian at the last evaluated state.
-    virtual void add_low_rank(const Controls& controls, LowRank& out) const = 0;
+    virtual void add_low_rank(const LoadParameters& load_parameters, LowRank& out) const = 0;
 
     /// Adds the magnitude [N] of the forces that cancel at the last evaluated state, a bound of their
     /// round-off.
@@ -19,16 +19,16 @@ class LowRankTerm : public Term {
 
     /// Chooses the pressures or tensions that the assembled curvature is scaled with from now on. extrapolated:
     /// those at the end of the last linearized step; in mixed Newton steps they are unknowns of their own,
-    /// condensed, which a stiff liquid needs to converge. convexified: leaves out the state's own pressure of
+    /// condensed, which a stiff liquid needs to converge. positive_definite: leaves out the state's own pressure of
     /// laws with a target volume, because it says little while the stiff volume is still far from its target;
     /// without effect if extrapolated.
-    void take_extrapolated(bool extrapolated, bool convexified) {
+    void take_extrapolated(bool extrapolated, bool positive_definite) {
         extrapolated_ = extrapolated;
-        convexified_ = convexified && !extrapolated;
+        positive_definite_ = positive_definite && !extrapolated;
     }
 
   protected:
-    bool extrapolated_ = false, convexified_ = false;
+    bool extrapolated_ = false, positive_definite_ = false;
 };
 
 }  // namespace magshell

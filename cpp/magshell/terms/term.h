@@ -19,7 +19,7 @@
 namespace magshell {
 
 /// One part of the energy. A Newton step calls, in this order: evaluate() at a state; prepare_assembly(),
-/// assembly() of all chunks and finish_assembly() at that state, with the state's own stresses (plain Newton)
+/// assembly() of all blocks and finish_assembly() at that state, with the state's own stresses (plain Newton)
 /// or with extrapolated stresses (mixed Newton); and extrapolate(), once the increment is known.
 class Term {
   public:
@@ -27,7 +27,7 @@ class Term {
 
     virtual std::string_view name() const = 0;
 
-    /// Returns the body whose element chunks assemble() runs over; -1 if the term has no chunks.
+    /// Returns the body whose element blocks assemble() runs over; -1 if the term has no blocks.
     virtual Index body() const { return -1; }
 
     /// Reads the parameters that the term uses. Returns true if one of them has changed.
@@ -50,29 +50,29 @@ class Term {
     virtual bool varies() const { return body() < 0 || depends_on_loads(); }
 
     /// Returns the energy [J] at q. Does not change the term.
-    virtual double energy(const double* q, const Controls& controls) const = 0;
+    virtual double energy(const double* q, const LoadParameters& load_parameters) const = 0;
 
     /// Adds the gradient at q, and stores what assemble() and extrapolate() need of this state.
-    virtual void evaluate(const double* q, const Controls& controls, Residual& out) = 0;
+    virtual void evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) = 0;
 
     /// Switches between the exact Hessian and a positive semidefinite approximation of it, which keeps Newton's
     /// iteration from overshooting (N&W 3.4).
     virtual void set_psd_projection(bool /*project_psd*/) {}
 
     /// Computes data that assemble() needs at the last evaluated state, such as field samples.
-    virtual void prepare_assembly(const double* /*q*/, const Controls&) {}
+    virtual void prepare_assembly(const double* /*q*/, const LoadParameters&) {}
 
-    /// Adds the part of the Hessian that belongs to one chunk of elements. Chunks that share no node may be
+    /// Adds the part of the Hessian that belongs to one block of elements. Blocks that share no node may be
     /// assembled at the same time.
-    virtual void assemble(const Chunk&, const double* /*q*/, const Controls&, bool /*extrapolated_stress*/,
-                          SystemMatrix& /*out*/) const {}
+    virtual void assemble(const ElementBlock&, const double* /*q*/, const LoadParameters&,
+                          bool /*extrapolated_stress*/, SystemMatrix& /*out*/) const {}
 
-    /// Adds the part of the Hessian that does not belong to elements of a chunk.
-    virtual void finish_assembly(const double* /*q*/, const Controls&, SystemMatrix& /*out*/) const {}
+    /// Adds the part of the Hessian that does not belong to elements of a block.
+    virtual void finish_assembly(const double* /*q*/, const LoadParameters&, SystemMatrix& /*out*/) const {}
 
     /// Adds the nonsymmetric part of the gradient's derivative, which forces without a potential have (follower
     /// loads).
-    virtual void add_nonsymmetric_tangent(const double* /*q*/, const Controls&,
+    virtual void add_nonsymmetric_tangent(const double* /*q*/, const LoadParameters&,
                                           NonsymmetricTangent& /*out*/) const {}
 
     /// Stores the stresses at the end of a linearized step p from the last evaluated state: sigma = C (d + J
@@ -87,7 +87,8 @@ class Term {
     /// Adds lambda . dg/dk for every parameter and load parameter k on which the term's gradient g depends, at
     /// the last evaluated state q. lambda has one entry per degree of freedom. With dE/dC = 1/2 d d^T, a
     /// stiffness C of a strain d with Jacobian J contributes (J lambda)^T dC/dk d.
-    virtual void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) = 0;
+    virtual void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
+                     Gradient& out) = 0;
 
     /// Returns the unwrapped angles [rad] of the last evaluated state. Positions determine an angle only up to
     /// full turns, so a solver that rejects a state restores the angles with set_angle_branches().

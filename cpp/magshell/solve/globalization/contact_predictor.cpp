@@ -20,7 +20,7 @@ double equilibrium_depth(double pull, double w, const ContactLaw& law) {
 
 }  // namespace
 
-VectorXd predict_contact(const Model& model, const VectorXd& q, const Controls& controls,
+VectorXd predict_contact(const Model& model, const VectorXd& q, const LoadParameters& load_parameters,
                          const VectorXd& weights, const std::vector<ContactTerm::ActiveContact>& expected) {
     const ContactTerm& contact = *model.contact();
     const auto before = [](const ContactTerm::ActiveContact* one, const ContactTerm::ActiveContact* other) {
@@ -34,7 +34,7 @@ VectorXd predict_contact(const Model& model, const VectorXd& q, const Controls& 
     if (!std::is_sorted(sorted.begin(), sorted.end(), before))
         std::sort(sorted.begin(), sorted.end(), before);
     VectorXd move;
-    for (const ContactTerm::ActiveContact& touch : contact.active_contacts(q.data(), controls)) {
+    for (const ContactTerm::ActiveContact& touch : contact.active_contacts(q.data(), load_parameters)) {
         const auto same = std::lower_bound(sorted.begin(), sorted.end(), &touch, before);
         const double force = same != sorted.end() && !before(&touch, *same) ? (*same)->force : 0.0;
         const ContactPoint& point = contact.point(touch);

@@ -16,7 +16,7 @@ namespace magshell {
 /// Returns the displacement that moves overshooting vertices to their balanced depth, projected onto the free dofs; empty if there
 /// is none. A vertex overshoots if its penalty force at q exceeds twice its balanced force.
 /// weights: those of the proximal term [N/m], per dof. expected: contacts with their predicted forces [N].
-VectorXd predict_contact(const Model& model, const VectorXd& q, const Controls& controls,
+VectorXd predict_contact(const Model& model, const VectorXd& q, const LoadParameters& load_parameters,
                          const VectorXd& weights, const std::vector<ContactTerm::ActiveContact>& expected);
 
 /// Returns the active contacts of the last evaluated state, with the forces predicted linearly for a step p from there.

@@ -48,7 +48,7 @@ class Deflation {
 
 }  // namespace
 
-NewtonReport solve_away_from(Newton& newton, VectorXd& q, const Controls& controls,
+NewtonReport solve_away_from(Newton& newton, VectorXd& q, const LoadParameters& load_parameters,
                              const KnownEquilibria& known, int max_iterations) {
     Model& model = newton.model();
     const Deflation deflation(model, known);
@@ -60,7 +60,7 @@ NewtonReport solve_away_from(Newton& newton, VectorXd& q, const Controls& contro
     };
     if (std::string reason = model.invalid_state_reason(q); !reason.empty()) return fail(std::move(reason));
     double last_step = 0.0;
-    newton.evaluate(q, controls, {});
+    newton.evaluate(q, load_parameters, {});
     for (;; ++report.iterations, newton.count_iteration()) {
         report.residual = newton.relative_residual(q, {});
         newton.watch(report.residual);
@@ -74,7 +74,7 @@ NewtonReport solve_away_from(Newton& newton, VectorXd& q, const Controls& contro
         if (report.iterations == max_iterations)
             return fail("no convergence in " + std::to_string(max_iterations) + " iterations");
         Eigen::MatrixXd no_moves(q.size(), 0);
-        report.factor = newton.factorize(q, controls, mixed && report.iterations > 0, {}, no_moves);
+        report.factor = newton.factorize(q, load_parameters, mixed && report.iterations > 0, {}, no_moves);
         if (!report.factor.succeeded) return fail(report.factor.reason);
         VectorXd step = newton.solve_with_factor(-newton.gradient(q, {}));
         step *= deflation.factor(q, step);
@@ -83,7 +83,7 @@ NewtonReport solve_away_from(Newton& newton, VectorXd& q, const Controls& contro
         if (newton.apply_increment(q, step, min_deflated_step, report) < 0.0) return report;
         if (mixed) model.extrapolate(step);
         last_step = step.head(model.n_coordinates()).lpNorm<Eigen::Infinity>();
-        newton.evaluate(q, controls, {});
+        newton.evaluate(q, load_parameters, {});
     }
 }
 

@@ -24,7 +24,7 @@ struct KnownEquilibria {
 
 /// Searches from q for a stationary point that is none of the known ones, at load parameters for which the supports are in
 /// place. Leaves q at the last state if it fails.
-NewtonReport solve_away_from(Newton& newton, VectorXd& q, const Controls& controls,
+NewtonReport solve_away_from(Newton& newton, VectorXd& q, const LoadParameters& load_parameters,
                              const KnownEquilibria& known, int max_iterations);
 
 }  // namespace magshell

@@ -61,8 +61,8 @@ struct MethodScore {
 
 class PostBucklingDescent : private EnergyDescent {
   public:
-    PostBucklingDescent(Newton& newton, VectorXd& q, const Controls& controls)
-        : EnergyDescent(newton, q, controls),
+    PostBucklingDescent(Newton& newton, VectorXd& q, const LoadParameters& load_parameters)
+        : EnergyDescent(newton, q, load_parameters),
           trust_radius_(longest * model_.extent()),
           newton_radius_(near * model_.extent()) {}
 
@@ -74,13 +74,13 @@ class PostBucklingDescent : private EnergyDescent {
     // Assesses q by its Hessian. Returns false if the descent is finished; otherwise sets the rate of the next step, 0 if the
     // factorization at hand will do.
     bool assess() {
-        const FactorReport factor = factor_ = newton_.factorize_at(q_, controls_);
+        const FactorReport factor = factor_ = newton_.factorize_at(q_, load_parameters_);
         const double residual = newton_.relative_residual(q_, {});
         is_stationary_ = residual <= newton_.options().tolerance;
         has_negative_curvature_ = false;
         if (!factor.succeeded) return continue_without_factor(factor, is_stationary_);
         if (factor.negative_pivots > 0) {
-            mode_ = most_unstable_mode(newton_, q_, controls_, factor.negative_pivots);
+            mode_ = most_unstable_mode(newton_, q_, load_parameters_, factor.negative_pivots);
             rate_ = rate_above_instability * std::abs(mode_.eigenvalue);
             has_negative_curvature_ = mode_.eigenvalue < 0.0;
             if (has_negative_curvature_) report_.descent_direction = mode_.shape;
@@ -105,20 +105,20 @@ class PostBucklingDescent : private EnergyDescent {
             return false;
         if (finish_from_here(expected)) return true;
         newton_radius_ = 0.25 * expected;
-        if (!newton_.factorize_at(q_, controls_).succeeded) rate_ = forced_rate();
+        if (!newton_.factorize_at(q_, load_parameters_).succeeded) rate_ = forced_rate();
         return false;
     }
 
     bool finish_from_here(double expected) {
         return finish_with_newton(
             [&](VectorXd& trial) {
-                return newton_.solve_until_unstable(trial, controls_, {.factor = &factor_});
+                return newton_.solve_until_unstable(trial, load_parameters_, {.factor = &factor_});
             },
             [&](const NewtonReport& report, const VectorXd& trial) {
                 const bool there =
                     expected <= round_off * model_.extent() && length(trial - q_) <= 3.0 * expected;
                 return report.factor.negative_pivots == 0 &&
-                       (there || lowers(model_.energy(trial, controls_)));
+                       (there || lowers(model_.energy(trial, load_parameters_)));
             });
     }
 
@@ -130,12 +130,12 @@ class PostBucklingDescent : private EnergyDescent {
             return (before - energy_) / (newton_.factorizations() - factorizations);
         };
         if (has_negative_curvature_ && is_stationary_) push_off_saddle();
-        newton_.evaluate(q_, controls_, {});
+        newton_.evaluate(q_, load_parameters_, {});
         if (!definite && !factorize_definite()) return false;
         if (has_negative_curvature_ && !is_stationary_ && rate_ == first_rate &&
             last_displacement_ < settled_ && length(newton_step()) < settled_) {
             push_off_saddle();
-            newton_.evaluate(q_, controls_, {});
+            newton_.evaluate(q_, load_parameters_, {});
             if (!factorize_definite()) return false;
         }
         // In a state with many directions of negative curvature, gradient flow steps follow only the fastest one. With few of
@@ -191,7 +191,8 @@ class PostBucklingDescent : private EnergyDescent {
         Eigen::MatrixXd no_moves(q_.size(), 0);
         for (double times = 4.0;; times *= 4.0) {
             const VectorXd weights = rate_ * model_.metric();
-            const FactorReport factor = newton_.factorize(q_, controls_, false, {&weights, &q_}, no_moves);
+            const FactorReport factor =
+                newton_.factorize(q_, load_parameters_, false, {&weights, &q_}, no_moves);
             if (factor.succeeded && factor.negative_pivots == 0) return true;
             if (!raise_rate(times)) return false;
         }
@@ -249,7 +250,7 @@ class PostBucklingDescent : private EnergyDescent {
         for (int k = 0; k < max_flow_iterations && !settles; ++k, newton_.count_iteration()) {
             if (k > 0) {
                 const FactorReport factor =
-                    newton_.factorize(trial, controls_, newton_.options().mixed, proximal, no_moves);
+                    newton_.factorize(trial, load_parameters_, newton_.options().mixed, proximal, no_moves);
                 if (!factor.succeeded || factor.negative_pivots > 0) break;
                 p = newton_.solve_with_factor(-newton_.gradient(trial, proximal));
             }
@@ -257,16 +258,16 @@ class PostBucklingDescent : private EnergyDescent {
             if (!(each <= model_.extent()) || (k > 1 && each > last)) break;
             if (newton_.apply_increment(trial, p, min_flow_alpha, report) < 0.0) break;
             if (newton_.options().mixed) model_.extrapolate(p);
-            newton_.evaluate(trial, controls_, proximal);
+            newton_.evaluate(trial, load_parameters_, proximal);
             newton_.watch(newton_.relative_residual(trial, proximal));
             last = each;
             whole = std::max(whole, each);
             settles = k > 0 && each < flow_tolerance * whole;
         }
-        const double energy = settles ? model_.energy(trial, controls_) : 0.0;
+        const double energy = settles ? model_.energy(trial, load_parameters_) : 0.0;
         if (!settles || !lowers(energy) || crosses_obstacle(trial)) {
             model_.set_angle_branches(angle_branches);
-            newton_.evaluate(q_, controls_, {});
+            newton_.evaluate(q_, load_parameters_, {});
             return false;
         }
         q_ = trial;
@@ -279,12 +280,12 @@ class PostBucklingDescent : private EnergyDescent {
         // [-] Displacement over the extent that counts as none; see test_both_sides_of_a_saddle_cost_the_same.
         constexpr double no_displacement = 1e-9;
         for (;;) {
-            const double moved = lbfgs_descent(newton_, q_, energy_, controls_, max_lbfgs_steps);
+            const double moved = lbfgs_descent(newton_, q_, energy_, load_parameters_, max_lbfgs_steps);
             if (moved > no_displacement * model_.extent()) {
                 last_displacement_ = report_.last_displacement = moved;
                 return true;
             }
-            newton_.evaluate(q_, controls_, {});
+            newton_.evaluate(q_, load_parameters_, {});
             if (!raise_rate() || !factorize_definite()) return false;
         }
     }
@@ -304,8 +305,9 @@ class PostBucklingDescent : private EnergyDescent {
 
 }  // namespace
 
-RelaxationReport descend_to_stable(Newton& newton, VectorXd& q, const Controls& controls, int max_steps) {
-    return PostBucklingDescent(newton, q, controls).run(max_steps);
+RelaxationReport descend_to_stable(Newton& newton, VectorXd& q, const LoadParameters& load_parameters,
+                                   int max_steps) {
+    return PostBucklingDescent(newton, q, load_parameters).run(max_steps);
 }
 
 }  // namespace magshell

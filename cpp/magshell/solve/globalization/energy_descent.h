@@ -12,6 +12,7 @@
 namespace magshell {
 
 /// Descends from q, an equilibrium at load parameters near these, in at most max_steps steps.
-RelaxationReport descend_to_stable(Newton& newton, VectorXd& q, const Controls& controls, int max_steps);
+RelaxationReport descend_to_stable(Newton& newton, VectorXd& q, const LoadParameters& load_parameters,
+                                   int max_steps);
 
 }  // namespace magshell

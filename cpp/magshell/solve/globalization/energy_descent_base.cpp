@@ -15,17 +15,17 @@ constexpr double forced_length = 0.05;
 
 }  // namespace
 
-EnergyDescent::EnergyDescent(Newton& newton, VectorXd& q, const Controls& controls)
+EnergyDescent::EnergyDescent(Newton& newton, VectorXd& q, const LoadParameters& load_parameters)
     : newton_(newton),
       model_(newton.model()),
       q_(q),
-      controls_(controls),
+      load_parameters_(load_parameters),
       settled_(settled * model_.extent()) {
-    const VectorXd move = model_.dof_map().prescribed_increment(q_, controls);
+    const VectorXd move = model_.dof_map().prescribed_increment(q_, load_parameters);
     if (model_.has_body_contact() && model_.max_step_length(q_, move) < 1.0)
         report_.reason = model_.describe_blocked_step(q_, move);
     model_.dof_map().retract(q_, move);
-    energy_ = model_.energy(q_, controls);
+    energy_ = model_.energy(q_, load_parameters);
     if (report_.reason.empty()) report_.reason = model_.invalid_state_reason(q_);
 }
 
@@ -40,7 +40,7 @@ bool EnergyDescent::continue_without_factor(const FactorReport& factor, bool at_
 }
 
 bool EnergyDescent::crosses_obstacle(const VectorXd& trial) {
-    crossing_reason_ = model_.crossing_reason(q_, controls_, trial, controls_);
+    crossing_reason_ = model_.crossing_reason(q_, load_parameters_, trial, load_parameters_);
     return !crossing_reason_.empty();
 }
 
@@ -89,8 +89,8 @@ double EnergyDescent::leave_saddle(const Mode& mode) {
             const VectorXd push = sign * amplitude * mode.shape;
             if (model_.has_body_contact() && model_.max_step_length(saddle, push) < 1.0) break;
             model_.dof_map().retract(trial, push);
-            if (!model_.crossing_reason(saddle, controls_, trial, controls_).empty()) break;
-            const double energy = model_.energy(trial, controls_);
+            if (!model_.crossing_reason(saddle, load_parameters_, trial, load_parameters_).empty()) break;
+            const double energy = model_.energy(trial, load_parameters_);
             // The first displacement may be too small to change the energy, but must be made.
             if (amplitude > settled_ && !(energy < side.energy)) break;
             side = {trial, energy};

@@ -12,7 +12,7 @@ namespace magshell {
 class EnergyDescent {
   protected:
     /// Moves supports to their targets at these load parameters; the report says if that is impossible.
-    EnergyDescent(Newton& newton, VectorXd& q, const Controls& controls);
+    EnergyDescent(Newton& newton, VectorXd& q, const LoadParameters& load_parameters);
 
     /// Alternates assess() and advance() until one of them returns false: assess() if the report is final, advance() if no step is left.
     template <class Assess, class Advance>
@@ -68,7 +68,7 @@ class EnergyDescent {
     Newton& newton_;
     Model& model_;
     VectorXd& q_;
-    const Controls& controls_;
+    const LoadParameters& load_parameters_;
     RelaxationReport report_;
     std::string crossing_reason_;  // why an obstacle refused the last step, in words; empty if none did
     double energy_, rate_ = 0.0;

@@ -36,12 +36,12 @@ struct DescentState {
 
 class Descent {
   public:
-    Descent(Newton& newton, const Controls& controls, const VectorXd& q, double energy)
+    Descent(Newton& newton, const LoadParameters& load_parameters, const VectorXd& q, double energy)
         : newton_(newton),
           model_(newton.model()),
-          controls_(controls),
+          load_parameters_(load_parameters),
           history_(descent_history, min_curvature_cosine) {
-        model_.evaluate(q, controls_);
+        model_.evaluate(q, load_parameters_);
         here_ = at(q, energy);
     }
 
@@ -61,7 +61,7 @@ class Descent {
             const double before = here_.energy;
             if (!line_search_along(d, slope)) {
                 model_.set_angle_branches(here_.angle_branches);
-                model_.evaluate(here_.q, controls_);
+                model_.evaluate(here_.q, load_parameters_);
                 if (history_.empty()) break;
                 history_.clear();
             } else if (before - here_.energy <= energy_round_off * std::abs(before)) {
@@ -102,8 +102,9 @@ class Descent {
         for (int trial = 0; trial < max_search_trials; ++trial) {
             VectorXd there = here_.q;
             model_.dof_map().retract(there, alpha * step);
-            const double energy = model_.energy(there, controls_), change = energy - here_.energy;
-            const bool crosses = !model_.crossing_reason(here_.q, controls_, there, controls_).empty();
+            const double energy = model_.energy(there, load_parameters_), change = energy - here_.energy;
+            const bool crosses =
+                !model_.crossing_reason(here_.q, load_parameters_, there, load_parameters_).empty();
             if (crosses || !(change <= armijo_c1 * alpha * slope + allowed)) {
                 if (accepted_alpha > 0.0) break;
                 too_far = true;
@@ -113,7 +114,7 @@ class Descent {
                 continue;
             }
             if (accepted_alpha > 0.0 && !(energy < end.energy)) break;
-            model_.evaluate(there, controls_);
+            model_.evaluate(there, load_parameters_);
             end = at(there, energy);
             accepted_alpha = alpha;
             const double slope_there = end.gradient.dot(d);
@@ -133,15 +134,16 @@ class Descent {
 
     Newton& newton_;
     Model& model_;
-    const Controls& controls_;
+    const LoadParameters& load_parameters_;
     LbfgsHistory history_;
     DescentState here_;
 };
 
 }  // namespace
 
-double lbfgs_descent(Newton& newton, VectorXd& q, double& energy, const Controls& controls, int most_steps) {
-    Descent descent(newton, controls, q, energy);
+double lbfgs_descent(Newton& newton, VectorXd& q, double& energy, const LoadParameters& load_parameters,
+                     int most_steps) {
+    Descent descent(newton, load_parameters, q, energy);
     const DescentState& end = descent.run(most_steps);
     const double moved = (end.q - q).head(newton.model().n_coordinates()).lpNorm<Eigen::Infinity>();
     q = end.q;

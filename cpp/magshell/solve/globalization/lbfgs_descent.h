@@ -11,6 +11,7 @@ namespace magshell {
 
 /// Descends from q, whose energy is given, with Newton's last factorization, which must be positive definite. Updates q and its energy.
 /// Returns the largest displacement [m], or 0 if no step lowers the energy.
-double lbfgs_descent(Newton& newton, VectorXd& q, double& energy, const Controls& controls, int most_steps);
+double lbfgs_descent(Newton& newton, VectorXd& q, double& energy, const LoadParameters& load_parameters,
+                     int most_steps);
 
 }  // namespace magshell

@@ -18,12 +18,12 @@ class ObstacleSides {
     explicit ObstacleSides(const Model& model) : model_(model) {}
 
     /// Remembers where the contact points are relative to the obstacles, which stand where the model has them now.
-    void remember(const VectorXd& q, const Controls& controls);
+    void remember(const VectorXd& q, const LoadParameters& load_parameters);
     /// Returns why a state cannot follow the remembered one, in words: a point would pass through an obstacle on the straight
     /// way between them, in the frame of the obstacle. Empty where none does.
-    std::string crossed(const VectorXd& q, const Controls& controls) const;
+    std::string crossed(const VectorXd& q, const LoadParameters& load_parameters) const;
     /// Returns the largest turn of an obstacle since the remembered state [rad]: an upper bound, full turns count.
-    double turned(const Controls& controls) const;
+    double turned(const LoadParameters& load_parameters) const;
 
   private:
     const Model& model_;

@@ -19,8 +19,8 @@ constexpr double rate_growth = 2.0, rate_decay = 4.0;
 
 class PseudoTransient : private EnergyDescent {
   public:
-    PseudoTransient(Newton& newton, VectorXd& q, const Controls& controls)
-        : EnergyDescent(newton, q, controls) {}
+    PseudoTransient(Newton& newton, VectorXd& q, const LoadParameters& load_parameters)
+        : EnergyDescent(newton, q, load_parameters) {}
 
     RelaxationReport run(int max_steps) {
         return run_loop(max_steps, [&] { return prepare(); }, [&] { return advance(); });
@@ -29,7 +29,7 @@ class PseudoTransient : private EnergyDescent {
   private:
     // Assesses q by its Hessian. Returns false if Newton finishes from here; otherwise sets the rate of the next step.
     bool prepare() {
-        const FactorReport factor = newton_.factorize_at(q_, controls_);
+        const FactorReport factor = newton_.factorize_at(q_, load_parameters_);
         if (!factor.succeeded)
             return continue_without_factor(factor,
                                            newton_.relative_residual(q_, {}) <= newton_.options().tolerance);
@@ -37,7 +37,7 @@ class PseudoTransient : private EnergyDescent {
         if (convex) report_.descent_direction.resize(0);
         if (!convex || rate_ == 0.0) {
             const bool at_rest = newton_.relative_residual(q_, {}) <= newton_.options().tolerance;
-            Mode mode = most_unstable_mode(newton_, q_, controls_, factor.negative_pivots);
+            Mode mode = most_unstable_mode(newton_, q_, load_parameters_, factor.negative_pivots);
             // The rate does not fall below the last one, which was needed a moment ago.
             rate_ = std::max(transient_rate_factor * std::abs(mode.eigenvalue), rate_);
             if (mode.eigenvalue < 0.0 && (at_rest || last_displacement_ < settled_))
@@ -49,9 +49,9 @@ class PseudoTransient : private EnergyDescent {
     }
 
     bool finish() {
-        return finish_with_newton([&](VectorXd& trial) { return newton_.solve(trial, controls_); },
+        return finish_with_newton([&](VectorXd& trial) { return newton_.solve(trial, load_parameters_); },
                                   [&](const NewtonReport&, const VectorXd& trial) {
-                                      return lowers(model_.energy(trial, controls_));
+                                      return lowers(model_.energy(trial, load_parameters_));
                                   });
     }
 
@@ -69,9 +69,9 @@ class PseudoTransient : private EnergyDescent {
         const Model::AngleBranches angle_branches = model_.angle_branches();
         const VectorXd weights = rate_ * model_.metric();
         const NewtonReport report =
-            newton_.solve(trial, controls_, {&weights, &proximal}, max_step_iterations);
+            newton_.solve(trial, load_parameters_, {&weights, &proximal}, max_step_iterations);
         const VectorXd moved = trial - proximal;
-        const double energy = report.converged ? model_.energy(trial, controls_) : 0.0;
+        const double energy = report.converged ? model_.energy(trial, load_parameters_) : 0.0;
         const double pull = 0.5 * moved.dot(weights.cwiseProduct(moved));
         if (!report.converged || !lowers(energy + pull) || crosses_obstacle(trial)) {
             model_.set_angle_branches(angle_branches);
@@ -88,21 +88,22 @@ class PseudoTransient : private EnergyDescent {
 
 }  // namespace
 
-RelaxationReport relax(Newton& newton, VectorXd& q, const Controls& controls, int max_steps, bool from_rest) {
+RelaxationReport relax(Newton& newton, VectorXd& q, const LoadParameters& load_parameters, int max_steps,
+                       bool from_rest) {
     const Model& model = newton.model();
     RelaxationReport report;
     if (from_rest && !model.has_body_contact() && !model.has_follower_loads()) {
-        report = descend_to_stable(newton, q, controls, max_steps);
+        report = descend_to_stable(newton, q, load_parameters, max_steps);
         if (report.converged || report.neutral || report.steps >= max_steps) return report;
     }
     const int steps = report.steps, saddles_escaped = report.saddles_escaped;
-    report = PseudoTransient(newton, q, controls).run(max_steps - steps);
+    report = PseudoTransient(newton, q, load_parameters).run(max_steps - steps);
     report.steps += steps;
     report.saddles_escaped += saddles_escaped;
     if (report.converged || !model.has_body_contact() || !model.invalid_state_reason(q).empty())
         return report;
     // Contact may be the cause whatever the reason was, so the largest contact force is named.
-    newton.evaluate(q, controls, {});
+    newton.evaluate(q, load_parameters, {});
     if (const std::string hardest = model.body_contact()->hardest(); !hardest.empty())
         report.reason += "; bodies touch: " + hardest;
     return report;

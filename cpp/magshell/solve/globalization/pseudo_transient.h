@@ -23,6 +23,7 @@ struct RelaxationReport {
 };
 
 /// Descends from q to a stable equilibrium at these load parameters. from_rest: q is an equilibrium at load parameters near these.
-RelaxationReport relax(Newton& newton, VectorXd& q, const Controls& controls, int max_steps, bool from_rest);
+RelaxationReport relax(Newton& newton, VectorXd& q, const LoadParameters& load_parameters, int max_steps,
+                       bool from_rest);
 
 }  // namespace magshell

@@ -30,9 +30,9 @@ std::size_t bytes_of(const SubstepRecord& substep) {
 MotionState beginning(Model& model, const MotionInput& input) {
     MotionState start = input.start;
     model.set_angle_branches(start.angle_branches);
-    model.set_time_varying(input.controls_at(0, 0.0));
+    model.set_time_varying(input.load_parameters_at(0, 0.0));
     if (!input.rotations_given)
-        start.q += EdgeRotationEquilibrium(model, start.q, input.controls_at(0, 0.0)).correction();
+        start.q += EdgeRotationEquilibrium(model, start.q, input.load_parameters_at(0, 0.0)).correction();
     if (input.viscosity.maxwell() && start.e.empty()) start.e = model.elastic().strains(start.q);
     return start;
 }
@@ -136,16 +136,17 @@ class Run {
             ahead.pop_back();
             SubstepRecord record;
             const Tableau& tableau = stepper_.tableau_from(state, substep.dissipative);
-            const std::vector<Controls> controls = stage_controls(input_, tableau, step, substep);
+            const std::vector<LoadParameters> load_parameters =
+                stage_load_parameters(input_, tableau, step, substep);
             const double dt = substep.fraction() * input_.time_step;
             const bool recorded = keep || balance_.applies(), shortest = substep.fraction() <= smallest_part;
             const bool taken =
-                stepper_.step(state, dt, substep.dissipative, controls, recorded ? &record : nullptr,
+                stepper_.step(state, dt, substep.dissipative, load_parameters, recorded ? &record : nullptr,
                               result_.keep == AdjointStorage::factors, result_.reason);
             const bool calm = substep.dissipative || input_.tableau.stages == 1;  // implicit Euler already
             const bool gains_energy =
                 taken && balance_.applies() && !(calm && shortest) &&
-                balance_.gains_energy(stepper_.algebra(dt, tableau), record, state, controls);
+                balance_.gains_energy(stepper_.algebra(dt, tableau), record, state, load_parameters);
             if (taken && !gains_energy) {
                 done.push_back(substep);
                 if (keep) records.push_back(std::move(record));
@@ -172,7 +173,8 @@ class Run {
     void record() {
         record_state(model_, input_, result_);
         const Index done = result_.steps_done;
-        const Controls now = done == 0 ? input_.controls_at(0, 0.0) : input_.controls_at(done - 1, 1.0);
+        const LoadParameters now =
+            done == 0 ? input_.load_parameters_at(0, 0.0) : input_.load_parameters_at(done - 1, 1.0);
         const MotionState& state = result_.last;
         model_.set_angle_branches(state.angle_branches);
         model_.set_time_varying(now);
@@ -207,17 +209,18 @@ std::pair<Index, double> MotionInput::between(Index step, double fraction) const
     return {first + i, (fraction - begin) / (end - begin)};
 }
 
-std::vector<Controls> stage_controls(const MotionInput& input, const Tableau& tableau, Index step,
-                                     const Substep& substep) {
-    std::vector<Controls> controls = {input.controls_at(step, substep.begin)};
+std::vector<LoadParameters> stage_load_parameters(const MotionInput& input, const Tableau& tableau,
+                                                  Index step, const Substep& substep) {
+    std::vector<LoadParameters> load_parameters = {input.load_parameters_at(step, substep.begin)};
     for (int i = 0; i < tableau.stages; ++i)
-        controls.push_back(input.controls_at(step, substep.begin + tableau.time(i) * substep.fraction()));
-    return controls;
+        load_parameters.push_back(
+            input.load_parameters_at(step, substep.begin + tableau.time(i) * substep.fraction()));
+    return load_parameters;
 }
 
-Controls MotionInput::controls_at(Index step, double fraction) const {
+LoadParameters MotionInput::load_parameters_at(Index step, double fraction) const {
     const auto [first, weight] = between(step, fraction);
-    return interpolate(controls[first], controls[first + 1], weight);
+    return interpolate(load_parameters[first], load_parameters[first + 1], weight);
 }
 
 Substeps substeps_of(const std::map<Index, Substeps>& substeps, Index step) {
@@ -230,9 +233,9 @@ void repeat_step(Stepper& stepper, const MotionInput& input, Index step, const S
     for (const Substep& substep : substeps) {
         SubstepRecord record;
         std::string reason;
-        const std::vector<Controls> controls =
-            stage_controls(input, stepper.tableau_from(state, substep.dissipative), step, substep);
-        if (!stepper.step(state, substep.fraction() * input.time_step, substep.dissipative, controls,
+        const std::vector<LoadParameters> load_parameters =
+            stage_load_parameters(input, stepper.tableau_from(state, substep.dissipative), step, substep);
+        if (!stepper.step(state, substep.fraction() * input.time_step, substep.dissipative, load_parameters,
                           kept ? &record : nullptr, false, reason))
             throw InvalidInput("a step that was taken before cannot be repeated: " + reason);
         if (kept) kept->push_back(std::move(record));

@@ -21,15 +21,16 @@ struct MotionInput {
     double time_step = 0.0;  // [s]
     Index steps = 0;
     /// Load parameters at the beginning of each step and at its stages, steps (stages + 1) in all; linear in between.
-    std::vector<Controls> controls;
-    TimeVaryingParameters varying;  // the values that vary in time; their numbers are appended to `controls`
+    std::vector<LoadParameters> load_parameters;
+    TimeVaryingParameters
+        varying;  // the values that vary in time; their numbers are appended to `load_parameters`
     NewtonOptions newton;
     ProjectiveOptions projective;  // used if it solves the stages
     Index record_every = 1;        // steps between recorded states
 
     /// Returns the load parameters at a fraction of a step.
-    Controls controls_at(Index step, double fraction) const;
-    /// Returns the index of the entry of `controls` before a fraction of a step, and the weight of the entry after it.
+    LoadParameters load_parameters_at(Index step, double fraction) const;
+    /// Returns the index of the entry of `load_parameters` before a fraction of a step, and the weight of the entry after it.
     std::pair<Index, double> between(Index step, double fraction) const;
 };
 
@@ -53,8 +54,8 @@ struct Substep {
 using Substeps = std::vector<Substep>;
 
 /// Returns the load parameters at the beginning of a substep and at its stages.
-std::vector<Controls> stage_controls(const MotionInput& input, const Tableau& tableau, Index step,
-                                     const Substep& substep);
+std::vector<LoadParameters> stage_load_parameters(const MotionInput& input, const Tableau& tableau,
+                                                  Index step, const Substep& substep);
 
 struct MotionResult {
     Outcome outcome = Outcome::failed;

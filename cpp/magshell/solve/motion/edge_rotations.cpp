@@ -4,10 +4,11 @@
 
 namespace magshell {
 
-EdgeRotationEquilibrium::EdgeRotationEquilibrium(Model& model, const VectorXd& q, const Controls& controls)
+EdgeRotationEquilibrium::EdgeRotationEquilibrium(Model& model, const VectorXd& q,
+                                                 const LoadParameters& load_parameters)
     : model_(model), first_(model.nodes().first_scalar()) {
-    model.evaluate(q, controls);
-    model.assemble(q, controls, false);
+    model.evaluate(q, load_parameters);
+    model.assemble(q, load_parameters, false);
     const SystemMatrix& matrix = model.matrix();
     std::vector<Eigen::Triplet<double>> entries;
     for (Index column = first_; column < matrix.size(); ++column)

@@ -10,7 +10,7 @@ namespace magshell {
 class EdgeRotationEquilibrium {
   public:
     /// Evaluates and assembles at q, and factorizes the stiffness of the rotations.
-    EdgeRotationEquilibrium(Model& model, const VectorXd& q, const Controls& controls);
+    EdgeRotationEquilibrium(Model& model, const VectorXd& q, const LoadParameters& load_parameters);
 
     /// Returns the increment of the edge rotations of q to equilibrium; zero for all other dofs.
     VectorXd correction() const;

@@ -18,19 +18,20 @@ constexpr double balance_round_off = 1e-11;
 }  // namespace
 
 double EnergyBalance::energy(const VectorXd& q, const Model::AngleBranches& angle_branches,
-                             const Controls& controls) {
+                             const LoadParameters& load_parameters) {
     model_.set_angle_branches(angle_branches);
-    model_.set_time_varying(controls);
-    return model_.energy(q, controls);
+    model_.set_time_varying(load_parameters);
+    return model_.energy(q, load_parameters);
 }
 
-EnergyBalance::StateEnergy EnergyBalance::state_energy(const MotionState& state, const Controls& controls) {
+EnergyBalance::StateEnergy EnergyBalance::state_energy(const MotionState& state,
+                                                       const LoadParameters& load_parameters) {
     if (end_.q.size() == state.q.size() && end_.q == state.q && end_.angle_branches == state.angle_branches &&
-        end_.controls == controls)
+        end_.load_parameters == load_parameters)
         return end_;
-    const double all = energy(state.q, state.angle_branches, controls);
-    return {state.q, state.angle_branches, controls, all,
-            model_.body_contact()->energy(state.q.data(), controls)};
+    const double all = energy(state.q, state.angle_branches, load_parameters);
+    return {state.q, state.angle_branches, load_parameters, all,
+            model_.body_contact()->energy(state.q.data(), load_parameters)};
 }
 
 bool EnergyBalance::has_contact(const StepAlgebra& step, const SubstepRecord& record) const {
@@ -41,10 +42,10 @@ bool EnergyBalance::has_contact(const StepAlgebra& step, const SubstepRecord& re
 }
 
 bool EnergyBalance::gains_energy(const StepAlgebra& step, const SubstepRecord& record, const MotionState& end,
-                                 std::span<const Controls> controls) {
+                                 std::span<const LoadParameters> load_parameters) {
     if (!has_contact(step, record)) return false;
     const MotionState& begin = record.begin;
-    const Controls &first = controls.front(), &last = controls.back();
+    const LoadParameters &first = load_parameters.front(), &last = load_parameters.back();
     const StateEnergy at_first = state_energy(begin, first);
     end_ = state_energy(end, last);
     const double at_begin = at_first.energy, at_end = end_.energy;
@@ -52,7 +53,7 @@ bool EnergyBalance::gains_energy(const StepAlgebra& step, const SubstepRecord& r
     const double gain = at_end + kinetic(end) - at_begin - moving - tolerated_gain * (moving + kept) -
                         balance_round_off * (std::abs(at_begin) + std::abs(at_end));
     if (!(gain > 0.0)) return false;
-    double put_in = std::max(work(step, record, controls), 0.0);
+    double put_in = std::max(work(step, record, load_parameters), 0.0);
     if (first != last) {
         const double changed = 0.5 * (energy(begin.q, begin.angle_branches, last) - at_begin + at_end -
                                       energy(end.q, end.angle_branches, first));
@@ -62,7 +63,7 @@ bool EnergyBalance::gains_energy(const StepAlgebra& step, const SubstepRecord& r
 }
 
 double EnergyBalance::work(const StepAlgebra& step, const SubstepRecord& record,
-                           std::span<const Controls> controls) {
+                           std::span<const LoadParameters> load_parameters) {
     const Tableau& tableau = step.tableau();
     const int first = tableau.begins_explicitly ? 1 : 0;
     const StepRates at(model_, step, record);
@@ -72,7 +73,7 @@ double EnergyBalance::work(const StepAlgebra& step, const SubstepRecord& record,
         const VectorXd& q = begins ? record.begin.q : record.stages[j - first].q;
         model_.set_angle_branches(begins ? record.begin.angle_branches
                                          : record.stages[j - first].angle_branches);
-        const Controls& now = controls[begins ? 0 : j - first + 1];
+        const LoadParameters& now = load_parameters[begins ? 0 : j - first + 1];
         model_.set_time_varying(now);
         model_.evaluate(q, now);
         const StageRates& rates = at.all[j];

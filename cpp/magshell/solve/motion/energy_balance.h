@@ -22,25 +22,27 @@ class EnergyBalance {
 
     /// Returns true if the test applies: there is contact between bodies, and no load without potential.
     bool applies() const { return model_.has_body_contact() && !model_.has_follower_loads(); }
-    /// Returns true if a step to `end` gained energy; controls: load parameters at its beginning and at its stages. Leaves the model
+    /// Returns true if a step to `end` gained energy; load_parameters: load parameters at its beginning and at its stages. Leaves the model
     /// evaluated at another state.
     bool gains_energy(const StepAlgebra& step, const SubstepRecord& record, const MotionState& end,
-                      std::span<const Controls> controls);
+                      std::span<const LoadParameters> load_parameters);
 
   private:
     double kinetic(const MotionState& state) const { return 0.5 * state.v.dot(mass_.cwiseProduct(state.v)); }
-    double energy(const VectorXd& q, const Model::AngleBranches& angle_branches, const Controls& controls);
+    double energy(const VectorXd& q, const Model::AngleBranches& angle_branches,
+                  const LoadParameters& load_parameters);
     /// A state with its load parameters and its potential energies.
     struct StateEnergy {
         VectorXd q;
         Model::AngleBranches angle_branches;
-        Controls controls;
+        LoadParameters load_parameters;
         double energy, of_contact;  // [J] of all terms, and of the contact between bodies
     };
-    StateEnergy state_energy(const MotionState& state, const Controls& controls);
+    StateEnergy state_energy(const MotionState& state, const LoadParameters& load_parameters);
     bool has_contact(const StepAlgebra& step, const SubstepRecord& record) const;
     /// Returns the work of supports and of forces without potential over the step [J].
-    double work(const StepAlgebra& step, const SubstepRecord& record, std::span<const Controls> controls);
+    double work(const StepAlgebra& step, const SubstepRecord& record,
+                std::span<const LoadParameters> load_parameters);
 
     Model& model_;
     const VectorXd& mass_;

@@ -5,12 +5,12 @@
 namespace magshell {
 
 MotorReactions::MotorReactions(Newton& newton, const Inertia& inertia, const MotionState& begin, double dt,
-                               const VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
-                               const StageRates& last)
+                               const VectorXd& q, const LoadParameters& load_parameters,
+                               const ProximalTerm& proximal, const StageRates& last)
     : newton_(newton), proximal_(proximal), q_(q), target_(*proximal.target) {
     Model& model = newton_.model();
     if (begin.dt_before == 0.0) {
-        newton_.evaluate(q_, controls, proximal_);
+        newton_.evaluate(q_, load_parameters, proximal_);
         return;
     }
     const double r = dt / begin.dt_before;
@@ -22,35 +22,35 @@ MotorReactions::MotorReactions(Newton& newton, const Inertia& inertia, const Mot
     target_ -=
         (proximal.weights->array() != 0.0).select(pull.array() / proximal.weights->array(), 0.0).matrix();
     const Model::AngleBranches angle_branches = model.angle_branches();
-    converged_ = solve(controls);
+    converged_ = solve(load_parameters);
     model.set_angle_branches(angle_branches);
 }
 
 // Solves for the state. It is so near the end of the step that GMRES with the last factorization usually suffices.
-bool MotorReactions::solve(const Controls& controls) {
+bool MotorReactions::solve(const LoadParameters& load_parameters) {
     constexpr int most_steps = 4;  // GMRES steps before Newton takes over; see test_what_motors_do_in_time
     Model& model = newton_.model();
     const ProximalTerm proximal = this->proximal();
     const VectorXd from = q_;
     const Model::AngleBranches angle_branches = model.angle_branches();
-    newton_.evaluate(q_, controls, proximal);
+    newton_.evaluate(q_, load_parameters, proximal);
     for (int k = 0; k <= most_steps; ++k) {
         if (newton_.relative_residual(q_, proximal) <= newton_.options().tolerance) return true;
         const std::shared_ptr<Factor> nearby = newton_.factor();
         if (k == most_steps || !nearby || nearby->pattern() != model.dof_map().pattern()) break;
         VectorXd step = -newton_.gradient(q_, proximal);
-        if (!newton_.solve_gmres_adjoint(q_, controls, proximal, *nearby, step).converged) break;
+        if (!newton_.solve_gmres_adjoint(q_, load_parameters, proximal, *nearby, step).converged) break;
         model.dof_map().retract(q_, step);
-        newton_.evaluate(q_, controls, proximal);
+        newton_.evaluate(q_, load_parameters, proximal);
     }
     q_ = from;
     model.set_angle_branches(angle_branches);
-    return newton_.solve(q_, controls, proximal).converged;
+    return newton_.solve(q_, load_parameters, proximal).converged;
 }
 
 // Returns the motor forces. At large stiffness the residual that is left exceeds what positions can resolve, so its effect on the
 // forces is removed to first order.
-VectorXd MotorReactions::motor_forces(const Controls& controls) {
+VectorXd MotorReactions::motor_forces(const LoadParameters& load_parameters) {
     Model& model = newton_.model();
     VectorXd force = newton_.gradient(q_, proximal());
     if (!converged_)
@@ -59,7 +59,7 @@ VectorXd MotorReactions::motor_forces(const Controls& controls) {
     VectorXd left = force, pull(q_.size());
     const std::shared_ptr<Factor> nearby = newton_.factor();
     if (nearby && nearby->pattern() == model.dof_map().pattern() &&
-        newton_.solve_gmres_adjoint(q_, controls, proximal(), *nearby, left).converged) {
+        newton_.solve_gmres_adjoint(q_, load_parameters, proximal(), *nearby, left).converged) {
         model.multiply(left, pull);
         model.nonsymmetric_tangent().add_product(left, true, pull);
         force -= pull + proximal_.weights->cwiseProduct(left);

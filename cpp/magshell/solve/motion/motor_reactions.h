@@ -16,7 +16,7 @@ class MotorReactions {
     /// q, proximal, last: state, inertia and rates of the last stage. Leaves the model evaluated at q(), with the angle branches
     /// that it had.
     MotorReactions(Newton& newton, const Inertia& inertia, const MotionState& begin, double dt,
-                   const VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
+                   const VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
                    const StageRates& last);
 
     const VectorXd& q() const { return q_; }
@@ -30,10 +30,10 @@ class MotorReactions {
     double weight_begin() const { return weight_begin_; }
     double weight_before() const { return weight_before_; }
     /// Returns the forces [N] and moments [N m] of the motors; NaN if the state was not found.
-    VectorXd motor_forces(const Controls& controls);
+    VectorXd motor_forces(const LoadParameters& load_parameters);
 
   private:
-    bool solve(const Controls& controls);
+    bool solve(const LoadParameters& load_parameters);
 
     Newton& newton_;
     ProximalTerm proximal_;

@@ -42,22 +42,23 @@ Stepper::Stepper(Newton& newton, const Tableau& tableau, Inertia inertia, const 
     if (projective.on) projective_ = std::make_unique<ProjectiveSolver>(newton, projective);
 }
 
-NewtonReport Stepper::solve(VectorXd& q, const Controls& controls, const ProximalTerm& proximal) {
+NewtonReport Stepper::solve(VectorXd& q, const LoadParameters& load_parameters,
+                            const ProximalTerm& proximal) {
     Model& model = newton_.model();
     if (projective_) {
         const double scale = viscosity_.any() ? viscosity_.scale(proximal.motion->time) : 1.0;
-        return projective_->solve(q, controls, proximal, scale);
+        return projective_->solve(q, load_parameters, proximal, scale);
     }
     const VectorXd predicted = q;
     const Model::AngleBranches angle_branches = model.angle_branches();
-    NewtonReport report = newton_.solve(q, controls, proximal);
+    NewtonReport report = newton_.solve(q, load_parameters, proximal);
     // After contact between bodies, Newton has used its line search already.
     const bool searched = model.has_body_contact() && report.had_contact;
     if (!report.converged && !searched && (model.has_contact() || newton_.options().mixed)) {
         q = predicted;
         model.set_angle_branches(angle_branches);
-        report = model.has_contact() ? newton_.solve_damped(q, controls, proximal)
-                                     : newton_.solve_standard(q, controls, proximal);
+        report = model.has_contact() ? newton_.solve_damped(q, load_parameters, proximal)
+                                     : newton_.solve_standard(q, load_parameters, proximal);
     }
     return report;
 }
@@ -92,17 +93,18 @@ StepRates::StepRates(const Model& model, const StepAlgebra& step, const SubstepR
     }
 }
 
-bool Stepper::step(MotionState& state, double dt, bool dissipative, std::span<const Controls> controls,
-                   SubstepRecord* kept, bool with_factors, std::string& reason) {
+bool Stepper::step(MotionState& state, double dt, bool dissipative,
+                   std::span<const LoadParameters> load_parameters, SubstepRecord* kept, bool with_factors,
+                   std::string& reason) {
     const StepAlgebra& step = algebra(dt, tableau_from(state, dissipative));
     const Tableau& tableau = step.tableau();
     Model& model = newton_.model();
     const Index coordinates = model.n_coordinates();
     model.set_angle_branches(state.angle_branches);
-    model.begin_step(state.q, controls.front());
+    model.begin_step(state.q, load_parameters.front());
     const ScopedStrainHistory elastic_afterwards(model);
     const bool damped = !model.dampers().empty();
-    if (viscosity_.any()) model.set_time_varying(controls.front());
+    if (viscosity_.any()) model.set_time_varying(load_parameters.front());
     const StrainSet at_begin = viscosity_.any() ? model.elastic().strains(state.q) : StrainSet(),
                     joints_at_begin = model.dampers().strains(state.q);
     std::vector<StageRates> rates = first_rates(model, tableau, state);
@@ -112,15 +114,15 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative, std::span<co
     VectorXd motor_forces, held;
     for (int i = 0; i < tableau.stages; ++i) {
         step.start_of_stage(i, state, rates, x_hat, v_hat);
-        model.set_time_varying(controls[i + 1]);
+        model.set_time_varying(load_parameters[i + 1]);
         const VectorXd target = step.target(x_hat, v_hat);
         // Predicts constant velocity; dofs without velocity begin where they were.
         q.head(coordinates) = x_hat.head(coordinates) +
                               step.stage_time() * (i == 0 ? state.v : rates.back().v).head(coordinates);
         if (model.has_contact() && !projective_)
-            if (const VectorXd move =
-                    predict_contact(model, q, controls[i + 1], step.weights(),
-                                    model.contact()->active_contacts(state.q.data(), controls.front()));
+            if (const VectorXd move = predict_contact(
+                    model, q, load_parameters[i + 1], step.weights(),
+                    model.contact()->active_contacts(state.q.data(), load_parameters.front()));
                 move.size() > 0)
                 model.dof_map().retract(q, move);
         if (model.dof_map().has_reduced_coordinates() || model.has_body_contact()) {
@@ -151,9 +153,9 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative, std::span<co
         }
         const StageMotion motion{&x_hat, &v_hat, step.stage_time()};
         const ProximalTerm proximal{&step.weights(), &target, &motion};
-        const NewtonReport report = solve(q, controls[i + 1], proximal);
+        const NewtonReport report = solve(q, load_parameters[i + 1], proximal);
         if (!report.converged) {
-            reason = model.not_finite(q, controls[i + 1]);
+            reason = model.not_finite(q, load_parameters[i + 1]);
             if (reason.empty()) reason = report.reason;
             model.set_angle_branches(state.angle_branches);
             return false;
@@ -165,8 +167,9 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative, std::span<co
         StageRates& now = rates.emplace_back();
         step.finish_stage(q, x_hat, v_hat, coordinates, now);
         if (i + 1 == tableau.stages && model.dof_map().has_motors())
-            motor_forces = MotorReactions(newton_, inertia_, state, dt, q, controls[i + 1], proximal, now)
-                               .motor_forces(controls[i + 1]);
+            motor_forces =
+                MotorReactions(newton_, inertia_, state, dt, q, load_parameters[i + 1], proximal, now)
+                    .motor_forces(load_parameters[i + 1]);
         if (viscosity_.any()) {
             viscous.finish(viscosity_, T, model.elastic().strains(q), now.elastic);
             e = std::move(viscous.e);
@@ -177,7 +180,7 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative, std::span<co
             stages.push_back({q, model.angle_branches(), factorized ? newton_.release_factor() : nullptr});
         }
     }
-    reason = model.crossing_reason(state.q, controls.front(), q, controls.back());
+    reason = model.crossing_reason(state.q, load_parameters.front(), q, load_parameters.back());
     if (!reason.empty()) {
         model.set_angle_branches(state.angle_branches);
         return false;

@@ -78,8 +78,9 @@ class Stepper {
     /// Advances the state by a step, with the load parameters at its beginning and at the stages of tableau_from(). On failure the state
     /// is unchanged, and `reason` says why. `kept` receives the step if it is not null, and with_factors the last factorization
     /// of each stage.
-    bool step(MotionState& state, double dt, bool dissipative, std::span<const Controls> controls,
-              SubstepRecord* kept, bool with_factors, std::string& reason);
+    bool step(MotionState& state, double dt, bool dissipative,
+              std::span<const LoadParameters> load_parameters, SubstepRecord* kept, bool with_factors,
+              std::string& reason);
 
     /// Returns the method of a step from this state: SDIRK2 if it needs rates that the state lacks; implicit Euler if dissipative.
     const Tableau& tableau_from(const MotionState& state, bool dissipative) const;
@@ -87,7 +88,7 @@ class Stepper {
 
   private:
     /// Solves a stage, by damped or standard Newton steps if the usual ones fail.
-    NewtonReport solve(VectorXd& q, const Controls& controls, const ProximalTerm& proximal);
+    NewtonReport solve(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal);
 
     Newton& newton_;
     std::unique_ptr<ProjectiveSolver> projective_;  // nullptr: stages are solved by Newton

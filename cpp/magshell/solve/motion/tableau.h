@@ -41,12 +41,9 @@ inline Tableau sdirk2() {
 inline Tableau sdirk3() {
     // [-] Coefficients of the method; see test_order_in_time.
     constexpr double g = 0.43586652150845899942;  // g^3 - 3 g^2 + 3/2 g - 1/6 = 0
-    return {3,
-            g,
-            false,
-            {{g},
-             {0.5 * (1.0 - g), g},
-             {-0.25 * (6.0 * g * g - 16.0 * g + 1.0), 0.25 * (6.0 * g * g - 20.0 * g + 5.0), g}}};
+    constexpr double b1 = 1.20849664917601;       // (-6 g^2 + 16 g - 1) / 4; see test_order_in_time
+    constexpr double b2 = -0.6443631706844692;    // (6 g^2 - 20 g + 5) / 4; see test_order_in_time
+    return {3, g, false, {{g}, {0.5 * (1.0 - g), g}, {b1, b2, g}}};
 }
 
 /// Returns TR-BDF2 [Bank et al. 1985; Hosea and Shampine 1996]: the trapezoidal rule to 2 - sqrt(2) of the step, then BDF2. It is of second

@@ -120,41 +120,43 @@ double Newton::relative_residual(const VectorXd& q, const ProximalTerm& proximal
                  options_.tolerance));
 }
 
-void Newton::evaluate(const VectorXd& q, const Controls& controls, const ProximalTerm& proximal) {
-    model_.evaluate(q, controls);
-    if (proximal.motion && model_.has_forces()) model_.evaluate_forces(q, controls, *proximal.motion);
+void Newton::evaluate(const VectorXd& q, const LoadParameters& load_parameters,
+                      const ProximalTerm& proximal) {
+    model_.evaluate(q, load_parameters);
+    if (proximal.motion && model_.has_forces()) model_.evaluate_forces(q, load_parameters, *proximal.motion);
 }
 
-void Newton::assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
+void Newton::assemble(const VectorXd& q, const LoadParameters& load_parameters, bool extrapolated_stress,
                       const ProximalTerm& proximal, bool project_psd) {
-    model_.assemble(q, controls, extrapolated_stress, project_psd);
-    if (proximal.motion && model_.has_forces()) model_.assemble_forces(controls, project_psd);
+    model_.assemble(q, load_parameters, extrapolated_stress, project_psd);
+    if (proximal.motion && model_.has_forces()) model_.assemble_forces(load_parameters, project_psd);
     unsymmetric_ = model_.unsymmetric();
 }
 
 VectorXd Newton::remaining_motion(const VectorXd& move, double alpha, const VectorXd& q,
-                                  const Controls& controls) const {
+                                  const LoadParameters& load_parameters) const {
     if (!model_.dof_map().has_motors()) return (1.0 - alpha) * move;
-    return model_.dof_map().prescribed_increment(q, controls);  // along the curved paths of motors
+    return model_.dof_map().prescribed_increment(q, load_parameters);  // along the curved paths of motors
 }
 
-bool Newton::is_equilibrium(const VectorXd& q, const Controls& controls) {
-    evaluate(q, controls, {});
-    const bool in_place = model_.dof_map().prescribed_increment(q, controls).isZero(0.0);
+bool Newton::is_equilibrium(const VectorXd& q, const LoadParameters& load_parameters) {
+    evaluate(q, load_parameters, {});
+    const bool in_place = model_.dof_map().prescribed_increment(q, load_parameters).isZero(0.0);
     return in_place && relative_residual(q, {}) <= options_.tolerance;
 }
 
-NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const ProximalTerm& proximal) {
-    return solve(q, controls, proximal, options_.max_iterations);
+NewtonReport Newton::solve(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal) {
+    return solve(q, load_parameters, proximal, options_.max_iterations);
 }
 
-NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
+NewtonReport Newton::solve(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
                            int max_iterations) {
-    if (!model_.has_body_contact()) return iterate(q, controls, proximal, max_iterations, options_.mixed, {});
+    if (!model_.has_body_contact())
+        return iterate(q, load_parameters, proximal, max_iterations, options_.mixed, {});
     constexpr int searched = 5;  // times max_iterations; see test_strip_folds_onto_itself
     const VectorXd from = q;
     const Model::AngleBranches angle_branches = model_.angle_branches();
-    NewtonReport report = iterate(q, controls, proximal, max_iterations, options_.mixed, {});
+    NewtonReport report = iterate(q, load_parameters, proximal, max_iterations, options_.mixed, {});
     if (report.converged || !report.had_contact) return report;
     const int iterations = report.iterations;
     // If a step was blocked, the line search continues from there; otherwise the iteration may have led anywhere and starts again.
@@ -162,14 +164,15 @@ NewtonReport Newton::solve(VectorXd& q, const Controls& controls, const Proximal
         q = from;
         model_.set_angle_branches(angle_branches);
     }
-    report = solve_with_line_search(q, controls, proximal, searched * max_iterations);
+    report = solve_with_line_search(q, load_parameters, proximal, searched * max_iterations);
     report.iterations += iterations;
     if (!report.converged) describe_contact(report);
     return report;
 }
 
-NewtonReport Newton::solve_standard(VectorXd& q, const Controls& controls, const ProximalTerm& proximal) {
-    return iterate(q, controls, proximal, options_.max_iterations, false, {});
+NewtonReport Newton::solve_standard(VectorXd& q, const LoadParameters& load_parameters,
+                                    const ProximalTerm& proximal) {
+    return iterate(q, load_parameters, proximal, options_.max_iterations, false, {});
 }
 
 bool Newton::is_negligible(const VectorXd& step) const {
@@ -177,12 +180,13 @@ bool Newton::is_negligible(const VectorXd& step) const {
            negligible_move * model_.length_scale();
 }
 
-NewtonReport Newton::solve_until_unstable(VectorXd& q, const Controls& controls, const LoadStep& load) {
-    return iterate(q, controls, {}, options_.max_iterations, options_.mixed, load, true);
+NewtonReport Newton::solve_until_unstable(VectorXd& q, const LoadParameters& load_parameters,
+                                          const LoadStep& load) {
+    return iterate(q, load_parameters, {}, options_.max_iterations, options_.mixed, load, true);
 }
 
-NewtonReport Newton::solve_load(VectorXd& q, const Controls& controls, const LoadStep& load) {
-    return iterate(q, controls, {}, options_.max_iterations, options_.mixed, load);
+NewtonReport Newton::solve_load(VectorXd& q, const LoadParameters& load_parameters, const LoadStep& load) {
+    return iterate(q, load_parameters, {}, options_.max_iterations, options_.mixed, load);
 }
 
 bool Newton::can_reuse_factor(double contraction, double residual, double last_step) const {
@@ -211,12 +215,12 @@ double Newton::contact_matrix_change(const VectorXd& step) const {
     return forces.norm();
 }
 
-NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
+NewtonReport Newton::iterate(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
                              int max_iterations, bool mixed, const LoadStep& load, bool stop_on_instability) {
     NewtonReport report;
     if (load.factor) report.factor = *load.factor;
     Index first_negative_pivots = report.factor.negative_pivots;
-    VectorXd move = model_.dof_map().prescribed_increment(q, controls);
+    VectorXd move = model_.dof_map().prescribed_increment(q, load_parameters);
     bool extrapolated = false;
     double last_step = 0.0, step_before = 0.0, last_residual = std::numeric_limits<double>::infinity();
     double moved = std::numeric_limits<double>::infinity();  // displacement since the last factorization [m]
@@ -227,11 +231,11 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Proxim
     };
     if (std::string reason = model_.invalid_state_reason(q); !reason.empty()) return fail(std::move(reason));
     if (mixed && load.stress_predictor && load.stress_predictor->step.size() > 0) {
-        evaluate(load.stress_predictor->from, controls, proximal);
+        evaluate(load.stress_predictor->from, load_parameters, proximal);
         model_.extrapolate(load.stress_predictor->step);
         extrapolated = true;
     }
-    evaluate(q, controls, proximal);
+    evaluate(q, load_parameters, proximal);
     for (;; ++report.iterations, ++iterations_) {
         report.had_contact |= model_.has_active_body_contact();
         report.residual = relative_residual(q, proximal);
@@ -271,7 +275,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Proxim
             const bool begins =
                 mixed && !extrapolated && model_.n_muscles() == 0 && !model_.has_body_contact();
             const bool project_psd = begins || contraction > required_contraction;
-            report.factor = factorize(q, controls, mixed && extrapolated, proximal, pull, project_psd);
+            report.factor = factorize(q, load_parameters, mixed && extrapolated, proximal, pull, project_psd);
             report.reason = report.factor.reason;
             if (!report.factor.succeeded) return false;
             const Index negative_pivots = report.factor.negative_pivots;
@@ -325,13 +329,13 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Proxim
             }
         }
         if (proximal.motion && model_.has_contact())
-            if (const VectorXd more =
-                    predict_contact(model_, q, controls, *proximal.weights, predicted_contacts(model_, step));
+            if (const VectorXd more = predict_contact(model_, q, load_parameters, *proximal.weights,
+                                                      predicted_contacts(model_, step));
                 more.size() > 0) {
                 model_.dof_map().retract(q, more);
                 step += more;
             }
-        move = remaining_motion(move, alpha, q, controls);
+        move = remaining_motion(move, alpha, q, load_parameters);
         const double length = step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
         if (report.iterations == 0) report.first_length = length;
         if (stop_on_instability && report.iterations > 0 &&
@@ -348,7 +352,7 @@ NewtonReport Newton::iterate(VectorXd& q, const Controls& controls, const Proxim
         step_before = last_step;
         last_step = length;
         moved += length;
-        evaluate(q, controls, proximal);
+        evaluate(q, load_parameters, proximal);
     }
 }
 
@@ -386,16 +390,17 @@ FactorReport Newton::factorize_assembled(const VectorXd& q, const ProximalTerm& 
     return report;
 }
 
-FactorReport Newton::factorize_at(const VectorXd& q, const Controls& controls, const ProximalTerm& proximal) {
-    evaluate(q, controls, proximal);
-    assemble(q, controls, false, proximal);
+FactorReport Newton::factorize_at(const VectorXd& q, const LoadParameters& load_parameters,
+                                  const ProximalTerm& proximal) {
+    evaluate(q, load_parameters, proximal);
+    assemble(q, load_parameters, false, proximal);
     return factorize_assembled(q, proximal);
 }
 
-FactorReport Newton::factorize(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
-                               const ProximalTerm& proximal, Eigen::Ref<Eigen::MatrixXd> moves,
-                               bool project_psd) {
-    assemble(q, controls, extrapolated_stress, proximal, project_psd);
+FactorReport Newton::factorize(const VectorXd& q, const LoadParameters& load_parameters,
+                               bool extrapolated_stress, const ProximalTerm& proximal,
+                               Eigen::Ref<Eigen::MatrixXd> moves, bool project_psd) {
+    assemble(q, load_parameters, extrapolated_stress, proximal, project_psd);
     for (Eigen::Index k = 0; k < moves.cols(); ++k) {
         if (moves.col(k).isZero(0.0)) continue;
         const VectorXd move = moves.col(k);
@@ -411,9 +416,9 @@ FactorReport Newton::factorize(const VectorXd& q, const Controls& controls, bool
     return factorize_assembled(q, proximal);
 }
 
-GmresReport Newton::solve_gmres_adjoint(const VectorXd& q, const Controls& controls,
+GmresReport Newton::solve_gmres_adjoint(const VectorXd& q, const LoadParameters& load_parameters,
                                         const ProximalTerm& proximal, const Factor& nearby, VectorXd& rhs) {
-    assemble(q, controls, false, proximal);
+    assemble(q, load_parameters, false, proximal);
     const Stopwatch running(linear_time_);
     const DofMap& dof_map = model_.dof_map();
     VectorXd stiffness = model_.diagonal(), whole(model_.size());

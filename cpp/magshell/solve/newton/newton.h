@@ -88,45 +88,49 @@ class Newton {
     /// Solves from q for a stationary point at these load parameters; leaves q at the last state if it fails. Prescribed nodes are moved to
     /// their target in the first iteration, with its linearization. If bodies come into contact and the iteration fails,
     /// solve_with_line_search() follows.
-    NewtonReport solve(VectorXd& q, const Controls& controls, const ProximalTerm& proximal = {});
+    NewtonReport solve(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal = {});
 
     /// Returns true if a step is so short that a factorization made before it is valid after it, for gradients too.
     bool is_negligible(const VectorXd& step) const;
 
     /// Solves like the above, with another limit on the iterations.
-    NewtonReport solve(VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
+    NewtonReport solve(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
                        int max_iterations);
     /// Solves a load step, and stops as soon as the matrix has negative pivots that it had not at the beginning while the steps
     /// do not get much shorter, or if the second step grows too long (early termination on loss of stability; Crisfield 9.5).
-    NewtonReport solve_until_unstable(VectorXd& q, const Controls& controls, const LoadStep& load);
+    NewtonReport solve_until_unstable(VectorXd& q, const LoadParameters& load_parameters,
+                                      const LoadStep& load);
     /// Solves a load step without stopping on loss of stability.
-    NewtonReport solve_load(VectorXd& q, const Controls& controls, const LoadStep& load);
+    NewtonReport solve_load(VectorXd& q, const LoadParameters& load_parameters, const LoadStep& load);
     /// Solves by standard instead of mixed Newton steps.
-    NewtonReport solve_standard(VectorXd& q, const Controls& controls, const ProximalTerm& proximal = {});
+    NewtonReport solve_standard(VectorXd& q, const LoadParameters& load_parameters,
+                                const ProximalTerm& proximal = {});
     /// Solves by standard Newton steps that are shortened until they contract (natural monotonicity test [Deuflhard]), in rounds
     /// with fixed normal forces of friction. It is slower, and robust if contacts open and close, stick and slip.
-    NewtonReport solve_damped(VectorXd& q, const Controls& controls, const ProximalTerm& proximal);
+    NewtonReport solve_damped(VectorXd& q, const LoadParameters& load_parameters,
+                              const ProximalTerm& proximal);
     /// Solves by standard Newton steps with a line search on the slope of the energy, with matrices projected to be
     /// positive semidefinite where bodies are in contact. Contact between bodies requires it far from the solution.
-    NewtonReport solve_with_line_search(VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
-                                        int max_iterations);
+    NewtonReport solve_with_line_search(VectorXd& q, const LoadParameters& load_parameters,
+                                        const ProximalTerm& proximal, int max_iterations);
 
     /// Evaluates the residual at q, with the forces of a time stage.
-    void evaluate(const VectorXd& q, const Controls& controls, const ProximalTerm& proximal);
+    void evaluate(const VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal);
     /// Evaluates, assembles with the stresses of the state itself, and factorizes.
-    FactorReport factorize_at(const VectorXd& q, const Controls& controls, const ProximalTerm& proximal = {});
+    FactorReport factorize_at(const VectorXd& q, const LoadParameters& load_parameters,
+                              const ProximalTerm& proximal = {});
     /// Returns the gradient of the energy at the last evaluated state plus that of the proximal term [N].
     VectorXd gradient(const VectorXd& q, const ProximalTerm& proximal) const;
     /// Assembles at the last evaluated state and factorizes. Replaces each column of `moves`, a motion of prescribed nodes, by the
     /// forces K moves that it causes. project_psd: makes the contribution of contact and low-rank terms positive semidefinite.
-    FactorReport factorize(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
+    FactorReport factorize(const VectorXd& q, const LoadParameters& load_parameters, bool extrapolated_stress,
                            const ProximalTerm& proximal, Eigen::Ref<Eigen::MatrixXd> moves,
                            bool project_psd = false);
     /// Replaces rhs by the solution of K^T p = rhs with the Hessian at q, the last evaluated state, by GMRES with a factorization made
     /// nearby. Both are of all dofs, zero where prescribed. The residual is below 1e-14 of rhs, each component
     /// scaled by the root of its own stiffness.
-    GmresReport solve_gmres_adjoint(const VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
-                                    const Factor& nearby, VectorXd& rhs);
+    GmresReport solve_gmres_adjoint(const VectorXd& q, const LoadParameters& load_parameters,
+                                    const ProximalTerm& proximal, const Factor& nearby, VectorXd& rhs);
     /// Returns p with K p = rhs by the last factorization; both are of all dofs, zero where prescribed. tolerance: residual over rhs,
     /// used only if K is nonsymmetric and GMRES is needed.
     VectorXd solve_with_factor(const VectorXd& rhs, double tolerance = 1e-9) const;
@@ -139,13 +143,13 @@ class Newton {
     /// Line search along a step that was applied completely and evaluated last. slope: initial decrease of the energy along it [J].
     /// Goes back towards `from` if the energy rises at the end, until its slope is less than half of the initial one.
     /// Returns the step length that is left.
-    double line_search(VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
+    double line_search(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
                        const VectorXd& from, const VectorXd& step, double slope);
 
     /// Returns the residual at the last evaluated state, relative to the forces that cancel in it and, with_floor, to their round-off.
     double relative_residual(const VectorXd& q, const ProximalTerm& proximal, bool with_floor = true) const;
     /// Returns true if q, found at these load parameters before, is still an equilibrium.
-    bool is_equilibrium(const VectorXd& q, const Controls& controls);
+    bool is_equilibrium(const VectorXd& q, const LoadParameters& load_parameters);
 
     Model& model() { return model_; }
     /// The last factorization; null before the first.
@@ -168,12 +172,12 @@ class Newton {
     }
 
   private:
-    NewtonReport iterate(VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
+    NewtonReport iterate(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
                          int max_iterations, bool mixed, const LoadStep& load,
                          bool stop_on_instability = false);
     /// Returns the rest of a prescribed motion of supports and motors after a step of this length.
     VectorXd remaining_motion(const VectorXd& move, double share, const VectorXd& q,
-                              const Controls& controls) const;
+                              const LoadParameters& load_parameters) const;
     /// Returns the length, in units of `step`, at which bodies in contact do not push back by more than the step predicts; more than 1 if the
     /// predicted force is not reached. alpha: length of `step` over the full Newton step. slope: initial decrease of the energy along
     /// it [J], at q, the last evaluated state.
@@ -182,9 +186,9 @@ class Newton {
     void describe_contact(NewtonReport& report) const;
     /// Takes damped steps with fixed normal forces of friction from the last evaluated state, until the residual is below `enough` or
     /// most_steps are done. Returns false, with a reason in the report, if no step can be taken.
-    bool damped_iterations(VectorXd& q, const Controls& controls, const ProximalTerm& proximal, double enough,
-                           int most_steps, NewtonReport& report);
-    void assemble(const VectorXd& q, const Controls& controls, bool extrapolated_stress,
+    bool damped_iterations(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
+                           double enough, int most_steps, NewtonReport& report);
+    void assemble(const VectorXd& q, const LoadParameters& load_parameters, bool extrapolated_stress,
                   const ProximalTerm& proximal, bool project_psd = false);
     /// Returns true if the expected iterations with the last factorization are cheaper than a new one.
     bool can_reuse_factor(double contraction, double residual, double last_step) const;

@@ -107,7 +107,7 @@ void Newton::describe_contact(NewtonReport& report) const {
         report.reason += "; bodies touch: " + hardest;
 }
 
-double Newton::line_search(VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
+double Newton::line_search(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
                            const VectorXd& from, const VectorXd& step, double slope) {
     constexpr double enough =
         0.5;  // [-] slope at the end over the initial one; see test_strip_folds_onto_itself
@@ -122,7 +122,7 @@ double Newton::line_search(VectorXd& q, const Controls& controls, const Proximal
                        lower + bracket_margin * (upper - lower), upper - bracket_margin * (upper - lower));
         q = from;
         model_.dof_map().retract(q, alpha_contact * step);
-        evaluate(q, controls, proximal);
+        evaluate(q, load_parameters, proximal);
         const double there = slope_here();
         if (there > enough * slope) {
             upper = alpha_contact;
@@ -139,7 +139,7 @@ double Newton::line_search(VectorXd& q, const Controls& controls, const Proximal
     return alpha_contact;
 }
 
-NewtonReport Newton::solve_with_line_search(VectorXd& q, const Controls& controls,
+NewtonReport Newton::solve_with_line_search(VectorXd& q, const LoadParameters& load_parameters,
                                             const ProximalTerm& proximal, int max_iterations) {
     NewtonReport report;
     report.reason = model_.invalid_state_reason(q);
@@ -148,10 +148,10 @@ NewtonReport Newton::solve_with_line_search(VectorXd& q, const Controls& control
         report.reason = std::move(reason);
         return report;
     };
-    VectorXd move = model_.dof_map().prescribed_increment(q, controls);
+    VectorXd move = model_.dof_map().prescribed_increment(q, load_parameters);
     double last_residual = std::numeric_limits<double>::infinity(), alpha = 1.0;
     bool was_projected = false;
-    evaluate(q, controls, proximal);
+    evaluate(q, load_parameters, proximal);
     for (;; ++report.iterations, ++iterations_) {
         report.residual = relative_residual(q, proximal);
         watch(report.residual);
@@ -172,7 +172,7 @@ NewtonReport Newton::solve_with_line_search(VectorXd& q, const Controls& control
         double slope = 0.0;
         for (;; project_psd = true) {
             Eigen::MatrixXd pull = move;
-            report.factor = factorize(q, controls, false, proximal, pull, project_psd);
+            report.factor = factorize(q, load_parameters, false, proximal, pull, project_psd);
             if (!report.factor.succeeded) return fail(report.factor.reason);
             step = move + solve_with_factor(force - pull.col(0));
             slope = force.dot(step);
@@ -182,27 +182,28 @@ NewtonReport Newton::solve_with_line_search(VectorXd& q, const Controls& control
         was_projected = project_psd;
         alpha = apply_increment(q, step, min_search_length, report);
         if (alpha < 0.0) return report;
-        move = remaining_motion(move, alpha, q, controls);
-        evaluate(q, controls, proximal);
-        if (in_place) alpha *= line_search(q, controls, proximal, from, step, alpha * slope);
+        move = remaining_motion(move, alpha, q, load_parameters);
+        evaluate(q, load_parameters, proximal);
+        if (in_place) alpha *= line_search(q, load_parameters, proximal, from, step, alpha * slope);
     }
 }
 
 // With fixed normal forces the stage is a minimization, in which damped steps converge. The normal forces are updated between the
 // rounds, until standard Newton converges.
-NewtonReport Newton::solve_damped(VectorXd& q, const Controls& controls, const ProximalTerm& proximal) {
+NewtonReport Newton::solve_damped(VectorXd& q, const LoadParameters& load_parameters,
+                                  const ProximalTerm& proximal) {
     // Rounds, damped steps per round, and standard Newton iterations after each; see test_sticks_at_050.
     constexpr int most_rounds = 12, most_steps = 20, last_steps = 8;
     constexpr double least_gain = 1e-2;  // [-] reduction of the residual in a round; see test_sticks_at_050
     NewtonReport report;
-    VectorXd move = model_.dof_map().prescribed_increment(q, controls);
+    VectorXd move = model_.dof_map().prescribed_increment(q, load_parameters);
     if (!move.isZero(0.0) && apply_increment(q, move, 1.0, report) < 0.0) return report;
-    evaluate(q, controls, proximal);
+    evaluate(q, load_parameters, proximal);
     for (int round = 0; round < most_rounds; ++round) {
         const double enough = std::max(options_.tolerance, least_gain * relative_residual(q, proximal));
-        if (!damped_iterations(q, controls, proximal, enough, most_steps, report)) return report;
+        if (!damped_iterations(q, load_parameters, proximal, enough, most_steps, report)) return report;
         VectorXd end = q;
-        const NewtonReport last = iterate(end, controls, proximal, last_steps, false, {});
+        const NewtonReport last = iterate(end, load_parameters, proximal, last_steps, false, {});
         report.iterations += last.iterations;
         if (last.converged) {
             q = std::move(end);
@@ -210,15 +211,16 @@ NewtonReport Newton::solve_damped(VectorXd& q, const Controls& controls, const P
             report.residual = last.residual;
             return report;
         }
-        evaluate(q, controls, proximal);
+        evaluate(q, load_parameters, proximal);
     }
     report.residual = relative_residual(q, proximal);
     report.reason = "no convergence in " + std::to_string(most_rounds) + " rounds of shortened steps";
     return report;
 }
 
-bool Newton::damped_iterations(VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
-                               double enough, int most_steps, NewtonReport& report) {
+bool Newton::damped_iterations(VectorXd& q, const LoadParameters& load_parameters,
+                               const ProximalTerm& proximal, double enough, int most_steps,
+                               NewtonReport& report) {
     constexpr double shortest = 1.0 / 4096.0;  // [-] of a step; see test_sticks_at_050
     const ScopedFrozenForces held(model_);
     double last_residual = std::numeric_limits<double>::infinity();
@@ -233,7 +235,7 @@ bool Newton::damped_iterations(VectorXd& q, const Controls& controls, const Prox
         Eigen::MatrixXd no_moves(q.size(), 0);
         const bool project_psd = report.residual > search_contraction * last_residual;
         last_residual = report.residual;
-        const FactorReport factor = factorize(q, controls, false, proximal, no_moves, project_psd);
+        const FactorReport factor = factorize(q, load_parameters, false, proximal, no_moves, project_psd);
         if (!factor.succeeded) {
             report.reason = factor.reason;
             return false;
@@ -247,7 +249,7 @@ bool Newton::damped_iterations(VectorXd& q, const Controls& controls, const Prox
              alpha *= 0.5) {
             q = from;
             model_.dof_map().retract(q, alpha * step);
-            evaluate(q, controls, proximal);
+            evaluate(q, load_parameters, proximal);
             if (alpha <= shortest || relative_residual(q, proximal) <= enough) break;
             if (length(solve_with_factor(-gradient(q, proximal))) <= (1.0 - 0.25 * alpha) * whole) break;
         }

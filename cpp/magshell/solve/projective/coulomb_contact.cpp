@@ -22,8 +22,8 @@ void ScopedContactOff::stand(bool aside) const {
     if (model_.body_contact()) model_.body_contact()->set_switched_off(aside);
 }
 
-CoulombContact::CoulombContact(const Model& model, const ConstantMatrix& matrix, const Controls& controls,
-                               const VectorXd& begin, double time)
+CoulombContact::CoulombContact(const Model& model, const ConstantMatrix& matrix,
+                               const LoadParameters& load_parameters, const VectorXd& begin, double time)
     : model_(model),
       matrix_(matrix),
       begin_(begin),
@@ -35,7 +35,7 @@ CoulombContact::CoulombContact(const Model& model, const ConstantMatrix& matrix,
     if (!model.contact()) return;
     for (const ContactTerm::HardContact& keeping : model.contact()->hard_contacts()) {
         if (!matrix.solves(keeping.node)) continue;
-        obstacles_.push_back({keeping, model.contact()->obstacle_state(keeping.obstacle, controls)});
+        obstacles_.push_back({keeping, model.contact()->obstacle_state(keeping.obstacle, load_parameters)});
         pairs_.push_back({{keeping.node, -1, -1, -1}, 1, {1.0, 0.0, 0.0, 0.0}, keeping.friction});
     }
 }

@@ -44,7 +44,7 @@ class CoulombContact {
   public:
     /// Starts a stage whose step began at `begin` [m], `time` [s] ago. Throws InvalidInput if points on faces may come into
     /// contact, or if a contact has different static and kinetic coefficients of friction.
-    CoulombContact(const Model& model, const ConstantMatrix& matrix, const Controls& controls,
+    CoulombContact(const Model& model, const ConstantMatrix& matrix, const LoadParameters& load_parameters,
                    const VectorXd& begin, double time);
 
     /// Returns the current contact forces, of all dofs [N].

@@ -62,14 +62,14 @@ void ProjectiveSolver::prepare(const VectorXd& q, const ProximalTerm& proximal, 
     matrix_.linearize(q);
 }
 
-NewtonReport ProjectiveSolver::solve(VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
-                                     double scale) {
+NewtonReport ProjectiveSolver::solve(VectorXd& q, const LoadParameters& load_parameters,
+                                     const ProximalTerm& proximal, double scale) {
     const bool touches = options_.coulomb && (model_.has_contact() || model_.has_body_contact());
-    return touches ? solve_with_coulomb(q, controls, proximal, scale)
-                   : solve_smooth(q, controls, proximal, scale);
+    return touches ? solve_with_coulomb(q, load_parameters, proximal, scale)
+                   : solve_smooth(q, load_parameters, proximal, scale);
 }
 
-NewtonReport ProjectiveSolver::solve_smooth(VectorXd& q, const Controls& controls,
+NewtonReport ProjectiveSolver::solve_smooth(VectorXd& q, const LoadParameters& load_parameters,
                                             const ProximalTerm& proximal, double scale) {
     NewtonReport report;
     const auto fail = [&](std::string reason) {
@@ -78,8 +78,8 @@ NewtonReport ProjectiveSolver::solve_smooth(VectorXd& q, const Controls& control
     };
     if (std::string reason = model_.invalid_state_reason(q); !reason.empty()) return fail(std::move(reason));
     const DofMap& dof_map = model_.dof_map();
-    VectorXd move = dof_map.prescribed_increment(q, controls);
-    newton_.evaluate(q, controls, proximal);
+    VectorXd move = dof_map.prescribed_increment(q, load_parameters);
+    newton_.evaluate(q, load_parameters, proximal);
     prepare(q, proximal, scale);
     LbfgsHistory lbfgs(options_.history);
     VectorXd touched = model_.contact_stiffness_diagonal(), between;
@@ -134,8 +134,8 @@ NewtonReport ProjectiveSolver::solve_smooth(VectorXd& q, const Controls& control
         double alpha = newton_.apply_increment(q, step, min_projective_step, report);
         if (alpha < 0.0) return report;
         move *= 1.0 - alpha;
-        newton_.evaluate(q, controls, proximal);
-        if (in_place) alpha *= newton_.line_search(q, controls, proximal, from, step, alpha * slope);
+        newton_.evaluate(q, load_parameters, proximal);
+        if (in_place) alpha *= newton_.line_search(q, load_parameters, proximal, from, step, alpha * slope);
         VectorXd now = reduced_gradient(q, proximal);
         if (in_place) lbfgs.add(alpha * direction, now - gradient);
         gradient = std::move(now);
@@ -143,7 +143,7 @@ NewtonReport ProjectiveSolver::solve_smooth(VectorXd& q, const Controls& control
 }
 
 // The contact forces are put into the target of the proximal term, so that the residual contains them.
-NewtonReport ProjectiveSolver::solve_with_coulomb(VectorXd& q, const Controls& controls,
+NewtonReport ProjectiveSolver::solve_with_coulomb(VectorXd& q, const LoadParameters& load_parameters,
                                                   const ProximalTerm& proximal, double scale) {
     NewtonReport report;
     const auto fail = [&](std::string reason) {
@@ -151,14 +151,14 @@ NewtonReport ProjectiveSolver::solve_with_coulomb(VectorXd& q, const Controls& c
         return report;
     };
     const DofMap& dof_map = model_.dof_map();
-    VectorXd first_move = dof_map.prescribed_increment(q, controls);
+    VectorXd first_move = dof_map.prescribed_increment(q, load_parameters);
     if (const double alpha = newton_.apply_increment(q, first_move, min_projective_step, report); alpha < 1.0)
         return fail(alpha < 0.0 ? report.reason
                                 : "a prescribed support motion pushes two bodies into each other");
     if (std::string reason = model_.invalid_state_reason(q); !reason.empty()) return fail(std::move(reason));
-    newton_.evaluate(q, controls, proximal);
+    newton_.evaluate(q, load_parameters, proximal);
     prepare(q, proximal, scale);
-    CoulombContact contact(model_, matrix_, controls, *proximal.motion->x_hat, proximal.motion->time);
+    CoulombContact contact(model_, matrix_, load_parameters, *proximal.motion->x_hat, proximal.motion->time);
     VectorXd target = *proximal.target;
     const ProximalTerm pushed{proximal.weights, &target, proximal.motion};
     Anderson anderson(options_.history);
@@ -192,7 +192,7 @@ NewtonReport ProjectiveSolver::solve_with_coulomb(VectorXd& q, const Controls& c
         target = *proximal.target;
         for (Index k = 0; k < model_.n_coordinates(); ++k)
             if (contact.forces()[k] != 0.0) target[k] += contact.forces()[k] / (*proximal.weights)[k];
-        newton_.evaluate(q, controls, proximal);
+        newton_.evaluate(q, load_parameters, proximal);
     }
 }
 

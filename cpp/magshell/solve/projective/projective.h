@@ -38,14 +38,15 @@ class ProjectiveSolver {
 
     /// Solves from q for a stationary point at these load parameters, or leaves q where it failed, as Newton::solve does. scale:
     /// factor of the elastic stiffness, see ViscousTerms::set_history.
-    NewtonReport solve(VectorXd& q, const Controls& controls, const ProximalTerm& proximal, double scale);
+    NewtonReport solve(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
+                       double scale);
 
   private:
-    NewtonReport solve_smooth(VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
-                              double scale);
+    NewtonReport solve_smooth(VectorXd& q, const LoadParameters& load_parameters,
+                              const ProximalTerm& proximal, double scale);
     /// Solves with Coulomb contact in each iteration.
-    NewtonReport solve_with_coulomb(VectorXd& q, const Controls& controls, const ProximalTerm& proximal,
-                                    double scale);
+    NewtonReport solve_with_coulomb(VectorXd& q, const LoadParameters& load_parameters,
+                                    const ProximalTerm& proximal, double scale);
     /// Returns true if the contact stiffness of obstacles has changed by much since it was `before`, and then updates `before`.
     bool contact_stiffness_changed(const ProximalTerm& proximal, VectorXd& before) const;
     void prepare(const VectorXd& q, const ProximalTerm& proximal, double scale);

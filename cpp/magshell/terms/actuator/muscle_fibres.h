@@ -1,4 +1,4 @@
-// MuscleFibres: the fibres of a muscle in SIMD packs, their law and parameters, as the energy term and the rate
+// MuscleFibres: the fibres of a muscle in SIMD vectors, their law and parameters, as the energy term and the rate
 // term of a muscle share them.
 //
 // Parameters: "fibres" (unit vector of each element in the reference configuration), "strength" w [Pa] of each
@@ -30,9 +30,9 @@ struct MuscleInput {
 
 /// Stores (first) or adds the nodal forces alpha_k pull of an integration point.
 template <int N>
-inline void add_pulls(const PushedForwardVector<N>& m, const Pack3& pull, bool first, Pack3 g[N]) {
+inline void add_pulls(const PushForward<N>& m, const SimdVec3& pull, bool first, SimdVec3 g[N]) {
     for (int k = 0; k < N; ++k) {
-        const Pack3 share = m.alpha[k] * pull;
+        const SimdVec3 share = m.alpha[k] * pull;
         g[k] = first ? share : g[k] + share;
     }
 }
@@ -40,10 +40,10 @@ inline void add_pulls(const PushedForwardVector<N>& m, const Pack3& pull, bool f
 /// The blocks alpha_k alpha_l M of an integration point, in the form that add_blocks takes.
 template <int N>
 struct FibreTangent {
-    const PushedForwardVector<N>& m;
-    Pack33 stiffness;
+    const PushForward<N>& m;
+    SimdMat3 stiffness;
 
-    Pack33 block(int k, int l) const { return (m.alpha[k] * m.alpha[l]) * stiffness; }
+    SimdMat3 block(int k, int l) const { return (m.alpha[k] * m.alpha[l]) * stiffness; }
 };
 
 template <class Element>
@@ -53,22 +53,22 @@ class MuscleFibres {
     using Nodes = std::array<Index, N>;
 
     struct Pieces {
-        PushedForwardVector<N> m[points];
-        Pack volume[points];
-        Pack strength, activation;
+        PushForward<N> m[points];
+        SimdDouble volume[points];
+        SimdDouble strength, activation;
     };
 
-    MuscleFibres(const MuscleInput& input, const Fibres& fibres, const ChunkLoop& chunks,
+    MuscleFibres(const MuscleInput& input, const Fibres& fibres, const ColoredLoop& element_blocks,
                  const SystemMatrix& matrix, Registry& registry)
         : fibres(fibres),
           law(input.law),
-          loop(nodes(fibres), chunks, matrix),
+          loop(nodes(fibres), element_blocks, matrix),
           directions(
               registry.values.add(input.owner, "fibres", "1", fibres.n_elements(), 3, &fibres.elements)),
           strength(
               registry.values.add(input.owner, "strength", "Pa", fibres.n_elements(), 1, &fibres.elements)),
           activation(registry.values.add(input.owner, "activation", "1", input.n_segments, 1)),
-          pieces_(loop.packs()) {
+          pieces_(loop.groups()) {
         for (Index k = 0; k < fibres.n_elements(); ++k)
             segments_.push_back(input.segments[fibres.elements.user[k]]);
     }
@@ -76,9 +76,9 @@ class MuscleFibres {
     bool set_values(const Values& values) {
         const bool turned = values.changed(directions);
         const auto each_lane = [&](const auto& body) {
-            for (Index pack = 0; pack < loop.packs(); ++pack)
-                for (int lane = 0; lane < Pack::width; ++lane)
-                    body(pieces_[pack], lane, loop.element(pack, lane));
+            for (Index group = 0; group < loop.groups(); ++group)
+                for (int lane = 0; lane < SimdDouble::width; ++lane)
+                    body(pieces_[group], lane, loop.element(group, lane));
         };
         if (turned)
             each_lane([&](Pieces& each, int lane, Index t) {
@@ -101,7 +101,7 @@ class MuscleFibres {
         return turned || values.changed(strength, activation);
     }
 
-    const Pieces& at(Index pack) const { return pieces_[pack]; }
+    const Pieces& at(Index group) const { return pieces_[group]; }
     Index segment(Index element) const { return segments_[element]; }
 
     RestElement<Element> rest_of(Index element) const {
@@ -120,14 +120,14 @@ class MuscleFibres {
     /// Gradients of an element by its parameters. `pulled` holds F^T b of every point by nodes: F^T b = sum_k
     /// g_k pulled_k.
     struct Found {
-        Pack strength{0.0}, activation{0.0};
-        Pack pulled[points][N];
+        SimdDouble strength{0.0}, activation{0.0};
+        SimdDouble pulled[points][N];
 
         Found() {
-            for (Pack(&of_point)[N] : pulled) std::fill_n(of_point, N, Pack(0.0));
+            for (SimdDouble(&of_point)[N] : pulled) std::fill_n(of_point, N, SimdDouble(0.0));
         }
         /// Adds the gradient by the F m of a point, where F is the deformation gradient of the nodes x.
-        void add(int p, const Pack3 x[N], const Pack3& by) {
+        void add(int p, const SimdVec3 x[N], const SimdVec3& by) {
             for (int k = 0; k < N; ++k) pulled[p][k] += dot(x[k], by);
         }
     };
@@ -140,9 +140,9 @@ class MuscleFibres {
             by_activation_.resize(muscle.fibres.n_elements(), 0.0);
         }
 
-        void take(Index pack, const Found& found) {
-            for (int lane = 0; lane < muscle_.loop.lanes_in(pack); ++lane) {
-                const Index t = muscle_.loop.element(pack, lane);
+        void take(Index group, const Found& found) {
+            for (int lane = 0; lane < muscle_.loop.lanes_in(group); ++lane) {
+                const Index t = muscle_.loop.element(group, lane);
                 by_strength_[t] = found.strength[lane];
                 by_activation_[t] = found.activation[lane];
                 const RestElement<Element> rest = muscle_.rest_of(t);
@@ -171,7 +171,7 @@ class MuscleFibres {
     const Fibres& fibres;
     const FibreLaw law;
     const ElementLoop<N> loop;
-    const Slot directions, strength, activation;
+    const ParameterSlice directions, strength, activation;
 
   private:
     static const std::vector<Nodes>& nodes(const Fibres& fibres) {

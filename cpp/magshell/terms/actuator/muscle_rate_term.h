@@ -27,64 +27,65 @@ class MuscleRateTerm final : public ForceTerm {
     static constexpr int N = Element::nodes, points = Element::points;
 
   public:
-    MuscleRateTerm(std::shared_ptr<Shared> fibres, const Slot& shortening_rate)
+    MuscleRateTerm(std::shared_ptr<Shared> fibres, const ParameterSlice& shortening_rate)
         : fibres_(std::move(fibres)), loop_(fibres_->loop), shortening_rate_(shortening_rate) {}
 
     std::string_view name() const override { return "muscle"; }
     void set_values(const Values& values) override { largest_rate_ = values.number(shortening_rate_); }
 
-    void evaluate(const Kinematics& at, const Controls&, Residual& out) override {
-        loop_.scatter_packs([&](Index pack) {
-            const Pieces& each = fibres_->at(pack);
-            Pack3 x[N], v[N], g[N];
-            loop_.gather(pack, at.q.data(), x);
-            loop_.gather(pack, at.v.data(), v);
+    void evaluate(const Kinematics& at, const LoadParameters&, Residual& out) override {
+        loop_.scatter_groups([&](Index group) {
+            const Pieces& each = fibres_->at(group);
+            SimdVec3 x[N], v[N], g[N];
+            loop_.gather(group, at.q.data(), x);
+            loop_.gather(group, at.v.data(), v);
             for (int p = 0; p < points; ++p) {
-                const Point point(*this, pack, p, x, v);
-                const Pack3 pull = (each.volume[p] * point.tension) * point.place.n;
+                const Point point(*this, group, p, x, v);
+                const SimdVec3 pull = (each.volume[p] * point.tension) * point.fibre.n;
                 add_pulls<N>(each.m[p], pull, p == 0, g);
             }
-            loop_.scatter(pack, g, out);
+            loop_.scatter(group, g, out);
         });
     }
 
-    void assemble(const Kinematics& at, const Controls&, bool convexified, SystemMatrix& out,
+    void assemble(const Kinematics& at, const LoadParameters&, bool positive_definite, SystemMatrix& out,
                   NonsymmetricTangent& rest) const override {
         std::vector<std::array<Vec3, N*(N + 1) / 2>> axes(fibres_->fibres.n_elements());
-        const Pack rate(at.rate), half(0.5);
-        loop_.scatter_packs([&](Index pack) {
-            const Pieces& each = fibres_->at(pack);
-            Pack3 x[N], v[N], angle_branches[N * (N + 1) / 2];
-            loop_.gather(pack, at.q.data(), x);
-            loop_.gather(pack, at.v.data(), v);
-            Pack33 h[N * (N + 1) / 2];
+        const SimdDouble rate(at.rate), half(0.5);
+        loop_.scatter_groups([&](Index group) {
+            const Pieces& each = fibres_->at(group);
+            SimdVec3 x[N], v[N], angle_branches[N * (N + 1) / 2];
+            loop_.gather(group, at.q.data(), x);
+            loop_.gather(group, at.v.data(), v);
+            SimdMat3 h[N * (N + 1) / 2];
             for (int p = 0; p < points; ++p) {
-                const Point point(*this, pack, p, x, v);
-                const DeformedFibre& place = point.place;
-                const Pack3 u = (point.by_rate * place.inverse) * place.across(point.moves);
-                Pack along = point.by_length + rate * point.by_rate, across = point.tension * place.inverse;
-                if (convexified) {
-                    along = max(along, Pack(0.0));
-                    across = max(across, Pack(0.0));
+                const Point point(*this, group, p, x, v);
+                const DeformedFibre& fibre = point.fibre;
+                const SimdVec3 u = (point.by_rate * fibre.inverse) * fibre.across(point.moves);
+                SimdDouble along = point.by_length + rate * point.by_rate,
+                           across = point.tension * fibre.inverse;
+                if (positive_definite) {
+                    along = max(along, SimdDouble(0.0));
+                    across = max(across, SimdDouble(0.0));
                 }
-                Pack33 stiffness = place.stiffness(along, across);
-                if (!convexified) stiffness += half * symmetric_outer(place.n, u);
+                SimdMat3 stiffness = fibre.stiffness(along, across);
+                if (!positive_definite) stiffness += half * symmetric_outer(fibre.n, u);
                 add_blocks<N>(FibreTangent<N>{each.m[p], each.volume[p] * stiffness}, p == 0, h);
-                const Pack3 axis = (half * each.volume[p]) * cross(u, place.n);
+                const SimdVec3 axis = (half * each.volume[p]) * cross(u, fibre.n);
                 for (int k = 0; k < N; ++k)
                     for (int l = 0; l <= k; ++l) {
-                        const Pack3 share = (each.m[p].alpha[k] * each.m[p].alpha[l]) * axis;
-                        Pack3& into = angle_branches[lower_index(k, l)];
+                        const SimdVec3 share = (each.m[p].alpha[k] * each.m[p].alpha[l]) * axis;
+                        SimdVec3& into = angle_branches[lower_index(k, l)];
                         into = p == 0 ? share : into + share;
                     }
             }
             complete_blocks<N>(h);
-            loop_.scatter(pack, h, out);
-            for (int lane = 0; lane < loop_.lanes_in(pack); ++lane)
+            loop_.scatter(group, h, out);
+            for (int lane = 0; lane < loop_.lanes_in(group); ++lane)
                 for (int pair = 0; pair < N * (N + 1) / 2; ++pair)
-                    axes[loop_.element(pack, lane)][pair] = lane_of(angle_branches[pair], lane);
+                    axes[loop_.element(group, lane)][pair] = lane_of(angle_branches[pair], lane);
         });
-        if (convexified) return;
+        if (positive_definite) return;
         for (Index t = 0; t < fibres_->fibres.n_elements(); ++t) {
             const std::span<const Index> nodes = fibres_->fibres.nodes_of(t);
             for (int k = 0; k < N; ++k)
@@ -97,40 +98,40 @@ class MuscleRateTerm final : public ForceTerm {
         }
     }
 
-    void vjp(const Kinematics& at, const Controls&, const VectorXd& lambda, KinematicsGradient& by,
+    void vjp(const Kinematics& at, const LoadParameters&, const VectorXd& lambda, KinematicsGradient& by,
              Gradient& out) const override {
         typename Shared::Gatherer gathered(*fibres_);
         std::vector<double> by_rates(fibres_->fibres.n_elements(), 0.0);
         Residual by_velocity;
         by_velocity.reset(lambda.size());
-        loop_.scatter_packs([&](Index pack) {
-            const Pieces& each = fibres_->at(pack);
-            Pack3 x[N], v[N], adjoint[N], g[N];
-            loop_.gather(pack, at.q.data(), x);
-            loop_.gather(pack, at.v.data(), v);
-            loop_.gather(pack, lambda.data(), adjoint);
+        loop_.scatter_groups([&](Index group) {
+            const Pieces& each = fibres_->at(group);
+            SimdVec3 x[N], v[N], adjoint[N], g[N];
+            loop_.gather(group, at.q.data(), x);
+            loop_.gather(group, at.v.data(), v);
+            loop_.gather(group, lambda.data(), adjoint);
             typename Shared::Found found;
             for (int p = 0; p < points; ++p) {
-                const Point point(*this, pack, p, x, v);
-                const DeformedFibre& place = point.place;
-                const Pack3 turned = each.m[p].at(adjoint);
-                const Pack along = each.volume[p] * dot(place.n, turned);
+                const Point point(*this, group, p, x, v);
+                const DeformedFibre& fibre = point.fibre;
+                const SimdVec3 turned = each.m[p].at(adjoint);
+                const SimdDouble along = each.volume[p] * dot(fibre.n, turned);
                 found.strength += along * point.by_strength;
                 found.activation += along * point.by_activation;
-                const Pack3 to_rate = (along * point.by_rate) * place.n;
+                const SimdVec3 to_rate = (along * point.by_rate) * fibre.n;
                 found.add(p, x,
-                          (along * point.by_length) * place.n +
-                              (each.volume[p] * point.tension * place.inverse) * place.across(turned) +
-                              (along * point.by_rate * place.inverse) * place.across(point.moves));
+                          (along * point.by_length) * fibre.n +
+                              (each.volume[p] * point.tension * fibre.inverse) * fibre.across(turned) +
+                              (along * point.by_rate * fibre.inverse) * fibre.across(point.moves));
                 found.add(p, v, to_rate);
-                found.add(p, adjoint, (each.volume[p] * point.tension) * place.n);
+                found.add(p, adjoint, (each.volume[p] * point.tension) * fibre.n);
                 add_pulls<N>(each.m[p], -to_rate, p == 0, g);
-                const Pack by_rate = along * point.by_rate * point.rate;
-                for (int lane = 0; lane < loop_.lanes_in(pack); ++lane)
-                    by_rates[loop_.element(pack, lane)] -= by_rate[lane] / largest_rate_;
+                const SimdDouble by_rate = along * point.by_rate * point.rate;
+                for (int lane = 0; lane < loop_.lanes_in(group); ++lane)
+                    by_rates[loop_.element(group, lane)] -= by_rate[lane] / largest_rate_;
             }
-            gathered.take(pack, found);
-            loop_.scatter(pack, g, by_velocity);
+            gathered.take(group, found);
+            loop_.scatter(group, g, by_velocity);
         });
         by.velocity += by_velocity.gradient;
         gathered.hand_over(out);
@@ -139,15 +140,15 @@ class MuscleRateTerm final : public ForceTerm {
 
     void add_cancelling_forces(const Kinematics& at, VectorXd& out) const override {
         for (Index t = 0; t < fibres_->fibres.n_elements(); ++t) {
-            const Index pack = t / Pack::width;
-            const int lane = t % Pack::width;
-            const Pieces& each = fibres_->at(pack);
+            const Index group = t / SimdDouble::width;
+            const int lane = t % SimdDouble::width;
+            const Pieces& each = fibres_->at(group);
             const std::span<const Index> nodes = fibres_->fibres.nodes_of(t);
-            Pack3 x[N], v[N];
-            loop_.gather(pack, at.q.data(), x);
-            loop_.gather(pack, at.v.data(), v);
+            SimdVec3 x[N], v[N];
+            loop_.gather(group, at.q.data(), x);
+            loop_.gather(group, at.v.data(), v);
             for (int p = 0; p < points; ++p) {
-                const double by_rate = std::abs(Point(*this, pack, p, x, v).by_rate[lane]);
+                const double by_rate = std::abs(Point(*this, group, p, x, v).by_rate[lane]);
                 double reach = 0.0;
                 for (int k = 0; k < N; ++k)
                     reach += std::abs(each.m[p].alpha[k][lane]) * lane_of(x[k], lane).norm();
@@ -161,27 +162,27 @@ class MuscleRateTerm final : public ForceTerm {
   private:
     /// The tension T and its derivatives by l, l', w and a.
     struct Point {
-        DeformedFibre place;
-        Pack3 moves;  // y'
-        Pack rate;    // l'
-        Pack tension, by_length, by_rate, by_strength, by_activation;
+        DeformedFibre fibre;
+        SimdVec3 moves;   // y'
+        SimdDouble rate;  // l'
+        SimdDouble tension, by_length, by_rate, by_strength, by_activation;
 
-        Point(const MuscleRateTerm& term, Index pack, int p, const Pack3 x[N], const Pack3 v[N])
-            : place(term.fibres_->at(pack).m[p].at(x)), moves(term.fibres_->at(pack).m[p].at(v)) {
-            const Pieces& each = term.fibres_->at(pack);
+        Point(const MuscleRateTerm& term, Index group, int p, const SimdVec3 x[N], const SimdVec3 v[N])
+            : fibre(term.fibres_->at(group).m[p].at(x)), moves(term.fibres_->at(group).m[p].at(v)) {
+            const Pieces& each = term.fibres_->at(group);
             const FibreLaw& law = term.fibres_->law;
             // The slope of the active part alone: the total at activation 1 minus the total at 0.
-            const FibreLaw::Response with = law.at(place.length, Pack(1.0)),
-                                     without = law.at(place.length, Pack(0.0));
-            const Pack active = with.by_activation, slope = with.slope - without.slope;
-            rate = dot(place.n, moves);
-            Pack more, steep;
-            for (int lane = 0; lane < Pack::width; ++lane) {
+            const FibreLaw::Response with = law.at(fibre.length, SimdDouble(1.0)),
+                                     without = law.at(fibre.length, SimdDouble(0.0));
+            const SimdDouble active = with.by_activation, slope = with.slope - without.slope;
+            rate = dot(fibre.n, moves);
+            SimdDouble more, steep;
+            for (int lane = 0; lane < SimdDouble::width; ++lane) {
                 const FibreCurve::Sample at = law.excess_over_isometric(rate[lane] / term.largest_rate_);
                 more.set(lane, at.value);
                 steep.set(lane, at.slope / term.largest_rate_);
             }
-            const Pack pulls = each.strength * each.activation;
+            const SimdDouble pulls = each.strength * each.activation;
             tension = pulls * active * more;
             by_length = pulls * slope * more;
             by_rate = pulls * active * steep;
@@ -192,7 +193,7 @@ class MuscleRateTerm final : public ForceTerm {
 
     const std::shared_ptr<Shared> fibres_;
     const ElementLoop<N>& loop_;
-    const Slot shortening_rate_;
+    const ParameterSlice shortening_rate_;
     double largest_rate_ = 1.0;
 };
 

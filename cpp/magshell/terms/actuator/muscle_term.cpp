@@ -15,12 +15,12 @@ class MuscleEnergy final : public MuscleTerm {
     static constexpr int N = Element::nodes, points = Element::points;
 
   public:
-    MuscleEnergy(std::shared_ptr<Shared> fibres, Index body, const Slot& shortening_rate)
+    MuscleEnergy(std::shared_ptr<Shared> fibres, Index body, const ParameterSlice& shortening_rate)
         : body_(body),
           fibres_(std::move(fibres)),
           loop_(fibres_->loop),
           shortening_rate_(shortening_rate),
-          stiffness_(loop_.packs()) {}
+          stiffness_(loop_.groups()) {}
 
     Index body() const override { return body_; }
     bool depends_on_loads() const override { return false; }
@@ -32,12 +32,12 @@ class MuscleEnergy final : public MuscleTerm {
         return fibres_->set_values(values);
     }
 
-    double energy(const double* q, const Controls&) const override {
-        return loop_.sum([&](Index pack) {
-            const Pieces& each = fibres_->at(pack);
-            Pack3 x[N];
-            loop_.gather(pack, q, x);
-            Pack total(0.0);
+    double energy(const double* q, const LoadParameters&) const override {
+        return loop_.sum([&](Index group) {
+            const Pieces& each = fibres_->at(group);
+            SimdVec3 x[N];
+            loop_.gather(group, q, x);
+            SimdDouble total(0.0);
             for (int p = 0; p < points; ++p)
                 total += each.volume[p] *
                          fibres_->law.at(DeformedFibre(each.m[p].at(x)).length, each.activation).energy;
@@ -48,20 +48,20 @@ class MuscleEnergy final : public MuscleTerm {
     /// Adds w m m^T with the stiffness of the fully activated reference configuration, so that the matrix does
     /// not depend on the activation.
     bool add_projective_stiffness(NodeMatrix& out) const override {
-        const FibreLaw::Response law = fibres_->law.at(Pack(1.0), Pack(1.0));
-        const Pack stiffness = max(max(law.slope, law.tension), Pack(0.0));
-        for (Index pack = 0; pack < loop_.packs(); ++pack) {
-            const Pieces& each = fibres_->at(pack);
-            Pack sum[N][N];
+        const FibreLaw::Response law = fibres_->law.at(SimdDouble(1.0), SimdDouble(1.0));
+        const SimdDouble stiffness = max(max(law.slope, law.tension), SimdDouble(0.0));
+        for (Index group = 0; group < loop_.groups(); ++group) {
+            const Pieces& each = fibres_->at(group);
+            SimdDouble sum[N][N];
             for (int k = 0; k < N; ++k)
                 for (int l = 0; l <= k; ++l) {
-                    sum[k][l] = Pack(0.0);
+                    sum[k][l] = SimdDouble(0.0);
                     for (int p = 0; p < points; ++p)
                         sum[k][l] += (each.strength * stiffness * each.volume[p]) *
                                      (each.m[p].alpha[k] * each.m[p].alpha[l]);
                 }
-            for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
-                const std::span<const Index> nodes = fibres_->fibres.nodes_of(loop_.element(pack, lane));
+            for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+                const std::span<const Index> nodes = fibres_->fibres.nodes_of(loop_.element(group, lane));
                 for (int k = 0; k < N; ++k) {
                     out.add_diagonal(nodes[k], sum[k][k][lane]);
                     for (int l = 0; l < k; ++l) out.add_pair(nodes[k], nodes[l], sum[k][l][lane]);
@@ -71,60 +71,60 @@ class MuscleEnergy final : public MuscleTerm {
         return true;
     }
 
-    void evaluate(const double* q, const Controls&, Residual& out) override {
-        loop_.scatter_packs([&](Index pack) {
-            const Pieces& each = fibres_->at(pack);
-            Pack3 x[N], g[N];
-            loop_.gather(pack, q, x);
+    void evaluate(const double* q, const LoadParameters&, Residual& out) override {
+        loop_.scatter_groups([&](Index group) {
+            const Pieces& each = fibres_->at(group);
+            SimdVec3 x[N], g[N];
+            loop_.gather(group, q, x);
             for (int p = 0; p < points; ++p) {
                 const DeformedFibre at(each.m[p].at(x));
                 const FibreLaw::Response law = fibres_->law.at(at.length, each.activation);
-                stiffness_[pack].along[p] = law.slope;
-                stiffness_[pack].across[p] = at.over_length(law);
-                const Pack3 pull = (each.volume[p] * each.strength * law.tension) * at.n;
+                stiffness_[group].along[p] = law.slope;
+                stiffness_[group].across[p] = at.over_length(law);
+                const SimdVec3 pull = (each.volume[p] * each.strength * law.tension) * at.n;
                 add_pulls<N>(each.m[p], pull, p == 0, g);
             }
-            loop_.scatter(pack, g, out);
+            loop_.scatter(group, g, out);
         });
     }
 
-    void assemble(const Chunk& chunk, const double* q, const Controls&, bool,
+    void assemble(const ElementBlock& element_block, const double* q, const LoadParameters&, bool,
                   SystemMatrix& out) const override {
-        ElementLoop<N>::over_packs(chunk, [&](Index pack) __attribute__((flatten)) {
-            const Pieces& each = fibres_->at(pack);
-            Pack3 x[N];
-            loop_.gather(pack, q, x);
+        ElementLoop<N>::over_groups(element_block, [&](Index group) __attribute__((flatten)) {
+            const Pieces& each = fibres_->at(group);
+            SimdVec3 x[N];
+            loop_.gather(group, q, x);
             Symmetric3 stiffness[points];
             for (int p = 0; p < points; ++p) {
-                Pack along = stiffness_[pack].along[p], across = stiffness_[pack].across[p];
+                SimdDouble along = stiffness_[group].along[p], across = stiffness_[group].across[p];
                 if (psd_projection_) {
-                    along = max(along, Pack(0.0));
-                    across = max(across, Pack(0.0));
+                    along = max(along, SimdDouble(0.0));
+                    across = max(across, SimdDouble(0.0));
                 }
-                const Pack33 m = DeformedFibre(each.m[p].at(x)).stiffness(along, across);
-                const Pack scale = each.volume[p] * each.strength;
+                const SimdMat3 m = DeformedFibre(each.m[p].at(x)).stiffness(along, across);
+                const SimdDouble scale = each.volume[p] * each.strength;
                 for (int r = 0; r < 3; ++r)
                     for (int c = 0; c <= r; ++c) stiffness[p].at[lower_index(r, c)] = scale * m.at[3 * r + c];
             }
-            Pack33 h[N * (N + 1) / 2];
+            SimdMat3 h[N * (N + 1) / 2];
             add_products(each, stiffness, h);
-            loop_.scatter(pack, h, out);
+            loop_.scatter(group, h, out);
         });
     }
 
-    void vjp(const double* q, const Controls&, const double* lambda, Gradient& out) override {
+    void vjp(const double* q, const LoadParameters&, const double* lambda, Gradient& out) override {
         typename Shared::Gatherer gathered(*fibres_);
-        loop_.each_pack([&](Index pack) {
-            const Pieces& each = fibres_->at(pack);
-            Pack3 x[N], adjoint[N];
-            loop_.gather(pack, q, x);
-            loop_.gather(pack, lambda, adjoint);
+        loop_.each_group([&](Index group) {
+            const Pieces& each = fibres_->at(group);
+            SimdVec3 x[N], adjoint[N];
+            loop_.gather(group, q, x);
+            loop_.gather(group, lambda, adjoint);
             typename Shared::Found found;
             for (int p = 0; p < points; ++p) {
                 const DeformedFibre at(each.m[p].at(x));
                 const FibreLaw::Response law = fibres_->law.at(at.length, each.activation);
-                const Pack3 rate = each.m[p].at(adjoint);
-                const Pack along = dot(at.n, rate), scale = each.volume[p] * each.strength;
+                const SimdVec3 rate = each.m[p].at(adjoint);
+                const SimdDouble along = dot(at.n, rate), scale = each.volume[p] * each.strength;
                 found.strength += each.volume[p] * law.tension * along;
                 found.activation += scale * law.by_activation * along;
                 found.add(
@@ -132,7 +132,7 @@ class MuscleEnergy final : public MuscleTerm {
                     (scale * law.slope * along) * at.n + (scale * at.over_length(law)) * at.across(rate));
                 found.add(p, adjoint, (scale * law.tension) * at.n);
             }
-            gathered.take(pack, found);
+            gathered.take(group, found);
         });
         gathered.hand_over(out);
     }
@@ -140,9 +140,9 @@ class MuscleEnergy final : public MuscleTerm {
     // The stretch l loses digits to the cancellation of coordinates as F does.
     void add_cancelling_forces(double beyond, VectorXd& out) const override {
         for (Index t = 0; t < fibres_->fibres.n_elements(); ++t) {
-            const Pieces& each = fibres_->at(t / Pack::width);
-            const int lane = t % Pack::width;
-            const FibreLaw::Response law = fibres_->law.at(Pack(1.0), each.activation);
+            const Pieces& each = fibres_->at(t / SimdDouble::width);
+            const int lane = t % SimdDouble::width;
+            const FibreLaw::Response law = fibres_->law.at(SimdDouble(1.0), each.activation);
             const double stiffness =
                 each.strength[lane] * (std::abs(law.slope[lane]) + std::abs(law.tension[lane]));
             double coordinate = beyond;
@@ -164,16 +164,16 @@ class MuscleEnergy final : public MuscleTerm {
         const std::size_t count = static_cast<std::size_t>(fibres_->fibres.n_elements()) * points;
         FibreStates out{points, std::vector<double>(count), std::vector<double>(count),
                         std::vector<double>(count)};
-        loop_.each_pack([&](Index pack) {
-            const Pieces& each = fibres_->at(pack);
-            Pack3 x[N], moves[N];
-            loop_.gather(pack, q, x);
-            if (v) loop_.gather(pack, v, moves);
+        loop_.each_group([&](Index group) {
+            const Pieces& each = fibres_->at(group);
+            SimdVec3 x[N], moves[N];
+            loop_.gather(group, q, x);
+            if (v) loop_.gather(group, v, moves);
             for (int p = 0; p < points; ++p) {
                 const DeformedFibre at(each.m[p].at(x));
                 const FibreLaw::Response law = fibres_->law.at(at.length, each.activation);
-                for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
-                    const Index t = loop_.element(pack, lane);
+                for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+                    const Index t = loop_.element(group, lane);
                     const std::size_t place =
                         static_cast<std::size_t>(fibres_->fibres.elements.user[t]) * points + p;
                     double tension = law.tension[lane];
@@ -196,22 +196,22 @@ class MuscleEnergy final : public MuscleTerm {
   private:
     // At the last evaluated state: T' and T/l.
     struct Stiffness {
-        Pack along[points], across[points];
+        SimdDouble along[points], across[points];
     };
 
     // Computes sum_p alpha_pk alpha_pl M_p for all pairs of nodes. The blocks are symmetric, so six numbers of
     // each are computed.
-    static void add_products(const Pieces& each, const Symmetric3 m[points], Pack33 h[]) {
+    static void add_products(const Pieces& each, const Symmetric3 m[points], SimdMat3 h[]) {
         for (int k = 0; k < N; ++k) {
             Symmetric3 of_node[points];
             for (int p = 0; p < points; ++p)
                 for (int i = 0; i < 6; ++i) of_node[p].at[i] = each.m[p].alpha[k] * m[p].at[i];
             for (int l = 0; l <= k; ++l) {
-                Pack sum[6];
+                SimdDouble sum[6];
                 for (int i = 0; i < 6; ++i) sum[i] = each.m[0].alpha[l] * of_node[0].at[i];
                 for (int p = 1; p < points; ++p)
                     for (int i = 0; i < 6; ++i) sum[i] += each.m[p].alpha[l] * of_node[p].at[i];
-                Pack33& block = h[lower_index(k, l)];
+                SimdMat3& block = h[lower_index(k, l)];
                 for (int r = 0; r < 3; ++r)
                     for (int c = 0; c < 3; ++c)
                         block.at[3 * r + c] = sum[r >= c ? lower_index(r, c) : lower_index(c, r)];
@@ -222,18 +222,18 @@ class MuscleEnergy final : public MuscleTerm {
     const Index body_;
     const std::shared_ptr<Shared> fibres_;
     const ElementLoop<N>& loop_;
-    const Slot shortening_rate_;
+    const ParameterSlice shortening_rate_;
     double largest_rate_ = 0.0;
     bool psd_projection_ = false;
     std::vector<Stiffness> stiffness_;
 };
 
 template <class Element>
-Muscle make(const MuscleInput& input, const Fibres& fibres, Index body, const ChunkLoop& chunks,
+Muscle make(const MuscleInput& input, const Fibres& fibres, Index body, const ColoredLoop& element_blocks,
             const SystemMatrix& matrix, Registry& registry) {
     std::shared_ptr<MuscleFibres<Element>> shared =
-        std::make_shared<MuscleFibres<Element>>(input, fibres, chunks, matrix, registry);
-    Slot rate;
+        std::make_shared<MuscleFibres<Element>>(input, fibres, element_blocks, matrix, registry);
+    ParameterSlice rate;
     Muscle muscle;
     if (!input.law.force_velocity.empty()) {
         rate = registry.values.add(input.owner, "shortening_rate", "1/s", 1, 1);
@@ -245,11 +245,11 @@ Muscle make(const MuscleInput& input, const Fibres& fibres, Index body, const Ch
 
 }  // namespace
 
-Muscle make_muscle(const MuscleInput& input, const Fibres& fibres, Index body, const ChunkLoop& chunks,
-                   const SystemMatrix& matrix, Registry& registry) {
+Muscle make_muscle(const MuscleInput& input, const Fibres& fibres, Index body,
+                   const ColoredLoop& element_blocks, const SystemMatrix& matrix, Registry& registry) {
     return fibres.solid.quadratic()
-               ? make<QuadraticTetrahedron>(input, fibres, body, chunks, matrix, registry)
-               : make<LinearTetrahedron>(input, fibres, body, chunks, matrix, registry);
+               ? make<QuadraticTetrahedron>(input, fibres, body, element_blocks, matrix, registry)
+               : make<LinearTetrahedron>(input, fibres, body, element_blocks, matrix, registry);
 }
 
 }  // namespace magshell

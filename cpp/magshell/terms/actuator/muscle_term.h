@@ -30,9 +30,9 @@ struct Muscle {
     std::unique_ptr<ForceTerm> force;  // nullptr without a force-velocity curve
 };
 
-/// Creates a muscle. body: index of the fibres among the bodies that have chunks. The references must outlive
+/// Creates a muscle. body: index of the fibres among the bodies that have blocks. The references must outlive
 /// it.
-Muscle make_muscle(const MuscleInput& input, const Fibres& fibres, Index body, const ChunkLoop& chunks,
-                   const SystemMatrix& matrix, Registry& registry);
+Muscle make_muscle(const MuscleInput& input, const Fibres& fibres, Index body,
+                   const ColoredLoop& element_blocks, const SystemMatrix& matrix, Registry& registry);
 
 }  // namespace magshell

@@ -38,7 +38,7 @@ TendonTerm::Pull::Pull(const std::array<double, n_numbers>& numbers, double shar
 
 TendonTerm::TendonTerm(const std::vector<TendonInput>& inputs, const Nodes& nodes, const SystemMatrix& matrix,
                        Registry& registry)
-    : factor_(registry.controls.add("scene", "load_factor", "1", 1, 1)) {
+    : factor_(registry.load_parameters.add("scene", "load_factor", "1", 1, 1)) {
     for (const TendonInput& input : inputs) {
         const Index tendon = static_cast<Index>(tendons_.size());
         Tendon& added = tendons_.emplace_back();
@@ -116,15 +116,15 @@ bool TendonTerm::set_values(const Values& values) {
     return false;
 }
 
-double TendonTerm::energy(const double* q, const Controls& controls) const {
+double TendonTerm::energy(const double* q, const LoadParameters& load_parameters) const {
     double sum = 0.0;
     for (const String& each : strings_)
         sum += Pull(tendons_[each.tendon].numbers, each.share, each.length_at(q)).energy;
-    return controls[factor_.first] * sum;
+    return load_parameters[factor_.first] * sum;
 }
 
-void TendonTerm::evaluate(const double* q, const Controls& controls, Residual& out) {
-    const double factor = factor_now_ = controls[factor_.first];
+void TendonTerm::evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) {
+    const double factor = factor_now_ = load_parameters[factor_.first];
     for (String& each : strings_) {
         each.length = 0.0;
         each.slopes.assign(each.nodes.size(), Vec3::Zero());
@@ -149,8 +149,9 @@ void TendonTerm::extrapolate(const double* p) {
         each.extrapolated = std::max(0.0, each.tension + each.stiffness * each.along(p));
 }
 
-void TendonTerm::finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const {
-    const double factor = controls[factor_.first];
+void TendonTerm::finish_assembly(const double* q, const LoadParameters& load_parameters,
+                                 SystemMatrix& out) const {
+    const double factor = load_parameters[factor_.first];
     for (const String& each : strings_) {
         const double tension = factor * (extrapolated_ ? each.extrapolated : each.tension);
         if (tension == 0.0) continue;
@@ -174,9 +175,9 @@ void TendonTerm::finish_assembly(const double* q, const Controls& controls, Syst
     }
 }
 
-void TendonTerm::add_low_rank(const Controls& controls, LowRank& out) const {
+void TendonTerm::add_low_rank(const LoadParameters& load_parameters, LowRank& out) const {
     for (const String& each : strings_)
-        out.add(each.nodes, each.slopes, controls[factor_.first] * each.stiffness);
+        out.add(each.nodes, each.slopes, load_parameters[factor_.first] * each.stiffness);
 }
 
 void TendonTerm::add_cancelling_here(VectorXd& out) const {
@@ -186,15 +187,16 @@ void TendonTerm::add_cancelling_here(VectorXd& out) const {
                 std::abs(factor_now_) * each.stiffness * each.length * each.slopes[k].cwiseAbs();
 }
 
-void TendonTerm::vjp(const double*, const Controls& controls, const double* lambda, Gradient& out) {
-    const double factor = controls[factor_.first];
+void TendonTerm::vjp(const double*, const LoadParameters& load_parameters, const double* lambda,
+                     Gradient& out) {
+    const double factor = load_parameters[factor_.first];
     for (const String& each : strings_) {
         const double along = each.along(lambda);
         const Tendon& tendon = tendons_[each.tendon];
         const Pull pull(tendon.numbers, each.share, each.length);
         for (int k = 0; k < n_numbers; ++k)
             out.values[tendon.slots[k].at(0)] += factor * pull.tension_by[k] * along;
-        out.controls[factor_.first] += pull.tension * along;
+        out.load_parameters[factor_.first] += pull.tension * along;
     }
 }
 

@@ -39,13 +39,15 @@ class TendonTerm final : public LowRankTerm {
 
     std::string_view name() const override { return "tendons"; }
     bool set_values(const Values& values) override;
-    double energy(const double* q, const Controls& controls) const override;
-    void evaluate(const double* q, const Controls& controls, Residual& out) override;
-    void finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const override;
-    void add_low_rank(const Controls& controls, LowRank& out) const override;
+    double energy(const double* q, const LoadParameters& load_parameters) const override;
+    void evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) override;
+    void finish_assembly(const double* q, const LoadParameters& load_parameters,
+                         SystemMatrix& out) const override;
+    void add_low_rank(const LoadParameters& load_parameters, LowRank& out) const override;
     void extrapolate(const double* p) override;
     void add_cancelling_here(VectorXd& out) const override;
-    void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
+    void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
+             Gradient& out) override;
     std::size_t bytes() const override;
 
   private:
@@ -70,7 +72,7 @@ class TendonTerm final : public LowRankTerm {
     };
     static constexpr int n_numbers = 4;
     struct Tendon {
-        std::array<Slot, n_numbers> slots;
+        std::array<ParameterSlice, n_numbers> slots;
         std::array<double, n_numbers> numbers{};  // T, k, r, smoothing
     };
     /// Energy of a string, dE/dL, d2E/dL2, and the derivatives of dE/dL by the tendon's parameters.
@@ -83,7 +85,7 @@ class TendonTerm final : public LowRankTerm {
     void add_string(Index tendon, double share, const EmbeddedPoint* first, std::size_t points,
                     const Nodes& nodes, const SystemMatrix& matrix);
 
-    Slot factor_;
+    ParameterSlice factor_;
     std::vector<Tendon> tendons_;
     std::vector<String> strings_;
     double factor_now_ = 0.0;  // at the last evaluated state

@@ -16,7 +16,7 @@ std::array<Vec3, N> corners_of(const std::array<Index, N>& places, const std::ve
 }
 
 template <int N>
-void add_curvature(const std::array<Vec3, N>& x, double factor, Pack33 blocks[]) {
+void add_curvature(const std::array<Vec3, N>& x, double factor, SimdMat3 blocks[]) {
     std::array<Vec3, N*(N + 1) / 2> axes;
     axes.fill(Vec3::Zero());
     VolumeForm<N>::curvature(
@@ -30,11 +30,11 @@ void add_curvature(const std::array<Vec3, N>& x, double factor, Pack33 blocks[])
 
 VolumeTerm::VolumeTerm(const std::vector<VolumeInput>& inputs, const Nodes& nodes, const SystemMatrix& matrix,
                        Registry& registry)
-    : factor_(registry.controls.add("scene", "load_factor", "1", 1, 1)) {
+    : factor_(registry.load_parameters.add("scene", "load_factor", "1", 1, 1)) {
     for (const VolumeInput& input : inputs) {
         const VolumeNames names = names_of(input.law);
         const Index rows = static_cast<Index>(input.surfaces.size());
-        std::array<Slot, 2> slots;
+        std::array<ParameterSlice, 2> slots;
         for (int k = 0; k < 2; ++k)
             if (names.names[k])
                 slots[k] = registry.values.add(input.owner, names.names[k], names.units[k], rows, 1);
@@ -43,7 +43,7 @@ VolumeTerm::VolumeTerm(const std::vector<VolumeInput>& inputs, const Nodes& node
 }
 
 void VolumeTerm::add(const VolumeInput& input, const ClosedSurface& surface, Index row,
-                     std::array<Slot, 2> slots, const Nodes& nodes, const SystemMatrix& matrix) {
+                     std::array<ParameterSlice, 2> slots, const Nodes& nodes, const SystemMatrix& matrix) {
     Volume& added = volumes_.emplace_back();
     added.law = input.law;
     added.slots = slots;
@@ -168,22 +168,23 @@ std::string VolumeTerm::invalid_state_reason(const double* q) const {
     return {};
 }
 
-double VolumeTerm::energy(const double* q, const Controls& controls) const {
+double VolumeTerm::energy(const double* q, const LoadParameters& load_parameters) const {
     double sum = 0.0;
     for (const Volume& each : volumes_)
         sum += VolumeEnergy(each.law, each.numbers, each.rest, each.volume_at(each.at(q)),
-                            controls[factor_.first])
+                            load_parameters[factor_.first])
                    .energy;
     return sum;
 }
 
-void VolumeTerm::evaluate(const double* q, const Controls& controls, Residual& out) {
+void VolumeTerm::evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) {
     for (Volume& each : volumes_) {
         const std::vector<Vec3> x = each.at(q);
         each.volume = each.volume_at(x);
         each.slopes.assign(x.size(), Vec3::Zero());
         each.add_slopes(x, each.slopes);
-        const VolumeEnergy law(each.law, each.numbers, each.rest, each.volume, controls[factor_.first]);
+        const VolumeEnergy law(each.law, each.numbers, each.rest, each.volume,
+                               load_parameters[factor_.first]);
         each.slope = each.extrapolated = law.slope;
         each.curvature = law.curvature;
         each.magnitude = law.magnitude;
@@ -197,16 +198,16 @@ void VolumeTerm::extrapolate(const double* p) {
     for (Volume& each : volumes_) each.extrapolated = each.slope + each.curvature * each.along(p);
 }
 
-void VolumeTerm::finish_assembly(const double* q, const Controls&, SystemMatrix& out) const {
+void VolumeTerm::finish_assembly(const double* q, const LoadParameters&, SystemMatrix& out) const {
     for (const Volume& each : volumes_) {
         const std::vector<Vec3> x = each.at(q);
         const double own =
-            convexified_ && has_target_volume(each.law) && each.pairs.empty() ? 0.0 : each.slope;
+            positive_definite_ && has_target_volume(each.law) && each.pairs.empty() ? 0.0 : each.slope;
         const double slope = extrapolated_ ? each.extrapolated : own;
         if (slope == 0.0 && each.curvature == 0.0) continue;
         const auto add_faces = [&]<int N>(const std::vector<Face<N>>& faces) {
             for (const Face<N>& face : faces) {
-                Pack33 blocks[N * (N + 1) / 2]{};
+                SimdMat3 blocks[N * (N + 1) / 2]{};
                 add_curvature<N>(corners_of(face.places, x), face.weight * slope, blocks);
                 std::array<Index, N> nodes;
                 for (int k = 0; k < N; ++k) nodes[k] = each.nodes[face.places[k]];
@@ -232,7 +233,7 @@ void VolumeTerm::add_outer_product(const Volume& volume, double stiffness, Syste
     }
 }
 
-void VolumeTerm::add_low_rank(const Controls&, LowRank& out) const {
+void VolumeTerm::add_low_rank(const LoadParameters&, LowRank& out) const {
     for (const Volume& each : volumes_)
         if (each.pairs.empty()) out.add(each.nodes, each.slopes, each.curvature);
 }
@@ -243,13 +244,15 @@ void VolumeTerm::add_cancelling_here(VectorXd& out) const {
             out.segment<3>(3 * each.nodes[k]) += std::abs(each.magnitude) * each.slopes[k].cwiseAbs();
 }
 
-void VolumeTerm::vjp(const double*, const Controls& controls, const double* lambda, Gradient& out) {
+void VolumeTerm::vjp(const double*, const LoadParameters& load_parameters, const double* lambda,
+                     Gradient& out) {
     for (const Volume& each : volumes_) {
         const double along = each.along(lambda);
-        const VolumeEnergy law(each.law, each.numbers, each.rest, each.volume, controls[factor_.first]);
+        const VolumeEnergy law(each.law, each.numbers, each.rest, each.volume,
+                               load_parameters[factor_.first]);
         for (int k = 0; k < 2; ++k)
             if (each.slots[k].entry >= 0) out.values[each.slots[k].at(each.row)] += law.slope_by[k] * along;
-        out.controls[factor_.first] += law.slope_by_factor * along;
+        out.load_parameters[factor_.first] += law.slope_by_factor * along;
     }
 }
 

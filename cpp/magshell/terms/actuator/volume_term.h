@@ -46,13 +46,15 @@ class VolumeTerm final : public LowRankTerm {
     bool has_infeasible_states() const override;
     double max_step_length(const double* q, const double* p) const override;
     std::string invalid_state_reason(const double* q) const override;
-    double energy(const double* q, const Controls& controls) const override;
-    void evaluate(const double* q, const Controls& controls, Residual& out) override;
-    void finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const override;
-    void add_low_rank(const Controls& controls, LowRank& out) const override;
+    double energy(const double* q, const LoadParameters& load_parameters) const override;
+    void evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) override;
+    void finish_assembly(const double* q, const LoadParameters& load_parameters,
+                         SystemMatrix& out) const override;
+    void add_low_rank(const LoadParameters& load_parameters, LowRank& out) const override;
     void extrapolate(const double* p) override;
     void add_cancelling_here(VectorXd& out) const override;
-    void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
+    void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
+             Gradient& out) override;
     std::size_t bytes() const override;
 
   private:
@@ -67,7 +69,7 @@ class VolumeTerm final : public LowRankTerm {
         std::vector<Face<3>> triangles;
         std::vector<Face<6>> curved;
         VolumeLaw law;
-        std::array<Slot, 2> slots;
+        std::array<ParameterSlice, 2> slots;
         Index row;
         bool stays_open;
         double rest = 0.0;  // [m3]
@@ -86,11 +88,11 @@ class VolumeTerm final : public LowRankTerm {
         double along(const double* p) const;
     };
 
-    void add(const VolumeInput& input, const ClosedSurface& surface, Index row, std::array<Slot, 2> slots,
-             const Nodes& nodes, const SystemMatrix& matrix);
+    void add(const VolumeInput& input, const ClosedSurface& surface, Index row,
+             std::array<ParameterSlice, 2> slots, const Nodes& nodes, const SystemMatrix& matrix);
     void add_outer_product(const Volume& volume, double stiffness, SystemMatrix& out) const;
 
-    Slot factor_;
+    ParameterSlice factor_;
     std::vector<Volume> volumes_;
 };
 

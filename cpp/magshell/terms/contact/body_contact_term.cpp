@@ -31,10 +31,10 @@ BodyContactTerm::BodyContactTerm(const Nodes& nodes, const std::vector<ContactSu
         const auto number = [&](const char* name, const char* unit) {
             return registry.values.add(owner, name, unit, 1, 1);
         };
-        slots_.push_back({number("contact_stiffness", "Pa"), number("activation_distance", "m"),
-                          number("min_distance", "m"), number("smoothing", "m"),
-                          number("friction_coefficient", "1"), number("static_friction_coefficient", "1"),
-                          number("sticking_speed", "m/s")});
+        slices_.push_back({number("contact_stiffness", "Pa"), number("activation_distance", "m"),
+                           number("min_distance", "m"), number("smoothing", "m"),
+                           number("friction_coefficient", "1"), number("static_friction_coefficient", "1"),
+                           number("sticking_speed", "m/s")});
         laws_[c].penalty = contacts[c].penalty;
     }
 }
@@ -42,14 +42,14 @@ BodyContactTerm::BodyContactTerm(const Nodes& nodes, const std::vector<ContactSu
 bool BodyContactTerm::set_values(const Values& values) {
     std::vector<double> distances;
     for (std::size_t c = 0; c < laws_.size(); ++c) {
-        const Slots& slots = slots_[c];
+        const ParameterSlices& slices = slices_[c];
         BarrierLaw& law = laws_[c];
-        law.stiffness = values.number(slots.stiffness);
-        law.reach = values.number(slots.reach);
-        law.thickness = values.number(slots.distance);
-        law.smoothing = values.number(slots.smoothing);
-        friction_[c] = {values.number(slots.kinetic), values.number(slots.fixed),
-                        values.number(slots.sticking_speed)};
+        law.stiffness = values.number(slices.stiffness);
+        law.reach = values.number(slices.reach);
+        law.thickness = values.number(slices.distance);
+        law.smoothing = values.number(slices.smoothing);
+        friction_[c] = {values.number(slices.kinetic), values.number(slices.fixed),
+                        values.number(slices.sticking_speed)};
         if (!law.penalty) least_[c] = law.thickness;  // a penalty allows smaller distances
         distances.push_back(law.reach + law.thickness);
     }
@@ -168,14 +168,14 @@ std::pair<double, std::string> BodyContactTerm::nearest_neighbours(Index contact
     return {nearest->distance, candidates_.describe(nearest->near)};
 }
 
-double BodyContactTerm::energy(const double* q, const Controls&) const {
+double BodyContactTerm::energy(const double* q, const LoadParameters&) const {
     if (switched_off_) return 0.0;
     double total = 0.0;
     for (const ActiveContact& active : *found(q)) total += active.at.energy();
     return total;
 }
 
-void BodyContactTerm::evaluate(const double* q, const Controls&, Residual& out) {
+void BodyContactTerm::evaluate(const double* q, const LoadParameters&, Residual& out) {
     evaluated_contacts_ = switched_off_ ? std::make_shared<const std::vector<ActiveContact>>() : found(q);
     for (const ActiveContact& active : *evaluated_contacts_) {
         const PairVectors gradient = active.at.gradient();
@@ -190,7 +190,7 @@ void BodyContactTerm::set_extra_couplings(const std::vector<ActiveContact>& acti
     for (const ActiveContact& active : active_contacts) extra_couplings_.push_back(active.near.pair.nodes);
 }
 
-void BodyContactTerm::prepare_assembly(const double* q, const Controls&) {
+void BodyContactTerm::prepare_assembly(const double* q, const LoadParameters&) {
     // The layer is not used as long as there is no contact, because it more than doubles the work of a
     // factorization.
     constexpr int patience = 4;  // [-] assemblies without contact after which the layer is dropped
@@ -219,7 +219,7 @@ void BodyContactTerm::prepare_assembly(const double* q, const Controls&) {
     }
 }
 
-void BodyContactTerm::finish_assembly(const double*, const Controls&, SystemMatrix&) const {
+void BodyContactTerm::finish_assembly(const double*, const LoadParameters&, SystemMatrix&) const {
     for (const ActiveContact& active : evaluated_contacts()) {
         PairBlocks blocks;
         active.at.hessian(psd_projection_, blocks);
@@ -228,21 +228,21 @@ void BodyContactTerm::finish_assembly(const double*, const Controls&, SystemMatr
     }
 }
 
-void BodyContactTerm::vjp(const double*, const Controls&, const double* lambda, Gradient& out) {
+void BodyContactTerm::vjp(const double*, const LoadParameters&, const double* lambda, Gradient& out) {
     for (const ActiveContact& active : evaluated_contacts())
         add_vjp(active, active.at.vjp(positions_of(active.near.pair, lambda)), {}, out.values);
 }
 
 void BodyContactTerm::add_vjp(const ActiveContact& active, const PairEnergy::ByLaw& by,
                               const FrictionLaw& by_friction, VectorXd& by_values) const {
-    const Slots& slots = slots_[active.near.contact];
-    by_values[slots.stiffness.first] += by.stiffness;
-    by_values[slots.reach.first] += by.reach;
-    by_values[slots.distance.first] += by.thickness;
-    by_values[slots.smoothing.first] += by.smoothing;
-    by_values[slots.kinetic.first] += by_friction.kinetic;
-    by_values[slots.fixed.first] += by_friction.fixed;
-    by_values[slots.sticking_speed.first] += by_friction.sticking_speed;
+    const ParameterSlices& slices = slices_[active.near.contact];
+    by_values[slices.stiffness.first] += by.stiffness;
+    by_values[slices.reach.first] += by.reach;
+    by_values[slices.distance.first] += by.thickness;
+    by_values[slices.smoothing.first] += by.smoothing;
+    by_values[slices.kinetic.first] += by_friction.kinetic;
+    by_values[slices.fixed.first] += by_friction.fixed;
+    by_values[slices.sticking_speed.first] += by_friction.sticking_speed;
 }
 
 void BodyContactTerm::add_cancelling_normal_forces(VectorXd& out) const {

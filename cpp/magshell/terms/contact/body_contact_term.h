@@ -106,16 +106,18 @@ class BodyContactTerm final : public Term {
     double max_step_length(const double* q, const double* p) const override;
     std::string invalid_state_reason(const double* q) const override;
     bool depends_on_loads() const override { return false; }
-    double energy(const double* q, const Controls& controls) const override;
-    void evaluate(const double* q, const Controls& controls, Residual& out) override;
-    void prepare_assembly(const double* q, const Controls& controls) override;
-    void finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const override;
-    void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
+    double energy(const double* q, const LoadParameters& load_parameters) const override;
+    void evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) override;
+    void prepare_assembly(const double* q, const LoadParameters& load_parameters) override;
+    void finish_assembly(const double* q, const LoadParameters& load_parameters,
+                         SystemMatrix& out) const override;
+    void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
+             Gradient& out) override;
     std::size_t bytes() const override;
 
   private:
-    struct Slots {
-        Slot stiffness, reach, distance, smoothing, kinetic, fixed, sticking_speed;
+    struct ParameterSlices {
+        ParameterSlice stiffness, reach, distance, smoothing, kinetic, fixed, sticking_speed;
     };
 
     using ActiveContacts = std::shared_ptr<const std::vector<ActiveContact>>;
@@ -137,7 +139,7 @@ class BodyContactTerm final : public Term {
     template <class Found>
     void each_limit(const double* q, const double* p, const Found& found) const;
 
-    std::vector<Slots> slots_;
+    std::vector<ParameterSlices> slices_;
     std::vector<BarrierLaw> laws_;
     std::vector<FrictionLaw> friction_;
     std::vector<double> least_;  // minimum separation of each contact [m]

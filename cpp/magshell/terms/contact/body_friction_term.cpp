@@ -5,7 +5,7 @@
 
 namespace magshell {
 
-void BodyFrictionTerm::begin_step(const VectorXd& q, const Controls&) {
+void BodyFrictionTerm::begin_step(const VectorXd& q, const LoadParameters&) {
     before_.clear();
     if (std::none_of(lagged_.begin(), lagged_.end(), [](bool lagged) { return lagged; })) return;
     for (const ActiveContact& active : contact_.active_contacts(q.data()))
@@ -13,7 +13,7 @@ void BodyFrictionTerm::begin_step(const VectorXd& q, const Controls&) {
     contact_.set_extra_couplings(before_);
 }
 
-void BodyFrictionTerm::evaluate(const Kinematics& at, const Controls&, Residual& out) {
+void BodyFrictionTerm::evaluate(const Kinematics& at, const LoadParameters&, Residual& out) {
     friction_contacts_.clear();
     now_ = frozen_ ? frozen_contacts_ : contact_.evaluated_contacts();
     const auto add_friction = [&](const ActiveContact& active, bool lagged) {
@@ -36,12 +36,12 @@ void BodyFrictionTerm::set_frozen(bool frozen) {
     contact_.set_extra_couplings(frozen ? frozen_contacts_ : before_);
 }
 
-void BodyFrictionTerm::assemble(const Kinematics& at, const Controls&, bool convexified, SystemMatrix&,
-                                NonsymmetricTangent& rest) const {
+void BodyFrictionTerm::assemble(const Kinematics& at, const LoadParameters&, bool positive_definite,
+                                SystemMatrix&, NonsymmetricTangent& rest) const {
     for (const FrictionContact& each : friction_contacts_) {
         const std::array<Index, 4>& nodes = each.active->near.pair.nodes;
         contact_.layer().add(nodes, [&](int i, int j) -> Mat3 {
-            return -at.rate * each.friction.by_velocity(i, j, convexified);
+            return -at.rate * each.friction.by_velocity(i, j, positive_definite);
         });
         if (each.lagged || frozen_) continue;
         NonsymmetricTangent::PairBlock& pair = rest.append_pair();
@@ -57,8 +57,8 @@ void BodyFrictionTerm::add_stiffness(const Kinematics& at, std::vector<PairStiff
                        -at.rate * each.friction.friction().secant});
 }
 
-void BodyFrictionTerm::vjp(const Kinematics&, const Controls&, const VectorXd& lambda, KinematicsGradient& by,
-                           Gradient& out) const {
+void BodyFrictionTerm::vjp(const Kinematics&, const LoadParameters&, const VectorXd& lambda,
+                           KinematicsGradient& by, Gradient& out) const {
     for (const FrictionContact& each : friction_contacts_) {
         const ActiveContact& active = *each.active;
         const PairFriction::Gradient of = each.friction.vjp(positions_of(active.near.pair, lambda.data()));

@@ -22,13 +22,13 @@ class BodyFrictionTerm final : public ForceTerm {
 
     std::string_view name() const override { return "body friction"; }
     void set_values(const Values&) override {}  // the contact term reads them
-    void begin_step(const VectorXd& q, const Controls& controls) override;
-    void evaluate(const Kinematics& at, const Controls& controls, Residual& out) override;
-    void assemble(const Kinematics& at, const Controls& controls, bool convexified, SystemMatrix& out,
-                  NonsymmetricTangent& rest) const override;
+    void begin_step(const VectorXd& q, const LoadParameters& load_parameters) override;
+    void evaluate(const Kinematics& at, const LoadParameters& load_parameters, Residual& out) override;
+    void assemble(const Kinematics& at, const LoadParameters& load_parameters, bool positive_definite,
+                  SystemMatrix& out, NonsymmetricTangent& rest) const override;
     void add_stiffness(const Kinematics& at, std::vector<PairStiffness>& out) const override;
-    void vjp(const Kinematics& at, const Controls& controls, const VectorXd& lambda, KinematicsGradient& by,
-             Gradient& out) const override;
+    void vjp(const Kinematics& at, const LoadParameters& load_parameters, const VectorXd& lambda,
+             KinematicsGradient& by, Gradient& out) const override;
     void set_frozen(bool frozen) override;
     void add_cancelling_forces(const Kinematics& at, VectorXd& out) const override;
 

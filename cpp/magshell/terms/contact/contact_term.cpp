@@ -48,11 +48,11 @@ bool passes(const Obstacle& shape, const Vec3& from, const Vec3& to) {
 
 }  // namespace
 
-Pack33 to_pack(const Mat3& block) {
-    Pack33 pack;
+SimdMat3 to_simd(const Mat3& block) {
+    SimdMat3 group;
     for (int r = 0; r < 3; ++r)
-        for (int c = 0; c < 3; ++c) pack.at[3 * r + c] = Pack(block(r, c));
-    return pack;
+        for (int c = 0; c < 3; ++c) group.at[3 * r + c] = SimdDouble(block(r, c));
+    return group;
 }
 
 ContactTerm::ContactTerm(const Nodes& nodes, const SystemMatrix& matrix,
@@ -84,9 +84,9 @@ ContactTerm::ContactTerm(const Nodes& nodes, const SystemMatrix& matrix,
     for (const std::shared_ptr<const Obstacle>& shape : obstacles) {
         const std::string owner = "obstacle " + std::to_string(obstacles_.size());
         obstacles_.push_back({shape, {}});
-        obstacle_slots_.push_back({registry.values.add(owner, "center", "m", 1, 3),
-                                   registry.values.add(owner, "rotation", "rad", 1, 3),
-                                   registry.controls.add(owner, "pose", "SI", 4, 3)});
+        obstacle_slices_.push_back({registry.values.add(owner, "center", "m", 1, 3),
+                                    registry.values.add(owner, "rotation", "rad", 1, 3),
+                                    registry.load_parameters.add(owner, "pose", "SI", 4, 3)});
     }
 }
 
@@ -98,45 +98,45 @@ bool ContactTerm::set_values(const Values& values) {
                     values.number(contact.sticking_speed)};
     }
     for (std::size_t o = 0; o < obstacles_.size(); ++o)
-        obstacles_[o].placement = {values.vector(obstacle_slots_[o].center),
-                                   values.vector(obstacle_slots_[o].rotation)};
+        obstacles_[o].placement = {values.vector(obstacle_slices_[o].center),
+                                   values.vector(obstacle_slices_[o].rotation)};
     return false;  // none of its forces cancel in add_cancelling_forces
 }
 
-ObstacleState ContactTerm::obstacle_state(Index obstacle, const Controls& controls) const {
-    const Slot& pose = obstacle_slots_[obstacle].pose;
-    const auto row = [&](Index k) -> Vec3 { return controls.segment<3>(pose.at(k)); };
+ObstacleState ContactTerm::obstacle_state(Index obstacle, const LoadParameters& load_parameters) const {
+    const ParameterSlice& pose = obstacle_slices_[obstacle].pose;
+    const auto row = [&](Index k) -> Vec3 { return load_parameters.segment<3>(pose.at(k)); };
     return {obstacles_[obstacle], ObstaclePose{row(0), row(1), row(2), row(3)}};
 }
 
 void ContactTerm::add_vjp(const ActiveContact& active, double by_force, const ContactLaw& by_friction,
                           const ObstacleGradient& by_obstacle, VectorXd& by_values,
-                          Controls& by_controls) const {
+                          LoadParameters& by_load_parameters) const {
     const Contact& contact = contacts_[active.contact];
     by_values[contact.stiffness.first] += by_force * active.force / law(active).stiffness;
     by_values[contact.smoothing.first] += by_force * active.by_smoothing;
     by_values[contact.offset.first] += by_force * active.stiffness;
     by_values[contact.friction.first] += by_friction.friction;
     by_values[contact.sticking_speed.first] += by_friction.sticking_speed;
-    const ObstacleSlots& obstacle = obstacle_slots_[active.obstacle];
+    const ObstacleSlices& obstacle = obstacle_slices_[active.obstacle];
     by_values.segment<3>(obstacle.center.first) += by_obstacle.placement.center;
     by_values.segment<3>(obstacle.rotation.first) += by_obstacle.placement.rotation_vector;
-    const auto by_row = [&](Index k) { return by_controls.segment<3>(obstacle.pose.at(k)); };
+    const auto by_row = [&](Index k) { return by_load_parameters.segment<3>(obstacle.pose.at(k)); };
     by_row(0) += by_obstacle.pose.displacement;
     by_row(1) += by_obstacle.pose.rotation_vector;
     by_row(2) += by_obstacle.pose.velocity;
     by_row(3) += by_obstacle.pose.spin;
 }
 
-std::vector<ContactTerm::ActiveContact> ContactTerm::active_contacts(const double* q,
-                                                                     const Controls& controls) const {
+std::vector<ContactTerm::ActiveContact> ContactTerm::active_contacts(
+    const double* q, const LoadParameters& load_parameters) const {
     std::vector<ActiveContact> all;
     for (std::size_t c = 0; c < contacts_.size(); ++c) {
         const Contact& contact = contacts_[c];
         const ContactLaw& law = laws_[c];
         const Index count = static_cast<Index>(contact.points.size());
         for (const Index o : contact.obstacles) {
-            const ObstacleState obstacle = obstacle_state(o, controls);
+            const ObstacleState obstacle = obstacle_state(o, load_parameters);
             std::vector<std::vector<ActiveContact>> found((count + block_length - 1) / block_length);
             parallel_for(static_cast<int>(found.size()), [&](int block) {
                 const Index first = block * block_length, last = std::min(count, first + block_length);
@@ -158,16 +158,16 @@ std::vector<ContactTerm::ActiveContact> ContactTerm::active_contacts(const doubl
     return all;
 }
 
-Index ContactTerm::passes_through(const VectorXd& q, const Controls& controls, const VectorXd& end,
-                                  const Controls& controls_at_end) const {
-    return passes_between(own_places(q, controls), own_places(end, controls_at_end));
+Index ContactTerm::passes_through(const VectorXd& q, const LoadParameters& load_parameters,
+                                  const VectorXd& end, const LoadParameters& load_parameters_at_end) const {
+    return passes_between(own_positions(q, load_parameters), own_positions(end, load_parameters_at_end));
 }
 
-std::vector<Vec3> ContactTerm::own_places(const VectorXd& q, const Controls& controls) const {
+std::vector<Vec3> ContactTerm::own_positions(const VectorXd& q, const LoadParameters& load_parameters) const {
     std::vector<Vec3> places;
     for (const Contact& contact : contacts_)
         for (const Index o : contact.obstacles) {
-            const ObstacleState obstacle = obstacle_state(o, controls);
+            const ObstacleState obstacle = obstacle_state(o, load_parameters);
             for (const ContactPoint& point : contact.points)
                 places.push_back(obstacle.own(weighted(point, q.data())));
         }
@@ -185,11 +185,11 @@ Index ContactTerm::passes_between(const std::vector<Vec3>& before, const std::ve
     return -1;
 }
 
-std::vector<Vec3> ContactTerm::rotation_vectors(const Controls& controls) const {
+std::vector<Vec3> ContactTerm::rotation_vectors(const LoadParameters& load_parameters) const {
     std::vector<Vec3> all;
     for (std::size_t o = 0; o < obstacles_.size(); ++o) {
         all.push_back(obstacles_[o].placement.rotation_vector);
-        all.push_back(controls.segment<3>(obstacle_slots_[o].pose.at(1)));
+        all.push_back(load_parameters.segment<3>(obstacle_slices_[o].pose.at(1)));
     }
     return all;
 }
@@ -227,18 +227,18 @@ void ContactTerm::add_block(const ActiveContact& active, const Mat3& block, Syst
     const Contact& contact = contacts_[active.contact];
     const ContactPoint& p = point(active);
     if (active.point < contact.first_on_face) {
-        out.add_diagonal_block(p.nodes[0], to_pack(block), 0);
+        out.add_diagonal_block(p.nodes[0], to_simd(block), 0);
         return;
     }
-    Pack33 blocks[6];
+    SimdMat3 blocks[6];
     for (int i = 0; i < 3; ++i)
-        for (int j = 0; j <= i; ++j) blocks[lower_index(i, j)] = to_pack(p.weights[i] * p.weights[j] * block);
+        for (int j = 0; j <= i; ++j) blocks[lower_index(i, j)] = to_simd(p.weights[i] * p.weights[j] * block);
     scatter_blocks<3>(out, p.nodes, contact.slots[active.point - contact.first_on_face], blocks, 0);
 }
 
-double ContactTerm::energy(const double* q, const Controls& controls) const {
+double ContactTerm::energy(const double* q, const LoadParameters& load_parameters) const {
     double total = 0.0;
-    for (const ActiveContact& active : active_contacts(q, controls)) {
+    for (const ActiveContact& active : active_contacts(q, load_parameters)) {
         const ContactLaw& of = law(active);
         total += of.stiffness * Penalty(of.offset - active.at.value, of.smoothing).energy;
     }
@@ -265,13 +265,13 @@ void ContactTerm::add_contact_stiffness(VectorXd& of_nodes) const {
     }
 }
 
-void ContactTerm::evaluate(const double* q, const Controls& controls, Residual& out) {
-    evaluated_contacts_ = switched_off_ ? std::vector<ActiveContact>() : active_contacts(q, controls);
+void ContactTerm::evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) {
+    evaluated_contacts_ = switched_off_ ? std::vector<ActiveContact>() : active_contacts(q, load_parameters);
     for (const ActiveContact& active : evaluated_contacts_)
         distribute(active, -active.force * active.at.normal, out);
 }
 
-void ContactTerm::finish_assembly(const double*, const Controls&, SystemMatrix& out) const {
+void ContactTerm::finish_assembly(const double*, const LoadParameters&, SystemMatrix& out) const {
     for (const ActiveContact& active : evaluated_contacts_) {
         const Distance& at = active.at;
         add_block(active, active.stiffness * at.normal * at.normal.transpose() - active.force * at.curvature,
@@ -280,15 +280,16 @@ void ContactTerm::finish_assembly(const double*, const Controls&, SystemMatrix& 
 }
 
 // The gradient of the energy is g = - N n.
-void ContactTerm::vjp(const double*, const Controls& controls, const double* lambda, Gradient& out) {
+void ContactTerm::vjp(const double*, const LoadParameters& load_parameters, const double* lambda,
+                      Gradient& out) {
     for (const ActiveContact& active : evaluated_contacts_) {
         const Vec3 along = at_point(active, lambda);
         const double by_force = -along.dot(active.at.normal);
         ObstacleGradient by_obstacle;
-        obstacle_state(active.obstacle, controls)
+        obstacle_state(active.obstacle, load_parameters)
             .vjp(active.position, active.at, -active.stiffness * by_force, -active.force * along,
                  Vec3::Zero(), by_obstacle);
-        add_vjp(active, by_force, {}, by_obstacle, out.values, out.controls);
+        add_vjp(active, by_force, {}, by_obstacle, out.values, out.load_parameters);
     }
 }
 

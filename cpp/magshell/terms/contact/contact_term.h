@@ -27,8 +27,8 @@ struct ContactInput {
          lagged = false;  // lagged: friction uses the normal forces of the beginning of the step
 };
 
-/// Returns a pack that holds the same 3x3 block in every lane.
-Pack33 to_pack(const Mat3& block);
+/// Returns a SIMD vector that holds the same 3x3 block in every lane.
+SimdMat3 to_simd(const Mat3& block);
 
 class ContactTerm final : public Term {
   public:
@@ -58,34 +58,35 @@ class ContactTerm final : public Term {
     void set_switched_off(bool off) { switched_off_ = off; }
 
     /// Returns the points in contact at q, in the order of contacts, obstacles and points.
-    std::vector<ActiveContact> active_contacts(const double* q, const Controls& controls) const;
+    std::vector<ActiveContact> active_contacts(const double* q, const LoadParameters& load_parameters) const;
     /// Returns the points in contact at the last evaluated state.
     const std::vector<ActiveContact>& evaluated_contacts() const { return evaluated_contacts_; }
 
     /// Returns the first vertex of a point that passes through an obstacle: on its straight path from q to
     /// `end`, in the frame of the obstacle, it enters on one side and leaves on another. Returns -1 if there is
     /// none.
-    Index passes_through(const VectorXd& q, const Controls& controls, const VectorXd& end,
-                         const Controls& controls_at_end) const;
+    Index passes_through(const VectorXd& q, const LoadParameters& load_parameters, const VectorXd& end,
+                         const LoadParameters& load_parameters_at_end) const;
 
     /// Returns every point of every contact in the own frame of each of its obstacles, where these stand now [m].
-    std::vector<Vec3> own_places(const VectorXd& q, const Controls& controls) const;
+    std::vector<Vec3> own_positions(const VectorXd& q, const LoadParameters& load_parameters) const;
     /// Returns the first vertex of a point that comes out on another side of an obstacle than it went in, on its straight way
     /// between two such places; -1 where none does.
     Index passes_between(const std::vector<Vec3>& before, const std::vector<Vec3>& after) const;
     /// Returns the rotation vectors of each obstacle, by its placement and by its pose [rad].
-    std::vector<Vec3> rotation_vectors(const Controls& controls) const;
+    std::vector<Vec3> rotation_vectors(const LoadParameters& load_parameters) const;
 
     const ContactPoint& point(const ActiveContact& active) const {
         return contacts_[active.contact].points[active.point];
     }
     const ContactLaw& law(const ActiveContact& active) const { return laws_[active.contact]; }
-    ObstacleState obstacle_state(Index obstacle, const Controls& controls) const;
+    ObstacleState obstacle_state(Index obstacle, const LoadParameters& load_parameters) const;
     /// Adds the gradient of a function of a point's normal force and friction, given its derivatives by the
     /// normal force, by the friction law and by the obstacle. Gradients by the obstacle's pose go to
-    /// `by_controls`, which belong to the time at which the obstacle had that pose.
+    /// `by_load_parameters`, which belong to the time at which the obstacle had that pose.
     void add_vjp(const ActiveContact& active, double by_force, const ContactLaw& by_friction,
-                 const ObstacleGradient& by_obstacle, VectorXd& by_values, Controls& by_controls) const;
+                 const ObstacleGradient& by_obstacle, VectorXd& by_values,
+                 LoadParameters& by_load_parameters) const;
 
     /// Adds a symmetric block between the nodes of a point, weighted by their shape functions.
     void add_block(const ActiveContact& active, const Mat3& block, SystemMatrix& out) const;
@@ -102,10 +103,12 @@ class ContactTerm final : public Term {
 
     std::string_view name() const override { return "contact"; }
     bool depends_on_loads() const override { return false; }
-    double energy(const double* q, const Controls& controls) const override;
-    void evaluate(const double* q, const Controls& controls, Residual& out) override;
-    void finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const override;
-    void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
+    double energy(const double* q, const LoadParameters& load_parameters) const override;
+    void evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) override;
+    void finish_assembly(const double* q, const LoadParameters& load_parameters,
+                         SystemMatrix& out) const override;
+    void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
+             Gradient& out) override;
     std::size_t bytes() const override;
 
   private:
@@ -114,17 +117,17 @@ class ContactTerm final : public Term {
         std::vector<ContactPoint> points;  // in the core's numbering of nodes
         std::vector<PairSlots<3>> slots;   // for points on faces, which come last
         Index first_on_face = 0;
-        Slot stiffness, smoothing, offset, friction, sticking_speed;
+        ParameterSlice stiffness, smoothing, offset, friction, sticking_speed;
     };
-    struct ObstacleSlots {
-        Slot center, rotation;
-        Slot pose;  // a load parameter
+    struct ObstacleSlices {
+        ParameterSlice center, rotation;
+        ParameterSlice pose;  // a load parameter
     };
 
     std::vector<Contact> contacts_;
     std::vector<ContactLaw> laws_;
     std::vector<PositionedObstacle> obstacles_;
-    std::vector<ObstacleSlots> obstacle_slots_;
+    std::vector<ObstacleSlices> obstacle_slices_;
     std::vector<ActiveContact> evaluated_contacts_;
     bool switched_off_ = false;
 };

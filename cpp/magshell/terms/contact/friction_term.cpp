@@ -20,19 +20,19 @@ Mat3 by_position(const Friction& friction, const ContactTerm::ActiveContact& act
 
 }  // namespace
 
-void FrictionTerm::begin_step(const VectorXd& q, const Controls& controls) {
+void FrictionTerm::begin_step(const VectorXd& q, const LoadParameters& load_parameters) {
     before_.clear();
-    controls_before_ = controls;
+    load_parameters_before_ = load_parameters;
     if (std::none_of(lagged_.begin(), lagged_.end(), [](bool lagged) { return lagged; })) return;
-    for (const ContactTerm::ActiveContact& active : contact_.active_contacts(q.data(), controls))
+    for (const ContactTerm::ActiveContact& active : contact_.active_contacts(q.data(), load_parameters))
         if (lagged_[active.contact]) before_.push_back(active);
 }
 
-void FrictionTerm::evaluate(const Kinematics& at, const Controls& controls, Residual& out) {
+void FrictionTerm::evaluate(const Kinematics& at, const LoadParameters& load_parameters, Residual& out) {
     friction_contacts_.clear();
     const auto add_friction = [&](const ContactTerm::ActiveContact& active, bool lagged) {
         const ObstacleState obstacle =
-            contact_.obstacle_state(active.obstacle, lagged ? controls_before_ : controls);
+            contact_.obstacle_state(active.obstacle, lagged ? load_parameters_before_ : load_parameters);
         const Vec3 velocity = contact_.at_point(active, at.v.data()) - obstacle.velocity(active.position);
         const ContactLaw& law = contact_.law(active);
         friction_contacts_.push_back(
@@ -52,11 +52,11 @@ void FrictionTerm::set_frozen(bool frozen) {
     frozen_ = frozen;
 }
 
-void FrictionTerm::assemble(const Kinematics& at, const Controls&, bool convexified, SystemMatrix& out,
-                            NonsymmetricTangent& rest) const {
+void FrictionTerm::assemble(const Kinematics& at, const LoadParameters&, bool positive_definite,
+                            SystemMatrix& out, NonsymmetricTangent& rest) const {
     for (const FrictionContact& each : friction_contacts_) {
         const double coefficient = contact_.law(each.active).friction;
-        const Mat3& by_velocity = convexified ? each.friction.secant : each.friction.by_velocity;
+        const Mat3& by_velocity = positive_definite ? each.friction.secant : each.friction.by_velocity;
         contact_.add_block(each.active, -coefficient * at.rate * by_velocity, out);
         if (each.lagged || frozen_) continue;
         const Mat3 block = -coefficient * by_position(each.friction, each.active, each.obstacle.spin());
@@ -71,8 +71,8 @@ void FrictionTerm::assemble(const Kinematics& at, const Controls&, bool convexif
     }
 }
 
-void FrictionTerm::vjp(const Kinematics&, const Controls&, const VectorXd& lambda, KinematicsGradient& by,
-                       Gradient& out) const {
+void FrictionTerm::vjp(const Kinematics&, const LoadParameters&, const VectorXd& lambda,
+                       KinematicsGradient& by, Gradient& out) const {
     for (const FrictionContact& each : friction_contacts_) {
         const ContactTerm::ActiveContact& active = each.active;
         const Friction& friction = each.friction;
@@ -92,7 +92,8 @@ void FrictionTerm::vjp(const Kinematics&, const Controls&, const VectorXd& lambd
         contact_.add_vjp(active, by_force,
                          {.friction = -along.dot(friction.force),
                           .sticking_speed = -law.friction * along.dot(friction.by_sticking_speed)},
-                         by_obstacle, out.values, each.lagged ? by.begin_controls : out.controls);
+                         by_obstacle, out.values,
+                         each.lagged ? by.begin_load_parameters : out.load_parameters);
     }
 }
 

@@ -20,12 +20,12 @@ class FrictionTerm final : public ForceTerm {
 
     std::string_view name() const override { return "friction"; }
     void set_values(const Values&) override {}  // the contact term reads them
-    void begin_step(const VectorXd& q, const Controls& controls) override;
-    void evaluate(const Kinematics& at, const Controls& controls, Residual& out) override;
-    void assemble(const Kinematics& at, const Controls& controls, bool convexified, SystemMatrix& out,
-                  NonsymmetricTangent& rest) const override;
-    void vjp(const Kinematics& at, const Controls& controls, const VectorXd& lambda, KinematicsGradient& by,
-             Gradient& out) const override;
+    void begin_step(const VectorXd& q, const LoadParameters& load_parameters) override;
+    void evaluate(const Kinematics& at, const LoadParameters& load_parameters, Residual& out) override;
+    void assemble(const Kinematics& at, const LoadParameters& load_parameters, bool positive_definite,
+                  SystemMatrix& out, NonsymmetricTangent& rest) const override;
+    void vjp(const Kinematics& at, const LoadParameters& load_parameters, const VectorXd& lambda,
+             KinematicsGradient& by, Gradient& out) const override;
     /// Freezes normal forces and normals. Friction is then the gradient of a convex potential of the
     /// velocities.
     void set_frozen(bool frozen) override;
@@ -44,7 +44,7 @@ class FrictionTerm final : public ForceTerm {
     std::vector<ContactTerm::ActiveContact> before_;  // lagged contacts at the beginning of the step
     std::vector<ContactTerm::ActiveContact> frozen_contacts_;
     bool frozen_ = false;
-    Controls controls_before_;
+    LoadParameters load_parameters_before_;
     std::vector<FrictionContact> friction_contacts_;  // at the last evaluated state
 };
 

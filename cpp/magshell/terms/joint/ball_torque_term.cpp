@@ -7,13 +7,13 @@ namespace magshell {
 BallTorqueTerm::BallTorqueTerm(const std::vector<Input>& joints, const std::vector<Vec3>& rest,
                                Registry& registry) {
     for (const Input& input : joints) {
-        const Slot slot = registry.values.add(input.owner, "torque", "N m", 1, 3);
+        const ParameterSlice slice = registry.values.add(input.owner, "torque", "N m", 1, 3);
         for (const Index* corners : {input.child, input.parent}) {
             if (!corners) continue;
             Side& side = sides_.emplace_back();
             std::copy_n(corners, 4, side.corners.begin());
             side.sign = corners == input.child ? 1.0 : -1.0;
-            side.slot = slot;
+            side.slice = slice;
             double squares = 0.0;  // sum over six edges, 8 l^2 each
             for (int i = 0; i < 4; ++i)
                 for (int j = 0; j < i; ++j) squares += (rest[corners[i]] - rest[corners[j]]).squaredNorm();
@@ -23,7 +23,7 @@ BallTorqueTerm::BallTorqueTerm(const std::vector<Input>& joints, const std::vect
 }
 
 bool BallTorqueTerm::set_values(const Values& values) {
-    for (Side& side : sides_) side.moment = side.sign * side.share * values.vector(side.slot);
+    for (Side& side : sides_) side.moment = side.sign * side.share * values.vector(side.slice);
     return false;
 }
 
@@ -38,7 +38,7 @@ std::array<Vec3, 4> BallTorqueTerm::Side::arms(const double* q) const {
     return at;
 }
 
-void BallTorqueTerm::evaluate(const double* q, const Controls&, Residual& out) {
+void BallTorqueTerm::evaluate(const double* q, const LoadParameters&, Residual& out) {
     for (const Side& side : sides_) {
         const std::array<Vec3, 4> arms = side.arms(q);
         for (int k = 0; k < 4; ++k) {
@@ -48,7 +48,7 @@ void BallTorqueTerm::evaluate(const double* q, const Controls&, Residual& out) {
     }
 }
 
-void BallTorqueTerm::add_nonsymmetric_tangent(const double*, const Controls&,
+void BallTorqueTerm::add_nonsymmetric_tangent(const double*, const LoadParameters&,
                                               NonsymmetricTangent& out) const {
     for (const Side& side : sides_)
         for (int i = 0; i < 4; ++i)
@@ -57,11 +57,11 @@ void BallTorqueTerm::add_nonsymmetric_tangent(const double*, const Controls&,
                                                        ((i == j ? 0.75 : -0.25) * -side.moment).eval()});
 }
 
-void BallTorqueTerm::vjp(const double* q, const Controls&, const double* lambda, Gradient& out) {
+void BallTorqueTerm::vjp(const double* q, const LoadParameters&, const double* lambda, Gradient& out) {
     for (const Side& side : sides_) {
         const std::array<Vec3, 4> arms = side.arms(q);
         for (int k = 0; k < 4; ++k)
-            out.values.segment<3>(side.slot.first) -=
+            out.values.segment<3>(side.slice.first) -=
                 side.sign * side.share *
                 arms[k].cross(Vec3(Eigen::Map<const Vec3>(lambda + 3 * side.corners[k])));
     }

@@ -27,18 +27,19 @@ class BallTorqueTerm final : public Term {
     std::string_view name() const override { return "joints"; }
     bool set_values(const Values& values) override;
     bool depends_on_loads() const override { return false; }
-    double energy(const double*, const Controls&) const override { return 0.0; }
-    void evaluate(const double* q, const Controls& controls, Residual& out) override;
-    void add_nonsymmetric_tangent(const double* q, const Controls& controls,
+    double energy(const double*, const LoadParameters&) const override { return 0.0; }
+    void evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) override;
+    void add_nonsymmetric_tangent(const double* q, const LoadParameters& load_parameters,
                                   NonsymmetricTangent& out) const override;
-    void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
+    void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
+             Gradient& out) override;
     std::size_t bytes() const override { return sides_.capacity() * sizeof(Side); }
 
   private:
     struct Side {  // one of the two links of a joint
         std::array<Index, 4> corners;
         double sign, share;  // share: 1/(8 l^2)
-        Slot slot;
+        ParameterSlice slice;
         Vec3 moment = Vec3::Zero();
 
         std::array<Vec3, 4> arms(const double* q) const;

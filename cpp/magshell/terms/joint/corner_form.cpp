@@ -70,9 +70,9 @@ void LinkPair::add(const Eigen::Matrix<double, 8, 8>& h, const CornerForm::Corne
             if (cross != 0.0)
                 block += cross * (a.col(i) * b.col(j).transpose() + b.col(i) * a.col(j).transpose());
             if (i == j)
-                out.add_diagonal_block(nodes_[i], to_pack(block), 0);
+                out.add_diagonal_block(nodes_[i], to_simd(block), 0);
             else
-                out.add_block(slots_[i][j], out.column_length(std::min(nodes_[i], nodes_[j])), to_pack(block),
+                out.add_block(slots_[i][j], out.column_length(std::min(nodes_[i], nodes_[j])), to_simd(block),
                               0);
         }
 }

@@ -8,13 +8,13 @@ DamperTerm::DamperTerm(const std::vector<Input>& joints, const std::vector<Vec3>
                        const SystemMatrix& matrix, Registry& registry) {
     for (const Input& input : joints) {
         const LinkPair links(input.parent, input.child, rest, matrix);
-        const Slot slot = registry.values.add(input.owner, "damping", "SI", 1, 1);
+        const ParameterSlice slice = registry.values.add(input.owner, "damping", "SI", 1, 1);
         const bool length = input.joint.kind == JointKind::prismatic;
         const double reach = length ? links.reach() : 1.0 + links.reach() / links.length();
-        const Slot axis =
-            input.joint.has_axis() ? registry.values.add(input.owner, "axis", "1", 1, 3) : Slot{};
+        const ParameterSlice axis =
+            input.joint.has_axis() ? registry.values.add(input.owner, "axis", "1", 1, 3) : ParameterSlice{};
         const auto add = [&](const JointForm& form, double share) {
-            each_.push_back({links, form, share, slot, axis, input.joint, length,
+            each_.push_back({links, form, share, slice, axis, input.joint, length,
                              form.at(links.rest()).first.cwiseAbs(), reach});
         };
         if (input.joint.kind != JointKind::ball) {
@@ -32,8 +32,8 @@ DamperTerm::DamperTerm(const std::vector<Input>& joints, const std::vector<Vec3>
 bool DamperTerm::set_values(const Values& values) {
     bool changed = false;
     for (Each& each : each_) {
-        changed |= values.changed(each.slot);
-        each.damping = each.share * values.number(each.slot);
+        changed |= values.changed(each.slice);
+        each.damping = each.share * values.number(each.slice);
         if (each.axis.size() == 0 || !values.changed(each.axis)) continue;
         each.joint.axis = values.vector(each.axis);
         each.form = JointForm(each.joint, each.links);
@@ -47,7 +47,7 @@ double DamperTerm::stress_by_damping(std::size_t k, double strain) const {
     return history_.shift ? history_.scale * strain - history_.shift->number(static_cast<Index>(k), 0) : 0.0;
 }
 
-void DamperTerm::evaluate(const double* q, const Controls&, Residual& out) {
+void DamperTerm::evaluate(const double* q, const LoadParameters&, Residual& out) {
     for (std::size_t k = 0; k < each_.size(); ++k) {
         const Each& each = each_[k];
         const Corners at = each.links.positions(q);
@@ -59,7 +59,7 @@ void DamperTerm::evaluate(const double* q, const Controls&, Residual& out) {
     }
 }
 
-void DamperTerm::finish_assembly(const double*, const Controls&, SystemMatrix& out) const {
+void DamperTerm::finish_assembly(const double*, const LoadParameters&, SystemMatrix& out) const {
     if (!history_.shift) return;
     for (std::size_t k = 0; k < each_.size(); ++k) {
         const Each& each = each_[k];
@@ -70,11 +70,11 @@ void DamperTerm::finish_assembly(const double*, const Controls&, SystemMatrix& o
     }
 }
 
-void DamperTerm::vjp(const double*, const Controls&, const double* lambda, Gradient& out) {
+void DamperTerm::vjp(const double*, const LoadParameters&, const double* lambda, Gradient& out) {
     if (!history_.shift) return;
     const Strains along = strain_rates(lambda);
     for (std::size_t k = 0; k < each_.size(); ++k)
-        out.values[each_[k].slot.first] +=
+        out.values[each_[k].slice.first] +=
             each_[k].share * stress_by_damping(k, now_[k].value) * along.number(static_cast<Index>(k), 0);
 }
 

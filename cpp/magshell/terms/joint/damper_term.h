@@ -32,10 +32,12 @@ class DamperTerm final : public ElasticTerm {
 
     std::string_view name() const override { return "joints"; }
     bool set_values(const Values& values) override;
-    double energy(const double*, const Controls&) const override { return 0.0; }
-    void evaluate(const double* q, const Controls& controls, Residual& out) override;
-    void finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const override;
-    void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
+    double energy(const double*, const LoadParameters&) const override { return 0.0; }
+    void evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) override;
+    void finish_assembly(const double* q, const LoadParameters& load_parameters,
+                         SystemMatrix& out) const override;
+    void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
+             Gradient& out) override;
     std::vector<double> angle_branches() const override { return last_turn_; }
     void set_angle_branches(const std::vector<double>& angle_branches) override {
         last_turn_ = angle_branches;
@@ -65,8 +67,8 @@ class DamperTerm final : public ElasticTerm {
         LinkPair links;
         JointForm form;
         double share;  // fraction of the joint's damping
-        Slot slot;
-        Slot axis;  // if the joint has an axis
+        ParameterSlice slice;
+        ParameterSlice axis;  // if the joint has an axis
         Joint joint;
         bool length;
         JointForm::Corners at_rest;  // |ds/dx|

@@ -37,11 +37,11 @@ JointTerm::JointTerm(const std::vector<Input>& joints, const std::vector<Vec3>& 
             return registry.values.add(input.owner, name, unit, 1, width);
         };
         if (each.act == Act::closure) {
-            each.slots.push_back(add("stiffness", "N/m", 1));
+            each.slices.push_back(add("stiffness", "N/m", 1));
             each.geometry = add("origin", "m", 3);
         } else {
             for (const char* name : names_of(joint.kind, each.act))
-                each.slots.push_back(name ? add(name, "SI", 1) : Slot{});
+                each.slices.push_back(name ? add(name, "SI", 1) : ParameterSlice{});
             if (each.act == Act::ball_servo)
                 each.geometry = add("target_rotation", "rad", 3);
             else if (each.act == Act::cone || joint.has_axis())
@@ -77,9 +77,9 @@ void JointTerm::Each::find_form() {
 bool JointTerm::set_values(const Values& values) {
     bool changed = false;
     for (Each& each : each_) {
-        for (const Slot& slot : each.slots) changed |= slot.size() > 0 && values.changed(slot);
+        for (const ParameterSlice& slice : each.slices) changed |= slice.size() > 0 && values.changed(slice);
         const auto number = [&](int k) {
-            return each.slots[k].size() > 0 ? values.number(each.slots[k]) : 0.0;
+            return each.slices[k].size() > 0 ? values.number(each.slices[k]) : 0.0;
         };
         if (each.geometry.size() > 0 && values.changed(each.geometry)) {
             const Vec3 now = values.vector(each.geometry);
@@ -131,7 +131,7 @@ JointTerm::State JointTerm::state(std::size_t k, const double* q) const {
     return s;
 }
 
-double JointTerm::energy(const double* q, const Controls&) const {
+double JointTerm::energy(const double* q, const LoadParameters&) const {
     double total = 0.0;
     for (std::size_t k = 0; k < each_.size(); ++k) {
         const Corners at = each_[k].links.positions(q);
@@ -141,7 +141,7 @@ double JointTerm::energy(const double* q, const Controls&) const {
     return total;
 }
 
-void JointTerm::evaluate(const double* q, const Controls&, Residual& out) {
+void JointTerm::evaluate(const double* q, const LoadParameters&, Residual& out) {
     for (std::size_t k = 0; k < each_.size(); ++k) {
         const Each& each = each_[k];
         if (each.act == Act::closure) {
@@ -155,7 +155,7 @@ void JointTerm::evaluate(const double* q, const Controls&, Residual& out) {
     }
 }
 
-void JointTerm::finish_assembly(const double* q, const Controls&, SystemMatrix& out) const {
+void JointTerm::finish_assembly(const double* q, const LoadParameters&, SystemMatrix& out) const {
     for (std::size_t k = 0; k < each_.size(); ++k) {
         const Each& each = each_[k];
         if (each.act == Act::closure) {
@@ -181,7 +181,7 @@ void JointTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
     }
 }
 
-void JointTerm::vjp(const double* q, const Controls&, const double* lambda, Gradient& out) {
+void JointTerm::vjp(const double* q, const LoadParameters&, const double* lambda, Gradient& out) {
     for (std::size_t k = 0; k < each_.size(); ++k) {
         const Each& each = each_[k];
         const Corners rate = each.links.gather(lambda);
@@ -193,7 +193,7 @@ void JointTerm::vjp(const double* q, const Controls&, const double* lambda, Grad
         const double along = now.share * CornerForm::inner(now.form.first, rate);
         const JointEnergy law = law_at(each, now.coordinate);
         for (int n = 0; n < JointLaw::size; ++n)
-            if (each.slots[n].size() > 0) out.values[each.slots[n].first] += along * law.force_by[n];
+            if (each.slices[n].size() > 0) out.values[each.slices[n].first] += along * law.force_by[n];
         // Joint coordinates and their rates do not depend on the axis through the form alone; assembly/ adds
         // that part.
         if (each.act != Act::coordinate) geometry_vjp(each, now, q, rate, out);
@@ -203,7 +203,7 @@ void JointTerm::vjp(const double* q, const Controls&, const double* lambda, Grad
 void JointTerm::closure_vjp(const Each& each, const double* q, const Corners& rate, Gradient& out) const {
     const Corners at = each.links.positions(q);
     const Vec3 off = gap(each, at), along = rate * each.gap.weights;
-    out.values[each.slots[0].first] += off.dot(along);
+    out.values[each.slices[0].first] += off.dot(along);
     for (int c = 0; c < 3; ++c) {
         const CornerSum by = each.links.vector(true, Vec3::Unit(c)) - each.links.vector(false, Vec3::Unit(c));
         out.values[each.geometry.first + c] +=

@@ -34,11 +34,13 @@ class JointTerm final : public Term {
     std::string_view name() const override { return "joints"; }
     bool set_values(const Values& values) override;
     bool depends_on_loads() const override { return false; }
-    double energy(const double* q, const Controls& controls) const override;
-    void evaluate(const double* q, const Controls& controls, Residual& out) override;
-    void finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const override;
+    double energy(const double* q, const LoadParameters& load_parameters) const override;
+    void evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) override;
+    void finish_assembly(const double* q, const LoadParameters& load_parameters,
+                         SystemMatrix& out) const override;
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
-    void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
+    void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
+             Gradient& out) override;
     std::vector<double> angle_branches() const override { return last_turn_; }
     void set_angle_branches(const std::vector<double>& angle_branches) override {
         last_turn_ = angle_branches;
@@ -54,9 +56,10 @@ class JointTerm final : public Term {
         CornerSum gap;                // of a loop closure
         CornerForm::Corners at_rest;  // |d(form)/dx|; of a loop closure |d(gap)/dx|
         double reach;  // magnitude that round-off is proportional to: [m], or in link lengths for angles
-        double top = 0.0, cosine = 0.0;  // c; zero if the form is the coordinate itself
-        std::vector<Slot> slots;         // of the law; the stiffness of a loop closure
-        Slot geometry;  // parameter of the form: axis, origin of a loop closure, or a servo's target rotation
+        double top = 0.0, cosine = 0.0;      // c; zero if the form is the coordinate itself
+        std::vector<ParameterSlice> slices;  // of the law; the stiffness of a loop closure
+        ParameterSlice
+            geometry;  // parameter of the form: axis, origin of a loop closure, or a servo's target rotation
         Vec3 target_rotation = Vec3::Zero();  // rotation vector [rad]
         JointLaw law;
         double stiffness = 0.0;  // of a loop closure

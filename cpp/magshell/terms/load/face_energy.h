@@ -35,10 +35,10 @@ class FaceEnergyTerm final : public Term {
                    Registry& registry)
         : body_(body),
           loop_(loop),
-          factor_(registry.controls.add("scene", "load_factor", "1", 1, 1)),
-          inputs_(loop.packs()) {
+          factor_(registry.load_parameters.add("scene", "load_factor", "1", 1, 1)),
+          inputs_(loop.groups()) {
         for (const FaceInput& input : Kernel::inputs)
-            slots_.push_back(
+            slices_.push_back(
                 registry.values.add(owner, input.name, input.unit, surface.n_faces(), 1, &surface.faces));
     }
 
@@ -48,54 +48,55 @@ class FaceEnergyTerm final : public Term {
     bool set_values(const Values& values) override {
         bool changed = false;
         for (int k = 0; k < n_inputs; ++k) {
-            changed |= values.changed(slots_[k]);
-            for (Index pack = 0; pack < loop_.packs(); ++pack)
-                for (int lane = 0; lane < Pack::width; ++lane)
-                    inputs_[pack].of[k].set(lane, values.number(slots_[k], loop_.face(pack, lane)));
+            changed |= values.changed(slices_[k]);
+            for (Index group = 0; group < loop_.groups(); ++group)
+                for (int lane = 0; lane < SimdDouble::width; ++lane)
+                    inputs_[group].of[k].set(lane, values.number(slices_[k], loop_.face(group, lane)));
         }
         return changed;
     }
 
-    double energy(const double* q, const Controls& controls) const override {
-        return controls[factor_.first] *
-               loop_.sum([&](Index pack) { return kernel(pack, q).energy(inputs_[pack].of); });
+    double energy(const double* q, const LoadParameters& load_parameters) const override {
+        return load_parameters[factor_.first] *
+               loop_.sum([&](Index group) { return kernel(group, q).energy(inputs_[group].of); });
     }
 
-    void evaluate(const double* q, const Controls& controls, Residual& out) override {
-        const Pack factor(controls[factor_.first]);
-        loop_.scatter_packs([&](Index pack) {
-            Pack3 g[3];
-            kernel(pack, q).gradient(inputs_[pack].of, g);
-            for (Pack3& of_corner : g) of_corner = factor * of_corner;
-            loop_.scatter(pack, g, out);
+    void evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) override {
+        const SimdDouble factor(load_parameters[factor_.first]);
+        loop_.scatter_groups([&](Index group) {
+            SimdVec3 g[3];
+            kernel(group, q).gradient(inputs_[group].of, g);
+            for (SimdVec3& of_corner : g) of_corner = factor * of_corner;
+            loop_.scatter(group, g, out);
         });
     }
 
-    void assemble(const Chunk& chunk, const double* q, const Controls& controls, bool,
-                  SystemMatrix& out) const override {
-        const Pack factor(controls[factor_.first]);
-        FaceLoop::over_packs(chunk, [&](Index pack) {
-            Pack33 h[6];
-            kernel(pack, q).hessian(inputs_[pack].of, h);
-            for (Pack33& block : h) block = factor * block;
-            loop_.scatter(pack, h, out);
+    void assemble(const ElementBlock& element_block, const double* q, const LoadParameters& load_parameters,
+                  bool, SystemMatrix& out) const override {
+        const SimdDouble factor(load_parameters[factor_.first]);
+        FaceLoop::over_groups(element_block, [&](Index group) {
+            SimdMat3 h[6];
+            kernel(group, q).hessian(inputs_[group].of, h);
+            for (SimdMat3& block : h) block = factor * block;
+            loop_.scatter(group, h, out);
         });
     }
 
-    void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override {
-        const double factor = controls[factor_.first];
-        for (Index pack = 0; pack < loop_.packs(); ++pack) {
-            Pack3 rate[3], g[3];
-            loop_.gather(pack, lambda, rate);
-            const Kernel faces = kernel(pack, q);
-            Pack by_input[n_inputs];
-            faces.rate_by_inputs(inputs_[pack].of, rate, by_input);
-            faces.gradient(inputs_[pack].of, g);
-            const Pack along = dot(rate[0], g[0]) + dot(rate[1], g[1]) + dot(rate[2], g[2]);
-            for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+    void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
+             Gradient& out) override {
+        const double factor = load_parameters[factor_.first];
+        for (Index group = 0; group < loop_.groups(); ++group) {
+            SimdVec3 rate[3], g[3];
+            loop_.gather(group, lambda, rate);
+            const Kernel faces = kernel(group, q);
+            SimdDouble by_input[n_inputs];
+            faces.rate_by_inputs(inputs_[group].of, rate, by_input);
+            faces.gradient(inputs_[group].of, g);
+            const SimdDouble along = dot(rate[0], g[0]) + dot(rate[1], g[1]) + dot(rate[2], g[2]);
+            for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
                 for (int k = 0; k < n_inputs; ++k)
-                    out.values[slots_[k].at(loop_.face(pack, lane))] += factor * by_input[k][lane];
-                out.controls[factor_.first] += along[lane];
+                    out.values[slices_[k].at(loop_.face(group, lane))] += factor * by_input[k][lane];
+                out.load_parameters[factor_.first] += along[lane];
             }
         }
     }
@@ -104,19 +105,19 @@ class FaceEnergyTerm final : public Term {
 
   private:
     struct Inputs {
-        Pack of[n_inputs];
+        SimdDouble of[n_inputs];
     };
 
-    Kernel kernel(Index pack, const double* q) const {
-        Pack3 x[3];
-        loop_.gather(pack, q, x);
+    Kernel kernel(Index group, const double* q) const {
+        SimdVec3 x[3];
+        loop_.gather(group, q, x);
         return Kernel(x);
     }
 
     Index body_;
     const FaceLoop& loop_;
-    Slot factor_;
-    std::vector<Slot> slots_;
+    ParameterSlice factor_;
+    std::vector<ParameterSlice> slices_;
     std::vector<Inputs> inputs_;
 };
 

@@ -29,7 +29,7 @@ const typename Kernel::Coefficients& of_all_parts() {
 
 PressureTerm::PressureTerm(const std::vector<PressureInput>& inputs, const Nodes& nodes,
                            const SystemMatrix& matrix, Registry& registry)
-    : nodes_(nodes), factor_(registry.controls.add("scene", "load_factor", "1", 1, 1)) {
+    : nodes_(nodes), factor_(registry.load_parameters.add("scene", "load_factor", "1", 1, 1)) {
     for (const PressureInput& input : inputs) {
         const Index first = static_cast<Index>(pressures_.size());
         loads_.push_back({registry.values.add(input.owner, "pressure", "Pa", input.rows, 1), first});
@@ -53,7 +53,7 @@ void PressureTerm::add_face(const PressureInput& input, std::size_t face, Index 
         const Index row = input.row[parts * face + part];
         added.places[part] = row < 0 ? -1 : first + row;
     }
-    added.slots = pair_slots<N>(matrix, added.nodes);
+    added.slices = pair_slots<N>(matrix, added.nodes);
 }
 
 void PressureTerm::number_pairs() {
@@ -106,16 +106,16 @@ typename FacePressure<N>::Coefficients PressureTerm::Face<N>::coefficients(
 bool PressureTerm::set_values(const Values& values) {
     bool changed = false;
     for (const Load& load : loads_) {
-        changed |= values.changed(load.slot);
-        for (Index row = 0; row < load.slot.rows; ++row)
-            pressures_[load.first + row] = values.number(load.slot, row);
+        changed |= values.changed(load.slice);
+        for (Index row = 0; row < load.slice.rows; ++row)
+            pressures_[load.first + row] = values.number(load.slice, row);
     }
     return changed;
 }
 
 // Along the straight path from the reference shape the forces are quadratic in the path parameter s, which two
 // Gauss points integrate exactly.
-double PressureTerm::energy(const double* q, const Controls& controls) const {
+double PressureTerm::energy(const double* q, const LoadParameters& load_parameters) const {
     double sum = 0.0;
     each_face([&](const auto& face) {
         using Kernel = typename std::remove_cvref_t<decltype(face)>::Kernel;
@@ -131,11 +131,11 @@ double PressureTerm::energy(const double* q, const Controls& controls) const {
             for (std::size_t k = 0; k < now.size(); ++k) sum += 0.5 * g[k].dot(moved[k]);
         }
     });
-    return controls[factor_.first] * sum;
+    return load_parameters[factor_.first] * sum;
 }
 
-void PressureTerm::evaluate(const double* q, const Controls& controls, Residual& out) {
-    const double factor = controls[factor_.first];
+void PressureTerm::evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) {
+    const double factor = load_parameters[factor_.first];
     each_face([&](const auto& face) {
         using Kernel = typename std::remove_cvref_t<decltype(face)>::Kernel;
         const auto g = Kernel::forces(face.coefficients(pressures_), Kernel::relative(face.at(q)));
@@ -144,24 +144,25 @@ void PressureTerm::evaluate(const double* q, const Controls& controls, Residual&
     });
 }
 
-void PressureTerm::finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const {
-    const double factor = controls[factor_.first];
+void PressureTerm::finish_assembly(const double* q, const LoadParameters& load_parameters,
+                                   SystemMatrix& out) const {
+    const double factor = load_parameters[factor_.first];
     if (factor == 0.0) return;
     each_face([&](const auto& face) {
         using Kernel = typename std::remove_cvref_t<decltype(face)>::Kernel;
         constexpr int n = std::tuple_size_v<typename Kernel::Corners>;
         const auto c = Kernel::axes(face.coefficients(pressures_), Kernel::relative(face.at(q)));
-        Pack33 blocks[n * (n + 1) / 2]{};
+        SimdMat3 blocks[n * (n + 1) / 2]{};
         for (int k = 1; k < n; ++k)
             for (int l = 0; l < k; ++l)
                 set_skew(blocks[lower_index(k, l)], -0.5 * factor * (c[k][l] - c[l][k]));
-        scatter_blocks<n>(out, face.nodes, face.slots, blocks, 0);
+        scatter_blocks<n>(out, face.nodes, face.slices, blocks, 0);
     });
 }
 
-void PressureTerm::add_nonsymmetric_tangent(const double* q, const Controls& controls,
+void PressureTerm::add_nonsymmetric_tangent(const double* q, const LoadParameters& load_parameters,
                                             NonsymmetricTangent& out) const {
-    const double factor = controls[factor_.first];
+    const double factor = load_parameters[factor_.first];
     if (factor == 0.0) return;
     std::vector<Vec3> axes(pairs_.size(), Vec3::Zero());
     std::vector<double> negligible(pairs_.size(), 0.0);
@@ -188,8 +189,9 @@ void PressureTerm::add_nonsymmetric_tangent(const double* q, const Controls& con
         if (axes[k].norm() > negligible[k]) out.add({pairs_[k], factor * axes[k]});
 }
 
-void PressureTerm::vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) {
-    const double factor = controls[factor_.first];
+void PressureTerm::vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
+                       Gradient& out) {
+    const double factor = load_parameters[factor_.first];
     std::vector<double> by_pressure(pressures_.size(), 0.0);
     each_face([&](const auto& face) {
         using Kernel = typename std::remove_cvref_t<decltype(face)>::Kernel;
@@ -201,10 +203,10 @@ void PressureTerm::vjp(const double* q, const Controls& controls, const double* 
         }
     });
     for (const Load& load : loads_)
-        for (Index row = 0; row < load.slot.rows; ++row) {
+        for (Index row = 0; row < load.slice.rows; ++row) {
             const double by = by_pressure[load.first + row];
-            out.values[load.slot.at(row)] += factor * by;
-            out.controls[factor_.first] += pressures_[load.first + row] * by;
+            out.values[load.slice.at(row)] += factor * by;
+            out.load_parameters[factor_.first] += pressures_[load.first + row] * by;
         }
 }
 

@@ -33,12 +33,14 @@ class PressureTerm final : public Term {
 
     std::string_view name() const override { return "pressure"; }
     bool set_values(const Values& values) override;
-    double energy(const double* q, const Controls& controls) const override;
-    void evaluate(const double* q, const Controls& controls, Residual& out) override;
-    void finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const override;
-    void add_nonsymmetric_tangent(const double* q, const Controls& controls,
+    double energy(const double* q, const LoadParameters& load_parameters) const override;
+    void evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) override;
+    void finish_assembly(const double* q, const LoadParameters& load_parameters,
+                         SystemMatrix& out) const override;
+    void add_nonsymmetric_tangent(const double* q, const LoadParameters& load_parameters,
                                   NonsymmetricTangent& out) const override;
-    void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
+    void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
+             Gradient& out) override;
     std::size_t bytes() const override;
 
   private:
@@ -48,7 +50,7 @@ class PressureTerm final : public Term {
 
         std::array<Index, N> nodes;
         std::array<Index, Kernel::parts> places;  // index among the pressures of all loads; negative: none
-        PairSlots<N> slots;
+        PairSlots<N> slices;
         std::array<Index, N*(N + 1) / 2> pairs;  // pairs of nodes, at lower_index
 
         typename Kernel::Corners at(const double* q) const;
@@ -57,7 +59,7 @@ class PressureTerm final : public Term {
     };
     /// The pressures of one load.
     struct Load {
-        Slot slot;
+        ParameterSlice slice;
         Index first;
     };
 
@@ -75,7 +77,7 @@ class PressureTerm final : public Term {
     }
 
     const Nodes& nodes_;
-    Slot factor_;
+    ParameterSlice factor_;
     std::vector<Load> loads_;
     std::vector<double> pressures_;  // [Pa], of all loads
     std::tuple<std::vector<Face<3>>, std::vector<Face<6>>> faces_;

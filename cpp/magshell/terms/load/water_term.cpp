@@ -32,26 +32,26 @@ Drag WaterTerm::drag(const Kinematics& at, Index face) const {
     return {water_, corners_of(nodes, at.q), corners_of(nodes, at.v), corners_of(nodes, at.w)};
 }
 
-void WaterTerm::evaluate(const Kinematics& at, const Controls&, Residual& out) {
-    loop_.scatter_packs([&](Index pack) {
-        Pack3 g[3];
-        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane)
-            set_lane(g[0], lane, Vec3(-drag(at, loop_.face(pack, lane)).corner_force()));
+void WaterTerm::evaluate(const Kinematics& at, const LoadParameters&, Residual& out) {
+    loop_.scatter_groups([&](Index group) {
+        SimdVec3 g[3];
+        for (int lane = 0; lane < loop_.lanes_in(group); ++lane)
+            set_lane(g[0], lane, Vec3(-drag(at, loop_.face(group, lane)).corner_force()));
         g[1] = g[2] = g[0];
-        loop_.scatter(pack, g, out);
+        loop_.scatter(group, g, out);
     });
 }
 
 // All corners of a face have the same force. The symmetric part of its derivative by the motion of the face as
 // a whole goes into the system matrix, which stays positive definite; the rest goes into the nonsymmetric
 // tangent.
-void WaterTerm::assemble(const Kinematics& at, const Controls&, bool, SystemMatrix& out,
+void WaterTerm::assemble(const Kinematics& at, const LoadParameters&, bool, SystemMatrix& out,
                          NonsymmetricTangent& rest) const {
     NonsymmetricTangent::FaceBlock* const shared = rest.append_face_blocks(surface_.n_faces());
-    loop_.scatter_packs([&](Index pack) {
-        Pack33 h[6];
-        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
-            const Index f = loop_.face(pack, lane);
+    loop_.scatter_groups([&](Index group) {
+        SimdMat3 h[6];
+        for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+            const Index f = loop_.face(group, lane);
             const Drag::Jacobian jacobian = drag(at, f).corner_jacobian();
             const Mat3 by_motion =
                 (-at.rate / 3.0) * (jacobian.by_velocity + at.rate * jacobian.by_acceleration);
@@ -65,12 +65,12 @@ void WaterTerm::assemble(const Kinematics& at, const Controls&, bool, SystemMatr
                 left.block.middleCols<3>(3 * k) = by_motion - symmetric - jacobian.by_position[k];
         }
         for (int k = 1; k < 6; ++k) h[k] = h[0];
-        loop_.scatter(pack, h, out);
+        loop_.scatter(group, h, out);
     });
 }
 
-void WaterTerm::vjp(const Kinematics& at, const Controls&, const VectorXd& lambda, KinematicsGradient& by,
-                    Gradient& out) const {
+void WaterTerm::vjp(const Kinematics& at, const LoadParameters&, const VectorXd& lambda,
+                    KinematicsGradient& by, Gradient& out) const {
     Drag::Gradient sum;
     for (Index f = 0; f < surface_.n_faces(); ++f) {
         const Drag face = drag(at, f);

@@ -17,18 +17,18 @@ class WaterTerm final : public ForceTerm {
 
     std::string_view name() const override { return "water"; }
     void set_values(const Values& values) override;
-    void evaluate(const Kinematics& at, const Controls& controls, Residual& out) override;
-    void assemble(const Kinematics& at, const Controls& controls, bool convexified, SystemMatrix& out,
-                  NonsymmetricTangent& rest) const override;
-    void vjp(const Kinematics& at, const Controls& controls, const VectorXd& lambda, KinematicsGradient& by,
-             Gradient& out) const override;
+    void evaluate(const Kinematics& at, const LoadParameters& load_parameters, Residual& out) override;
+    void assemble(const Kinematics& at, const LoadParameters& load_parameters, bool positive_definite,
+                  SystemMatrix& out, NonsymmetricTangent& rest) const override;
+    void vjp(const Kinematics& at, const LoadParameters& load_parameters, const VectorXd& lambda,
+             KinematicsGradient& by, Gradient& out) const override;
 
   private:
     Drag drag(const Kinematics& at, Index face) const;
 
     const Surface& surface_;
     const FaceLoop& loop_;
-    Slot fluid_density_, velocity_, drag_coefficient_, thrust_coefficient_, added_mass_;
+    ParameterSlice fluid_density_, velocity_, drag_coefficient_, thrust_coefficient_, added_mass_;
     Water water_;
 };
 

@@ -11,19 +11,19 @@ FieldSources::FieldSources(const std::vector<std::shared_ptr<const AppliedField>
         const std::string owner = "field " + std::to_string(sources_.size());
         Source& source = sources_.emplace_back();
         for (const FieldParameter& p : given->parameters())
-            source.slots.push_back(
+            source.slices.push_back(
                 registry.values.add(owner, std::string(p.name), std::string(p.unit), p.rows, p.width));
-        if (!source.slots.empty()) source.own = given->clone();
+        if (!source.slices.empty()) source.own = given->clone();
         source.field = source.own ? source.own : given;
     }
 }
 
 void FieldSources::set_values(const Values& values) {
     for (Source& source : sources_) {
-        const bool changed = std::any_of(source.slots.begin(), source.slots.end(),
-                                         [&](const Slot& slot) { return values.changed(slot); });
+        const bool changed = std::any_of(source.slices.begin(), source.slices.end(),
+                                         [&](const ParameterSlice& slice) { return values.changed(slice); });
         if (changed)
-            source.own->set_values({values[source.slots.front()], static_cast<std::size_t>(source.count())});
+            source.own->set_values({values[source.slices.front()], static_cast<std::size_t>(source.count())});
     }
 }
 
@@ -38,7 +38,7 @@ void FieldSources::add_vjp(std::span<const Vec3> points, const FieldProbe& probe
         if (source.own)
             source.own->add_vjp(
                 points, probe, scale,
-                {out.values.data() + source.slots.front().first, static_cast<std::size_t>(source.count())});
+                {out.values.data() + source.slices.front().first, static_cast<std::size_t>(source.count())});
 }
 
 }  // namespace magshell

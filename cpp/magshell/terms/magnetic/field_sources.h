@@ -25,10 +25,10 @@ class FieldSources {
   private:
     struct Source {
         std::shared_ptr<const AppliedField> field;
-        std::shared_ptr<AppliedField> own;  // the same object if it has parameters, else nullptr
-        std::vector<Slot> slots;            // consecutive
+        std::shared_ptr<AppliedField> own;   // the same object if it has parameters, else nullptr
+        std::vector<ParameterSlice> slices;  // consecutive
 
-        Index count() const { return slots.back().first + slots.back().size() - slots.front().first; }
+        Index count() const { return slices.back().first + slices.back().size() - slices.front().first; }
     };
     std::vector<Source> sources_;
 };

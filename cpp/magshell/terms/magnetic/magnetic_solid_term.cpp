@@ -3,7 +3,7 @@
 #include "magshell/assembly/element_loop.h"
 #include "magshell/energy/magnetic_solid.h"
 #include "magshell/strain/tetrahedron.h"
-#include "magshell/terms/magnetic/field_packs.h"
+#include "magshell/terms/magnetic/field_groups.h"
 #include "magshell/terms/magnetic/total_applied_field.h"
 
 namespace magshell {
@@ -21,15 +21,15 @@ class MagneticSolidTerm final : public Term {
 
   public:
     MagneticSolidTerm(const Solid& solid, const std::vector<Nodes>& nodes, Index body,
-                      const ChunkLoop& chunks, const SystemMatrix& matrix, const FieldSources& sources,
-                      Registry& registry)
+                      const ColoredLoop& element_blocks, const SystemMatrix& matrix,
+                      const FieldSources& sources, Registry& registry)
         : solid_(solid),
           body_(body),
-          loop_(nodes, chunks, matrix),
+          loop_(nodes, element_blocks, matrix),
           field_(sources, registry),
           magnetization_(registry.values.add(solid.owner, "remanent_magnetization", "A/m", solid.n_elements(),
                                              3, &solid.elements)),
-          elements_(loop_.packs()) {
+          elements_(loop_.groups()) {
         for (int p = 0; p < points; ++p) shapes_[p] = shapes_at(Element(), p);
     }
 
@@ -38,63 +38,64 @@ class MagneticSolidTerm final : public Term {
 
     bool set_values(const Values& values) override {
         if (!values.changed(magnetization_)) return false;
-        for (Index pack = 0; pack < loop_.packs(); ++pack)
-            for (int lane = 0; lane < Pack::width; ++lane) {
-                const Index t = loop_.element(pack, lane);
+        for (Index group = 0; group < loop_.groups(); ++group)
+            for (int lane = 0; lane < SimdDouble::width; ++lane) {
+                const Index t = loop_.element(group, lane);
                 const RestElement<Element> rest = rest_of(t);
                 const Vec3 m = values.vector(magnetization_, t);
                 for (int p = 0; p < points; ++p) {
                     const Eigen::Matrix<double, N, 1> alpha = gradients(rest, p) * m;
-                    elements_[pack].at[p].volume.set(lane, rest.volume[p]);
-                    for (int k = 0; k < N; ++k) elements_[pack].at[p].alpha[k].set(lane, alpha[k]);
+                    elements_[group].at[p].volume.set(lane, rest.volume[p]);
+                    for (int k = 0; k < N; ++k) elements_[group].at[p].alpha[k].set(lane, alpha[k]);
                 }
             }
         return true;
     }
 
-    double energy(const double* q, const Controls& controls) const override {
-        const std::vector<Fields> fields = sample(q, controls, 0);
-        const Pack3 everywhere = broadcast(field_.uniform(controls));
-        return loop_.sum([&](Index pack) {
-            Pack3 x[N];
-            loop_.gather(pack, q, x);
-            Pack total(0.0);
+    double energy(const double* q, const LoadParameters& load_parameters) const override {
+        const std::vector<Fields> fields = sample(q, load_parameters, 0);
+        const SimdVec3 everywhere = broadcast(field_.uniform(load_parameters));
+        return loop_.sum([&](Index group) {
+            SimdVec3 x[N];
+            loop_.gather(group, q, x);
+            SimdDouble total(0.0);
             for (int p = 0; p < points; ++p)
                 total +=
-                    elements_[pack].at[p].energy(x, fields.empty() ? everywhere : fields[pack].at[p].flux);
+                    elements_[group].at[p].energy(x, fields.empty() ? everywhere : fields[group].at[p].flux);
             return total;
         });
     }
 
-    void evaluate(const double* q, const Controls& controls, Residual& out) override {
-        const std::vector<Fields> fields = sample(q, controls, 1);
-        const Pack3 everywhere = broadcast(field_.uniform(controls)), none = broadcast(Vec3::Zero());
-        loop_.scatter_packs([&](Index pack) {
-            Pack3 x[N], g[N];
-            loop_.gather(pack, q, x);
+    void evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) override {
+        const std::vector<Fields> fields = sample(q, load_parameters, 1);
+        const SimdVec3 everywhere = broadcast(field_.uniform(load_parameters)),
+                       none = broadcast(Vec3::Zero());
+        loop_.scatter_groups([&](Index group) {
+            SimdVec3 x[N], g[N];
+            loop_.gather(group, q, x);
             std::fill_n(g, N, none);
             for (int p = 0; p < points; ++p) {
-                const Point& point = elements_[pack].at[p];
-                point.add_gradient(fields.empty() ? everywhere : fields[pack].at[p].flux, g);
-                if (!fields.empty()) point.add_gradient_by_position(shapes_[p], x, fields[pack].at[p], g);
+                const Point& point = elements_[group].at[p];
+                point.add_gradient(fields.empty() ? everywhere : fields[group].at[p].flux, g);
+                if (!fields.empty()) point.add_gradient_by_position(shapes_[p], x, fields[group].at[p], g);
             }
-            loop_.scatter(pack, g, out);
+            loop_.scatter(group, g, out);
         });
     }
 
-    void prepare_assembly(const double* q, const Controls& controls) override {
-        fields_ = sample(q, controls, 2);
+    void prepare_assembly(const double* q, const LoadParameters& load_parameters) override {
+        fields_ = sample(q, load_parameters, 2);
     }
 
-    void assemble(const Chunk& chunk, const double*, const Controls&, bool,
+    void assemble(const ElementBlock& element_block, const double*, const LoadParameters&, bool,
                   SystemMatrix& out) const override {
         if (fields_.empty()) return;
-        ElementLoop<N>::over_packs(chunk, [&](Index pack) {
-            Pack33 h[N * (N + 1) / 2];
-            for (Pack33& block : h) std::fill_n(block.at, 9, Pack(0.0));
+        ElementLoop<N>::over_groups(element_block, [&](Index group) {
+            SimdMat3 h[N * (N + 1) / 2];
+            for (SimdMat3& block : h) std::fill_n(block.at, 9, SimdDouble(0.0));
             for (int p = 0; p < points; ++p)
-                elements_[pack].at[p].add_hessian(shapes_[p], fields_[pack].at[p], h);
-            loop_.scatter(pack, h, out);
+                elements_[group].at[p].add_hessian(shapes_[p], fields_[group].at[p], h);
+            loop_.scatter(group, h, out);
         });
     }
 
@@ -103,9 +104,10 @@ class MagneticSolidTerm final : public Term {
     //   D = - V_p (F' M . B + F M . G v),
     //
     // is linear in the magnetization and in the field.
-    void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override {
-        const Vec3 everywhere = field_.uniform(controls);
-        const double factor = field_.factor(controls);
+    void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
+             Gradient& out) override {
+        const Vec3 everywhere = field_.uniform(load_parameters);
+        const double factor = field_.factor(load_parameters);
         std::vector<Vec3> places, magnetizations, rates, angle_branches;
         at_points(q, places, magnetizations);
         at_points(lambda, rates, angle_branches);
@@ -128,7 +130,7 @@ class MagneticSolidTerm final : public Term {
             }
             out.values.segment<3>(magnetization_.at(t)) += by_magnetization;
         }
-        field_.add_vjp(places, probe, samples, controls, out);
+        field_.add_vjp(places, probe, samples, load_parameters, out);
     }
 
     std::size_t bytes() const override { return loop_.bytes() + bytes_of(elements_) + bytes_of(fields_); }
@@ -156,14 +158,14 @@ class MagneticSolidTerm final : public Term {
     void at_points(const double* q, std::vector<Vec3>& places, std::vector<Vec3>& magnetizations) const {
         places.resize(static_cast<std::size_t>(solid_.n_elements()) * points);
         magnetizations.resize(places.size());
-        loop_.each_pack([&](Index pack) {
-            Pack3 x[N];
-            loop_.gather(pack, q, x);
+        loop_.each_group([&](Index group) {
+            SimdVec3 x[N];
+            loop_.gather(group, q, x);
             for (int p = 0; p < points; ++p) {
-                const Pack3 place = Point::position(shapes_[p], x),
-                            m = elements_[pack].at[p].magnetization(x);
-                for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
-                    const Index n = loop_.element(pack, lane) * points + p;
+                const SimdVec3 place = Point::position(shapes_[p], x),
+                               m = elements_[group].at[p].magnetization(x);
+                for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+                    const Index n = loop_.element(group, lane) * points + p;
                     places[n] = lane_of(place, lane);
                     magnetizations[n] = lane_of(m, lane);
                 }
@@ -171,21 +173,21 @@ class MagneticSolidTerm final : public Term {
         });
     }
 
-    // Returns the applied field at every point in packs; empty in a uniform field. Order as in
+    // Returns the applied field at every point in SIMD vectors; empty in a uniform field. Order as in
     // AppliedField::add_samples.
-    std::vector<Fields> sample(const double* q, const Controls& controls, int order) const {
-        if (!field_.varies(controls)) return {};
+    std::vector<Fields> sample(const double* q, const LoadParameters& load_parameters, int order) const {
+        if (!field_.varies(load_parameters)) return {};
         std::vector<Vec3> places, moments;
         at_points(q, places, moments);
-        return in_packs<points>(loop_, field_.sample(places, moments, order, controls), order,
-                                field_.uniform(controls));
+        return in_groups<points>(loop_, field_.sample(places, moments, order, load_parameters), order,
+                                 field_.uniform(load_parameters));
     }
 
     const Solid& solid_;
     const Index body_;
     const ElementLoop<N> loop_;
     const TotalAppliedField field_;
-    Slot magnetization_;
+    ParameterSlice magnetization_;
     std::array<double, N> shapes_[points];
     std::vector<Points> elements_;
     std::vector<Fields> fields_;  // sampled for the current assembly; empty in a uniform field
@@ -193,14 +195,14 @@ class MagneticSolidTerm final : public Term {
 
 }  // namespace
 
-std::unique_ptr<Term> make_magnetic_solid_term(const Solid& solid, Index body, const ChunkLoop& chunks,
-                                               const SystemMatrix& matrix, const FieldSources& sources,
-                                               Registry& registry) {
+std::unique_ptr<Term> make_magnetic_solid_term(const Solid& solid, Index body,
+                                               const ColoredLoop& element_blocks, const SystemMatrix& matrix,
+                                               const FieldSources& sources, Registry& registry) {
     if (solid.quadratic())
-        return std::make_unique<MagneticSolidTerm<QuadraticTetrahedron>>(solid, solid.quadratic_nodes, body,
-                                                                         chunks, matrix, sources, registry);
-    return std::make_unique<MagneticSolidTerm<LinearTetrahedron>>(solid, solid.linear_nodes, body, chunks,
-                                                                  matrix, sources, registry);
+        return std::make_unique<MagneticSolidTerm<QuadraticTetrahedron>>(
+            solid, solid.quadratic_nodes, body, element_blocks, matrix, sources, registry);
+    return std::make_unique<MagneticSolidTerm<LinearTetrahedron>>(solid, solid.linear_nodes, body,
+                                                                  element_blocks, matrix, sources, registry);
 }
 
 }  // namespace magshell

@@ -12,8 +12,8 @@ namespace magshell {
 
 /// Creates the term and registers "remanent_magnetization" [A/m], one vector per element. The sources must
 /// outlive it.
-std::unique_ptr<Term> make_magnetic_solid_term(const Solid& solid, Index body, const ChunkLoop& chunks,
-                                               const SystemMatrix& matrix, const FieldSources& sources,
-                                               Registry& registry);
+std::unique_ptr<Term> make_magnetic_solid_term(const Solid& solid, Index body,
+                                               const ColoredLoop& element_blocks, const SystemMatrix& matrix,
+                                               const FieldSources& sources, Registry& registry);
 
 }  // namespace magshell

@@ -2,7 +2,7 @@
 
 #include <Eigen/LU>
 
-#include "magshell/terms/magnetic/field_packs.h"
+#include "magshell/terms/magnetic/field_groups.h"
 
 namespace magshell {
 namespace {
@@ -27,15 +27,15 @@ MagneticTerm::MagneticTerm(const Surface& surface, Index body, const FaceLoop& l
       magnetization_(registry.values.add(surface.owner, "remanent_magnetization", "A/m", surface.n_faces(), 3,
                                          &surface.faces)),
       thickness_(registry.values.add(surface.owner, "thickness", "m", surface.n_faces(), 1, &surface.faces)),
-      elements_(loop.packs()) {}
+      elements_(loop.groups()) {}
 
 bool MagneticTerm::set_values(const Values& values) {
     if (!values.changed(magnetization_, thickness_)) return false;
     normal_magnetization_ = false;
     thicknesses_.assign(values[thickness_], values[thickness_] + thickness_.size());
-    for (Index pack = 0; pack < loop_.packs(); ++pack)
-        for (int lane = 0; lane < Pack::width; ++lane) {
-            const Index f = loop_.face(pack, lane);
+    for (Index group = 0; group < loop_.groups(); ++group)
+        for (int lane = 0; lane < SimdDouble::width; ++lane) {
+            const Index f = loop_.face(group, lane);
             const Mat3 frame = rest_frame(surface_, f);
             const Vec3 across = frame.col(0).cross(frame.col(1)), m = values.vector(magnetization_, f);
             Vec3 coordinates = frame.inverse() * m;
@@ -43,10 +43,10 @@ bool MagneticTerm::set_values(const Values& values) {
             // set to zero.
             if (std::abs(coordinates[2]) <= 1e-14 * m.norm()) coordinates[2] = 0.0;
             if (coordinates[2] != 0.0) normal_magnetization_ = true;
-            elements_[pack].volume.set(lane, 0.5 * across.norm() * thicknesses_[f]);
-            elements_[pack].alpha.set(lane, coordinates[0]);
-            elements_[pack].beta.set(lane, coordinates[1]);
-            elements_[pack].gamma.set(lane, coordinates[2]);
+            elements_[group].volume.set(lane, 0.5 * across.norm() * thicknesses_[f]);
+            elements_[group].alpha.set(lane, coordinates[0]);
+            elements_[group].beta.set(lane, coordinates[1]);
+            elements_[group].gamma.set(lane, coordinates[2]);
         }
     return true;
 }
@@ -55,77 +55,77 @@ void MagneticTerm::find_points(const double* q, std::vector<Vec3>& points,
                                std::vector<Vec3>& magnetizations) const {
     points.resize(surface_.n_faces());
     magnetizations.resize(surface_.n_faces());
-    loop_.each_pack([&](Index pack) {
-        Pack3 x[3];
-        loop_.gather(pack, q, x);
-        const Pack3 center = Pack(1.0 / 3.0) * (x[0] + x[1] + x[2]);
-        const Pack3 m = Magnetic(x).magnetization(elements_[pack]);
-        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
-            points[loop_.face(pack, lane)] = lane_of(center, lane);
-            magnetizations[loop_.face(pack, lane)] = lane_of(m, lane);
+    loop_.each_group([&](Index group) {
+        SimdVec3 x[3];
+        loop_.gather(group, q, x);
+        const SimdVec3 center = SimdDouble(1.0 / 3.0) * (x[0] + x[1] + x[2]);
+        const SimdVec3 m = Magnetic(x).magnetization(elements_[group]);
+        for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+            points[loop_.face(group, lane)] = lane_of(center, lane);
+            magnetizations[loop_.face(group, lane)] = lane_of(m, lane);
         }
     });
 }
 
-std::vector<Magnetic::Field> MagneticTerm::sample(const double* q, const Controls& controls,
+std::vector<Magnetic::Field> MagneticTerm::sample(const double* q, const LoadParameters& load_parameters,
                                                   int order) const {
-    if (!field_.varies(controls)) return {};
+    if (!field_.varies(load_parameters)) return {};
     std::vector<Vec3> points, moments;
     find_points(q, points, moments);
-    const FieldSamples samples = field_.sample(points, moments, order, controls);
-    const Vec3 everywhere = field_.uniform(controls);
-    std::vector<Magnetic::Field> packs(loop_.packs());
-    for (Index pack = 0; pack < loop_.packs(); ++pack)
-        for (int lane = 0; lane < Pack::width; ++lane)
-            set_field(packs[pack], lane, samples, loop_.face(pack, lane), order, everywhere);
-    return packs;
+    const FieldSamples samples = field_.sample(points, moments, order, load_parameters);
+    const Vec3 everywhere = field_.uniform(load_parameters);
+    std::vector<Magnetic::Field> groups(loop_.groups());
+    for (Index group = 0; group < loop_.groups(); ++group)
+        for (int lane = 0; lane < SimdDouble::width; ++lane)
+            set_field(groups[group], lane, samples, loop_.face(group, lane), order, everywhere);
+    return groups;
 }
 
-double MagneticTerm::energy(const double* q, const Controls& controls) const {
-    const std::vector<Magnetic::Field> fields = sample(q, controls, 0);
-    const Pack3 everywhere = broadcast(field_.uniform(controls));
-    return loop_.sum([&](Index pack) {
-        Pack3 x[3];
-        loop_.gather(pack, q, x);
-        return Magnetic(x).energy(elements_[pack], fields.empty() ? everywhere : fields[pack].flux);
+double MagneticTerm::energy(const double* q, const LoadParameters& load_parameters) const {
+    const std::vector<Magnetic::Field> fields = sample(q, load_parameters, 0);
+    const SimdVec3 everywhere = broadcast(field_.uniform(load_parameters));
+    return loop_.sum([&](Index group) {
+        SimdVec3 x[3];
+        loop_.gather(group, q, x);
+        return Magnetic(x).energy(elements_[group], fields.empty() ? everywhere : fields[group].flux);
     });
 }
 
-void MagneticTerm::evaluate(const double* q, const Controls& controls, Residual& out) {
-    const std::vector<Magnetic::Field> fields = sample(q, controls, 1);
+void MagneticTerm::evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) {
+    const std::vector<Magnetic::Field> fields = sample(q, load_parameters, 1);
     const bool varies = !fields.empty();
-    const Pack3 everywhere = broadcast(field_.uniform(controls));
-    loop_.scatter_packs([&](Index pack) {
-        Pack3 x[3], g[3];
-        loop_.gather(pack, q, x);
+    const SimdVec3 everywhere = broadcast(field_.uniform(load_parameters));
+    loop_.scatter_groups([&](Index group) {
+        SimdVec3 x[3], g[3];
+        loop_.gather(group, q, x);
         const Magnetic face(x);
-        face.gradient(elements_[pack], varies ? fields[pack].flux : everywhere, g);
+        face.gradient(elements_[group], varies ? fields[group].flux : everywhere, g);
         if (varies) {
-            const Pack3 pull = face.gradient_by_position(elements_[pack], fields[pack]);
-            for (Pack3& at_node : g) at_node += pull;
+            const SimdVec3 pull = face.gradient_by_position(elements_[group], fields[group]);
+            for (SimdVec3& at_node : g) at_node += pull;
         }
-        loop_.scatter(pack, g, out);
+        loop_.scatter(group, g, out);
     });
 }
 
-void MagneticTerm::prepare_assembly(const double* q, const Controls& controls) {
-    fields_ = sample(q, controls, 2);
+void MagneticTerm::prepare_assembly(const double* q, const LoadParameters& load_parameters) {
+    fields_ = sample(q, load_parameters, 2);
 }
 
-void MagneticTerm::assemble(const Chunk& chunk, const double* q, const Controls& controls, bool,
-                            SystemMatrix& out) const {
+void MagneticTerm::assemble(const ElementBlock& element_block, const double* q,
+                            const LoadParameters& load_parameters, bool, SystemMatrix& out) const {
     const bool varies = !fields_.empty();
-    const Vec3 uniform = field_.uniform(controls);
+    const Vec3 uniform = field_.uniform(load_parameters);
     if (!varies && (!normal_magnetization_ || uniform.isZero(0.0))) return;
-    const Pack3 everywhere = broadcast(uniform);
-    FaceLoop::over_packs(chunk, [&](Index pack) {
-        Pack3 x[3];
-        Pack33 h[6];
-        loop_.gather(pack, q, x);
+    const SimdVec3 everywhere = broadcast(uniform);
+    FaceLoop::over_groups(element_block, [&](Index group) {
+        SimdVec3 x[3];
+        SimdMat3 h[6];
+        loop_.gather(group, q, x);
         const Magnetic face(x);
-        face.hessian(elements_[pack], varies ? fields_[pack].flux : everywhere, h);
-        if (varies) face.add_hessian_by_position(elements_[pack], fields_[pack], h);
-        loop_.scatter(pack, h, out);
+        face.hessian(elements_[group], varies ? fields_[group].flux : everywhere, h);
+        if (varies) face.add_hessian_by_position(elements_[group], fields_[group], h);
+        loop_.scatter(group, h, out);
     });
 }
 
@@ -134,25 +134,26 @@ void MagneticTerm::assemble(const Chunk& chunk, const double* q, const Controls&
 //   D = - A~ h (M' . B + M . G v),   M' = alpha a_1' + beta a_2' + gamma n',
 //
 // is linear in (alpha, beta, gamma), in the thickness and in the field.
-void MagneticTerm::vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) {
+void MagneticTerm::vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
+                       Gradient& out) {
     const Index n = surface_.n_faces();
-    const double factor = field_.factor(controls);
-    const Vec3 everywhere = field_.uniform(controls);
+    const double factor = field_.factor(load_parameters);
+    const Vec3 everywhere = field_.uniform(load_parameters);
     std::vector<Vec3> points, magnetizations;
     find_points(q, points, magnetizations);
     const FieldSamples samples = field_.at_factor_one(points, magnetizations);
 
     FieldProbe probe;  // - A~ h (M', M, v)
     probe.flux.resize(n), probe.moment.resize(n), probe.direction.resize(n);
-    loop_.each_pack([&](Index pack) {
-        Pack3 x[3], rate[3];
-        loop_.gather(pack, q, x);
-        loop_.gather(pack, lambda, rate);
+    loop_.each_group([&](Index group) {
+        SimdVec3 x[3], rate[3];
+        loop_.gather(group, q, x);
+        loop_.gather(group, lambda, rate);
         const Magnetic face(x);
-        const Pack3 turn = face.normal_rate(rate);
-        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
-            const Index f = loop_.face(pack, lane);
-            const Magnetic::Element& e = elements_[pack];
+        const SimdVec3 turn = face.normal_rate(rate);
+        for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+            const Index f = loop_.face(group, lane);
+            const Magnetic::Element& e = elements_[group];
             const Vec3 coordinates(e.alpha[lane], e.beta[lane], e.gamma[lane]),
                 at[3] = {lane_of(rate[0], lane), lane_of(rate[1], lane), lane_of(rate[2], lane)};
             Mat3 frame, frame_rate;
@@ -172,7 +173,7 @@ void MagneticTerm::vjp(const double* q, const Controls& controls, const double* 
             probe.direction[f] = v;
         }
     });
-    field_.add_vjp(points, probe, samples, controls, out);
+    field_.add_vjp(points, probe, samples, load_parameters, out);
 }
 
 std::size_t MagneticTerm::bytes() const {

@@ -22,26 +22,28 @@ class MagneticTerm final : public Term {
     std::string_view name() const override { return Magnetic::name; }
     Index body() const override { return body_; }
     bool set_values(const Values& values) override;
-    double energy(const double* q, const Controls& controls) const override;
-    void evaluate(const double* q, const Controls& controls, Residual& out) override;
-    void prepare_assembly(const double* q, const Controls& controls) override;
-    void assemble(const Chunk& chunk, const double* q, const Controls& controls, bool,
-                  SystemMatrix& out) const override;
-    void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
+    double energy(const double* q, const LoadParameters& load_parameters) const override;
+    void evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) override;
+    void prepare_assembly(const double* q, const LoadParameters& load_parameters) override;
+    void assemble(const ElementBlock& element_block, const double* q, const LoadParameters& load_parameters,
+                  bool, SystemMatrix& out) const override;
+    void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
+             Gradient& out) override;
     std::size_t bytes() const override;
 
   private:
     /// Computes the barycenters [m] of all faces and the magnetizations [A/m] there.
     void find_points(const double* q, std::vector<Vec3>& points, std::vector<Vec3>& magnetizations) const;
-    /// Returns the applied field at every barycenter in packs; empty in a uniform field. Order as in
+    /// Returns the applied field at every barycenter in SIMD vectors; empty in a uniform field. Order as in
     /// AppliedField::add_samples.
-    std::vector<Magnetic::Field> sample(const double* q, const Controls& controls, int order) const;
+    std::vector<Magnetic::Field> sample(const double* q, const LoadParameters& load_parameters,
+                                        int order) const;
 
     const Surface& surface_;
     const Index body_;
     const FaceLoop& loop_;
     const TotalAppliedField field_;
-    Slot magnetization_, thickness_;  // values
+    ParameterSlice magnetization_, thickness_;  // values
     std::vector<double> thicknesses_;
     LargeVector<Magnetic::Element> elements_;
     std::vector<Magnetic::Field> fields_;  // sampled for the current assembly; empty in a uniform field

@@ -30,32 +30,34 @@ class MomentTerm final : public Term {
 
     std::string_view name() const override { return "moments"; }
     bool set_values(const Values& values) override;
-    double energy(const double* q, const Controls& controls) const override;
-    void evaluate(const double* q, const Controls& controls, Residual& out) override;
-    void finish_assembly(const double* q, const Controls& controls, SystemMatrix& out) const override;
-    void vjp(const double* q, const Controls& controls, const double* lambda, Gradient& out) override;
-    std::size_t bytes() const override { return chunks_.size() * sizeof(Chunk); }
+    double energy(const double* q, const LoadParameters& load_parameters) const override;
+    void evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) override;
+    void finish_assembly(const double* q, const LoadParameters& load_parameters,
+                         SystemMatrix& out) const override;
+    void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
+             Gradient& out) override;
+    std::size_t bytes() const override { return element_blocks_.size() * sizeof(ElementBlock); }
 
   private:
     using Each = std::array<Vec3, 4>;
-    struct Chunk {
+    struct ElementBlock {
         std::array<Index, 4> corners;
         Vec3 middle;   // in the reference configuration
         Each offsets;  // rho_k / 4 l^2
-        Slot moment, center;
+        ParameterSlice moment, center;
         std::array<double, 4> alpha{}, b{};
         std::array<std::array<SystemMatrix::Slot, 4>, 4> slots;  // lower triangle
     };
 
-    static Each at_corners(const Chunk& chunk, const double* from);
+    static Each at_corners(const ElementBlock& element_block, const double* from);
     static Vec3 sum(const std::array<double, 4>& weights, const Each& of);
     /// Returns the total field at the magnets, the uniform part included in `flux`, and computes the magnets'
     /// points and moments at q.
-    FieldSamples sample(const double* q, const Controls& controls, int order, std::vector<Vec3>& points,
-                        std::vector<Vec3>& moments) const;
+    FieldSamples sample(const double* q, const LoadParameters& load_parameters, int order,
+                        std::vector<Vec3>& points, std::vector<Vec3>& moments) const;
 
     const TotalAppliedField field_;
-    std::vector<Chunk> chunks_;
+    std::vector<ElementBlock> element_blocks_;
 };
 
 }  // namespace magshell

@@ -15,26 +15,30 @@ class TotalAppliedField {
     TotalAppliedField(const FieldSources& sources, Registry& registry);
 
     /// Returns the uniform part [T].
-    Vec3 uniform(const Controls& controls) const { return controls.segment<3>(flux_density_.first); }
-    double factor(const Controls& controls) const { return controls[factor_.first]; }
+    Vec3 uniform(const LoadParameters& load_parameters) const {
+        return load_parameters.segment<3>(flux_density_.first);
+    }
+    double factor(const LoadParameters& load_parameters) const { return load_parameters[factor_.first]; }
     /// Returns true if sources add a nonuniform part.
-    bool varies(const Controls& controls) const { return !sources_.empty() && factor(controls) != 0.0; }
+    bool varies(const LoadParameters& load_parameters) const {
+        return !sources_.empty() && factor(load_parameters) != 0.0;
+    }
 
     /// Returns the part of the sources, scaled by the field factor, without the uniform part. Order and moments
     /// as in AppliedField::add_samples.
     FieldSamples sample(const std::vector<Vec3>& places, const std::vector<Vec3>& moments, int order,
-                        const Controls& controls) const;
+                        const LoadParameters& load_parameters) const;
     /// Returns flux density and gradient of the sources for a field factor of 1, as add_vjp() requires them.
     FieldSamples at_factor_one(const std::vector<Vec3>& places, const std::vector<Vec3>& moments) const;
 
     /// Adds the gradient of a probe of the total field by both load parameters and by the parameters of the
     /// sources.
     void add_vjp(const std::vector<Vec3>& places, const FieldProbe& probe, const FieldSamples& at_factor_one,
-                 const Controls& controls, Gradient& out) const;
+                 const LoadParameters& load_parameters, Gradient& out) const;
 
   private:
     const FieldSources& sources_;
-    Slot flux_density_, factor_;
+    ParameterSlice flux_density_, factor_;
 };
 
 }  // namespace magshell

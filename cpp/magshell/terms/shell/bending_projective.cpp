@@ -12,9 +12,9 @@ std::vector<std::array<double, 4>> BendingTerm::slopes_at_rest() const {
     for (Index node = 0; node < nodes_.n_nodes(); ++node) q.segment<3>(3 * node) = nodes_.rest[node];
     const Index n = sheet_.n_dihedrals();
     std::vector<std::array<double, 4>> slopes(n);
-    for (Index first = 0; first < n; first += Pack::width) {
-        const Index last = std::min<Index>(first + Pack::width, n);
-        Pack3 g[4];
+    for (Index first = 0; first < n; first += SimdDouble::width) {
+        const Index last = std::min<Index>(first + SimdDouble::width, n);
+        SimdVec3 g[4];
         dihedral_angles_at(sheet_, first, last, q.data()).gradient(g);
         for (int lane = 0; lane < last - first; ++lane) {
             std::array<Vec3, 4> gradient;
@@ -29,7 +29,7 @@ std::vector<std::array<double, 4>> BendingTerm::slopes_at_rest() const {
 bool BendingTerm::add_projective_stiffness(NodeMatrix& out) const {
     const std::vector<std::array<double, 4>> slopes = slopes_at_rest();
     for (Index f = 0; f < sheet_.n_faces(); ++f) {
-        const Symmetric3& stiffness = stiffness_[f / Pack::width];
+        const Symmetric3& stiffness = stiffness_[f / SimdDouble::width];
         NodeRows rows(3);
         for (int i = 0; i < 3; ++i) {
             const FaceSide& side = sheet_.sides[f][i];
@@ -40,7 +40,7 @@ bool BendingTerm::add_projective_stiffness(NodeMatrix& out) const {
             rows.add(i, out.point(side.rotation), side.sign);
             out.add_adjacent_face(side.rotation, sheet_.corners[f]);
         }
-        rows.add_to(out, [&](int r, int s) { return stiffness(r, s)[f % Pack::width]; });
+        rows.add_to(out, [&](int r, int s) { return stiffness(r, s)[f % SimdDouble::width]; });
     }
     return true;
 }

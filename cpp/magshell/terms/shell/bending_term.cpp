@@ -19,18 +19,19 @@ void fetch(const Array& array, Index first, Index count) {
 
 }  // namespace
 
-BendingTerm::BendingTerm(const Shell& sheet, Index body, const ChunkLoop& chunks, const GrowthForm& growth,
-                         const Nodes& nodes, const SystemMatrix& matrix, Registry& registry)
+BendingTerm::BendingTerm(const Shell& sheet, Index body, const ColoredLoop& element_blocks,
+                         const GrowthForm& growth, const Nodes& nodes, const SystemMatrix& matrix,
+                         Registry& registry)
     : StrainScaffold(sheet.n_faces()),
       sheet_(sheet),
       body_(body),
-      chunks_(chunks),
+      element_blocks_(element_blocks),
       nodes_(nodes),
       first_scalar_(nodes.first_scalar()),
       materials_(sheet, registry),
       growth_(sheet.owner, sheet.faces, growth, registry),
       curvature_scale_(registry.values.add(sheet.owner, "curvature_scale", "1", sheet.n_edges(), 1)),
-      stiffness_(face_packs()),
+      stiffness_(face_groups()),
       angle_changes_(sheet.dihedrals.size()),
       rates_(sheet.dihedrals.size()),
       gradients_(sheet.dihedrals.size()) {
@@ -59,13 +60,13 @@ bool BendingTerm::set_values(const Values& values) {
     const bool material_changed = materials_.set_values(values), grew = growth_.set_values(values);
     if (!material_changed && !grew && !values.changed(curvature_scale_)) return false;
     curvature_scales_ = Eigen::Map<const VectorXd>(values[curvature_scale_], curvature_scale_.size());
-    for (Index pack = 0; pack < face_packs(); ++pack)
-        for (int lane = 0; lane < Pack::width; ++lane) {
-            const Index f = element_of(pack, lane, sheet_.n_faces());
+    for (Index group = 0; group < face_groups(); ++group)
+        for (int lane = 0; lane < SimdDouble::width; ++lane) {
+            const Index f = element_of(group, lane, sheet_.n_faces());
             const Vec3 scale = scales_of(f);
             const Mat3 stiffness = rest_face(f).bending_stiffness(materials_[f]);
             const Mat3 scaled = scale.asDiagonal() * stiffness * scale.asDiagonal();
-            set_lane(stiffness_[pack], lane, scaled);
+            set_lane(stiffness_[group], lane, scaled);
         }
     if (grew) find_natural_angles();
     return true;
@@ -87,11 +88,11 @@ Vec3 BendingTerm::rest_angles(Index face) const {
 void BendingTerm::find_natural_angles() {
     std::vector<Vec3> changes(sheet_.n_faces());
     for (Index f = 0; f < sheet_.n_faces(); ++f) changes[f] = grown(f).natural_angle_changes(rest_angles(f));
-    natural_angles_.resize(face_packs());
-    for (Index pack = 0; pack < face_packs(); ++pack)
-        for (int lane = 0; lane < Pack::width; ++lane) {
-            const Vec3 of_face = shared(changes, element_of(pack, lane, sheet_.n_faces()));
-            for (int i = 0; i < 3; ++i) natural_angles_[pack][i].set(lane, of_face[i]);
+    natural_angles_.resize(face_groups());
+    for (Index group = 0; group < face_groups(); ++group)
+        for (int lane = 0; lane < SimdDouble::width; ++lane) {
+            const Vec3 of_face = shared(changes, element_of(group, lane, sheet_.n_faces()));
+            for (int i = 0; i < 3; ++i) natural_angles_[group][i].set(lane, of_face[i]);
         }
 }
 
@@ -116,7 +117,7 @@ Vec3 BendingTerm::shared(const std::vector<Vec3>& of_faces, Index face) const {
 
 Vec3 BendingTerm::natural_angle_changes(Index face) const {
     if (natural_angles_.empty()) return Vec3::Zero();
-    return lane_of(natural_angles_[face / Pack::width].data(), face % Pack::width);
+    return lane_of(natural_angles_[face / SimdDouble::width].data(), face % SimdDouble::width);
 }
 
 void BendingTerm::add_natural_angles_vjp(const std::vector<Vec3>& by_angles, Gradient& out) const {
@@ -141,12 +142,13 @@ Vec3 BendingTerm::scales_of(Index face) const {
 }
 
 void BendingTerm::store_dihedrals(const double* q) {
-    chunks_.each([&](const Chunk& chunk) {
-        for (Index first = chunk.first_dihedral; first < chunk.last_dihedral; first += Pack::width) {
-            const Index last = std::min(first + Pack::width, chunk.last_dihedral);
+    element_blocks_.each([&](const ElementBlock& element_block) {
+        for (Index first = element_block.first_dihedral; first < element_block.last_dihedral;
+             first += SimdDouble::width) {
+            const Index last = std::min(first + SimdDouble::width, element_block.last_dihedral);
             const DihedralAngle fold = dihedral_angles_at(sheet_, first, last, q);
-            const Pack angle = fold.angle();
-            Pack3 g[4];
+            const SimdDouble angle = fold.angle();
+            SimdVec3 g[4];
             fold.gradient(g);
             for (int lane = 0; lane < last - first; ++lane) {
                 angle_changes_[first + lane] = angle_change(sheet_.dihedrals[first + lane], angle[lane]);
@@ -161,38 +163,39 @@ void BendingTerm::store_dihedrals(const double* q) {
     });
 }
 
-/// Computes the strains delta of a pack of faces from a number per dihedral stencil and the rotations in q. It
+/// Computes the strains delta of a SIMD vector of faces from a number per dihedral stencil and the rotations in q. It
 /// is linear, so it serves rates as well.
-void BendingTerm::measure(Index pack, const double* q, const std::vector<double>& changes,
-                          Pack delta[3]) const {
+void BendingTerm::measure(Index group, const double* q, const std::vector<double>& changes,
+                          SimdDouble delta[3]) const {
     const auto turn_of = [&](Index fold) { return changes[fold]; };
     const double* rotation = q + first_scalar_;
-    const SidesOfPack sides = sides_of(pack);
+    const SidesOfGroup sides = sides_of(group);
     for (int i = 0; i < 3; ++i)
-        delta[i] = pack_of([&](int lane) { return bending_strain((*sides[lane])[i], turn_of, rotation); });
+        delta[i] = simd_of([&](int lane) { return bending_strain((*sides[lane])[i], turn_of, rotation); });
 }
 
-double BendingTerm::energy(const double* q, const Controls&) const {
+double BendingTerm::energy(const double* q, const LoadParameters&) const {
     std::vector<double> changes(sheet_.dihedrals.size());
-    chunks_.each([&](const Chunk& chunk) {
-        for (Index first = chunk.first_dihedral; first < chunk.last_dihedral; first += Pack::width) {
-            const Index last = std::min(first + Pack::width, chunk.last_dihedral);
-            const Pack angle = dihedral_angles_at(sheet_, first, last, q).angle();
+    element_blocks_.each([&](const ElementBlock& element_block) {
+        for (Index first = element_block.first_dihedral; first < element_block.last_dihedral;
+             first += SimdDouble::width) {
+            const Index last = std::min(first + SimdDouble::width, element_block.last_dihedral);
+            const SimdDouble angle = dihedral_angles_at(sheet_, first, last, q).angle();
             for (Index h = first; h < last; ++h)
                 changes[h] = angle_change(sheet_.dihedrals[h], angle[h - first]);
         }
     });
     const auto turn_of = [&](Index fold) { return changes[fold]; };
     const double* rotation = q + first_scalar_;
-    return chunks_.sum([&](const Chunk& chunk) {
+    return element_blocks_.sum([&](const ElementBlock& element_block) {
         double total = 0.0;
-        for (Index f = chunk.first; f < chunk.last; ++f) {
+        for (Index f = element_block.first; f < element_block.last; ++f) {
             const Vec3 turned = natural_angle_changes(f);
             double delta[3];
             for (int i = 0; i < 3; ++i)
                 delta[i] = bending_strain(sheet_.sides[f][i], turn_of, rotation) - turned[i];
-            const Symmetric3& stiffness = stiffness_[f / Pack::width];
-            const int lane = f % Pack::width;
+            const Symmetric3& stiffness = stiffness_[f / SimdDouble::width];
+            const int lane = f % SimdDouble::width;
             for (int i = 0; i < 3; ++i)
                 for (int j = 0; j < 3; ++j) total += 0.5 * delta[i] * stiffness(i, j)[lane] * delta[j];
         }
@@ -200,12 +203,12 @@ double BendingTerm::energy(const double* q, const Controls&) const {
     });
 }
 
-void BendingTerm::evaluate(const double* q, const Controls&, Residual& out) {
+void BendingTerm::evaluate(const double* q, const LoadParameters&, Residual& out) {
     store_dihedrals(q);
-    each_pack([&](Index pack) {
-        Pack delta[3];
-        strain(pack, q, delta);
-        store_stress(pack, delta);
+    each_group([&](Index group) {
+        SimdDouble delta[3];
+        strain(group, q, delta);
+        store_stress(group, delta);
     });
     add_forces(stress_, out);
 }
@@ -219,11 +222,11 @@ double BendingTerm::moment(const DihedralStencil& fold, const Strains& stress) c
 }
 
 void BendingTerm::add_forces(const Strains& stresses, Residual& out) {
-    // Faces that share a rotation share an edge and hence a node, so chunks of one colour do not share
+    // Faces that share a rotation share an edge and hence a node, so blocks of one colour do not share
     // rotations either.
     constexpr Index ahead = 24;  // prefetch distance [dihedral stencils]
-    chunks_.scatter([&](const Chunk& chunk) {
-        for (Index h = chunk.first_dihedral; h < chunk.last_dihedral; ++h) {
+    element_blocks_.scatter([&](const ElementBlock& element_block) {
+        for (Index h = element_block.first_dihedral; h < element_block.last_dihedral; ++h) {
             fetch(sheet_.dihedrals, h + ahead, 1);
             fetch(gradients_, h + ahead, 1);
             const double m = moment(sheet_.dihedrals[h], stresses);
@@ -231,7 +234,7 @@ void BendingTerm::add_forces(const Strains& stresses, Residual& out) {
                 for (int c = 0; c < 3; ++c)
                     out.add(3 * sheet_.dihedrals[h].nodes[k] + c, m * gradients_[h][3 * k + c]);
         }
-        for (Index f = chunk.first; f < chunk.last; ++f)
+        for (Index f = element_block.first; f < element_block.last; ++f)
             for (int i = 0; i < 3; ++i) {
                 const FaceSide& side = sheet_.sides[f][i];
                 if (side.rotation >= 0)
@@ -240,35 +243,37 @@ void BendingTerm::add_forces(const Strains& stresses, Residual& out) {
     });
 }
 
-void BendingTerm::assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
-                           SystemMatrix& out) const {
-    FaceLoop::over_packs(chunk, [&](Index pack) { assemble_faces(pack, out); });
+void BendingTerm::assemble(const ElementBlock& element_block, const double* q, const LoadParameters&,
+                           bool extrapolated_stress, SystemMatrix& out) const {
+    FaceLoop::over_groups(element_block, [&](Index group) { assemble_faces(group, out); });
     const Strains& stress = extrapolated_stress ? extrapolated_ : stress_;
-    for (Index first = chunk.first_dihedral; first < chunk.last_dihedral; first += Pack::width)
-        assemble_dihedrals(first, std::min(first + Pack::width, chunk.last_dihedral), q, stress, out);
+    for (Index first = element_block.first_dihedral; first < element_block.last_dihedral;
+         first += SimdDouble::width)
+        assemble_dihedrals(first, std::min(first + SimdDouble::width, element_block.last_dihedral), q, stress,
+                           out);
 }
 
-void BendingTerm::assemble_faces(Index pack, SystemMatrix& out) const {
-    const Index next = Pack::width * (pack + 1);
-    fetch(face_slots_, next, Pack::width);
-    fetch(sheet_.sides, next, Pack::width);
-    fetch(sheet_.stencils, next, Pack::width);
-    fetch(stiffness_, pack + 1, 1);
+void BendingTerm::assemble_faces(Index group, SystemMatrix& out) const {
+    const Index next = SimdDouble::width * (group + 1);
+    fetch(face_slots_, next, SimdDouble::width);
+    fetch(sheet_.sides, next, SimdDouble::width);
+    fetch(sheet_.stencils, next, SimdDouble::width);
+    fetch(stiffness_, group + 1, 1);
     BendingFace face;
-    const SidesOfPack sides = sides_of(pack);
+    const SidesOfGroup sides = sides_of(group);
     for (int i = 0; i < 3; ++i) {
         static constexpr std::array<double, 12> nothing = {};
         // For the right face of an edge, the first two nodes of the stencil are swapped, and so are its last
         // two.
-        const double* gradient[Pack::width];
-        int swap[Pack::width];
-        for (int lane = 0; lane < Pack::width; ++lane) {
+        const double* gradient[SimdDouble::width];
+        int swap[SimdDouble::width];
+        for (int lane = 0; lane < SimdDouble::width; ++lane) {
             const FaceSide& side = (*sides[lane])[i];
             gradient[lane] = (side.dihedral < 0 ? nothing : gradients_[side.dihedral]).data();
             swap[lane] = side.on_left ? 0 : 3;
         }
-        face.sign[i] = pack_of([&](int lane) { return (*sides[lane])[i].sign; });
-        const Pack weight = pack_of([&](int lane) { return (*sides[lane])[i].weight; });
+        face.sign[i] = simd_of([&](int lane) { return (*sides[lane])[i].sign; });
+        const SimdDouble weight = simd_of([&](int lane) { return (*sides[lane])[i].weight; });
         face.corner[i][(i + 1) % 3] =
             weight * vectors_of([&](int lane) { return gradient[lane] + swap[lane]; });
         face.corner[i][(i + 2) % 3] =
@@ -276,16 +281,16 @@ void BendingTerm::assemble_faces(Index pack, SystemMatrix& out) const {
         face.corner[i][i] = weight * vectors_of([&](int lane) { return gradient[lane] + 6 + swap[lane]; });
         face.beyond[i] = weight * vectors_of([&](int lane) { return gradient[lane] + 9 - swap[lane]; });
     }
-    Pack33 blocks[21];
-    Pack3 stiff_corner[3][3], rows[3][6];
-    const Symmetric3 stiffness = history_.scaled(stiffness_[pack]);
+    SimdMat3 blocks[21];
+    SimdVec3 stiff_corner[3][3], rows[3][6];
+    const Symmetric3 stiffness = history_.scaled(stiffness_[group]);
     face.node_blocks(stiffness, blocks, stiff_corner);
     const bool directors = sheet_.n_rotations() > 0;
     if (directors) face.rotation_rows(stiffness, stiff_corner, rows);
 
-    const int lanes = std::min(Pack::width, sheet_.n_faces() - pack * Pack::width);
+    const int lanes = std::min(SimdDouble::width, sheet_.n_faces() - group * SimdDouble::width);
     for (int lane = 0; lane < lanes; ++lane) {
-        const Index f = pack * Pack::width + lane;
+        const Index f = group * SimdDouble::width + lane;
         const Stencil& stencil = sheet_.stencils[f];
         const FaceSlots& slots = face_slots_[f];
         scatter_blocks<6>(out, stencil.nodes, slots.nodes, blocks, lane);
@@ -306,16 +311,16 @@ void BendingTerm::assemble_faces(Index pack, SystemMatrix& out) const {
 
 void BendingTerm::assemble_dihedrals(Index first, Index last, const double* q, const Strains& stress,
                                      SystemMatrix& out) const {
-    const Pack moments =
-        pack_of([&](int lane) { return moment(sheet_.dihedrals[std::min(first + lane, last - 1)], stress); });
+    const SimdDouble moments =
+        simd_of([&](int lane) { return moment(sheet_.dihedrals[std::min(first + lane, last - 1)], stress); });
     const DihedralHessian curvature(dihedral_angles_at(sheet_, first, last, q), moments);
     for (Index h = first; h < last; ++h)
         scatter_blocks<4>(out, sheet_.dihedrals[h].nodes, fold_slots_[h], curvature.block, h - first);
 }
 
 void BendingTerm::store_rates(const double* p) {
-    chunks_.each([&](const Chunk& chunk) {
-        for (Index h = chunk.first_dihedral; h < chunk.last_dihedral; ++h) {
+    element_blocks_.each([&](const ElementBlock& element_block) {
+        for (Index h = element_block.first_dihedral; h < element_block.last_dihedral; ++h) {
             rates_[h] = 0.0;
             for (int k = 0; k < 4; ++k)
                 for (int c = 0; c < 3; ++c)
@@ -326,20 +331,21 @@ void BendingTerm::store_rates(const double* p) {
 
 // Gradient by the parameters. With C = S C~ S and S the curvature scales of the edges, dC/ds_i s_i = e_i e_i^T
 // C + C e_i e_i^T.
-void BendingTerm::vjp(const double* q, const Controls&, const double* lambda, Gradient& out) {
+void BendingTerm::vjp(const double* q, const LoadParameters&, const double* lambda, Gradient& out) {
     store_rates(lambda);
     std::vector<Vec3> by_scale(sheet_.n_faces()), by_angles(growth_.any() ? sheet_.n_faces() : 0);
     std::vector<Mat3> by_stiffness(by_angles.size());
-    each_pack([&](Index pack) {
-        Pack delta[3], along[3], stress_rate[3];
-        strain(pack, q, delta);
-        history_.apply(pack, delta);
-        rate(pack, lambda, along);
-        stiffness_[pack].times(along, stress_rate);
-        for (Index f = pack * Pack::width; f < std::min((pack + 1) * Pack::width, sheet_.n_faces()); ++f) {
-            const int lane = f % Pack::width;
+    each_group([&](Index group) {
+        SimdDouble delta[3], along[3], stress_rate[3];
+        strain(group, q, delta);
+        history_.apply(group, delta);
+        rate(group, lambda, along);
+        stiffness_[group].times(along, stress_rate);
+        for (Index f = group * SimdDouble::width;
+             f < std::min((group + 1) * SimdDouble::width, sheet_.n_faces()); ++f) {
+            const int lane = f % SimdDouble::width;
             const Vec3 d = lane_of(delta, lane), rates = lane_of(along, lane), scale = scales_of(f);
-            const Vec3 stress = lane_of(stress_.at(pack), lane);
+            const Vec3 stress = lane_of(stress_.at(group), lane);
             const Mat3 by_poisson_ratio = rest_face(f).bending_by_poisson_ratio(materials_[f]);
             materials_.add_vjp(f, 3, rates.dot(stress),
                                rates.cwiseProduct(scale).dot(by_poisson_ratio * scale.cwiseProduct(d)), out);
@@ -370,7 +376,7 @@ void BendingTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
             const FaceSide& side = sheet_.sides[f][i];
             double moment = 0.0;
             for (int j = 0; j < 3; ++j)
-                moment += std::abs(stiffness_[f / Pack::width](i, j)[f % Pack::width]) * angle;
+                moment += std::abs(stiffness_[f / SimdDouble::width](i, j)[f % SimdDouble::width]) * angle;
             if (side.rotation >= 0) out[first_scalar_ + side.rotation] += moment;
             for (const Index corner : sheet_.corners[f])
                 out.segment<3>(3 * corner).array() += moment / height;

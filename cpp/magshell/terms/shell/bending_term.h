@@ -19,7 +19,7 @@ namespace magshell {
 
 class BendingTerm final : public StrainScaffold<BendingTerm> {
   public:
-    BendingTerm(const Shell& sheet, Index body, const ChunkLoop& chunks, const GrowthForm& growth,
+    BendingTerm(const Shell& sheet, Index body, const ColoredLoop& element_blocks, const GrowthForm& growth,
                 const Nodes& nodes, const SystemMatrix& matrix, Registry& registry);
 
     std::string_view name() const override { return "bending"; }
@@ -27,11 +27,11 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     bool set_values(const Values& values) override;
     bool varies() const override { return growth_.any(); }
     double length_scale() const override { return materials_.thinnest(); }
-    double energy(const double* q, const Controls&) const override;
-    void evaluate(const double* q, const Controls&, Residual& out) override;
-    void assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
-                  SystemMatrix& out) const override;
-    void vjp(const double* q, const Controls&, const double* lambda, Gradient& out) override;
+    double energy(const double* q, const LoadParameters&) const override;
+    void evaluate(const double* q, const LoadParameters&, Residual& out) override;
+    void assemble(const ElementBlock& element_block, const double* q, const LoadParameters&,
+                  bool extrapolated_stress, SystemMatrix& out) const override;
+    void vjp(const double* q, const LoadParameters&, const double* lambda, Gradient& out) override;
     bool add_projective_stiffness(NodeMatrix& out) const override;
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
@@ -54,28 +54,29 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
         std::array<Index, 6> rotations;        // entry of rotations i and j, at lower_index(i, j)
     };
 
-    using SidesOfPack = std::array<const std::array<FaceSide, 3>*, Pack::width>;
-    SidesOfPack sides_of(Index pack) const {
-        SidesOfPack sides;
-        for (int lane = 0; lane < Pack::width; ++lane)
-            sides[lane] = &sheet_.sides[element_of(pack, lane, sheet_.n_faces())];
+    using SidesOfGroup = std::array<const std::array<FaceSide, 3>*, SimdDouble::width>;
+    SidesOfGroup sides_of(Index group) const {
+        SidesOfGroup sides;
+        for (int lane = 0; lane < SimdDouble::width; ++lane)
+            sides[lane] = &sheet_.sides[element_of(group, lane, sheet_.n_faces())];
         return sides;
     }
-    Index face_packs() const { return packs_for(sheet_.n_faces()); }
+    Index face_groups() const { return groups_for(sheet_.n_faces()); }
     template <class Body>
-    void each_pack(const Body& body) const {
-        chunks_.each([&](const Chunk& chunk) { FaceLoop::over_packs(chunk, body); });
+    void each_group(const Body& body) const {
+        element_blocks_.each(
+            [&](const ElementBlock& element_block) { FaceLoop::over_groups(element_block, body); });
     }
-    void measure(Index pack, const double* q, const std::vector<double>& changes, Pack delta[3]) const;
+    void measure(Index group, const double* q, const std::vector<double>& changes, SimdDouble delta[3]) const;
     void begin_strains(const double* q) { store_dihedrals(q); }
     void begin_rates(const double* p) { store_rates(p); }
-    void strain(Index pack, const double* q, Pack d[3]) const {
-        measure(pack, q, angle_changes_, d);
+    void strain(Index group, const double* q, SimdDouble d[3]) const {
+        measure(group, q, angle_changes_, d);
         if (natural_angles_.empty()) return;
-        for (int i = 0; i < 3; ++i) d[i] -= natural_angles_[pack][i];
+        for (int i = 0; i < 3; ++i) d[i] -= natural_angles_[group][i];
     }
-    void rate(Index pack, const double* p, Pack d[3]) const { measure(pack, p, rates_, d); }
-    const Symmetric3& stiffness(Index pack) const { return stiffness_[pack]; }
+    void rate(Index group, const double* p, SimdDouble d[3]) const { measure(group, p, rates_, d); }
+    const Symmetric3& stiffness(Index group) const { return stiffness_[group]; }
     /// Returns the derivative of each reference dihedral angle with respect to its nodes along the mean normal
     /// of the two adjacent faces.
     std::vector<std::array<double, 4>> slopes_at_rest() const;
@@ -90,24 +91,24 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     Vec3 shared(const std::vector<Vec3>& of_faces, Index face) const;
     void find_natural_angles();
     void add_natural_angles_vjp(const std::vector<Vec3>& by_angles, Gradient& out) const;
-    void assemble_faces(Index pack, SystemMatrix& out) const;
+    void assemble_faces(Index group, SystemMatrix& out) const;
     void assemble_dihedrals(Index first, Index last, const double* q, const Strains& stress,
                             SystemMatrix& out) const;
 
     const Shell& sheet_;
     const Index body_;
-    const ChunkLoop& chunks_;
+    const ColoredLoop& element_blocks_;
     const Nodes& nodes_;
     const Index first_scalar_;
     ShellMaterials materials_;
     ShellGrowth growth_;
-    Slot curvature_scale_;
+    ParameterSlice curvature_scale_;
     LargeVector<FaceSlots> face_slots_;
     LargeVector<PairSlots<4>> fold_slots_;
     VectorXd curvature_scales_;  // one per edge, [Chen22] k_cur
     LargeVector<Symmetric3> stiffness_;
-    // natural_angle_changes() of each pack, where anything grows
-    std::vector<std::array<Pack, 3>> natural_angles_;
+    // natural_angle_changes() of each SIMD vector, where anything grows
+    std::vector<std::array<SimdDouble, 3>> natural_angles_;
     // For each dihedral stencil at the last evaluated state: theta - theta~, the rate of theta along the last
     // extrapolated step, and its gradient by the four nodes.
     std::vector<double> angle_changes_, rates_;

@@ -51,10 +51,10 @@ class ElasticTerm : public Term {
 };
 
 /// ElasticTerm for a class `Kernel` that derives from it and provides, for N strains per element,
-///       each_pack(body)                        calls body(pack) for all packs of its elements
+///       each_group(body)                         calls body(group) for all SIMD vectors of its elements
 ///       begin_strains(q), begin_rates(p)       computes what the strains of all elements share
-///       strain(pack, q, d), rate(pack, p, d)   the strains d at q; J p at the last evaluated state
-///       stiffness(pack)                        C
+///       strain(group, q, d), rate(group, p, d)   the strains d at q; J p at the last evaluated state
+///       stiffness(group)                        C
 template <class Kernel, int N = 3>
 class StrainScaffold : public ElasticTerm {
   public:
@@ -65,43 +65,45 @@ class StrainScaffold : public ElasticTerm {
 
     void extrapolate(const double* p) final {
         kernel().begin_rates(p);
-        kernel().each_pack([&](Index pack) {
-            Pack along[N], change[N];
-            kernel().rate(pack, p, along);
-            history_.scaled(kernel().stiffness(pack)).times(along, change);
-            for (int i = 0; i < N; ++i) extrapolated_.at(pack)[i] = stress_.at(pack)[i] + change[i];
+        kernel().each_group([&](Index group) {
+            SimdDouble along[N], change[N];
+            kernel().rate(group, p, along);
+            history_.scaled(kernel().stiffness(group)).times(along, change);
+            for (int i = 0; i < N; ++i) extrapolated_.at(group)[i] = stress_.at(group)[i] + change[i];
         });
     }
 
     Strains strains(const double* q) final {
         kernel().begin_strains(q);
         Strains out(stress_.elements, N);
-        kernel().each_pack([&](Index pack) { kernel().strain(pack, q, out.at(pack)); });
+        kernel().each_group([&](Index group) { kernel().strain(group, q, out.at(group)); });
         return out;
     }
 
     Strains strain_rates(const double* p) final {
         kernel().begin_rates(p);
         Strains out(stress_.elements, N);
-        kernel().each_pack([&](Index pack) { kernel().rate(pack, p, out.at(pack)); });
+        kernel().each_group([&](Index group) { kernel().rate(group, p, out.at(group)); });
         return out;
     }
 
     Strains stresses(const Strains& strains) const final {
         Strains out(stress_.elements, N);
-        kernel().each_pack(
-            [&](Index pack) { kernel().stiffness(pack).times(strains.at(pack), out.at(pack)); });
+        kernel().each_group(
+            [&](Index group) { kernel().stiffness(group).times(strains.at(group), out.at(group)); });
         return out;
     }
 
   protected:
-    /// Computes and stores the stress of a pack from its strain.
-    void store_stress(Index pack, Pack strain[N]) {
-        history_.apply<N>(pack, strain);
-        kernel().stiffness(pack).times(strain, stress_.at(pack));
+    /// Computes and stores the stress of a SIMD vector from its strain.
+    void store_stress(Index group, SimdDouble strain[N]) {
+        history_.apply<N>(group, strain);
+        kernel().stiffness(group).times(strain, stress_.at(group));
     }
 
-    std::size_t bytes_of_stresses() const { return bytes_of(stress_.packs) + bytes_of(extrapolated_.packs); }
+    std::size_t bytes_of_stresses() const {
+        return bytes_of(stress_.groups) + bytes_of(extrapolated_.groups);
+    }
 
     Strains stress_, extrapolated_;
 

@@ -13,13 +13,13 @@ MembraneTerm::MembraneTerm(const Surface& surface, Index body, const MembraneFac
       nodes_(nodes.n_nodes()),
       materials_(surface, registry),
       growth_(surface.owner, surface.faces, growth, registry),
-      elements_(loop.packs()) {
-    for (Index pack = 0; pack < loop.packs(); ++pack)
-        for (int lane = 0; lane < Pack::width; ++lane) {
-            const std::array<Vec3, 3> x = faces.rest_corners(loop.face(pack, lane));
+      elements_(loop.groups()) {
+    for (Index group = 0; group < loop.groups(); ++group)
+        for (int lane = 0; lane < SimdDouble::width; ++lane) {
+            const std::array<Vec3, 3> x = faces.rest_corners(loop.face(group, lane));
             for (int i = 0; i < 3; ++i)
-                elements_[pack].rest_squared_length[i].set(lane,
-                                                           (x[(i + 2) % 3] - x[(i + 1) % 3]).squaredNorm());
+                elements_[group].rest_squared_length[i].set(lane,
+                                                            (x[(i + 2) % 3] - x[(i + 1) % 3]).squaredNorm());
         }
 }
 
@@ -40,18 +40,18 @@ RestFace MembraneTerm::rest_face(Index face) const {
 bool MembraneTerm::set_values(const Values& values) {
     const bool material_changed = materials_.set_values(values), grew = growth_.set_values(values);
     if (!material_changed && !grew) return false;
-    for (Index pack = 0; pack < loop_.packs(); ++pack)
-        for (int lane = 0; lane < Pack::width; ++lane) {
-            const Index f = loop_.face(pack, lane);
+    for (Index group = 0; group < loop_.groups(); ++group)
+        for (int lane = 0; lane < SimdDouble::width; ++lane) {
+            const Index f = loop_.face(group, lane);
             const RestFace rest = rest_face(f);
             Mat3 stiffness = Mat3::Zero();
             for (const MembraneFaces::FacePart& share : faces_.parts(f))
                 if (share.part > 0.0)
                     stiffness += share.part * rest.membrane_stiffness(materials_[share.face]);
-            set_lane(elements_[pack].stiffness, lane, stiffness);
+            set_lane(elements_[group].stiffness, lane, stiffness);
             if (!grew) continue;
             for (int i = 0; i < 3; ++i)
-                elements_[pack].rest_squared_length[i].set(lane, rest.edge_length[i] * rest.edge_length[i]);
+                elements_[group].rest_squared_length[i].set(lane, rest.edge_length[i] * rest.edge_length[i]);
         }
     return true;
 }
@@ -78,69 +78,69 @@ bool MembraneTerm::add_projective_stiffness(NodeMatrix& out) const {
     return true;
 }
 
-double MembraneTerm::energy(const double* q, const Controls&) const {
-    return loop_.sum([&](Index pack) {
-        Pack3 x[3];
-        loop_.gather(pack, q, x);
-        Pack strain[3], stress[3];
-        Membrane(x).strain(elements_[pack], strain);
-        elements_[pack].stiffness.times(strain, stress);
-        return Pack(0.5) * (strain[0] * stress[0] + strain[1] * stress[1] + strain[2] * stress[2]);
+double MembraneTerm::energy(const double* q, const LoadParameters&) const {
+    return loop_.sum([&](Index group) {
+        SimdVec3 x[3];
+        loop_.gather(group, q, x);
+        SimdDouble strain[3], stress[3];
+        Membrane(x).strain(elements_[group], strain);
+        elements_[group].stiffness.times(strain, stress);
+        return SimdDouble(0.5) * (strain[0] * stress[0] + strain[1] * stress[1] + strain[2] * stress[2]);
     });
 }
 
-void MembraneTerm::evaluate(const double* q, const Controls&, Residual& out) {
+void MembraneTerm::evaluate(const double* q, const LoadParameters&, Residual& out) {
     state_.assign(q, q + 3 * nodes_);
-    loop_.scatter_packs([&](Index pack) {
-        Pack3 x[3], g[3];
-        loop_.gather(pack, q, x);
+    loop_.scatter_groups([&](Index group) {
+        SimdVec3 x[3], g[3];
+        loop_.gather(group, q, x);
         const Membrane membrane(x);
-        Pack strain[3];
-        membrane.strain(elements_[pack], strain);
-        store_stress(pack, strain);
-        membrane.gradient(stress_.at(pack), g);
-        loop_.scatter(pack, g, out);
+        SimdDouble strain[3];
+        membrane.strain(elements_[group], strain);
+        store_stress(group, strain);
+        membrane.gradient(stress_.at(group), g);
+        loop_.scatter(group, g, out);
     });
 }
 
-void MembraneTerm::assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
-                            SystemMatrix& out) const {
+void MembraneTerm::assemble(const ElementBlock& element_block, const double* q, const LoadParameters&,
+                            bool extrapolated_stress, SystemMatrix& out) const {
     const Strains& stress = extrapolated_stress ? extrapolated_ : stress_;
-    FaceLoop::over_packs(chunk, [&](Index pack) {
-        Pack3 x[3];
-        Pack33 h[6];
-        loop_.gather(pack, q, x);
-        Membrane(x).hessian(history_.scaled(elements_[pack].stiffness), stress.at(pack), h);
-        loop_.scatter(pack, h, out);
+    FaceLoop::over_groups(element_block, [&](Index group) {
+        SimdVec3 x[3];
+        SimdMat3 h[6];
+        loop_.gather(group, q, x);
+        Membrane(x).hessian(history_.scaled(elements_[group].stiffness), stress.at(group), h);
+        loop_.scatter(group, h, out);
     });
 }
 
-void MembraneTerm::strain(Index pack, const double* q, Pack d[3]) const {
-    Pack3 x[3];
-    loop_.gather(pack, q, x);
-    Membrane(x).strain(elements_[pack], d);
+void MembraneTerm::strain(Index group, const double* q, SimdDouble d[3]) const {
+    SimdVec3 x[3];
+    loop_.gather(group, q, x);
+    Membrane(x).strain(elements_[group], d);
 }
 
-void MembraneTerm::rate(Index pack, const double* p, Pack d[3]) const {
-    Pack3 x[3], along[3];
-    loop_.gather(pack, state_.data(), x);
-    loop_.gather(pack, p, along);
+void MembraneTerm::rate(Index group, const double* p, SimdDouble d[3]) const {
+    SimdVec3 x[3], along[3];
+    loop_.gather(group, state_.data(), x);
+    loop_.gather(group, p, along);
     Membrane(x).strain_rate(along, d);
 }
 
-void MembraneTerm::vjp(const double* q, const Controls&, const double* lambda, Gradient& out) {
+void MembraneTerm::vjp(const double* q, const LoadParameters&, const double* lambda, Gradient& out) {
     // Work of each part of a face, and its derivative by the Poisson ratio. A part may belong to a face of
-    // another chunk.
+    // another block.
     using OfShares = std::array<Eigen::Vector2d, 2>;
     std::vector<OfShares> by_shares(surface_.n_faces(),
                                     OfShares{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()});
-    loop_.each_pack([&](Index pack) {
-        Pack strains[3], rates[3];
-        strain(pack, q, strains);
-        history_.apply(pack, strains);
-        rate(pack, lambda, rates);
-        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
-            const Index f = loop_.face(pack, lane);
+    loop_.each_group([&](Index group) {
+        SimdDouble strains[3], rates[3];
+        strain(group, q, strains);
+        history_.apply(group, strains);
+        rate(group, lambda, rates);
+        for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+            const Index f = loop_.face(group, lane);
             const Vec3 d = lane_of(strains, lane), along = lane_of(rates, lane);
             const RestFace rest = rest_face(f);
             for (int k = 0; k < 2; ++k) {
@@ -158,14 +158,14 @@ void MembraneTerm::vjp(const double* q, const Controls&, const double* lambda, G
             materials_.add_vjp(faces_.parts(f)[k].face, 1, by_shares[f][k][0], by_shares[f][k][1], out);
     if (!growth_.any()) return;
     std::vector<Mat3> by_faces(surface_.n_faces());
-    each_pack([&](Index pack) {
-        Pack strains[3], rates[3], stresses[3];
-        strain(pack, q, strains);
-        history_.apply(pack, strains);
-        rate(pack, lambda, rates);
-        elements_[pack].stiffness.times(rates, stresses);
-        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
-            const Index f = loop_.face(pack, lane);
+    each_group([&](Index group) {
+        SimdDouble strains[3], rates[3], stresses[3];
+        strain(group, q, strains);
+        history_.apply(group, strains);
+        rate(group, lambda, rates);
+        elements_[group].stiffness.times(rates, stresses);
+        for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+            const Index f = loop_.face(group, lane);
             const GrownFace own = grown(f);
             const Vec3 d = lane_of(strains, lane), along = lane_of(rates, lane);
             Mat2 by_growth = own.lengths_by_growth(-history_.factor() * lane_of(stresses, lane));
@@ -197,11 +197,11 @@ void MembraneTerm::add_growth_vjp(const std::vector<Mat3>& by_faces, Gradient& o
 }
 
 void MembraneTerm::add_forces(const Strains& stresses, Residual& out) {
-    loop_.scatter_packs([&](Index pack) {
-        Pack3 x[3], g[3];
-        loop_.gather(pack, state_.data(), x);
-        Membrane(x).gradient(stresses.at(pack), g);
-        loop_.scatter(pack, g, out);
+    loop_.scatter_groups([&](Index group) {
+        SimdVec3 x[3], g[3];
+        loop_.gather(group, state_.data(), x);
+        Membrane(x).gradient(stresses.at(group), g);
+        loop_.scatter(group, g, out);
     });
 }
 
@@ -209,8 +209,8 @@ void MembraneTerm::add_forces(const Strains& stresses, Residual& out) {
 // in slender faces, the latter is larger.
 void MembraneTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
     for (Index f = 0; f < surface_.n_faces(); ++f) {
-        const Membrane::Element& element = elements_[f / Pack::width];
-        const int lane = f % Pack::width;
+        const Membrane::Element& element = elements_[f / SimdDouble::width];
+        const int lane = f % SimdDouble::width;
         const double coordinate = surface_.largest_coordinate(f) + beyond;
         for (int i = 0; i < 3; ++i) {
             double stress = 0.0;

@@ -22,11 +22,11 @@ class MembraneTerm final : public StrainScaffold<MembraneTerm> {
     bool set_values(const Values& values) override;
     bool varies() const override { return growth_.any(); }
     double length_scale() const override { return materials_.thinnest(); }
-    double energy(const double* q, const Controls&) const override;
-    void evaluate(const double* q, const Controls&, Residual& out) override;
-    void assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
-                  SystemMatrix& out) const override;
-    void vjp(const double* q, const Controls&, const double* lambda, Gradient& out) override;
+    double energy(const double* q, const LoadParameters&) const override;
+    void evaluate(const double* q, const LoadParameters&, Residual& out) override;
+    void assemble(const ElementBlock& element_block, const double* q, const LoadParameters&,
+                  bool extrapolated_stress, SystemMatrix& out) const override;
+    void vjp(const double* q, const LoadParameters&, const double* lambda, Gradient& out) override;
     bool add_projective_stiffness(NodeMatrix& out) const override;
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
@@ -40,16 +40,16 @@ class MembraneTerm final : public StrainScaffold<MembraneTerm> {
   private:
     friend class StrainScaffold<MembraneTerm>;
     template <class Body>
-    void each_pack(const Body& body) const {
-        loop_.each_pack(body);
+    void each_group(const Body& body) const {
+        loop_.each_group(body);
     }
     void begin_strains(const double*) {}
     void begin_rates(const double*) {}
-    void strain(Index pack, const double* q, Pack d[3]) const;
-    void rate(Index pack, const double* p, Pack d[3]) const;
+    void strain(Index group, const double* q, SimdDouble d[3]) const;
+    void rate(Index group, const double* p, SimdDouble d[3]) const;
     RestFace rest_face(Index face) const;
     void add_growth_vjp(const std::vector<Mat3>& by_faces, Gradient& out) const;
-    const Symmetric3& stiffness(Index pack) const { return elements_[pack].stiffness; }
+    const Symmetric3& stiffness(Index group) const { return elements_[group].stiffness; }
 
     const Surface& surface_;
     const Index body_;

@@ -6,28 +6,28 @@ namespace magshell {
 void ShellGrowth::Tensors::add(const std::string& owner, const char* name, const char* unit,
                                const TensorForm& form, Registry& registry) {
     if (form.rows == 0) return;
-    slot = registry.values.add(owner, name, unit, form.rows, form.width);
-    numbers.resize(slot.size());
+    slice = registry.values.add(owner, name, unit, form.rows, form.width);
+    numbers.resize(slice.size());
 }
 
 bool ShellGrowth::Tensors::take(const Values& values) {
-    if (slot.rows == 0 || !values.changed(slot)) return false;
-    numbers.assign(values[slot], values[slot] + slot.size());
+    if (slice.rows == 0 || !values.changed(slice)) return false;
+    numbers.assign(values[slice], values[slice] + slice.size());
     return true;
 }
 
 Mat3 ShellGrowth::Tensors::at(Index row, double without) const {
-    if (slot.rows == 0) return without * Mat3::Identity();
-    const double* from = numbers.data() + static_cast<std::size_t>(row) * slot.width;
-    if (slot.width == 1) return *from * Mat3::Identity();
+    if (slice.rows == 0) return without * Mat3::Identity();
+    const double* from = numbers.data() + static_cast<std::size_t>(row) * slice.width;
+    if (slice.width == 1) return *from * Mat3::Identity();
     const Eigen::Map<const Mat3> given(from);
     return 0.5 * (given + given.transpose());
 }
 
 void ShellGrowth::Tensors::add_gradient(Index row, const Mat3& by, Gradient& out) const {
-    if (slot.rows == 0) return;
-    double* to = out.values.data() + slot.at(row);
-    if (slot.width == 1)
+    if (slice.rows == 0) return;
+    double* to = out.values.data() + slice.at(row);
+    if (slice.width == 1)
         *to += by.trace();
     else
         Eigen::Map<Mat3>(to) += 0.5 * (by + by.transpose());

@@ -26,7 +26,7 @@ class ShellGrowth {
     ShellGrowth(const std::string& owner, const Renumbering& faces, const GrowthForm& form,
                 Registry& registry);
 
-    bool any() const { return growth_.slot.rows > 0 || curvature_.slot.rows > 0; }
+    bool any() const { return growth_.slice.rows > 0 || curvature_.slice.rows > 0; }
     /// Reads the tensors; returns true if any has changed.
     bool set_values(const Values& values);
 
@@ -43,7 +43,7 @@ class ShellGrowth {
 
   private:
     struct Tensors {
-        Slot slot;
+        ParameterSlice slice;
         std::vector<double> numbers;
 
         void add(const std::string& owner, const char* name, const char* unit, const TensorForm& form,
@@ -53,7 +53,7 @@ class ShellGrowth {
         void add_gradient(Index row, const Mat3& by, Gradient& out) const;
     };
 
-    Index row(const Tensors& of, Index face) const { return of.slot.rows > 1 ? faces_.user[face] : 0; }
+    Index row(const Tensors& of, Index face) const { return of.slice.rows > 1 ? faces_.user[face] : 0; }
 
     const Renumbering& faces_;
     Tensors growth_, curvature_;

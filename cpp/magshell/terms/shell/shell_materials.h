@@ -32,7 +32,7 @@ class ShellMaterials {
     }
 
   private:
-    Slot thickness_, young_modulus_, poisson_ratio_;
+    ParameterSlice thickness_, young_modulus_, poisson_ratio_;
     std::vector<ShellMaterial> of_faces_;
 };
 

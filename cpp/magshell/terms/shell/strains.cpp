@@ -6,8 +6,8 @@ void StrainSet::add(double factor, const StrainSet& other) {
     if (of_terms.empty())
         for (const Strains& part : other.of_terms) of_terms.emplace_back(part.elements, part.width);
     for (std::size_t t = 0; t < other.of_terms.size(); ++t)
-        for (std::size_t k = 0; k < of_terms[t].packs.size(); ++k)
-            of_terms[t].packs[k] += Pack(factor) * other.of_terms[t].packs[k];
+        for (std::size_t k = 0; k < of_terms[t].groups.size(); ++k)
+            of_terms[t].groups[k] += SimdDouble(factor) * other.of_terms[t].groups[k];
 }
 
 StrainSet StrainSet::times(double factor) const {
@@ -27,7 +27,7 @@ double StrainSet::dot(const StrainSet& other) const {
 
 std::size_t StrainSet::bytes() const {
     std::size_t total = 0;
-    for (const Strains& part : of_terms) total += bytes_of(part.packs);
+    for (const Strains& part : of_terms) total += bytes_of(part.groups);
     return total;
 }
 

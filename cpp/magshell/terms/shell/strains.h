@@ -13,22 +13,26 @@
 
 namespace magshell {
 
-/// Holds `width` numbers per element (three for a shell) in the layout of SIMD packs: strain i of pack p is
+/// Holds `width` numbers per element (three for a shell) in the layout of SIMD vectors: strain i of SIMD vector p is
 /// stored at width p + i, with one element per lane.
 struct Strains {
-    LargeVector<Pack> packs;
+    LargeVector<SimdDouble> groups;
     Index elements = 0;
     int width = 3;
 
     explicit Strains(Index elements_ = 0, int width_ = 3)
-        : packs(static_cast<std::size_t>(width_) * packs_for(elements_), Pack(0.0)),
+        : groups(static_cast<std::size_t>(width_) * groups_for(elements_), SimdDouble(0.0)),
           elements(elements_),
           width(width_) {}
-    Pack* at(Index pack) { return packs.data() + static_cast<std::size_t>(width) * pack; }
-    const Pack* at(Index pack) const { return packs.data() + static_cast<std::size_t>(width) * pack; }
-    double number(Index element, int i) const { return at(element / Pack::width)[i][element % Pack::width]; }
+    SimdDouble* at(Index group) { return groups.data() + static_cast<std::size_t>(width) * group; }
+    const SimdDouble* at(Index group) const {
+        return groups.data() + static_cast<std::size_t>(width) * group;
+    }
+    double number(Index element, int i) const {
+        return at(element / SimdDouble::width)[i][element % SimdDouble::width];
+    }
     void set(Index element, int i, double value) {
-        at(element / Pack::width)[i].set(element % Pack::width, value);
+        at(element / SimdDouble::width)[i].set(element % SimdDouble::width, value);
     }
 };
 
@@ -50,9 +54,9 @@ struct StrainHistory {
 
     /// Replaces d by scale d - shift.
     template <int N = 3>
-    void apply(Index pack, Pack strain[N]) const {
+    void apply(Index group, SimdDouble strain[N]) const {
         if (!shift) return;
-        for (int i = 0; i < N; ++i) strain[i] = Pack(scale) * strain[i] - shift->at(pack)[i];
+        for (int i = 0; i < N; ++i) strain[i] = SimdDouble(scale) * strain[i] - shift->at(group)[i];
     }
 
     /// Returns the derivative of the effective strain by the current strain.
@@ -63,7 +67,7 @@ struct StrainHistory {
     Symmetric<N> scaled(const Symmetric<N>& stiffness) const {
         Symmetric<N> result = stiffness;
         if (shift)
-            for (Pack& entry : result.at) entry *= Pack(scale);
+            for (SimdDouble& entry : result.at) entry *= SimdDouble(scale);
         return result;
     }
 };

@@ -15,12 +15,13 @@ void BendingSixTerm::count_rotations_from_rest(bool from_rest) {
     if (!from_rest) side_rotations_ = {};
 }
 
-void BendingSixTerm::prepare_assembly(const double* q, const Controls&) {
+void BendingSixTerm::prepare_assembly(const double* q, const LoadParameters&) {
     if (!from_rest_) return;
     side_rotations_.resize(sheet_.dihedrals.size());
-    chunks_.each([&](const Chunk& chunk) {
-        for (Index first = chunk.first_dihedral; first < chunk.last_dihedral; first += Pack::width) {
-            const Index last = std::min(first + Pack::width, chunk.last_dihedral);
+    element_blocks_.each([&](const ElementBlock& element_block) {
+        for (Index first = element_block.first_dihedral; first < element_block.last_dihedral;
+             first += SimdDouble::width) {
+            const Index last = std::min(first + SimdDouble::width, element_block.last_dihedral);
             for (int g = 0; g < 2; ++g) {
                 const std::array<DihedralAngleSix::Side, 2> sides = dihedrals_at(first, last, g, q).sides();
                 for (int lane = 0; lane < last - first; ++lane)
@@ -64,18 +65,18 @@ void BendingSixTerm::forces_from_rest(VectorXd& forces) const {
     });
 }
 
-void BendingSixTerm::assemble_from_rest(Index pack, const double* q, SystemMatrix& out) const {
-    Pack3 x[6];
+void BendingSixTerm::assemble_from_rest(Index group, const double* q, SystemMatrix& out) const {
+    SimdVec3 x[6];
     SixNodeRows rows;
-    loop_.gather(pack, q, x);
-    BendingSix(x).rows(elements_[pack], rows);
+    loop_.gather(group, q, x);
+    BendingSix(x).rows(elements_[group], rows);
     // The only nodes outside a face are the directors of clamped edges.
-    Pack3 held[3][2] = {};
-    Pack sign[3] = {};
+    SimdVec3 held[3][2] = {};
+    SimdDouble sign[3] = {};
     std::array<bool, 3> any_held{};
-    for (int lane = 0; lane < Pack::width; ++lane)
+    for (int lane = 0; lane < SimdDouble::width; ++lane)
         for (int i = 0; i < 3; ++i) {
-            const FaceSideSix& side = sheet_.sides[loop_.element(pack, lane)][i];
+            const FaceSideSix& side = sheet_.sides[loop_.element(group, lane)][i];
             sign[i].set(lane, side.sign);
             if (side.dihedral < 0) continue;
             const bool is_held = !sheet_.dihedrals[side.dihedral].right_is_face;
@@ -91,22 +92,22 @@ void BendingSixTerm::assemble_from_rest(Index pack, const double* q, SystemMatri
                     return DihedralAngleSix::side_weight(point, index_on_side(a), turn.foot) * turn.along;
                 };
                 for (int k = 0; k < 6; ++k) {
-                    Pack3& row = rows.at[3 * i + g][own[k]];
+                    SimdVec3& row = rows.at[3 * i + g][own[k]];
                     set_lane(row, lane, lane_of(row, lane) + part(at.own[k]));
                 }
                 if (is_held) set_lane(held[i][g], lane, part(at.beyond));
             }
         }
-    const Symmetric9 stiffness = history_.scaled(stiffness_[pack]);
+    const Symmetric9 stiffness = history_.scaled(stiffness_[group]);
     const SixNodeRows stiff = rows.times(stiffness);
-    Pack33 h[21];
+    SimdMat3 h[21];
     rows.blocks(stiff, h);
-    loop_.scatter(pack, h, out);
-    Pack3 beside[6][6];
+    loop_.scatter(group, h, out);
+    SimdVec3 beside[6][6];
     for (int a = 0; a < 6; ++a)
         for (int k = 0; k < 6; ++k) beside[a][k] = sign[a / 2] * stiff.at[3 * (a / 2) + a % 2][k];
-    for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
-        const Index f = loop_.element(pack, lane);
+    for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+        const Index f = loop_.element(group, lane);
         const std::array<Index, 6>& nodes = sheet_.own_nodes[f];
         Index length[6];
         for (int k = 0; k < 6; ++k) length[k] = out.column_length(nodes[k]);
@@ -114,24 +115,24 @@ void BendingSixTerm::assemble_from_rest(Index pack, const double* q, SystemMatri
             if (sheet_.stencils[f].rotations[a] >= 0)
                 for (int k = 0; k < 6; ++k)
                     out.add_rotation_row(face_slots_[f].rotation_nodes[a][k], length[k], beside[a][k], lane);
-        add_rotations(pack, lane, sign, stiffness, out);
+        add_rotations(group, lane, sign, stiffness, out);
     }
-    if (any_held[0] || any_held[1] || any_held[2]) add_held(pack, held, sign, stiffness, stiff, out);
+    if (any_held[0] || any_held[1] || any_held[2]) add_held(group, held, sign, stiffness, stiff, out);
 }
 
 /// Adds the blocks between the fixed directors of clamped edges and the nodes and rotations of their faces, and
 /// among directors.
-void BendingSixTerm::add_held(Index pack, const Pack3 (&held)[3][2], const Pack sign[3],
+void BendingSixTerm::add_held(Index group, const SimdVec3 (&held)[3][2], const SimdDouble sign[3],
                               const Symmetric9& stiffness, const SixNodeRows& stiff,
                               SystemMatrix& out) const {
-    for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
-        const Index f = loop_.element(pack, lane);
+    for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+        const Index f = loop_.element(group, lane);
         const std::array<Index, 15>& nodes = sheet_.stencils[f].nodes;
         const auto is_held = [&](int i) {
             const Index fold = sheet_.sides[f][i].dihedral;
             return fold >= 0 && !sheet_.dihedrals[fold].right_is_face;
         };
-        const auto add = [&](int row, int column, const Pack33& block) {
+        const auto add = [&](int row, int column, const SimdMat3& block) {
             const SystemMatrix::Slot slot = face_slots_[f].nodes[lower_index(row - 1, column)];
             if (slot == same_node) out.add_block_and_transpose(nodes[row], block, lane);
             if (slot >= 0)
@@ -144,12 +145,12 @@ void BendingSixTerm::add_held(Index pack, const Pack3 (&held)[3][2], const Pack 
                 add(row, k,
                     outer(held[i][0], stiff.at[3 * i][k]) + outer(held[i][1], stiff.at[3 * i + 1][k]));
             for (int j = 0; j < 3; ++j) {
-                Pack3 felt[2];  // coupling with the strains of edge j
+                SimdVec3 felt[2];  // coupling with the strains of edge j
                 for (int g = 0; g < 2; ++g)
                     felt[g] = stiffness(3 * i, 3 * j + g) * held[i][0] +
                               stiffness(3 * i + 1, 3 * j + g) * held[i][1];
                 if (is_held(j) && j <= i) {
-                    const Pack33 block = outer(felt[0], held[j][0]) + outer(felt[1], held[j][1]);
+                    const SimdMat3 block = outer(felt[0], held[j][0]) + outer(felt[1], held[j][1]);
                     if (j == i)
                         out.add_diagonal_block(nodes[row], block, lane);
                     else

@@ -14,7 +14,7 @@ Vec3 normal_of(const std::array<Vec3, 6>& x) {
 
 }  // namespace
 
-BendingSixTerm::BendingSixTerm(const SixNodeShell& sheet, Index body, const ChunkLoop& chunks,
+BendingSixTerm::BendingSixTerm(const SixNodeShell& sheet, Index body, const ColoredLoop& element_blocks,
                                const Nodes& nodes, const GrowthForm& growth, const SystemMatrix& matrix,
                                Registry& registry)
     : StrainScaffold(sheet.n_faces()),
@@ -22,29 +22,30 @@ BendingSixTerm::BendingSixTerm(const SixNodeShell& sheet, Index body, const Chun
       body_(body),
       nodes_(nodes),
       first_scalar_(nodes.first_scalar()),
-      chunks_(chunks),
-      loop_(sheet.own_nodes, chunks, matrix),
+      element_blocks_(element_blocks),
+      loop_(sheet.own_nodes, element_blocks, matrix),
       materials_(sheet.owner, sheet.faces, registry),
       growth_(sheet.owner, sheet.faces, growth, registry),
       rest_(sheet.rest.begin(), sheet.rest.end()),
-      elements_(loop_.packs()),
-      rest_measures_(loop_.packs()),
-      stiffness_(loop_.packs()),
+      elements_(loop_.groups()),
+      rest_measures_(loop_.groups()),
+      stiffness_(loop_.groups()),
       dihedrals_(sheet.dihedrals.size()) {
-    for (Index pack = 0; pack < loop_.packs(); ++pack) {
-        Pack3 x[6];
-        for (int lane = 0; lane < Pack::width; ++lane) {
-            const Index f = loop_.element(pack, lane);
+    for (Index group = 0; group < loop_.groups(); ++group) {
+        SimdVec3 x[6];
+        for (int lane = 0; lane < SimdDouble::width; ++lane) {
+            const Index f = loop_.element(group, lane);
             for (int k = 0; k < 6; ++k) set_lane(x[k], lane, sheet.rest[f][k]);
             for (int p = 0; p < BendingSix::points; ++p)
-                elements_[pack].inverse_jacobian[p].set(lane, rest_[f].inverse_jacobian[p]);
-            for (int r = 0; r < 9; ++r) elements_[pack].scale[r].set(lane, rest_[f].scale[r]);
+                elements_[group].inverse_jacobian[p].set(lane, rest_[f].inverse_jacobian[p]);
+            for (int r = 0; r < 9; ++r) elements_[group].scale[r].set(lane, rest_[f].scale[r]);
         }
-        BendingSix(x).measures(elements_[pack], rest_measures_[pack].data());
+        BendingSix(x).measures(elements_[group], rest_measures_[group].data());
     }
     if (growth_.any())
         for (Index f = 0; f < sheet.n_faces(); ++f)
-            rest_inside_.push_back(lane_of<9>(rest_measures_[f / Pack::width].data(), f % Pack::width));
+            rest_inside_.push_back(
+                lane_of<9>(rest_measures_[f / SimdDouble::width].data(), f % SimdDouble::width));
     for (const SixNodeShell::Stencil& s : sheet.stencils) {
         FaceSlots& slots = face_slots_.emplace_back();
         slots.nodes = pair_slots<15>(matrix, s.nodes);
@@ -66,9 +67,9 @@ BendingSixTerm::BendingSixTerm(const SixNodeShell& sheet, Index body, const Chun
 }
 
 DihedralAngleSix BendingSixTerm::dihedrals_at(Index first, Index last, int point, const double* q) const {
-    Pack3 x[9] = {};
-    Pack right_is_face(0.0);
-    for (int lane = 0; lane < Pack::width; ++lane) {
+    SimdVec3 x[9] = {};
+    SimdDouble right_is_face(0.0);
+    for (int lane = 0; lane < SimdDouble::width; ++lane) {
         const DihedralSixStencil& fold = sheet_.dihedrals[std::min(first + lane, last - 1)];
         for (int a = 0; a < 9; ++a)
             if (fold.nodes[a] >= 0) set_lane(x[a], lane, q + 3 * fold.nodes[a]);
@@ -83,13 +84,14 @@ double BendingSixTerm::angle_change(Index fold, int point, double angle) const {
 
 void BendingSixTerm::store_dihedrals(const double* q) {
     state_.assign(q, q + 3 * nodes_.n_nodes());
-    chunks_.each([&](const Chunk& chunk) {
-        for (Index first = chunk.first_dihedral; first < chunk.last_dihedral; first += Pack::width) {
-            const Index last = std::min(first + Pack::width, chunk.last_dihedral);
+    element_blocks_.each([&](const ElementBlock& element_block) {
+        for (Index first = element_block.first_dihedral; first < element_block.last_dihedral;
+             first += SimdDouble::width) {
+            const Index last = std::min(first + SimdDouble::width, element_block.last_dihedral);
             for (int g = 0; g < 2; ++g) {
                 const DihedralAngleSix fold = dihedrals_at(first, last, g, q);
-                const Pack angle = fold.angle();
-                Pack3 by_node[9];
+                const SimdDouble angle = fold.angle();
+                SimdVec3 by_node[9];
                 fold.gradient(by_node);
                 for (int lane = 0; lane < last - first; ++lane) {
                     DihedralState& state = dihedrals_[first + lane][g];
@@ -106,8 +108,8 @@ void BendingSixTerm::store_dihedrals(const double* q) {
 }
 
 void BendingSixTerm::store_rates(const double* p) {
-    chunks_.each([&](const Chunk& chunk) {
-        for (Index h = chunk.first_dihedral; h < chunk.last_dihedral; ++h)
+    element_blocks_.each([&](const ElementBlock& element_block) {
+        for (Index h = element_block.first_dihedral; h < element_block.last_dihedral; ++h)
             for (DihedralState& state : dihedrals_[h]) {
                 state.rate = 0.0;
                 for (int a = 0; a < 9; ++a) {
@@ -119,14 +121,14 @@ void BendingSixTerm::store_rates(const double* p) {
     });
 }
 
-/// Adds the strains of the edges of a pack of faces, from a number changes(edge, point) and the rotations in q.
+/// Adds the strains of the edges of a SIMD vector of faces, from a number changes(edge, point) and the rotations in q.
 /// It is linear, so it serves rates as well.
 template <class Turn>
-void BendingSixTerm::measure(Index pack, const double* q, const Turn& turn, Pack d[9]) const {
+void BendingSixTerm::measure(Index group, const double* q, const Turn& turn, SimdDouble d[9]) const {
     const double* rotation = q + first_scalar_;
-    for (int lane = 0; lane < Pack::width; ++lane)
+    for (int lane = 0; lane < SimdDouble::width; ++lane)
         for (int i = 0; i < 3; ++i) {
-            const FaceSideSix& side = sheet_.sides[loop_.element(pack, lane)][i];
+            const FaceSideSix& side = sheet_.sides[loop_.element(group, lane)][i];
             for (int g = 0; g < 2; ++g) {
                 double delta = side.dihedral < 0 ? 0.0 : side.weight * turn(side.dihedral, side.point(g));
                 if (side.rotation[g] >= 0) delta += side.sign * rotation[side.rotation[g]];
@@ -135,35 +137,36 @@ void BendingSixTerm::measure(Index pack, const double* q, const Turn& turn, Pack
         }
 }
 
-void BendingSixTerm::interior(Index pack, const double* q, Pack f[9]) const {
-    Pack3 x[6];
-    loop_.gather(pack, q, x);
-    BendingSix(x).measures(elements_[pack], f);
-    for (int r = 0; r < 9; ++r) f[r] -= rest_measures_[pack][r];
+void BendingSixTerm::interior(Index group, const double* q, SimdDouble f[9]) const {
+    SimdVec3 x[6];
+    loop_.gather(group, q, x);
+    BendingSix(x).measures(elements_[group], f);
+    for (int r = 0; r < 9; ++r) f[r] -= rest_measures_[group][r];
 }
 
-void BendingSixTerm::strain(Index pack, const double* q, Pack d[9]) const {
-    interior(pack, q, d);
-    measure(pack, q, [&](Index fold, int g) { return dihedrals_[fold][g].angle_change; }, d);
+void BendingSixTerm::strain(Index group, const double* q, SimdDouble d[9]) const {
+    interior(group, q, d);
+    measure(group, q, [&](Index fold, int g) { return dihedrals_[fold][g].angle_change; }, d);
 }
 
-void BendingSixTerm::rate(Index pack, const double* p, Pack d[9]) const {
-    Pack3 x[6], along[6];
+void BendingSixTerm::rate(Index group, const double* p, SimdDouble d[9]) const {
+    SimdVec3 x[6], along[6];
     SixNodeRows rows;
-    loop_.gather(pack, state_.data(), x);
-    loop_.gather(pack, p, along);
-    BendingSix(x).rows(elements_[pack], rows);
+    loop_.gather(group, state_.data(), x);
+    loop_.gather(group, p, along);
+    BendingSix(x).rows(elements_[group], rows);
     rows.along(along, d);
-    measure(pack, p, [&](Index fold, int g) { return dihedrals_[fold][g].rate; }, d);
+    measure(group, p, [&](Index fold, int g) { return dihedrals_[fold][g].rate; }, d);
 }
 
 std::vector<std::array<double, 2>> BendingSixTerm::angle_changes_at(const double* q) const {
     std::vector<std::array<double, 2>> changes(dihedrals_.size());
-    chunks_.each([&](const Chunk& chunk) {
-        for (Index first = chunk.first_dihedral; first < chunk.last_dihedral; first += Pack::width) {
-            const Index last = std::min(first + Pack::width, chunk.last_dihedral);
+    element_blocks_.each([&](const ElementBlock& element_block) {
+        for (Index first = element_block.first_dihedral; first < element_block.last_dihedral;
+             first += SimdDouble::width) {
+            const Index last = std::min(first + SimdDouble::width, element_block.last_dihedral);
             for (int g = 0; g < 2; ++g) {
-                const Pack angle = dihedrals_at(first, last, g, q).angle();
+                const SimdDouble angle = dihedrals_at(first, last, g, q).angle();
                 for (Index h = first; h < last; ++h) changes[h][g] = angle_change(h, g, angle[h - first]);
             }
         }
@@ -174,32 +177,32 @@ std::vector<std::array<double, 2>> BendingSixTerm::angle_changes_at(const double
 Strains BendingSixTerm::strains_at(const double* q) const {
     const std::vector<std::array<double, 2>> changes = angle_changes_at(q);
     Strains out(sheet_.n_faces(), 9);
-    each_pack([&](Index pack) {
-        interior(pack, q, out.at(pack));
-        measure(pack, q, [&](Index fold, int g) { return changes[fold][g]; }, out.at(pack));
+    each_group([&](Index group) {
+        interior(group, q, out.at(group));
+        measure(group, q, [&](Index fold, int g) { return changes[fold][g]; }, out.at(group));
     });
     return out;
 }
 
-double BendingSixTerm::energy(const double* q, const Controls&) const {
+double BendingSixTerm::energy(const double* q, const LoadParameters&) const {
     const std::vector<std::array<double, 2>> changes = angle_changes_at(q);
-    return loop_.sum([&](Index pack) {
-        Pack d[9], stress[9];
-        interior(pack, q, d);
-        measure(pack, q, [&](Index fold, int g) { return changes[fold][g]; }, d);
-        stiffness_[pack].times(d, stress);
-        Pack sum = d[0] * stress[0];
+    return loop_.sum([&](Index group) {
+        SimdDouble d[9], stress[9];
+        interior(group, q, d);
+        measure(group, q, [&](Index fold, int g) { return changes[fold][g]; }, d);
+        stiffness_[group].times(d, stress);
+        SimdDouble sum = d[0] * stress[0];
         for (int r = 1; r < 9; ++r) sum += d[r] * stress[r];
-        return Pack(0.5) * sum;
+        return SimdDouble(0.5) * sum;
     });
 }
 
-void BendingSixTerm::evaluate(const double* q, const Controls&, Residual& out) {
+void BendingSixTerm::evaluate(const double* q, const LoadParameters&, Residual& out) {
     store_dihedrals(q);
-    each_pack([&](Index pack) {
-        Pack d[9];
-        strain(pack, q, d);
-        store_stress(pack, d);
+    each_group([&](Index group) {
+        SimdDouble d[9];
+        strain(group, q, d);
+        store_stress(group, d);
     });
     add_forces(stress_, out);
 }
@@ -213,18 +216,18 @@ double BendingSixTerm::moment(const DihedralSixStencil& fold, int point, const S
 }
 
 void BendingSixTerm::add_forces(const Strains& stresses, Residual& out) {
-    loop_.scatter_packs([&](Index pack) {
-        Pack3 x[6], g[6];
+    loop_.scatter_groups([&](Index group) {
+        SimdVec3 x[6], g[6];
         SixNodeRows rows;
-        loop_.gather(pack, state_.data(), x);
-        BendingSix(x).rows(elements_[pack], rows);
-        rows.forces(stresses.at(pack), g);
-        loop_.scatter(pack, g, out);
+        loop_.gather(group, state_.data(), x);
+        BendingSix(x).rows(elements_[group], rows);
+        rows.forces(stresses.at(group), g);
+        loop_.scatter(group, g, out);
     });
-    // Faces that share a rotation share an edge and hence a node, so chunks of one colour do not share
+    // Faces that share a rotation share an edge and hence a node, so blocks of one colour do not share
     // rotations either.
-    chunks_.scatter([&](const Chunk& chunk) {
-        for (Index h = chunk.first_dihedral; h < chunk.last_dihedral; ++h)
+    element_blocks_.scatter([&](const ElementBlock& element_block) {
+        for (Index h = element_block.first_dihedral; h < element_block.last_dihedral; ++h)
             for (int g = 0; g < 2; ++g) {
                 const double m = moment(sheet_.dihedrals[h], g, stresses);
                 for (int a = 0; a < 9; ++a) {
@@ -234,7 +237,7 @@ void BendingSixTerm::add_forces(const Strains& stresses, Residual& out) {
                         out.add(3 * node + c, m * dihedrals_[h][g].gradient[3 * a + c]);
                 }
             }
-        for (Index f = chunk.first; f < chunk.last; ++f)
+        for (Index f = element_block.first; f < element_block.last; ++f)
             for (int i = 0; i < 3; ++i) {
                 const FaceSideSix& side = sheet_.sides[f][i];
                 for (int g = 0; g < 2; ++g)
@@ -244,32 +247,34 @@ void BendingSixTerm::add_forces(const Strains& stresses, Residual& out) {
     });
 }
 
-void BendingSixTerm::assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
-                              SystemMatrix& out) const {
+void BendingSixTerm::assemble(const ElementBlock& element_block, const double* q, const LoadParameters&,
+                              bool extrapolated_stress, SystemMatrix& out) const {
     const Strains& stress = extrapolated_stress ? extrapolated_ : stress_;
     if (from_rest_) {
-        ElementLoop<6>::over_packs(chunk, [&](Index pack) { assemble_from_rest(pack, q, out); });
+        ElementLoop<6>::over_groups(element_block, [&](Index group) { assemble_from_rest(group, q, out); });
         return;
     }
-    ElementLoop<6>::over_packs(chunk, [&](Index pack) { assemble_faces(pack, q, stress, out); });
-    for (Index first = chunk.first_dihedral; first < chunk.last_dihedral; first += Pack::width)
-        assemble_dihedrals(first, std::min(first + Pack::width, chunk.last_dihedral), q, stress, out);
+    ElementLoop<6>::over_groups(element_block, [&](Index group) { assemble_faces(group, q, stress, out); });
+    for (Index first = element_block.first_dihedral; first < element_block.last_dihedral;
+         first += SimdDouble::width)
+        assemble_dihedrals(first, std::min(first + SimdDouble::width, element_block.last_dihedral), q, stress,
+                           out);
 }
 
-void BendingSixTerm::assemble_faces(Index pack, const double* q, const Strains& stress,
+void BendingSixTerm::assemble_faces(Index group, const double* q, const Strains& stress,
                                     SystemMatrix& out) const {
-    Pack3 x[6];
+    SimdVec3 x[6];
     SixNodeRows rows;
-    loop_.gather(pack, q, x);
+    loop_.gather(group, q, x);
     const BendingSix face(x);
-    face.rows(elements_[pack], rows);
+    face.rows(elements_[group], rows);
     // Dihedral angles add to the rows of their edge: for the face's own nodes, and for the three nodes across
     // the edge.
-    Pack3 beyond[3][2][3] = {};
-    Pack sign[3] = {};
-    for (int lane = 0; lane < Pack::width; ++lane)
+    SimdVec3 beyond[3][2][3] = {};
+    SimdDouble sign[3] = {};
+    for (int lane = 0; lane < SimdDouble::width; ++lane)
         for (int i = 0; i < 3; ++i) {
-            const FaceSideSix& side = sheet_.sides[loop_.element(pack, lane)][i];
+            const FaceSideSix& side = sheet_.sides[loop_.element(group, lane)][i];
             sign[i].set(lane, side.sign);
             if (side.dihedral < 0) continue;
             const SideNodes& at = side.on_left ? left_side : right_side;
@@ -278,17 +283,17 @@ void BendingSixTerm::assemble_faces(Index pack, const double* q, const Strains& 
                 const std::array<double, 27>& by_node = dihedrals_[side.dihedral][side.point(g)].gradient;
                 const auto part = [&](int a) -> Vec3 { return side.weight * Vec3(by_node.data() + 3 * a); };
                 for (int k = 0; k < 6; ++k) {
-                    Pack3& row = rows.at[3 * i + g][own[k]];
+                    SimdVec3& row = rows.at[3 * i + g][own[k]];
                     set_lane(row, lane, lane_of(row, lane) + part(at.own[k]));
                 }
                 for (int k = 0; k < 3; ++k) set_lane(beyond[i][g][k], lane, part(at.beyond + k));
             }
         }
-    const Symmetric9 stiffness = history_.scaled(stiffness_[pack]);
+    const Symmetric9 stiffness = history_.scaled(stiffness_[group]);
     const SixNodeRows stiff = rows.times(stiffness);
-    Pack33 h[120];
+    SimdMat3 h[120];
     rows.blocks(stiff, h);
-    face.add_curvature(elements_[pack], stress.at(pack), h);
+    face.add_curvature(elements_[group], stress.at(group), h);
     for (int i = 0; i < 3; ++i)
         for (int k = 0; k < 3; ++k) {
             const int row = 6 + 3 * i + k;
@@ -297,7 +302,7 @@ void BendingSixTerm::assemble_faces(Index pack, const double* q, const Strains& 
                                          outer(beyond[i][1][k], stiff.at[3 * i + 1][a]);
             for (int j = 0; j <= i; ++j) {
                 // The coupling of the nodes across edge i with those across edge j.
-                Pack3 felt[2];
+                SimdVec3 felt[2];
                 for (int g = 0; g < 2; ++g)
                     felt[g] = stiffness(3 * i, 3 * j + g) * beyond[i][0][k] +
                               stiffness(3 * i + 1, 3 * j + g) * beyond[i][1][k];
@@ -307,7 +312,7 @@ void BendingSixTerm::assemble_faces(Index pack, const double* q, const Strains& 
                             outer(felt[0], beyond[j][0][l]) + outer(felt[1], beyond[j][1][l]);
             }
         }
-    Pack3 beside[6][15];  // row of rotation 2 i + g against the nodes
+    SimdVec3 beside[6][15];  // row of rotation 2 i + g against the nodes
     for (int i = 0; i < 3; ++i)
         for (int g = 0; g < 2; ++g) {
             for (int a = 0; a < 6; ++a) beside[2 * i + g][a] = sign[i] * stiff.at[3 * i + g][a];
@@ -317,8 +322,8 @@ void BendingSixTerm::assemble_faces(Index pack, const double* q, const Strains& 
                         sign[i] * (stiffness(3 * i + g, 3 * j) * beyond[j][0][l] +
                                    stiffness(3 * i + g, 3 * j + 1) * beyond[j][1][l]);
         }
-    for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
-        const Index f = loop_.element(pack, lane);
+    for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+        const Index f = loop_.element(group, lane);
         const SixNodeShell::Stencil& stencil = sheet_.stencils[f];
         const FaceSlots& slots = face_slots_[f];
         scatter_blocks<15>(out, stencil.nodes, slots.nodes, h, lane);
@@ -329,14 +334,14 @@ void BendingSixTerm::assemble_faces(Index pack, const double* q, const Strains& 
                     out.add_rotation_row(slots.rotation_nodes[a][k], out.column_length(stencil.nodes[k]),
                                          beside[a][k], lane);
         }
-        add_rotations(pack, lane, sign, stiffness, out);
+        add_rotations(group, lane, sign, stiffness, out);
     }
 }
 
 /// Adds the blocks between the rotations of a face.
-void BendingSixTerm::add_rotations(Index pack, int lane, const Pack sign[3], const Symmetric9& stiffness,
-                                   SystemMatrix& out) const {
-    const std::array<Index, 21>& slots = face_slots_[loop_.element(pack, lane)].rotations;
+void BendingSixTerm::add_rotations(Index group, int lane, const SimdDouble sign[3],
+                                   const Symmetric9& stiffness, SystemMatrix& out) const {
+    const std::array<Index, 21>& slots = face_slots_[loop_.element(group, lane)].rotations;
     for (int a = 0; a < 6; ++a)
         for (int b = 0; b <= a; ++b)
             if (const Index slot = slots[lower_index(a, b)]; slot >= 0)
@@ -346,9 +351,9 @@ void BendingSixTerm::add_rotations(Index pack, int lane, const Pack sign[3], con
 
 void BendingSixTerm::assemble_dihedrals(Index first, Index last, const double* q, const Strains& stress,
                                         SystemMatrix& out) const {
-    Pack33 h[45] = {};
+    SimdMat3 h[45] = {};
     for (int g = 0; g < 2; ++g) {
-        Pack moments(0.0);
+        SimdDouble moments(0.0);
         for (Index fold = first; fold < last; ++fold)
             moments.set(fold - first, moment(sheet_.dihedrals[fold], g, stress));
         dihedrals_at(first, last, g, q).add_curvature(moments, h);
@@ -366,7 +371,7 @@ void BendingSixTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
         for (int r = 0; r < 9; ++r) {
             double moment = 0.0;
             for (int s = 0; s < 9; ++s)
-                moment += std::abs(stiffness_[f / Pack::width](r, s)[f % Pack::width]) * angle;
+                moment += std::abs(stiffness_[f / SimdDouble::width](r, s)[f % SimdDouble::width]) * angle;
             if (r % 3 < 2)
                 if (const Index rotation = sheet_.sides[f][r / 3].rotation[r % 3]; rotation >= 0)
                     out[first_scalar_ + rotation] += moment;
@@ -386,10 +391,10 @@ bool BendingSixTerm::set_values(const Values& values) {
     const bool material_changed = materials_.set_values(values), grew = growth_.set_values(values);
     if (!material_changed && !grew) return false;
     if (grew) grow();
-    for (Index pack = 0; pack < loop_.packs(); ++pack)
-        for (int lane = 0; lane < Pack::width; ++lane) {
-            const Index f = loop_.element(pack, lane);
-            set_lane(stiffness_[pack], lane, rest_[f].bending_stiffness(materials_[f]));
+    for (Index group = 0; group < loop_.groups(); ++group)
+        for (int lane = 0; lane < SimdDouble::width; ++lane) {
+            const Index f = loop_.element(group, lane);
+            set_lane(stiffness_[group], lane, rest_[f].bending_stiffness(materials_[f]));
         }
     return true;
 }
@@ -407,18 +412,18 @@ Vec9 BendingSixTerm::rest_angles(Index face) const {
 // Dihedral angles are measured from their reference values already, so `angles` is subtracted from the natural
 // measures.
 void BendingSixTerm::grow() {
-    for (Index pack = 0; pack < loop_.packs(); ++pack)
-        for (int lane = 0; lane < Pack::width; ++lane) {
-            const Index f = loop_.element(pack, lane);
+    for (Index group = 0; group < loop_.groups(); ++group)
+        for (int lane = 0; lane < SimdDouble::width; ++lane) {
+            const Index f = loop_.element(group, lane);
             const GrownSix face = grown(f);
             rest_[f] = face.face();
             for (int p = 0; p < BendingSix::points; ++p)
-                elements_[pack].inverse_jacobian[p].set(lane, rest_[f].inverse_jacobian[p]);
+                elements_[group].inverse_jacobian[p].set(lane, rest_[f].inverse_jacobian[p]);
             const Vec9 angles = rest_angles(f);
             const Vec9 natural = face.rest().cwiseProduct(rest_inside_[f] + angles) + face.bent() - angles;
             for (int r = 0; r < 9; ++r) {
-                elements_[pack].scale[r].set(lane, rest_[f].scale[r]);
-                rest_measures_[pack][r].set(lane, natural[r]);
+                elements_[group].scale[r].set(lane, rest_[f].scale[r]);
+                rest_measures_[group][r].set(lane, natural[r]);
             }
         }
 }
@@ -431,18 +436,18 @@ GrownFace::ByNatural BendingSixTerm::strains_by_growth(const GrownSix& face, Ind
     return found;
 }
 
-void BendingSixTerm::vjp(const double* q, const Controls&, const double* lambda, Gradient& out) {
+void BendingSixTerm::vjp(const double* q, const LoadParameters&, const double* lambda, Gradient& out) {
     store_rates(lambda);
     std::vector<Eigen::Vector2d> of_faces(sheet_.n_faces());
-    each_pack([&](Index pack) {
-        Pack d[9], along[9];
-        strain(pack, q, d);
-        history_.apply<9>(pack, d);
-        rate(pack, lambda, along);
-        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
-            const Index f = loop_.element(pack, lane);
+    each_group([&](Index group) {
+        SimdDouble d[9], along[9];
+        strain(group, q, d);
+        history_.apply<9>(group, d);
+        rate(group, lambda, along);
+        for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+            const Index f = loop_.element(group, lane);
             const Eigen::Vector<double, 9> rates = lane_of<9>(along, lane);
-            of_faces[f] = {rates.dot(lane_of<9>(stress_.at(pack), lane)),
+            of_faces[f] = {rates.dot(lane_of<9>(stress_.at(group), lane)),
                            rates.dot(rest_[f].bending_by_poisson_ratio(materials_[f]) * lane_of<9>(d, lane))};
         }
     });
@@ -453,29 +458,29 @@ void BendingSixTerm::vjp(const double* q, const Controls&, const double* lambda,
 
 void BendingSixTerm::add_growth_vjp(const double* q, const double* lambda, Gradient& out) const {
     std::vector<GrownFace::ByNatural> by_faces(sheet_.n_faces());
-    each_pack([&](Index pack) {
-        Pack3 x[6], p[6];
-        Pack now[9], along_inside[9], d[9], along[9], stresses[9];
+    each_group([&](Index group) {
+        SimdVec3 x[6], p[6];
+        SimdDouble now[9], along_inside[9], d[9], along[9], stresses[9];
         SixNodeRows rows;
-        loop_.gather(pack, q, x);
-        loop_.gather(pack, lambda, p);
+        loop_.gather(group, q, x);
+        loop_.gather(group, lambda, p);
         const BendingSix interior(x);
-        interior.measures(elements_[pack], now);
-        interior.rows(elements_[pack], rows);
+        interior.measures(elements_[group], now);
+        interior.rows(elements_[group], rows);
         rows.along(p, along_inside);
-        strain(pack, q, d);
-        history_.apply<9>(pack, d);
-        rate(pack, lambda, along);
-        stiffness_[pack].times(along, stresses);
-        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
-            const Index f = loop_.element(pack, lane);
+        strain(group, q, d);
+        history_.apply<9>(group, d);
+        rate(group, lambda, along);
+        stiffness_[group].times(along, stresses);
+        for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+            const Index f = loop_.element(group, lane);
             const GrownSix face = grown(f);
             GrownFace::ByNatural& by = by_faces[f];
             by = strains_by_growth(face, f, history_.factor() * lane_of<9>(stresses, lane),
                                    lane_of<9>(now, lane));
             by.growth +=
                 face.bending_by_growth(materials_[f], lane_of<9>(along, lane), lane_of<9>(d, lane)) +
-                face.inside_by_growth(lane_of<9>(stress_.at(pack), lane), lane_of<9>(along_inside, lane));
+                face.inside_by_growth(lane_of<9>(stress_.at(group), lane), lane_of<9>(along_inside, lane));
         }
     });
     for (Index f = 0; f < sheet_.n_faces(); ++f) {
@@ -486,13 +491,13 @@ void BendingSixTerm::add_growth_vjp(const double* q, const double* lambda, Gradi
 
 void BendingSixTerm::strains_vjp(const Strains& stresses, Gradient& out) const {
     if (!growth_.any()) return;
-    for (Index pack = 0; pack < loop_.packs(); ++pack) {
-        Pack3 x[6];
-        Pack now[9];
-        loop_.gather(pack, state_.data(), x);
-        BendingSix(x).measures(elements_[pack], now);
-        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
-            const Index f = loop_.element(pack, lane);
+    for (Index group = 0; group < loop_.groups(); ++group) {
+        SimdVec3 x[6];
+        SimdDouble now[9];
+        loop_.gather(group, state_.data(), x);
+        BendingSix(x).measures(elements_[group], now);
+        for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+            const Index f = loop_.element(group, lane);
             const GrownSix face = grown(f);
             Vec9 by;
             for (int r = 0; r < 9; ++r) by[r] = stresses.number(f, r);
@@ -507,10 +512,10 @@ std::vector<std::array<std::array<double, 9>, 2>> BendingSixTerm::slopes_at_rest
     for (Index node = 0; node < nodes_.n_nodes(); ++node) q.segment<3>(3 * node) = nodes_.rest[node];
     const Index n = sheet_.n_dihedrals();
     std::vector<std::array<std::array<double, 9>, 2>> slopes(n);
-    for (Index first = 0; first < n; first += Pack::width) {
-        const Index last = std::min<Index>(first + Pack::width, n);
+    for (Index first = 0; first < n; first += SimdDouble::width) {
+        const Index last = std::min<Index>(first + SimdDouble::width, n);
         for (int g = 0; g < 2; ++g) {
-            Pack3 by_node[9];
+            SimdVec3 by_node[9];
             dihedrals_at(first, last, g, q.data()).gradient(by_node);
             for (Index h = first; h < last; ++h) {
                 Vec3 normal = Vec3::Zero();
@@ -527,14 +532,14 @@ std::vector<std::array<std::array<double, 9>, 2>> BendingSixTerm::slopes_at_rest
 
 bool BendingSixTerm::add_projective_stiffness(NodeMatrix& out) const {
     const std::vector<std::array<std::array<double, 9>, 2>> slopes = slopes_at_rest();
-    for (Index pack = 0; pack < loop_.packs(); ++pack) {
-        Pack3 x[6];
-        for (int lane = 0; lane < Pack::width; ++lane)
-            for (int k = 0; k < 6; ++k) set_lane(x[k], lane, sheet_.rest[loop_.element(pack, lane)][k]);
+    for (Index group = 0; group < loop_.groups(); ++group) {
+        SimdVec3 x[6];
+        for (int lane = 0; lane < SimdDouble::width; ++lane)
+            for (int k = 0; k < 6; ++k) set_lane(x[k], lane, sheet_.rest[loop_.element(group, lane)][k]);
         SixNodeRows interior;
-        BendingSix(x).rows(elements_[pack], interior);
-        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
-            const Index f = loop_.element(pack, lane);
+        BendingSix(x).rows(elements_[group], interior);
+        for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+            const Index f = loop_.element(group, lane);
             const Vec3 normal = normal_of(sheet_.rest[f]);
             NodeRows rows(9);
             for (int r = 0; r < 9; ++r)
@@ -552,7 +557,7 @@ bool BendingSixTerm::add_projective_stiffness(NodeMatrix& out) const {
                     out.add_adjacent_face(side.rotation[g], {own[0], own[1], own[2]});
                 }
             }
-            rows.add_to(out, [&](int r, int s) { return stiffness_[pack](r, s)[lane]; });
+            rows.add_to(out, [&](int r, int s) { return stiffness_[group](r, s)[lane]; });
         }
     }
     return true;

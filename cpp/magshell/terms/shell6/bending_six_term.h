@@ -21,20 +21,21 @@ namespace magshell {
 
 class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
   public:
-    BendingSixTerm(const SixNodeShell& sheet, Index body, const ChunkLoop& chunks, const Nodes& nodes,
-                   const GrowthForm& growth, const SystemMatrix& matrix, Registry& registry);
+    BendingSixTerm(const SixNodeShell& sheet, Index body, const ColoredLoop& element_blocks,
+                   const Nodes& nodes, const GrowthForm& growth, const SystemMatrix& matrix,
+                   Registry& registry);
 
     std::string_view name() const override { return "bending"; }
     Index body() const override { return body_; }
     bool set_values(const Values& values) override;
     bool varies() const override { return growth_.any(); }
     double length_scale() const override { return materials_.thinnest(); }
-    double energy(const double* q, const Controls&) const override;
-    void evaluate(const double* q, const Controls&, Residual& out) override;
-    void prepare_assembly(const double* q, const Controls&) override;
-    void assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
-                  SystemMatrix& out) const override;
-    void vjp(const double* q, const Controls&, const double* lambda, Gradient& out) override;
+    double energy(const double* q, const LoadParameters&) const override;
+    void evaluate(const double* q, const LoadParameters&, Residual& out) override;
+    void prepare_assembly(const double* q, const LoadParameters&) override;
+    void assemble(const ElementBlock& element_block, const double* q, const LoadParameters&,
+                  bool extrapolated_stress, SystemMatrix& out) const override;
+    void vjp(const double* q, const LoadParameters&, const double* lambda, Gradient& out) override;
     bool add_projective_stiffness(NodeMatrix& out) const override;
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
@@ -75,16 +76,16 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     };
 
     template <class Body>
-    void each_pack(const Body& body) const {
-        loop_.each_pack(body);
+    void each_group(const Body& body) const {
+        loop_.each_group(body);
     }
     /// Returns theta - theta~ [rad] at both points of every dihedral stencil.
     std::vector<std::array<double, 2>> angle_changes_at(const double* q) const;
     DihedralAngleSix dihedrals_at(Index first, Index last, int point, const double* q) const;
     double angle_change(Index fold, int point, double angle) const;
     template <class Turn>
-    void measure(Index pack, const double* q, const Turn& turn, Pack d[9]) const;
-    void interior(Index pack, const double* q, Pack f[9]) const;
+    void measure(Index group, const double* q, const Turn& turn, SimdDouble d[9]) const;
+    void interior(Index group, const double* q, SimdDouble f[9]) const;
     Vec9 rest_angles(Index face) const;
     void grow();
     void add_growth_vjp(const double* q, const double* lambda, Gradient& out) const;
@@ -92,20 +93,20 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
                                            const Vec9& interior) const;
     void begin_strains(const double* q) { store_dihedrals(q); }
     void begin_rates(const double* p) { store_rates(p); }
-    void strain(Index pack, const double* q, Pack d[9]) const;
-    void rate(Index pack, const double* p, Pack d[9]) const;
-    const Symmetric9& stiffness(Index pack) const { return stiffness_[pack]; }
+    void strain(Index group, const double* q, SimdDouble d[9]) const;
+    void rate(Index group, const double* p, SimdDouble d[9]) const;
+    const Symmetric9& stiffness(Index group) const { return stiffness_[group]; }
     /// Returns the derivative of each reference dihedral angle, at both points, with respect to its nodes along
     /// the mean normal of the two sides.
     std::vector<std::array<std::array<double, 9>, 2>> slopes_at_rest() const;
     void store_dihedrals(const double* q);
     void store_rates(const double* p);
     double moment(const DihedralSixStencil& fold, int point, const Strains& stress) const;
-    void assemble_faces(Index pack, const double* q, const Strains& stress, SystemMatrix& out) const;
-    void assemble_from_rest(Index pack, const double* q, SystemMatrix& out) const;
-    void add_held(Index pack, const Pack3 (&held)[3][2], const Pack sign[3], const Symmetric9& stiffness,
-                  const SixNodeRows& stiff, SystemMatrix& out) const;
-    void add_rotations(Index pack, int lane, const Pack sign[3], const Symmetric9& stiffness,
+    void assemble_faces(Index group, const double* q, const Strains& stress, SystemMatrix& out) const;
+    void assemble_from_rest(Index group, const double* q, SystemMatrix& out) const;
+    void add_held(Index group, const SimdVec3 (&held)[3][2], const SimdDouble sign[3],
+                  const Symmetric9& stiffness, const SixNodeRows& stiff, SystemMatrix& out) const;
+    void add_rotations(Index group, int lane, const SimdDouble sign[3], const Symmetric9& stiffness,
                        SystemMatrix& out) const;
     template <class Visit>
     void each_half_rotation(const Visit& visit) const;
@@ -116,13 +117,13 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     const Index body_;
     const Nodes& nodes_;
     const Index first_scalar_;
-    const ChunkLoop& chunks_;
+    const ColoredLoop& element_blocks_;
     ElementLoop<6> loop_;
     ShellMaterials materials_;
     ShellGrowth growth_;
     std::vector<SixNodeFace> rest_;
     std::vector<BendingSix::Element> elements_;
-    std::vector<std::array<Pack, 9>> rest_measures_;
+    std::vector<std::array<SimdDouble, 9>> rest_measures_;
     std::vector<Vec9> rest_inside_;  // curvature measures of the reference shape, where anything grows
     std::vector<FaceSlots> face_slots_;
     std::vector<PairSlots<9>> dihedral_slots_;

@@ -7,24 +7,24 @@
 
 namespace magshell {
 
-MembraneSixTerm::MembraneSixTerm(const SixNodeShell& sheet, Index body, const ChunkLoop& chunks,
+MembraneSixTerm::MembraneSixTerm(const SixNodeShell& sheet, Index body, const ColoredLoop& element_blocks,
                                  const Nodes& nodes, const GrowthForm& growth, const SystemMatrix& matrix,
                                  Registry& registry)
     : StrainScaffold(sheet.n_faces()),
       sheet_(sheet),
       body_(body),
       nodes_(nodes.n_nodes()),
-      loop_(sheet.own_nodes, chunks, matrix),
+      loop_(sheet.own_nodes, element_blocks, matrix),
       materials_(sheet.owner, sheet.faces, registry),
       growth_(sheet.owner, sheet.faces, growth, registry),
       rest_(sheet.rest.begin(), sheet.rest.end()),
-      rest_measures_(loop_.packs()),
-      stiffness_(loop_.packs()) {
-    for (Index pack = 0; pack < loop_.packs(); ++pack) {
-        Pack3 x[6];
-        for (int lane = 0; lane < Pack::width; ++lane)
-            for (int k = 0; k < 6; ++k) set_lane(x[k], lane, sheet.rest[loop_.element(pack, lane)][k]);
-        MembraneSix(x).measures(rest_measures_[pack].data());
+      rest_measures_(loop_.groups()),
+      stiffness_(loop_.groups()) {
+    for (Index group = 0; group < loop_.groups(); ++group) {
+        SimdVec3 x[6];
+        for (int lane = 0; lane < SimdDouble::width; ++lane)
+            for (int k = 0; k < 6; ++k) set_lane(x[k], lane, sheet.rest[loop_.element(group, lane)][k]);
+        MembraneSix(x).measures(rest_measures_[group].data());
     }
 }
 
@@ -32,10 +32,10 @@ bool MembraneSixTerm::set_values(const Values& values) {
     const bool material_changed = materials_.set_values(values), grew = growth_.set_values(values);
     if (!material_changed && !grew) return false;
     if (grew) grow();
-    for (Index pack = 0; pack < loop_.packs(); ++pack)
-        for (int lane = 0; lane < Pack::width; ++lane) {
-            const Index f = loop_.element(pack, lane);
-            set_lane(stiffness_[pack], lane, rest_[f].membrane_stiffness(materials_[f]));
+    for (Index group = 0; group < loop_.groups(); ++group)
+        for (int lane = 0; lane < SimdDouble::width; ++lane) {
+            const Index f = loop_.element(group, lane);
+            set_lane(stiffness_[group], lane, rest_[f].membrane_stiffness(materials_[f]));
         }
     return true;
 }
@@ -45,83 +45,83 @@ GrownSix MembraneSixTerm::grown(Index face) const {
 }
 
 void MembraneSixTerm::grow() {
-    for (Index pack = 0; pack < loop_.packs(); ++pack)
-        for (int lane = 0; lane < Pack::width; ++lane) {
-            const Index f = loop_.element(pack, lane);
+    for (Index group = 0; group < loop_.groups(); ++group)
+        for (int lane = 0; lane < SimdDouble::width; ++lane) {
+            const Index f = loop_.element(group, lane);
             const GrownSix face = grown(f);
             rest_[f] = face.face();
             const Vec9 lengths = face.squared_lengths();
-            for (int r = 0; r < 9; ++r) rest_measures_[pack][r].set(lane, lengths[r]);
+            for (int r = 0; r < 9; ++r) rest_measures_[group][r].set(lane, lengths[r]);
         }
 }
 
-double MembraneSixTerm::energy(const double* q, const Controls&) const {
-    return loop_.sum([&](Index pack) {
-        Pack d[9], stress[9];
-        strain(pack, q, d);
-        stiffness_[pack].times(d, stress);
-        Pack sum = d[0] * stress[0];
+double MembraneSixTerm::energy(const double* q, const LoadParameters&) const {
+    return loop_.sum([&](Index group) {
+        SimdDouble d[9], stress[9];
+        strain(group, q, d);
+        stiffness_[group].times(d, stress);
+        SimdDouble sum = d[0] * stress[0];
         for (int r = 1; r < 9; ++r) sum += d[r] * stress[r];
-        return Pack(0.5) * sum;
+        return SimdDouble(0.5) * sum;
     });
 }
 
-void MembraneSixTerm::evaluate(const double* q, const Controls&, Residual& out) {
+void MembraneSixTerm::evaluate(const double* q, const LoadParameters&, Residual& out) {
     state_.assign(q, q + 3 * nodes_);
-    loop_.each_pack([&](Index pack) {
-        Pack d[9];
-        strain(pack, q, d);
-        store_stress(pack, d);
+    loop_.each_group([&](Index group) {
+        SimdDouble d[9];
+        strain(group, q, d);
+        store_stress(group, d);
     });
     add_forces(stress_, out);
 }
 
-void MembraneSixTerm::assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
-                               SystemMatrix& out) const {
+void MembraneSixTerm::assemble(const ElementBlock& element_block, const double* q, const LoadParameters&,
+                               bool extrapolated_stress, SystemMatrix& out) const {
     const Strains& stress = extrapolated_stress ? extrapolated_ : stress_;
-    ElementLoop<6>::over_packs(chunk, [&](Index pack) {
-        Pack3 x[6];
-        Pack33 h[21];
+    ElementLoop<6>::over_groups(element_block, [&](Index group) {
+        SimdVec3 x[6];
+        SimdMat3 h[21];
         SixNodeRows rows;
-        loop_.gather(pack, q, x);
+        loop_.gather(group, q, x);
         MembraneSix(x).rows(rows);
-        rows.blocks(rows.times(history_.scaled(stiffness_[pack])), h);
-        MembraneSix::add_curvature(stress.at(pack), h);
-        loop_.scatter(pack, h, out);
+        rows.blocks(rows.times(history_.scaled(stiffness_[group])), h);
+        MembraneSix::add_curvature(stress.at(group), h);
+        loop_.scatter(group, h, out);
     });
 }
 
 Strains MembraneSixTerm::strains_at(const double* q) const {
     Strains out(sheet_.n_faces(), 9);
-    loop_.each_pack([&](Index pack) { strain(pack, q, out.at(pack)); });
+    loop_.each_group([&](Index group) { strain(group, q, out.at(group)); });
     return out;
 }
 
-void MembraneSixTerm::strain(Index pack, const double* q, Pack d[9]) const {
-    Pack3 x[6];
-    loop_.gather(pack, q, x);
+void MembraneSixTerm::strain(Index group, const double* q, SimdDouble d[9]) const {
+    SimdVec3 x[6];
+    loop_.gather(group, q, x);
     MembraneSix(x).measures(d);
-    for (int r = 0; r < 9; ++r) d[r] -= rest_measures_[pack][r];
+    for (int r = 0; r < 9; ++r) d[r] -= rest_measures_[group][r];
 }
 
-void MembraneSixTerm::rate(Index pack, const double* p, Pack d[9]) const {
-    Pack3 x[6], along[6];
+void MembraneSixTerm::rate(Index group, const double* p, SimdDouble d[9]) const {
+    SimdVec3 x[6], along[6];
     SixNodeRows rows;
-    loop_.gather(pack, state_.data(), x);
-    loop_.gather(pack, p, along);
+    loop_.gather(group, state_.data(), x);
+    loop_.gather(group, p, along);
     MembraneSix(x).rows(rows);
     rows.along(along, d);
 }
 
-void MembraneSixTerm::vjp(const double* q, const Controls&, const double* lambda, Gradient& out) {
+void MembraneSixTerm::vjp(const double* q, const LoadParameters&, const double* lambda, Gradient& out) {
     std::vector<Eigen::Vector2d> of_faces(sheet_.n_faces());
-    loop_.each_pack([&](Index pack) {
-        Pack d[9], along[9];
-        strain(pack, q, d);
-        history_.apply<9>(pack, d);
-        rate(pack, lambda, along);
-        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
-            const Index f = loop_.element(pack, lane);
+    loop_.each_group([&](Index group) {
+        SimdDouble d[9], along[9];
+        strain(group, q, d);
+        history_.apply<9>(group, d);
+        rate(group, lambda, along);
+        for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+            const Index f = loop_.element(group, lane);
             of_faces[f] = {
                 lane_of<9>(along, lane).dot(rest_[f].membrane_stiffness(materials_[f]) * lane_of<9>(d, lane)),
                 lane_of<9>(along, lane)
@@ -132,14 +132,14 @@ void MembraneSixTerm::vjp(const double* q, const Controls&, const double* lambda
         materials_.add_vjp(f, 1, of_faces[f][0], of_faces[f][1], out);
     if (!growth_.any()) return;
     std::vector<Mat3> by_growth(sheet_.n_faces());
-    each_pack([&](Index pack) {
-        Pack d[9], along[9], stresses[9];
-        strain(pack, q, d);
-        history_.apply<9>(pack, d);
-        rate(pack, lambda, along);
-        stiffness_[pack].times(along, stresses);
-        for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
-            const Index f = loop_.element(pack, lane);
+    each_group([&](Index group) {
+        SimdDouble d[9], along[9], stresses[9];
+        strain(group, q, d);
+        history_.apply<9>(group, d);
+        rate(group, lambda, along);
+        stiffness_[group].times(along, stresses);
+        for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+            const Index f = loop_.element(group, lane);
             const GrownSix face = grown(f);
             by_growth[f] = face.in_world(
                 face.membrane_by_growth(materials_[f], lane_of<9>(along, lane), lane_of<9>(d, lane)) -
@@ -160,13 +160,13 @@ void MembraneSixTerm::strains_vjp(const Strains& stresses, Gradient& out) const 
 }
 
 void MembraneSixTerm::add_forces(const Strains& stresses, Residual& out) {
-    loop_.scatter_packs([&](Index pack) {
-        Pack3 x[6], g[6];
+    loop_.scatter_groups([&](Index group) {
+        SimdVec3 x[6], g[6];
         SixNodeRows rows;
-        loop_.gather(pack, state_.data(), x);
+        loop_.gather(group, state_.data(), x);
         MembraneSix(x).rows(rows);
-        rows.forces(stresses.at(pack), g);
-        loop_.scatter(pack, g, out);
+        rows.forces(stresses.at(group), g);
+        loop_.scatter(group, g, out);
     });
 }
 
@@ -174,17 +174,17 @@ void MembraneSixTerm::add_forces(const Strains& stresses, Residual& out) {
 // positions.
 void MembraneSixTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
     for (Index f = 0; f < sheet_.n_faces(); ++f) {
-        const Index pack = f / Pack::width;
-        const int lane = f % Pack::width;
+        const Index group = f / SimdDouble::width;
+        const int lane = f % SimdDouble::width;
         const double coordinate = sheet_.largest_coordinate(f) + beyond;
         for (int r = 0; r < 9; ++r) {
             double stress = 0.0;
             for (int s = 0; s < 9; ++s) {
-                const double squared = rest_measures_[pack][s][lane];
-                stress += std::abs(stiffness_[pack](r, s)[lane]) *
+                const double squared = rest_measures_[group][s][lane];
+                stress += std::abs(stiffness_[group](r, s)[lane]) *
                           (squared + 0.25 * std::sqrt(squared) * coordinate);
             }
-            const double force = 2.0 * stress * std::sqrt(rest_measures_[pack][r][lane]);
+            const double force = 2.0 * stress * std::sqrt(rest_measures_[group][r][lane]);
             for (const Index node : sheet_.own_nodes[f]) out.segment<3>(3 * node).array() += force;
         }
     }

@@ -14,19 +14,20 @@ namespace magshell {
 
 class MembraneSixTerm final : public StrainScaffold<MembraneSixTerm, 9> {
   public:
-    MembraneSixTerm(const SixNodeShell& sheet, Index body, const ChunkLoop& chunks, const Nodes& nodes,
-                    const GrowthForm& growth, const SystemMatrix& matrix, Registry& registry);
+    MembraneSixTerm(const SixNodeShell& sheet, Index body, const ColoredLoop& element_blocks,
+                    const Nodes& nodes, const GrowthForm& growth, const SystemMatrix& matrix,
+                    Registry& registry);
 
     std::string_view name() const override { return "membrane"; }
     Index body() const override { return body_; }
     bool set_values(const Values& values) override;
     bool varies() const override { return growth_.any(); }
     double length_scale() const override { return materials_.thinnest(); }
-    double energy(const double* q, const Controls&) const override;
-    void evaluate(const double* q, const Controls&, Residual& out) override;
-    void assemble(const Chunk& chunk, const double* q, const Controls&, bool extrapolated_stress,
-                  SystemMatrix& out) const override;
-    void vjp(const double* q, const Controls&, const double* lambda, Gradient& out) override;
+    double energy(const double* q, const LoadParameters&) const override;
+    void evaluate(const double* q, const LoadParameters&, Residual& out) override;
+    void assemble(const ElementBlock& element_block, const double* q, const LoadParameters&,
+                  bool extrapolated_stress, SystemMatrix& out) const override;
+    void vjp(const double* q, const LoadParameters&, const double* lambda, Gradient& out) override;
     bool add_projective_stiffness(NodeMatrix& out) const override;
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
@@ -40,16 +41,16 @@ class MembraneSixTerm final : public StrainScaffold<MembraneSixTerm, 9> {
   private:
     friend class StrainScaffold<MembraneSixTerm, 9>;
     template <class Body>
-    void each_pack(const Body& body) const {
-        loop_.each_pack(body);
+    void each_group(const Body& body) const {
+        loop_.each_group(body);
     }
     GrownSix grown(Index face) const;
     void grow();
     void begin_strains(const double*) {}
     void begin_rates(const double*) {}
-    void strain(Index pack, const double* q, Pack d[9]) const;
-    void rate(Index pack, const double* p, Pack d[9]) const;
-    const Symmetric9& stiffness(Index pack) const { return stiffness_[pack]; }
+    void strain(Index group, const double* q, SimdDouble d[9]) const;
+    void rate(Index group, const double* p, SimdDouble d[9]) const;
+    const Symmetric9& stiffness(Index group) const { return stiffness_[group]; }
 
     const SixNodeShell& sheet_;
     const Index body_, nodes_;
@@ -57,7 +58,7 @@ class MembraneSixTerm final : public StrainScaffold<MembraneSixTerm, 9> {
     ShellMaterials materials_;
     ShellGrowth growth_;
     std::vector<SixNodeFace> rest_;
-    std::vector<std::array<Pack, 9>> rest_measures_;
+    std::vector<std::array<SimdDouble, 9>> rest_measures_;
     std::vector<Symmetric9> stiffness_;
     std::vector<double> state_;  // positions of the last evaluated state
 };

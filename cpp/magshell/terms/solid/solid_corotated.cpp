@@ -5,11 +5,11 @@
 namespace magshell {
 
 std::unique_ptr<SolidTerm> make_corotated_term(const SolidResponse& response, const Solid& solid, Index body,
-                                               const ChunkLoop& chunks, const SystemMatrix& matrix,
+                                               const ColoredLoop& element_blocks, const SystemMatrix& matrix,
                                                const Nodes& nodes, Registry& registry) {
     if (response.material == "Corotated")
-        return make_tetrahedra_term<Corotated, LameModuli>(response.mean_volume, solid, body, chunks, matrix,
-                                                           nodes, registry);
+        return make_tetrahedra_term<Corotated, LameModuli>(response.mean_volume, solid, body, element_blocks,
+                                                           matrix, nodes, registry);
     return nullptr;
 }
 

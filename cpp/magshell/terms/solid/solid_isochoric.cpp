@@ -5,11 +5,11 @@
 namespace magshell {
 
 std::unique_ptr<SolidTerm> make_isochoric_term(const SolidResponse& response, const Solid& solid, Index body,
-                                               const ChunkLoop& chunks, const SystemMatrix& matrix,
+                                               const ColoredLoop& element_blocks, const SystemMatrix& matrix,
                                                const Nodes& nodes, Registry& registry) {
     if (response.material == "NeoHookean isochoric")
         return make_tetrahedra_term<InvariantSolid<NeoHookeanIsochoric>, LameModuli>(
-            response.mean_volume, solid, body, chunks, matrix, nodes, registry);
+            response.mean_volume, solid, body, element_blocks, matrix, nodes, registry);
     return nullptr;
 }
 

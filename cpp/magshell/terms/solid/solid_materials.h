@@ -7,7 +7,7 @@
 namespace magshell {
 
 using MakeSolidTerm = std::unique_ptr<SolidTerm>(const SolidResponse&, const Solid&, Index body,
-                                                 const ChunkLoop&, const SystemMatrix&, const Nodes&,
+                                                 const ColoredLoop&, const SystemMatrix&, const Nodes&,
                                                  Registry&);
 
 MakeSolidTerm make_neo_hookean_term, make_isochoric_term, make_stable_neo_hookean_term,

@@ -6,8 +6,8 @@
 namespace magshell {
 namespace {
 
-Slot of_elements(const Solid& solid, Registry& registry, const char* name, const char* unit,
-                 Index width = 1) {
+ParameterSlice of_elements(const Solid& solid, Registry& registry, const char* name, const char* unit,
+                           Index width = 1) {
     return registry.values.add(solid.owner, name, unit, solid.n_elements(), width, &solid.elements);
 }
 
@@ -77,8 +77,8 @@ void GuccioneModuli::constants(Index element, double out[8]) const {
 }
 
 void GuccioneModuli::add_vjp(Index element, const double by[8], Gradient& out) const {
-    const Slot* slots[5] = {&stiffness_, &fibre_, &cross_, &shear_, &bulk_modulus_};
-    for (int k = 0; k < 5; ++k) out.values[slots[k]->at(element)] += by[k];
+    const ParameterSlice* slices[5] = {&stiffness_, &fibre_, &cross_, &shear_, &bulk_modulus_};
+    for (int k = 0; k < 5; ++k) out.values[slices[k]->at(element)] += by[k];
     for (int k = 0; k < 3; ++k) out.values[fibres_.at(element) + k] += by[5 + k];
 }
 

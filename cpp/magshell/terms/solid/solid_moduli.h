@@ -23,7 +23,7 @@ class LameModuli {
     double size(Index element) const;
 
   private:
-    Slot young_modulus_, poisson_ratio_;
+    ParameterSlice young_modulus_, poisson_ratio_;
     struct Pair {
         double young_modulus, poisson_ratio;
     };
@@ -41,7 +41,7 @@ class GuccioneModuli {
     double size(Index element) const;
 
   private:
-    Slot stiffness_, fibre_, cross_, shear_, bulk_modulus_, fibres_;
+    ParameterSlice stiffness_, fibre_, cross_, shear_, bulk_modulus_, fibres_;
     std::vector<std::array<double, 8>> of_elements_;
 };
 

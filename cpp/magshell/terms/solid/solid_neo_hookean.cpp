@@ -5,15 +5,15 @@
 namespace magshell {
 
 std::unique_ptr<SolidTerm> make_neo_hookean_term(const SolidResponse& response, const Solid& solid,
-                                                 Index body, const ChunkLoop& chunks,
+                                                 Index body, const ColoredLoop& element_blocks,
                                                  const SystemMatrix& matrix, const Nodes& nodes,
                                                  Registry& registry) {
     if (response.material == "NeoHookean ln J")
         return make_tetrahedra_term<InvariantSolid<NeoHookeanLogarithm>, LameModuli>(
-            response.mean_volume, solid, body, chunks, matrix, nodes, registry);
+            response.mean_volume, solid, body, element_blocks, matrix, nodes, registry);
     if (response.material == "NeoHookean J")
         return make_tetrahedra_term<InvariantSolid<NeoHookeanVolume>, LameModuli>(
-            response.mean_volume, solid, body, chunks, matrix, nodes, registry);
+            response.mean_volume, solid, body, element_blocks, matrix, nodes, registry);
     return nullptr;
 }
 

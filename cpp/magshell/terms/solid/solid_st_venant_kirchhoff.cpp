@@ -5,12 +5,12 @@
 namespace magshell {
 
 std::unique_ptr<SolidTerm> make_strain_quadratic_term(const SolidResponse& response, const Solid& solid,
-                                                      Index body, const ChunkLoop& chunks,
+                                                      Index body, const ColoredLoop& element_blocks,
                                                       const SystemMatrix& matrix, const Nodes& nodes,
                                                       Registry& registry) {
     if (response.material == "StVenantKirchhoff")
-        return make_tetrahedra_term<StVenantKirchhoff, LameModuli>(response.mean_volume, solid, body, chunks,
-                                                                   matrix, nodes, registry);
+        return make_tetrahedra_term<StVenantKirchhoff, LameModuli>(response.mean_volume, solid, body,
+                                                                   element_blocks, matrix, nodes, registry);
     return nullptr;
 }
 

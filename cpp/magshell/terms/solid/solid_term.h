@@ -34,7 +34,7 @@ struct SolidResponse {
 
 /// Creates the term. Throws InvalidInput if the material or the kind of element does not exist.
 std::unique_ptr<SolidTerm> make_solid_term(const SolidResponse& response, const Solid& solid, Index body,
-                                           const ChunkLoop& chunks, const SystemMatrix& matrix,
+                                           const ColoredLoop& element_blocks, const SystemMatrix& matrix,
                                            const Nodes& nodes, Registry& registry);
 
 }  // namespace magshell

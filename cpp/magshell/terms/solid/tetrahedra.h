@@ -23,24 +23,24 @@ template <class Element, class Material, class Moduli, bool mean>
 class Tetrahedra : public SolidTerm {
   public:
     Tetrahedra(const Solid& solid, const std::vector<std::array<Index, Element::nodes>>& element_nodes,
-               Index body, const ChunkLoop& chunks, const SystemMatrix& matrix, Registry& registry)
+               Index body, const ColoredLoop& element_blocks, const SystemMatrix& matrix, Registry& registry)
         : solid_(solid),
           body_(body),
-          loop_(element_nodes, chunks, matrix),
+          loop_(element_nodes, element_blocks, matrix),
           element_nodes_(element_nodes),
           moduli_(solid, registry),
-          rest_(loop_.packs()),
-          constants_(loop_.packs()),
+          rest_(loop_.groups()),
+          constants_(loop_.groups()),
           height_(solid.smallest_height()) {
-        for (Index pack = 0; pack < loop_.packs(); ++pack)
-            for (int lane = 0; lane < Pack::width; ++lane) {
+        for (Index group = 0; group < loop_.groups(); ++group)
+            for (int lane = 0; lane < SimdDouble::width; ++lane) {
                 Vec3 x[N];
-                for (int k = 0; k < N; ++k) x[k] = solid.rest(loop_.element(pack, lane), k);
+                for (int k = 0; k < N; ++k) x[k] = solid.rest(loop_.element(group, lane), k);
                 const RestElement<Element> at(x);
                 for (int p = 0; p < points; ++p) {
-                    rest_[pack].volume[p].set(lane, at.volume[p]);
+                    rest_[group].volume[p].set(lane, at.volume[p]);
                     for (int k = 0; k < 3; ++k)
-                        set_lane(rest_[pack].gradients[p][k], lane, Vec3(at.gradients[p].row(k)));
+                        set_lane(rest_[group].gradients[p][k], lane, Vec3(at.gradients[p].row(k)));
                 }
             }
     }
@@ -53,22 +53,22 @@ class Tetrahedra : public SolidTerm {
     bool set_values(const Values& values) override {
         if (!moduli_.set_values(values)) return false;
         double c[n_constants];
-        for (Index pack = 0; pack < loop_.packs(); ++pack)
-            for (int lane = 0; lane < Pack::width; ++lane) {
-                moduli_.constants(loop_.element(pack, lane), c);
-                for (int k = 0; k < n_constants; ++k) constants_[pack].at[k].set(lane, c[k]);
+        for (Index group = 0; group < loop_.groups(); ++group)
+            for (int lane = 0; lane < SimdDouble::width; ++lane) {
+                moduli_.constants(loop_.element(group, lane), c);
+                for (int k = 0; k < n_constants; ++k) constants_[group].at[k].set(lane, c[k]);
             }
         return true;
     }
 
-    double energy(const double* q, const Controls&) const override {
-        return loop_.sum([&](Index pack) {
-            const State state(*this, pack, q);
-            Pack total = mean ? rest_[pack].total() * state.volumetric[0].energy : Pack(0.0);
+    double energy(const double* q, const LoadParameters&) const override {
+        return loop_.sum([&](Index group) {
+            const State state(*this, group, q);
+            SimdDouble total = mean ? rest_[group].total() * state.volumetric[0].energy : SimdDouble(0.0);
             for (int p = 0; p < points; ++p) {
-                Pack density = state.at[p].energy(constants_[pack].at);
+                SimdDouble density = state.at[p].energy(constants_[group].at);
                 if constexpr (!mean) density += state.volumetric[p].energy;
-                total += rest_[pack].volume[p] * density;
+                total += rest_[group].volume[p] * density;
             }
             return total;
         });
@@ -77,23 +77,23 @@ class Tetrahedra : public SolidTerm {
     /// Adds w sum_p V_p g_k . g_l. The weight w is the material's own, or the P-wave modulus of the reference
     /// configuration, 2 mu + lambda.
     bool add_projective_stiffness(NodeMatrix& out) const override {
-        for (Index pack = 0; pack < loop_.packs(); ++pack) {
-            const RestModuli moduli = Material::rest_moduli(constants_[pack].at);
-            Pack weight = Pack(2.0) * moduli.mu + moduli.lambda;
-            if constexpr (requires { Material::projective_weight(constants_[pack].at); })
-                weight = Material::projective_weight(constants_[pack].at);
-            Pack sum[N][N];
+        for (Index group = 0; group < loop_.groups(); ++group) {
+            const RestModuli moduli = Material::rest_moduli(constants_[group].at);
+            SimdDouble weight = SimdDouble(2.0) * moduli.mu + moduli.lambda;
+            if constexpr (requires { Material::projective_weight(constants_[group].at); })
+                weight = Material::projective_weight(constants_[group].at);
+            SimdDouble sum[N][N];
             for (int p = 0; p < points; ++p) {
-                Pack3 g[N];
-                Element::gradients(rest_[pack].gradients[p], p, g);
+                SimdVec3 g[N];
+                Element::gradients(rest_[group].gradients[p], p, g);
                 for (int k = 0; k < N; ++k)
                     for (int l = 0; l <= k; ++l) {
-                        const Pack share = weight * rest_[pack].volume[p] * dot(g[k], g[l]);
+                        const SimdDouble share = weight * rest_[group].volume[p] * dot(g[k], g[l]);
                         sum[k][l] = p == 0 ? share : sum[k][l] + share;
                     }
             }
-            for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
-                const std::array<Index, N>& nodes = element_nodes_[loop_.element(pack, lane)];
+            for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+                const std::array<Index, N>& nodes = element_nodes_[loop_.element(group, lane)];
                 for (int k = 0; k < N; ++k) {
                     out.add_diagonal(nodes[k], sum[k][k][lane]);
                     for (int l = 0; l < k; ++l) out.add_pair(nodes[k], nodes[l], sum[k][l][lane]);
@@ -106,35 +106,35 @@ class Tetrahedra : public SolidTerm {
     bool has_infeasible_states() const override { return Material::refuses_inversion; }
 
     double max_step_length(const double* q, const double* step) const override {
-        std::vector<double> of_packs(loop_.packs(), 1.0);
-        loop_.each_pack([&](Index pack) {
-            Pack3 x[N], d[N];
-            loop_.gather(pack, q, x);
-            loop_.gather(pack, step, d);
+        std::vector<double> of_groups(loop_.groups(), 1.0);
+        loop_.each_group([&](Index group) {
+            SimdVec3 x[N], d[N];
+            loop_.gather(group, q, x);
+            loop_.gather(group, step, d);
             for (int p = 0; p < points; ++p) {
-                Pack c[4];
-                determinant_along(gradient_of(pack, p, x), gradient_of(pack, p, d), c);
-                for (int lane = 0; lane < Pack::width; ++lane) {
+                SimdDouble c[4];
+                determinant_along(gradient_of(group, p, x), gradient_of(group, p, d), c);
+                for (int lane = 0; lane < SimdDouble::width; ++lane) {
                     const double cubic[4] = {c[0][lane], c[1][lane], c[2][lane], c[3][lane]};
                     if (cubic[0] > std::abs(cubic[1]) + std::abs(cubic[2]) + std::abs(cubic[3])) continue;
-                    of_packs[pack] = std::min(of_packs[pack], first_root(cubic, 1.0));
+                    of_groups[group] = std::min(of_groups[group], first_root(cubic, 1.0));
                 }
             }
         });
-        return *std::min_element(of_packs.begin(), of_packs.end());
+        return *std::min_element(of_groups.begin(), of_groups.end());
     }
 
     std::string invalid_state_reason(const double* q) const override {
         Index first = std::numeric_limits<Index>::max();
         double least = 0.0;
-        for (Index pack = 0; pack < loop_.packs(); ++pack) {
-            Pack3 x[N];
-            loop_.gather(pack, q, x);
+        for (Index group = 0; group < loop_.groups(); ++group) {
+            SimdVec3 x[N];
+            loop_.gather(group, q, x);
             for (int p = 0; p < points; ++p) {
-                const Pack33 f = gradient_of(pack, p, x);
-                const Pack j = determinant(f, cofactor(f));
-                for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
-                    const Index user = solid_.elements.user[loop_.element(pack, lane)];
+                const SimdMat3 f = gradient_of(group, p, x);
+                const SimdDouble j = determinant(f, cofactor(f));
+                for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+                    const Index user = solid_.elements.user[loop_.element(group, lane)];
                     if (j[lane] > 0.0 || user >= first) continue;
                     first = user;
                     least = j[lane];
@@ -149,15 +149,15 @@ class Tetrahedra : public SolidTerm {
 
     void add_cancelling_forces(double beyond, VectorXd& out) const override {
         for (Index t = 0; t < solid_.n_elements(); ++t) {
-            const Rest& rest = rest_[t / Pack::width];
-            const int lane = t % Pack::width;
+            const Rest& rest = rest_[t / SimdDouble::width];
+            const int lane = t % SimdDouble::width;
             const double stiffness = moduli_.size(t);
             double coordinate = beyond;
             for (int k = 0; k < N; ++k)
                 coordinate =
                     std::max(coordinate, beyond + solid_.rest(t, k).template lpNorm<Eigen::Infinity>());
             for (int p = 0; p < points; ++p) {
-                Pack3 g[N];
+                SimdVec3 g[N];
                 Element::gradients(rest.gradients[p], p, g);
                 double steepest = 0.0;
                 for (int k = 0; k < N; ++k) steepest = std::max(steepest, lane_of(g[k], lane).norm());
@@ -172,23 +172,23 @@ class Tetrahedra : public SolidTerm {
         const std::size_t count = static_cast<std::size_t>(elements()) * points;
         PointStates out{points, std::vector<Mat3>(count), std::vector<Mat3>(count),
                         std::vector<double>(count)};
-        loop_.each_pack([&](Index pack) {
-            const State state(*this, pack, q);
+        loop_.each_group([&](Index group) {
+            const State state(*this, group, q);
             for (int p = 0; p < points; ++p) {
-                Pack s[Material::stresses];
-                state.at[p].stress(constants_[pack].at, state.of(p).pressure, s);
-                const Pack33& f = state.f[p];
-                const Pack33 cauchy = Pack(1.0) / determinant(f, cofactor(f)) *
-                                      multiply(state.at[p].piola(constants_[pack].at, s), transpose(f));
-                for (int lane = 0; lane < loop_.lanes_in(pack); ++lane) {
+                SimdDouble s[Material::stresses];
+                state.at[p].stress(constants_[group].at, state.of(p).pressure, s);
+                const SimdMat3& f = state.f[p];
+                const SimdMat3 cauchy = SimdDouble(1.0) / determinant(f, cofactor(f)) *
+                                        multiply(state.at[p].piola(constants_[group].at, s), transpose(f));
+                for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
                     const std::size_t at =
-                        static_cast<std::size_t>(solid_.elements.user[loop_.element(pack, lane)]) * points +
+                        static_cast<std::size_t>(solid_.elements.user[loop_.element(group, lane)]) * points +
                         p;
                     for (int k = 0; k < 9; ++k) {
                         out.deformation_gradients[at](k / 3, k % 3) = f.at[k][lane];
                         out.cauchy_stresses[at](k / 3, k % 3) = cauchy.at[k][lane];
                     }
-                    out.volumes[at] = rest_[pack].volume[p][lane];
+                    out.volumes[at] = rest_[group].volume[p][lane];
                 }
             }
         });
@@ -199,50 +199,50 @@ class Tetrahedra : public SolidTerm {
     static constexpr int N = Element::nodes, points = Element::points, n_constants = Material::constants;
 
     struct Rest {
-        Pack3 gradients[points][3];
-        Pack volume[points];
+        SimdVec3 gradients[points][3];
+        SimdDouble volume[points];
 
-        Pack total() const {
-            Pack sum = volume[0];
+        SimdDouble total() const {
+            SimdDouble sum = volume[0];
             for (int p = 1; p < points; ++p) sum += volume[p];
             return sum;
         }
     };
     struct Constants {
-        Pack at[n_constants];
+        SimdDouble at[n_constants];
     };
-    // The kinematics and the volumetric response of a pack of elements at q.
+    // The kinematics and the volumetric response of a SIMD vector of elements at q.
     struct State {
-        Pack33 f[points];
+        SimdMat3 f[points];
         Material at[points];
         Volumetric volumetric[mean ? 1 : points];
-        Pack mean_measure;
+        SimdDouble mean_measure;
 
-        State(const Tetrahedra& term, Index pack, const double* q)
-            : State(term, pack, Gradients(term, pack, q), std::make_index_sequence<points>()) {}
+        State(const Tetrahedra& term, Index group, const double* q)
+            : State(term, group, Gradients(term, group, q), std::make_index_sequence<points>()) {}
 
         /// Evaluates the law at other measures, two per point.
-        void take_measures(const Tetrahedra& term, Index pack, const Pack* measures) {
-            Pack before[mean ? 1 : points];
+        void take_measures(const Tetrahedra& term, Index group, const SimdDouble* measures) {
+            SimdDouble before[mean ? 1 : points];
             for (int k = 0; k < (mean ? 1 : points); ++k) before[k] = measure(k);
             for (int p = 0; p < points; ++p) at[p].take_measures(measures + 2 * p);
-            respond(term, pack);
+            respond(term, group);
             for (int k = 0; k < (mean ? 1 : points); ++k)
-                volumetric[k].bulk = Material::bulk_between(term.constants_[pack].at, measure(k), before[k]);
+                volumetric[k].bulk = Material::bulk_between(term.constants_[group].at, measure(k), before[k]);
         }
 
         /// Returns the volumetric response at a point.
         const Volumetric& of(int p) const { return volumetric[mean ? 0 : p]; }
 
       private:
-        Pack measure(int k) const { return mean ? mean_measure : at[k].volume_measure(); }
+        SimdDouble measure(int k) const { return mean ? mean_measure : at[k].volume_measure(); }
 
-        void respond(const Tetrahedra& term, Index pack) {
-            const Pack* c = term.constants_[pack].at;
+        void respond(const Tetrahedra& term, Index group) {
+            const SimdDouble* c = term.constants_[group].at;
             if constexpr (mean) {
-                Pack sum(0.0);
-                for (int k = 0; k < points; ++k) sum += term.rest_[pack].volume[k] * at[k].volume_measure();
-                mean_measure = sum / term.rest_[pack].total();
+                SimdDouble sum(0.0);
+                for (int k = 0; k < points; ++k) sum += term.rest_[group].volume[k] * at[k].volume_measure();
+                mean_measure = sum / term.rest_[group].total();
                 volumetric[0] = Material::volumetric(c, mean_measure);
             } else {
                 for (int k = 0; k < points; ++k)
@@ -251,33 +251,33 @@ class Tetrahedra : public SolidTerm {
         }
 
         struct Gradients {
-            Pack33 f[points];
-            Gradients(const Tetrahedra& term, Index pack, const double* q) {
-                Pack3 x[N];
-                term.loop_.gather(pack, q, x);
-                for (int p = 0; p < points; ++p) f[p] = term.gradient_of(pack, p, x);
+            SimdMat3 f[points];
+            Gradients(const Tetrahedra& term, Index group, const double* q) {
+                SimdVec3 x[N];
+                term.loop_.gather(group, q, x);
+                for (int p = 0; p < points; ++p) f[p] = term.gradient_of(group, p, x);
             }
         };
 
         template <std::size_t... p>
-        State(const Tetrahedra& term, Index pack, const Gradients& given, std::index_sequence<p...>)
+        State(const Tetrahedra& term, Index group, const Gradients& given, std::index_sequence<p...>)
             : f{given.f[p]...}, at{Material(given.f[p])...} {
-            respond(term, pack);
+            respond(term, group);
         }
     };
 
-    Pack33 gradient_of(Index pack, int p, const Pack3 x[N]) const {
-        Pack3 g[N];
-        Element::gradients(rest_[pack].gradients[p], p, g);
+    SimdMat3 gradient_of(Index group, int p, const SimdVec3 x[N]) const {
+        SimdVec3 g[N];
+        Element::gradients(rest_[group].gradients[p], p, g);
         return deformation_gradient<N>(x, g);
     }
 
     // Computes force_k += stress g_k.
-    void add_pull(Index pack, int p, const Pack33& stress, Pack3 g[N], Pack3 force[N]) const {
-        Element::gradients(rest_[pack].gradients[p], p, g);
-        Pack3 sum{Pack(0.0), Pack(0.0), Pack(0.0)};
+    void add_pull(Index group, int p, const SimdMat3& stress, SimdVec3 g[N], SimdVec3 force[N]) const {
+        Element::gradients(rest_[group].gradients[p], p, g);
+        SimdVec3 sum{SimdDouble(0.0), SimdDouble(0.0), SimdDouble(0.0)};
         for (int k = 1; k < N; ++k) {
-            const Pack3 pull = multiply(stress, g[k]);
+            const SimdVec3 pull = multiply(stress, g[k]);
             force[k] = p == 0 ? pull : force[k] + pull;
             sum += pull;
         }

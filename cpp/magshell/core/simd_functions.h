@@ -1,21 +1,21 @@
-// Elementary functions of packs, for kernels that need them: logarithm, exponential, cube root, and choices by lane.
+// Elementary functions of SIMD vectors, for kernels that need them: logarithm, exponential, cube root, and choices by lane.
 #pragma once
 
 #include <cmath>
 #include <limits>
 #include <utility>
 
-#include "magshell/core/pack.h"
+#include "magshell/core/simd_double.h"
 
 namespace magshell {
 
-typedef unsigned long long LaneBits __attribute__((vector_size(sizeof(Pack::Lanes))));
+typedef unsigned long long LaneBits __attribute__((vector_size(sizeof(SimdDouble::Lanes))));
 
 /// Returns a mask of the lanes whose bit is set.
 inline auto lanes_with_bits(unsigned bits) {
     return [&]<std::size_t... lane>(std::index_sequence<lane...>) {
         return ((LaneBits{} + bits) & LaneBits{1ull << lane...}) != LaneBits{};
-    }(std::make_index_sequence<Pack::width>());
+    }(std::make_index_sequence<SimdDouble::width>());
 }
 
 /// Returns the natural logarithm in every lane, to 1 ulp and with the special values of std::log; lanes are independent of each other.
@@ -25,8 +25,8 @@ inline auto lanes_with_bits(unsigned bits) {
 ///
 /// The series is the Taylor series: with |s| < 0.172, ten terms reach 1e-18 of the sum. ln 2 is split into two parts, the first with trailing
 /// zeros so that its product with k is exact.
-inline Pack log(const Pack& a) {
-    using Lanes = Pack::Lanes;
+inline SimdDouble log(const SimdDouble& a) {
+    using Lanes = SimdDouble::Lanes;
     const auto all = [](double number) { return Lanes{} + number; };
     constexpr unsigned long long mantissa = 0x000fffffffffffffull, one = 0x3ff0000000000000ull,
                                  root_half = 0x3fe6a09e667f3bcdull, exponent_zero = 0x4330000000000000ull;
@@ -46,28 +46,28 @@ inline Pack log(const Pack& a) {
     const Lanes infinity = all(std::numeric_limits<double>::infinity()),
                 nan = all(std::numeric_limits<double>::quiet_NaN());
     const Lanes with_ends = a.lanes == infinity ? infinity : a.lanes == all(0.0) ? -infinity : nan;
-    return Pack((a.lanes > all(0.0)) & (a.lanes < infinity) ? result : with_ends);
+    return SimdDouble((a.lanes > all(0.0)) & (a.lanes < infinity) ? result : with_ends);
 }
 
-inline Pack exp(const Pack& a) {
-    Pack result;
-    for (int l = 0; l < Pack::width; ++l) result.lanes[l] = std::exp(a.lanes[l]);
+inline SimdDouble exp(const SimdDouble& a) {
+    SimdDouble result;
+    for (int l = 0; l < SimdDouble::width; ++l) result.lanes[l] = std::exp(a.lanes[l]);
     return result;
 }
 
-inline Pack cbrt(const Pack& a) {
-    Pack result;
-    for (int l = 0; l < Pack::width; ++l) result.lanes[l] = std::cbrt(a.lanes[l]);
+inline SimdDouble cbrt(const SimdDouble& a) {
+    SimdDouble result;
+    for (int l = 0; l < SimdDouble::width; ++l) result.lanes[l] = std::cbrt(a.lanes[l]);
     return result;
 }
 
-inline Pack max(const Pack& a, const Pack& b) {
-    return Pack(a.lanes > b.lanes ? a.lanes : b.lanes);
+inline SimdDouble max(const SimdDouble& a, const SimdDouble& b) {
+    return SimdDouble(a.lanes > b.lanes ? a.lanes : b.lanes);
 }
 
 /// Returns a in lanes in which `number` is negative, else b.
-inline Pack where_negative(const Pack& number, const Pack& a, const Pack& b) {
-    return Pack(number.lanes < Pack(0.0).lanes ? a.lanes : b.lanes);
+inline SimdDouble where_negative(const SimdDouble& number, const SimdDouble& a, const SimdDouble& b) {
+    return SimdDouble(number.lanes < SimdDouble(0.0).lanes ? a.lanes : b.lanes);
 }
 
 }  // namespace magshell

@@ -10,9 +10,9 @@ namespace magshell::bindings {
 
 /// Throws InvalidInput unless both ends of a load path have as many numbers as the model's load parameters and
 /// varying parameters.
-inline void check_controls(const Model& model, const TimeVaryingParameters& varying, const Controls& from,
-                           const Controls& to) {
-    const Index width = model.registry().controls.size() + varying.size();
+inline void check_load_parameters(const Model& model, const TimeVaryingParameters& varying,
+                                  const LoadParameters& from, const LoadParameters& to) {
+    const Index width = model.registry().load_parameters.size() + varying.size();
     if (from.size() != width || to.size() != width)
         throw InvalidInput("controls must have shape (" + std::to_string(width) + ",)");
 }

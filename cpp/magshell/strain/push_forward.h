@@ -1,4 +1,4 @@
-// PushedForwardVector: a material vector m pushed forward by the deformation gradient, F m, at an integration
+// PushForward: a material vector m pushed forward by the deformation gradient, F m, at an integration
 // point of an element with N nodes. One element per SIMD lane.
 //
 //   F m = sum_k (g_k . m) x_k        g_k: gradient of the shape function of node k in the reference configuration [1/m]
@@ -9,12 +9,12 @@
 namespace magshell {
 
 template <int N>
-struct PushedForwardVector {
-    Pack alpha[N];  // g_k . m
+struct PushForward {
+    SimdDouble alpha[N];  // g_k . m
 
     /// Returns F m. Applied to nodal velocities, it returns the rate of F m.
-    Pack3 at(const Pack3 x[N]) const {
-        Pack3 y = alpha[0] * x[0];
+    SimdVec3 at(const SimdVec3 x[N]) const {
+        SimdVec3 y = alpha[0] * x[0];
         for (int k = 1; k < N; ++k) y += alpha[k] * x[k];
         return y;
     }

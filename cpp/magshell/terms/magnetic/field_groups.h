@@ -1,4 +1,4 @@
-// Arranges samples of the applied field in SIMD packs, as the magnetic kernels take them.
+// Arranges samples of the applied field in SIMD vectors, as the magnetic kernels take them.
 #pragma once
 
 #include <vector>
@@ -9,7 +9,7 @@
 
 namespace magshell {
 
-/// The field at all integration points of a pack of elements.
+/// The field at all integration points of a SIMD vector of elements.
 template <int points>
 struct PointFields {
     Magnetic::Field at[points];
@@ -26,17 +26,17 @@ inline void set_field(Magnetic::Field& field, int lane, const FieldSamples& samp
         }
 }
 
-/// Returns the fields of every pack, from samples that are ordered element by element.
+/// Returns the fields of every SIMD vector, from samples that are ordered element by element.
 template <int points, class Loop>
-std::vector<PointFields<points>> in_packs(const Loop& loop, const FieldSamples& samples, int order,
-                                          const Vec3& everywhere) {
-    std::vector<PointFields<points>> packs(loop.packs());
-    for (Index pack = 0; pack < loop.packs(); ++pack)
+std::vector<PointFields<points>> in_groups(const Loop& loop, const FieldSamples& samples, int order,
+                                           const Vec3& everywhere) {
+    std::vector<PointFields<points>> groups(loop.groups());
+    for (Index group = 0; group < loop.groups(); ++group)
         for (int p = 0; p < points; ++p)
-            for (int lane = 0; lane < Pack::width; ++lane)
-                set_field(packs[pack].at[p], lane, samples, loop.element(pack, lane) * points + p, order,
+            for (int lane = 0; lane < SimdDouble::width; ++lane)
+                set_field(groups[group].at[p], lane, samples, loop.element(group, lane) * points + p, order,
                           everywhere);
-    return packs;
+    return groups;
 }
 
 }  // namespace magshell
