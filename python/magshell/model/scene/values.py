@@ -131,7 +131,7 @@ class Values:
         labels = [
             (each, label) for each, label in self.scene._labels if each in self.scene._obstacle_contacts
         ]
-        return [(self.current(each), label, self.touching(each)) for each, label in labels]
+        return [(self.current(each), label, self.contact_bodies(each)) for each, label in labels]
 
     @property
     def all_sheets(self) -> Shell | CombinedSheets:
