@@ -24,10 +24,11 @@ NUMBER = 4.0  # P L^2 / (E I): an end that rises by two thirds of the length
 ASPECT = 1000
 
 
-def bent(mesh: ms.TriangleMesh, rel: float, thickness: float = LENGTH / 400) -> Answer:
+def bent(mesh: ms.TriangleMesh, rel: float, thickness: float = LENGTH / 400, **solver) -> Answer:
     """Compare the end of a cantilever of this mesh under a large force with the elastica."""
     sheet = shell(mesh, thickness=thickness)
-    found = ms.equilibrium(cantilever(sheet, (0, 0, force_for(NUMBER, sheet, LENGTH))))
+    scene = cantilever(sheet, (0, 0, force_for(NUMBER, sheet, LENGTH)))
+    found = ms.equilibrium(scene, solver=ms.MixedNewton(**solver))
     end = end_position(mesh, found.positions) / LENGTH
     return both(near("end x, z", end[[0, 2]], elastica(NUMBER), rel=rel, scale=1.0), at_rest(found))
 
@@ -117,7 +118,9 @@ def far_bent_strip_of_obtuse_faces(height):
 
 @case("a face of {:g} times its neighbours' size", over=(1e-3, 1e-4, 1e-5))
 def far_bent_strip_with_a_tiny_face(size):
-    return bent(tiny_face(strip(), 39, size), 3e-3)
+    # The search for the least size follows the round-off of the small face: 146 to 5494 factorizations where the thickness
+    # changes in its tenth digit. So it may take more than the usual limit of 5000.
+    return bent(tiny_face(strip(), 39, size), 3e-3, max_factorizations=40_000)
 
 
 @case("a face of 5 nm in a strip of 0.1 m, 0.25 mm thick: the round-off of its folds outweighs the load")

@@ -67,9 +67,20 @@ def blown_up(factor):
 
 @case("half its size: it may burst into folds that hold each other")
 def half_size():
-    """Check that any stable equilibrium is reached; which one depends on the last digits of the first steps."""
+    """Check that a stable equilibrium is reached, or a refusal names the cure.
+
+    A flat strip at half its size is pressed together symmetrically, so round-off decides how it bursts: starts that differ by
+    1e-12 take 2500 to 7100 factorizations, or end where no step lowers the energy.
+    """
     scene = idle_strip()
-    return at_rest(ms.equilibrium(scene, start=0.5 * scene.mesh.rest_positions))
+
+    def solve():
+        return ms.equilibrium(scene, start=0.5 * scene.mesh.rest_positions)
+
+    try:
+        return at_rest(solve())
+    except ms.NotConverged:
+        return refused(solve, "Start from positions closer to an equilibrium", ms.NotConverged)
 
 
 @case("rolled into a scroll of three turns")
