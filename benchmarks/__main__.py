@@ -1,4 +1,4 @@
-"""python -m benchmarks PART [options].
+"""Command line of the benchmarks: python -m benchmarks PART [options].
 
 A part is a module with add_arguments(parser) and run(options) -> results for JSON; its figure is a module of
 `figures` with draw(results, setting) -> a matplotlib Figure.
@@ -18,19 +18,19 @@ from .report import (
     add_common_arguments,
     as_json,
     read_results,
+    set_default_rounds,
     set_threads,
     setting,
-    settle_rounds,
     writable_folder,
     writable_path,
     write_json,
 )
 
-MISSING_LIBRARY = 3  # exit status; where it is the plotting library, the numbers are there all the same
+MISSING_LIBRARY = 3  # exit status; without the plotting library, the numbers are printed nevertheless
 
 
 class Part(NamedTuple):
-    """Names of modules of this package and of `figures`, and a line for the list."""
+    """One part of the benchmarks: names of modules of this package and of `figures`, and a line for the list."""
 
     module: str
     figure: str
@@ -63,7 +63,7 @@ EXTRAS = {
     "gymnasium": "gym",
     "matplotlib": "plot",
     "ngsolve": "ngsolve",
-}  # library: the extra that brings it
+}  # {library: the extra of magshell that installs it}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -92,7 +92,7 @@ def _part(name: str, arguments: list[str]) -> int:
     add_common_arguments(parser)
     part.add_arguments(parser)
     options = parser.parse_args(arguments)
-    settle_rounds(options)
+    set_default_rounds(options)
     set_threads(options.threads)
     try:
         results = as_json(part.run(options))
@@ -115,7 +115,7 @@ def _draw(name: str, results: dict[str, Any], made_on: dict[str, Any], path: Pat
 
 
 def _missing(error: ImportError, what: str) -> int:
-    """Says what to install, where it is a library of an extra; other errors come through."""
+    """Print how to install a library of an extra; an error about any other module is raised again."""
     library = (error.name or "").partition(".")[0]
     if library not in EXTRAS:
         raise error
@@ -124,7 +124,7 @@ def _missing(error: ImportError, what: str) -> int:
 
 
 def _all(arguments: list[str]) -> int:
-    """Every part, its numbers and its figure into one folder."""
+    """Run every part, and write its numbers and its figure into one folder."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks all", description="every part")
     parser.add_argument("folder", type=writable_folder, help="where PART.json and PART.png are written")
     parser.add_argument("--quick", action="store_true", help="small: what the parts print, no more")
@@ -138,7 +138,7 @@ def _all(arguments: list[str]) -> int:
         ]
         try:
             ended = _part(name, [*files, *(["--quick"] if options.quick else [])])
-        except SystemExit as error:  # the scenes of the paper may not be there, say
+        except SystemExit as error:  # for example, the scenes of the paper are missing
             print(f"{name}: {error}", file=sys.stderr)
             ended = 1
         status = status or ended
@@ -146,7 +146,7 @@ def _all(arguments: list[str]) -> int:
 
 
 def _figure(arguments: list[str]) -> int:
-    """The figure of numbers that an earlier run wrote."""
+    """Draw the figure of numbers that an earlier run wrote."""
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks figure", description="draws what an earlier run wrote with --json"
     )

@@ -1,4 +1,4 @@
-"""python -m benchmarks accuracy: cases against references, and their errors against time."""
+"""Part `accuracy` of the benchmarks: cases against references, and their errors against time."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import magshell as ms
 
-from . import beside_ngsolve, solid_accuracy
+from . import compare_ngsolve, solid_accuracy
 from .cases import CASES, SOLID_CASES, Case, Comparison, Outcome
 from .cases.hemisphere import large_deflection
 from .cases.magnetic_strip import field_across
@@ -19,7 +19,7 @@ from .report import add_rounds, print_table
 from .work_precision import BENDINGS, measure, print_points
 from .work_precision import STUDIES as CURVES
 
-# One call from rest at full load, and how many factorizations it may take, failed ones counted.
+# One solve from rest at full load, and the largest number of factorizations allowed, including failed ones.
 SINGLE_SOLVES: dict[str, tuple[Callable[[], Outcome], int]] = {
     "A1, full load": (lambda: end_shear(loads=(1.0,)), 12),
     "A4, full load": (large_deflection, 25),
@@ -27,7 +27,7 @@ SINGLE_SOLVES: dict[str, tuple[Callable[[], Outcome], int]] = {
 }
 
 
-ROUNDS_BESIDE = 12  # beside NGSolve: few meshes, and short calls
+ROUNDS_WITH_NGSOLVE = 12  # more than usual, because meshes are few and solves short
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -55,10 +55,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
-    """Prints the tables, returns their numbers. Raises ImportError before any work where NGSolve is asked for and not
-    there."""
+    """Print the tables and return their numbers. Raises ImportError at once if NGSolve is asked for but missing."""
     if options.ngsolve:
-        beside_ngsolve.check_ngsolve()
+        compare_ngsolve.check_ngsolve()
     results = {} if options.only_curves else _against_references(options)
     curves = [curve for curve in CURVES if options.only is None or curve.name in options.only]
     points = measure(curves, quick=options.quick, rounds=options.rounds)
@@ -66,10 +65,10 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         print_points(points)
     results["error against time"] = [point._asdict() for point in points]
     if options.ngsolve:
-        results["beside NGSolve"] = beside_ngsolve.measure(
-            options.only, max(options.rounds, ROUNDS_BESIDE), options.quick
+        results["beside NGSolve"] = compare_ngsolve.measure(
+            options.only, max(options.rounds, ROUNDS_WITH_NGSOLVE), options.quick
         )
-        beside_ngsolve.print_rows(results["beside NGSolve"]["rows"])
+        compare_ngsolve.print_rows(results["beside NGSolve"]["rows"])
     return results
 
 
@@ -93,7 +92,7 @@ def _against_references(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _outcome(case: Case, bending: str, quick: bool) -> Outcome | str:
-    """Its outcome, or why there is none."""
+    """Return the outcome of a case, or the message of the failed solve."""
     try:
         return case.run(case.coarse if quick else case.mesh, bending)
     except ms.NotConverged as error:
@@ -127,7 +126,7 @@ def _print_cases(cases: list[Case], outcomes: dict[str, Any]) -> None:
                     *costs,
                 ]
             )
-            if comparison.allowed is not None:  # the others are there for information
+            if comparison.allowed is not None:  # the other rows are for information only
                 compared += 1
                 within += comparison.passes
     headings = ["case", "quantity", "mesh", "reference", *BENDINGS, "allowed"]
@@ -233,7 +232,7 @@ def _cost(run: Outcome | str) -> tuple[str, str]:
 
 
 def _plain(outcomes: dict[str, Outcome | str]) -> dict[str, Any]:
-    """For JSON."""
+    """Convert outcomes to plain values for JSON."""
     return {
         bending: {"failed": run} if isinstance(run, str) else _plain_outcome(run)
         for bending, run in outcomes.items()

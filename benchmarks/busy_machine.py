@@ -1,4 +1,4 @@
-"""What two threads cost or gain beside other programs: a motion on two processors, alone and with company."""
+"""Cost or gain of two threads beside other programs: a motion on two processors, alone and beside other processes."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from .ratios import note
 from .report import bar, print_table
 
 CELLS, STEPS, ROUNDS = (48, 12), 40, 9  # 1152 faces
-QUICK_CELLS, QUICK_STEPS = (6, 2), 2  # which say nothing of the targets
+QUICK_CELLS, QUICK_STEPS = (6, 2), 2  # too small to compare with the targets
 THREADS = (1, 2)
 
-# What else runs: how many busy programs, how many motions at a time; two threads' time over one's at most.
+# {other load: (number of busy programs, number of motions at a time, largest ratio of two threads' time to one's)}.
 COMPANY = {
     "alone": (0, 1, None),
     "beside a busy program": (1, 1, 1.15),
@@ -41,8 +41,10 @@ while os.getppid() == parent:
 
 
 def measure(rounds: int) -> dict[str, Any]:
-    """Prints the table, returns its numbers: medians of seconds by the clock on the wall, one thread and two by turns.
-    No rounds: one of a tiny strip, to see what it prints."""
+    """Print the table and return its numbers: medians of wall-clock seconds, with one thread and two alternately.
+
+    With 0 rounds it runs one round of a tiny strip, to show the output.
+    """
     cells, steps = (CELLS, STEPS) if rounds else (QUICK_CELLS, QUICK_STEPS)
     targets, rounds = rounds > 0, max(1, rounds)
     times = {name: {threads: [] for threads in THREADS} for name in COMPANY}
@@ -69,7 +71,7 @@ def measure(rounds: int) -> dict[str, Any]:
 
 
 def ratio(times: dict[str, Any]) -> float:
-    """Two threads' time over that of one."""
+    """Return the time with two threads over that with one."""
     return times["2"] / times["1"]
 
 
@@ -86,19 +88,19 @@ def _strip(cells: tuple[int, int]) -> ms.Scene:
 
 
 def _runner() -> ProcessPoolExecutor:
-    """A process of its own, that waits for something to run."""
+    """Return an executor with one process of its own."""
     return ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_stay_on_two_processors)
 
 
 def _stay_on_two_processors() -> None:
-    """Where the system lets us choose."""
+    """Restrict this process to two processors, where the system allows that."""
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:2])
 
 
 @contextmanager
 def _busy_programs(count: int) -> Iterator[None]:
-    """So many run meanwhile, on the same two processors."""
+    """Run this many busy programs during the block, on the same two processors."""
     chosen = {"preexec_fn": _stay_on_two_processors} if os.name == "posix" else {}
     programs = [subprocess.Popen([sys.executable, "-c", _BUSY], **chosen) for _ in range(count)]
     try:

@@ -1,7 +1,7 @@
-"""python -m benchmarks check: all parts, quickly; the targets that are missed, and what the last release did better.
+"""Quick run of all parts: targets that are missed, and numbers that have changed since the last release.
 
-The numbers are those that parts note (ratios.py), held against a file of the last release's. Exit status: 0; 1 where
-one is worse by more than its kind's tolerance, where one is no longer measured, or where a part did not end.
+The numbers are those that parts note (ratios.py), compared with a file of the last release. Exit status: 0; 1 if a
+number is worse by more than the tolerance of its kind, if one is no longer measured, or if a part fails.
 """
 
 from __future__ import annotations
@@ -22,10 +22,17 @@ import numpy as np
 import magshell as ms
 
 from .ratios import KINDS, Ratio, collected
-from .report import add_common_arguments, print_table, set_threads, setting, settle_rounds, writable_folder
+from .report import (
+    add_common_arguments,
+    print_table,
+    set_default_rounds,
+    set_threads,
+    setting,
+    writable_folder,
+)
 
 LAST_RELEASE = Path(__file__).with_name("last_release.json")
-# Quick, but where sheets of a few faces say nothing of a target: large enough for it.
+# Options of a quick run; sheets are large enough where the targets need it.
 PARTS = {
     "accuracy": ["--quick", "--usual-meshes"],
     "kernels": ["--quick", "--faces", "8192", "--rounds", "3"],
@@ -36,7 +43,7 @@ PARTS = {
     "scaling": ["--quick", "--faces", "2048", "8192", "--company", "5"],
     "paper": ["--quick"],
 }
-# Whether the parts run and what they count, in seconds. Not `scaling`, which starts processes beside busy ones.
+# Options of a run of seconds: whether the parts run, and their counts. Without `scaling`, which starts busy processes.
 QUICKEST = {
     "accuracy": ["--quick", "--only", "A1", "C4", "T4a", "--rounds", "1"],
     "kernels": ["--quick", "--faces", "32"],
@@ -47,11 +54,14 @@ QUICKEST = {
     "paper": ["--quick", "--only", "bending_twisting", "kirigami_tower", "octopus"],
 }
 STEADY = ("count", "error")  # kinds that are nearly the same on every machine
-TIMED = ("share", "time")  # kinds that other people's work disturbs: worse is only what is so twice
+TIMED = ("share", "time")  # kinds that other programs disturb: worse only if worse in two runs
 
 
 def check(arguments: list[str], run: Callable[[str, list[str]], dict[str, float]] | None = None) -> int:
-    """run(part, arguments) -> the ratios of a part, for tests."""
+    """Run the parts, compare their numbers with the last release's, and return the exit status.
+
+    run(part, arguments): returns the ratios of a part, for tests.
+    """
     options = _parser().parse_args(arguments)
     run = measured if run is None else run
     if options.quickest:
@@ -67,8 +77,8 @@ def check(arguments: list[str], run: Callable[[str, list[str]], dict[str, float]
             failed[part] = f"{type(error).__name__}: {error}"
         print(f"{part}: {time.perf_counter() - began:.0f} s", flush=True)
     if options.write:
-        kept = _read(options.write) if options.only and options.write.is_file() else {}
-        return _write(options.write, now, failed, kept)
+        earlier = _read(options.write) if options.only and options.write.is_file() else {}
+        return _write(options.write, now, failed, earlier)
     _print_missed(now)
     _print_failed(failed)
     asked = [part for part in last if part not in failed and part in (options.only or last)]
@@ -76,7 +86,7 @@ def check(arguments: list[str], run: Callable[[str, list[str]], dict[str, float]
 
 
 def _quickest(options: argparse.Namespace, run: Callable[[str, list[str]], dict[str, Ratio]]) -> int:
-    """Run the parts as small as they go, and compare their counts and errors."""
+    """Run the parts at their smallest, and compare their counts and errors."""
     now, failed = {}, {}
     for part in options.only or QUICKEST:
         try:
@@ -93,13 +103,13 @@ def _quickest(options: argparse.Namespace, run: Callable[[str, list[str]], dict[
 
 
 def measured(part: str, arguments: list[str]) -> dict[str, Ratio]:
-    """What a part notes, its tables unseen; times over that of the loop."""
+    """Return the numbers that a part notes, without printing its tables; times are divided by that of the loop."""
     module = importlib.import_module(f"benchmarks.{part}")
     parser = argparse.ArgumentParser(prog=part)
     add_common_arguments(parser)
     module.add_arguments(parser)
     options = parser.parse_args(arguments)
-    settle_rounds(options)
+    set_default_rounds(options)
     set_threads(options.threads)
     before = loop()
     with contextlib.redirect_stdout(io.StringIO()), collected() as notes:
@@ -114,8 +124,10 @@ def measured(part: str, arguments: list[str]) -> dict[str, Ratio]:
 
 
 def loop(rounds: int = 7) -> float:
-    """Milliseconds of processor time of a fixed piece of arithmetic, the best of some rounds: what this machine can do
-    now, with one thread, in the caches."""
+    """Return the processor time [ms] of a fixed piece of arithmetic, the best of some rounds.
+
+    It measures the present speed of this machine, with one thread and data in the caches.
+    """
     values, times = np.linspace(0.0, 1.0, 4096), []
     for _ in range(rounds):
         began = time.process_time()
@@ -126,19 +138,19 @@ def loop(rounds: int = 7) -> float:
 
 
 def _over(ratio: Ratio, unit: float) -> Ratio:
-    """A time over the loop's. Its target stays what it was here, and is missed here if it was."""
+    """Divide a time by that of the loop, and its target too, so that it is missed as before."""
     limit = None if ratio.limit is None else ratio.limit / unit
     return ratio._replace(value=ratio.value / unit, limit=limit)
 
 
 def _disturbed(now: dict[str, Ratio], last: dict[str, float]) -> bool:
-    """Whether a time is worse, which it may be by other people's work."""
+    """Return whether a time is worse than before, which may be due to other programs."""
     timed = [ratio for ratio in now.values() if ratio.kind in TIMED and ratio.name in last]
     return any(ratio.worse_than(last[ratio.name]) for ratio in timed)
 
 
 def _better_of(first: dict[str, Ratio], second: dict[str, Ratio]) -> dict[str, Ratio]:
-    """Of two runs; of what is no time, the first."""
+    """Return the better times of two runs, and other numbers of the first."""
 
     def better(a: Ratio, b: Ratio) -> Ratio:
         return (max if a.at_least else min)(a, b, key=lambda ratio: ratio.value)
@@ -170,7 +182,7 @@ def _print_failed(failed: dict[str, str]) -> None:
 
 
 def _print_changes(now: dict[str, dict[str, Ratio]], last: dict[str, dict[str, float]]) -> int:
-    """1 where something is worse or gone."""
+    """Print what has changed; returns 1 if a number is worse or missing."""
     worse, gone, rows = 0, [], []
     for part, of in last.items():
         gone += [[part, name, f"{old:.4g}"] for name, old in of.items() if name not in now.get(part, {})]
@@ -205,7 +217,7 @@ def _tolerance(name: str) -> str:
 
 
 def _read(path: Path, section: str = "ratios") -> dict[str, dict[str, float]]:
-    """{part: {name: value}}"""
+    """Return the numbers of a file, {part: {name: value}}. Raises SystemExit if it cannot be read."""
     try:
         content = json.loads(path.read_text())
         ratios = content["ratios"] if section == "ratios" else content.get(section, {})
@@ -220,17 +232,17 @@ def _write(
     path: Path,
     now: dict[str, dict[str, Ratio]],
     failed: dict[str, str],
-    kept: dict[str, Any],
+    earlier: dict[str, Any],
     section: str = "ratios",
 ) -> int:
-    """kept: of the parts that were not asked for. The other section stays."""
+    """Write the numbers to a file. earlier: those of parts that were not run. The other section of the file stays."""
     _print_missed(now)
     _print_failed(failed)
     if failed:
         print(f"\n{path} was not written, as it would lack what did not end.")
         return 1
     ratios = {part: {name: float(f"{r.value:.4g}") for name, r in of.items()} for part, of in now.items()}
-    ratios = {part: {**kept, **ratios}[part] for part in PARTS if part in {**kept, **ratios}}
+    ratios = {part: {**earlier, **ratios}[part] for part in PARTS if part in {**earlier, **ratios}}
     made = {name: value for name, value in setting().items() if name in ("magshell", "processor", "numpy")}
     before = json.loads(path.read_text()) if path.is_file() else {}
     content = {**before, section: ratios}
@@ -243,7 +255,7 @@ def _write(
 
 
 def _new_file(text: str) -> Path:
-    """In a folder that can be written to: refused before the work, not after."""
+    """Return the path of a file to write. Raises before the work if its folder cannot be written to."""
     path = Path(text)
     writable_folder(str(path.parent))
     return path

@@ -1,4 +1,4 @@
-"""What contact costs, a pair and a face: a table of `python -m benchmarks kernels`."""
+"""Cost of contact for each pair and each face: tables of `python -m benchmarks kernels`."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from .timing import measure
 
 PAIRS, QUICK_PAIRS = 4000, 200
 CELLS, QUICK_CELLS = (32, 96), (8,)
-ALLOWED = 0.6  # us a pair, gradient and Hessian, on one core (ipctk 1.6: 3.1)
+ALLOWED = 0.6  # [us] time per pair, gradient and Hessian, on one core (ipctk 1.6: 3.1)
 LAW = {"stiffness": 1e5, "reach": 0.4, "thickness": 0.0, "smoothing": 0.1, "penalty": False}
 
 
 def contacts(quick: bool, rounds: int) -> dict[str, Any]:
-    """Prints the tables of pairs that touch and of sheets that lie on each other; returns their numbers, times in s."""
+    """Print the tables of pairs in contact and of sheets on each other; returns their numbers, times in s."""
     pairs = [
         cost_of_pairs(kind, QUICK_PAIRS if quick else PAIRS, rounds)
         for kind in ("point_triangle", "edge_edge")
@@ -54,27 +54,27 @@ def contacts(quick: bool, rounds: int) -> dict[str, Any]:
 
 
 def cost_of_pairs(kind: str, count: int, rounds: int) -> dict[str, Any]:
-    """Of random pairs nearer than three quarters of the reach."""
+    """Measure the cost of random pairs nearer than three quarters of the activation distance."""
     rng = np.random.default_rng(0)
-    places = rng.uniform(-1.0, 1.0, (20 * count, 4, 3))
-    places = places[_core.pair_proximities(kind, places)[0] < 0.75 * LAW["reach"]][:count]
-    ends = places + 0.1 * rng.standard_normal(places.shape)
+    points = rng.uniform(-1.0, 1.0, (20 * count, 4, 3))
+    points = points[_core.pair_proximities(kind, points)[0] < 0.75 * LAW["reach"]][:count]
+    ends = points + 0.1 * rng.standard_normal(points.shape)
     parallel = 1e-3 if kind == "edge_edge" else 0.0
     return {
         "kind": kind,
-        "pairs": len(places),
+        "pairs": len(points),
         "exact": measure(
-            lambda: _core.pair_sums(kind, places, 1.0, parallel, LAW, False), rounds=rounds
+            lambda: _core.pair_sums(kind, points, 1.0, parallel, LAW, False), rounds=rounds
         ).best,
         "cautious": measure(
-            lambda: _core.pair_sums(kind, places, 1.0, parallel, LAW, True), rounds=rounds
+            lambda: _core.pair_sums(kind, points, 1.0, parallel, LAW, True), rounds=rounds
         ).best,
-        "path": measure(lambda: _core.pair_free_shares(kind, places, ends, 0.0, 0.1), rounds=rounds).best,
+        "path": measure(lambda: _core.pair_free_shares(kind, points, ends, 0.0, 0.1), rounds=rounds).best,
     }
 
 
 def cost_of_search(cells: int, rounds: int) -> dict[str, Any]:
-    """Of two curved sheets, a fifth of a cell above each other, within two fifths."""
+    """Measure the cost of the broad phase for two curved sheets, a fifth of a cell apart, within two fifths."""
     mesh, cell = ms.meshes.rectangle(1.0, 1.0, cells=(cells, cells), irregular=0.2), 1.0 / cells
     lower = (
         mesh.rest_positions

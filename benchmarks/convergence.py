@@ -1,4 +1,4 @@
-"""How fast errors fall with the mesh size: the order of convergence on irregular meshes."""
+"""Order of convergence on irregular meshes: how fast errors fall with the mesh size."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ def _strongest_field(cells, bending: str, seed: int, solver=None) -> Outcome:
     return field_across(cells, bending, seed=seed, betas=(20.0,), solver=solver)
 
 
-# What to run, and the length of the strip in the unit of what it compares.
+# The run of each study, and the strip's length in the unit of its comparisons.
 STUDIES: dict[str, tuple[Callable[..., Outcome], float]] = {
     "A1, full load": (_full_shear, shear_strip.LENGTH),
     "C1-90, beta 20": (_strongest_field, 1.0),
 }
 
 
-# Where the ends of strips that stretch are, as the comparisons have them: a sheet of any fineness tends to these.
+# Ends of extensible strips, in the order of the comparisons: the limits of ever finer meshes.
 ENDS: dict[str, Callable[[], np.ndarray]] = {
     "A1, full load": shear_strip.stretched_end,
     "C1-90, beta 20": lambda: stretched_end(20.0),
@@ -42,7 +42,7 @@ ENDS: dict[str, Callable[[], np.ndarray]] = {
 
 @dataclass(frozen=True)
 class Convergence:
-    """Errors of one study on finer and finer meshes.
+    """The errors of one study on finer and finer meshes.
 
     cells: those along the strip, (m,); n_faces (m,). errors: (seeds, m), the distance of the end from its
     reference over the length of the strip. times: (seeds, m), s.
@@ -55,17 +55,17 @@ class Convergence:
 
     @property
     def mean_errors(self) -> np.ndarray:
-        """(m,): over the seeds, because one mesh's error depends on how its vertices fell."""
+        """The mean over the seeds, (m,), because one mesh's error depends on its random vertices."""
         return self.errors.mean(axis=0)
 
     @property
     def order(self) -> float:
-        """Of the mean errors, by least squares in the logarithms."""
+        """The order of the mean errors, by a least-squares fit of the logarithms."""
         return _slope(self.cells, self.mean_errors)
 
     @property
     def orders(self) -> np.ndarray:
-        """(seeds,): of each seed alone."""
+        """The order of each seed alone, (seeds,)."""
         return np.array([_slope(self.cells, errors) for errors in self.errors])
 
 
@@ -85,8 +85,10 @@ def converge(
 
 
 def _against_the_limit(study: str, meshes, seeds) -> Convergence:
-    """Of second order, whose errors are soon smaller than what an inextensible elastica leaves out: against one that
-    stretches, by a solver that goes on to round-off."""
+    """Measure second-order meshes against the extensible elastica, with a solver that converges to round-off.
+
+    Their errors are soon smaller than what the inextensible elastica neglects.
+    """
     run, length = STUDIES[study]
     end = ENDS[study]()
     outcomes = [
@@ -105,7 +107,8 @@ def _against_the_limit(study: str, meshes, seeds) -> Convergence:
 
 
 def _distance(run: Outcome) -> float:
-    """From the computed end of the strip to the exact one; its two components are the comparisons."""
+    """Return the distance of the computed end of the strip from the exact one; its two components are the
+    comparisons."""
     return float(
         np.linalg.norm([comparison.computed[-1] - comparison.reference[-1] for comparison in run.comparisons])
     )

@@ -1,4 +1,4 @@
-"""python -m benchmarks dynamics: integrators' error, time and energy; what gradients of motions cost and keep."""
+"""Part `dynamics` of the benchmarks: error, time and energy of integrators; time and memory of gradients of motions."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ INTEGRATORS = {
     "SDIRK3": ms.SDIRK3(),
 }
 LENGTH, WIDTH, THICKNESS = 0.05, 0.01, 5e-4
-STEPS = (20, 40, 80, 160, 320, 640)  # a period of the first mode
-AMPLITUDES = (0.001, 0.1, 0.3)  # of the tip, over the length
+STEPS = (20, 40, 80, 160, 320, 640)  # time steps per period of the first mode
+AMPLITUDES = (0.001, 0.1, 0.3)  # amplitudes of the tip, over the length
 STEPS_A_PERIOD, PERIODS = 40, 20
 REQUIRED_ENERGY = 0.98
 
@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
-    """Prints the tables, returns their numbers."""
+    """Print the tables and return their numbers."""
     if options.long < 0:
         raise SystemExit("--long must be at least 0")
     cells = tuple(chosen(options.cells, options.quick, (6, 2), (48, 8)))
@@ -77,7 +77,8 @@ def strip(cells: tuple[int, int] = (16, 2)) -> ms.Scene:
 
 
 def _errors(steps: tuple[int, ...], rounds: int) -> dict[str, Any]:
-    """Of a period in a field that swells and fades: root mean square of the positions at 20 times, over the length."""
+    """Measure the error of one period in a field that rises and falls: rms of the positions at 20 times, over the
+    length."""
     scene = strip()
     period = 1.0 / ms.vibration_modes(scene, count=1).frequencies[0]
 
@@ -121,21 +122,21 @@ def _errors(steps: tuple[int, ...], rounds: int) -> dict[str, Any]:
 
 
 def _energies(periods: int) -> dict[str, Any]:
-    """What is left of the energy of an undamped strip that begins with its first mode's velocities."""
+    """Measure the energy left of an undamped strip that begins with the velocities of its first mode."""
     scene = strip()
     modes = ms.vibration_modes(scene, count=1)
     period, mode = 1.0 / modes.frequencies[0], modes.modes[0]
     results, rows = {}, []
     for method in INTEGRATORS:
-        kept = [
-            _kept(scene, method, 2 * np.pi / period * amplitude * LENGTH * mode, period, periods)
+        left = [
+            _energy_left(scene, method, 2 * np.pi / period * amplitude * LENGTH * mode, period, periods)
             for amplitude in AMPLITUDES
         ]
-        results[method] = {"kept": dict(zip(AMPLITUDES, kept, strict=True))}
-        lost = np.nan if kept[0] is None else 1.0 - kept[0]
+        results[method] = {"kept": dict(zip(AMPLITUDES, left, strict=True))}
+        lost = np.nan if left[0] is None else 1.0 - left[0]
         allowed = 1.0 - REQUIRED_ENERGY if method == "TR-BDF2" else None
         missed = note("error", f"{method}: energy lost in {periods} periods", lost, at_most=allowed)
-        cells = ["failed" if share is None else f"{100 * share:.2f} %" for share in kept]
+        cells = ["failed" if fraction is None else f"{100 * fraction:.2f} %" for fraction in left]
         cells[0] += missed
         rows.append([method, *cells])
     print_table(
@@ -147,8 +148,10 @@ def _energies(periods: int) -> dict[str, Any]:
     return results
 
 
-def _kept(scene: ms.Scene, method: str, velocities: np.ndarray, period: float, periods: int) -> float | None:
-    """None where a step failed."""
+def _energy_left(
+    scene: ms.Scene, method: str, velocities: np.ndarray, period: float, periods: int
+) -> float | None:
+    """Return the final energy over the initial one, None if a step failed."""
     time_step, steps = period / STEPS_A_PERIOD, periods * STEPS_A_PERIOD
     try:
         move = ms.simulate(

@@ -1,4 +1,4 @@
-"""python -m benchmarks experiments: searches with and without gradients beside each other, and what memory they need."""
+"""Part `experiments` of the benchmarks: searches with and without gradients compared, and their memory."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from statistics import median
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .baselines import methods
-from .baselines.kept import Kept
 from .baselines.learned import LEARNERS
+from .baselines.stored_runs import StoredRuns
 from .baselines.tasks import BridgeTask, StripTask, robot_task
 from .memory_of_bridge import measure as measure_memory
 from .paper import examples_folder, on_path
@@ -22,13 +22,16 @@ if TYPE_CHECKING:
 
 QUICK_BUDGET = 6
 SEEDS = 5
-TIMES = 10  # as many simulations as ours: where a baseline is compared
-NEAR = 0.01  # of what ours ends with: where a task has no goal, ours is there
+TIMES = 10  # a baseline is compared after so many times the simulations of L-BFGS
+NEAR = 0.01  # [-] without a goal, L-BFGS counts as finished within this of its final objective
 
 
 class Experiment(NamedTuple):
-    """budget: simulations a run, TIMES what the gradient needs; of the octopus, which takes 3 s for one, half as many.
-    seeds: runs of each method, without --full; together they take about an hour of one core."""
+    """A comparison of searches on one task.
+
+    budget: simulations per run, TIMES what the gradient needs; half as many for the octopus, which takes 3 s for
+    one. seeds: runs of each method, without --full; together they take about an hour of one core.
+    """
 
     task: Callable[..., Any]
     budget: int
@@ -86,7 +89,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
-    """Prints the tables, returns their numbers."""
+    """Print the tables and return their numbers."""
     if options.quick and options.full:
         raise SystemExit("--quick or --full, not both")
     if options.known and not (options.runs and options.runs.exists()):
@@ -100,7 +103,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     wanted = [each for each in PARTS if options.only is None or each in options.only]
     folder = examples_folder(options.examples)
     results: dict = {"tasks": {}}
-    kept = Kept(options.runs)
+    stored = StoredRuns(options.runs)
     with on_path(folder):
         for name in wanted:
             if name != "memory":
@@ -109,9 +112,9 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
                 seeds = chosen(options.seeds, options.quick, 1, SEEDS if options.full else few)
                 task, searches = make(), options.methods
                 try:
-                    results["tasks"][name] = compared(task, budget, seeds, searches, kept, options.known)
-                except KeyboardInterrupt:  # what was run so far
-                    _print_task(name, compared(task, budget, seeds, searches, kept, known=True))
+                    results["tasks"][name] = compared(task, budget, seeds, searches, stored, options.known)
+                except KeyboardInterrupt:  # print the runs so far
+                    _print_task(name, compared(task, budget, seeds, searches, stored, known=True))
                     raise
                 _print_task(name, results["tasks"][name])
     if "memory" in wanted and not options.known:
@@ -120,11 +123,18 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def compared(
-    task: Task, budget: int, seeds: int, only: Sequence[str] | None, kept: Kept, known: bool = False
+    task: Task,
+    budget: int,
+    seeds: int,
+    only: Sequence[str] | None,
+    stored: StoredRuns,
+    known: bool = False,
 ) -> dict[str, Any]:
-    """{"unknowns", "goal", "budget", "seeds", "methods": {name: {"runs": [...]} or {"missing": library}}}.
+    """Run all searches on a task.
 
-    known: only what is kept, nothing is run."""
+    Returns {"unknowns", "goal", "budget", "seeds", "methods": {name: {"runs": [...]} or {"missing": library}}}.
+    known: take stored runs only, and run nothing.
+    """
     plain = methods.SEARCHES
     if task.searches is not None:
         plain = {name: each for name, each in plain.items() if name in task.searches}
@@ -134,7 +144,7 @@ def compared(
     with bar(task.name, len(searches) * seeds) as shown:
         for name, search in searches.items():
             if known:
-                runs = [kept.known(task.name, name, seed, budget) for seed in range(seeds)]
+                runs = [stored.known(task.name, name, seed, budget) for seed in range(seeds)]
                 if any(runs):
                     found[name] = {"runs": [each for each in runs if each]}
                 continue
@@ -142,7 +152,7 @@ def compared(
                 runs = []
                 for seed in range(seeds):
                     make = partial(methods.run, search, task, budget, seed)
-                    runs.append(kept.run(task.name, name, seed, budget, make))
+                    runs.append(stored.run(task.name, name, seed, budget, make))
                     shown.update()
                 found[name] = {"runs": runs}
             except ImportError as error:
@@ -182,15 +192,15 @@ def _print_task(name: str, task: dict[str, Any]) -> None:
                 _number(max(ends)),
                 shown,
                 _number(median(each["seconds"][-1] for each in runs)),
-                beside_ours(method, task),
+                compare_with_ours(method, task),
             ]
         )
-    told = f", goal {goal:g}" if goal else ""
-    print_table(f"{name}: {task['unknowns']} unknowns, medians of {seeds} runs{told}", headings, rows)
+    aim = f", goal {goal:g}" if goal else ""
+    print_table(f"{name}: {task['unknowns']} unknowns, medians of {seeds} runs{aim}", headings, rows)
 
 
-def beside_ours(method: str, task: dict[str, Any]) -> str:
-    """Whether a baseline is better or worse than ours, given TIMES as many simulations: medians of all runs."""
+def compare_with_ours(method: str, task: dict[str, Any]) -> str:
+    """Say whether a baseline is better or worse than L-BFGS with TIMES as many simulations: medians of all runs."""
     ours = task["methods"].get(OURS, {}).get("runs")
     if method == OURS or not ours:
         return "ours" if method == OURS else ""
@@ -206,7 +216,7 @@ def beside_ours(method: str, task: dict[str, Any]) -> str:
 
 
 def _needed(best: list[float], goal: float | None) -> int:
-    """Simulations until the goal, or else until near what came out at last."""
+    """Return the simulations until the goal, or else until close to the final objective."""
     return (
         len(best) if goal else 1 + next(k for k, value in enumerate(best) if value <= (1 + NEAR) * best[-1])
     )

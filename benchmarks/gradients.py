@@ -1,4 +1,4 @@
-"""python -m benchmarks gradients: the gradient by all inputs, over the equilibrium it differentiates."""
+"""Part `gradients` of the benchmarks: time of the gradient by all inputs, over that of its equilibrium."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from .ratios import note
 from .report import add_rounds, chosen, print_table
 
 FACES, QUICK_FACES = 8192, 128
-CELLS, QUICK_CELLS = (24, 6, 6), (8, 2, 2)  # of the solid
-ALLOWED_SHARE = 0.10  # of the equilibrium's time
+CELLS, QUICK_CELLS = (24, 6, 6), (8, 2, 2)  # cells of the solid
+ALLOWED_SHARE = 0.10  # [-] largest time of a gradient over that of its equilibrium
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
-    """Prints the table, returns its numbers."""
+    """Print the table and return its numbers."""
     faces = chosen(options.faces, options.quick, QUICK_FACES, FACES)
     if faces < 2:
         raise SystemExit("--faces must be at least 2")
@@ -61,7 +61,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _cost(scene: ms.Scene, inputs: dict[str, Any], values: dict[str, Any], rounds: int) -> dict[str, Any]:
-    """The best of some rounds of each, s of processor time."""
+    """Measure each time, s of the processor, as the best of some rounds."""
     import torch
 
     def tensors(arrays: dict) -> dict:
@@ -98,7 +98,8 @@ def _size(body: ms.Shell | ms.Solid) -> str:
 
 
 def _sheet(faces: int, bending: str) -> tuple[ms.Scene, dict[str, Any], dict[str, Any]]:
-    """A square sheet with every kind of input: bent by fields, gravity and a load, its clamp turned on the way."""
+    """Return a square sheet with every kind of input: bent by fields, gravity and a load, with a clamp that moves and
+    rotates."""
     cells = max(1, round((faces / 2) ** 0.5))
     mesh = ms.meshes.rectangle(0.1, 0.1, cells=(cells, cells))
     sheet = ms.Shell(
@@ -125,7 +126,7 @@ def _sheet(faces: int, bending: str) -> tuple[ms.Scene, dict[str, Any], dict[str
 
 
 def _solid(cells: tuple[int, int, int]) -> tuple[ms.Scene, dict[str, Any], dict[str, Any]]:
-    """A beam with every kind of input: bent by a field, gravity and forces, its end turned on the way."""
+    """Return a beam with every kind of input: bent by a field, gravity and forces, with an end that moves."""
     mesh = ms.meshes.box((0.1, 0.025, 0.025), cells=cells)
     count, x = mesh.n_tetrahedra, mesh.rest_positions[:, 0]
     solid = ms.Solid(

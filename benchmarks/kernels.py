@@ -1,5 +1,4 @@
-"""python -m benchmarks kernels: what a gradient and a Hessian cost, a face, by bending and magnetization; a
-tetrahedron and a contact."""
+"""Part `kernels` of the benchmarks: cost of a gradient and a Hessian for each face, tetrahedron and contact."""
 
 from __future__ import annotations
 
@@ -20,13 +19,13 @@ from .solid_kernels import muscles, solids
 from .timing import Timing, clocked, measure, peak_memory
 
 FACES, QUICK_FACES = (8192, 131072), (128, 512)
-ALLOWED = 0.6  # us a face, gradient and Hessian, of the first sheet on one core
-ALLOWED_GROWTH = 1.1  # at 131,072 faces over 8192
-REQUIRED_GAIN = 1.7  # of two threads over one
+ALLOWED = 0.6  # [us] time per face of gradient and Hessian, of the first sheet on one core
+ALLOWED_GROWTH = 1.1  # [-] time per face at 131,072 faces over that at 8192
+REQUIRED_GAIN = 1.7  # [-] smallest speedup of two threads
 
 
 class Sheet(NamedTuple):
-    """What a scene holds: each line of the table."""
+    """A line of the table: the energies that a scene has."""
 
     name: str
     bending: str = "midedge"
@@ -47,13 +46,13 @@ SHEETS = (
 
 
 class Cost(NamedTuple):
-    """Of one sheet at one size; times in s."""
+    """The cost of one sheet at one size; times in s."""
 
     faces: int
     build: float
     gradient: Timing
     hessian: Timing  # gradient and Hessian, into the sparse matrix
-    memory: int  # bytes, of the model
+    memory: int  # bytes of the model
 
     def microseconds(self, timing: Timing) -> Timing:
         return Timing(*(1e6 * value / self.faces for value in timing))
@@ -66,7 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
-    """Prints the table, returns its numbers."""
+    """Print the table and return its numbers."""
     sizes = chosen(options.faces, options.quick, QUICK_FACES, FACES)
     if min(sizes) < 2:
         raise SystemExit("--faces must be at least 2")
@@ -96,7 +95,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def cost(sheet: Sheet, faces: int, rounds: int) -> Cost:
-    """Of a square sheet near its rest shape, clamped at one side, with an irregular mesh."""
+    """Measure a square sheet near its rest shape, clamped at one side, with an irregular mesh."""
     model, state, controls, n_faces, build = _near_rest(sheet, faces)
     return Cost(
         n_faces,
@@ -108,7 +107,7 @@ def cost(sheet: Sheet, faces: int, rounds: int) -> Cost:
 
 
 def two_threads(sheet: Sheet, faces: int, rounds: int) -> float:
-    """How many times as fast as one they make gradient and Hessian, by the clock on the wall."""
+    """Return the speedup of gradient and Hessian by two threads, in wall-clock time."""
     model, state, controls, *_ = _near_rest(sheet, faces)
     before, times = ms.num_threads(), []
     try:
@@ -121,7 +120,7 @@ def two_threads(sheet: Sheet, faces: int, rounds: int) -> float:
 
 
 def _near_rest(sheet: Sheet, faces: int):
-    """The core's model, a state, controls, how many faces there are, and how long the scene took to build, s."""
+    """Return the core's model, a state, controls, the number of faces, and the time [s] to build the scene."""
     cells = max(1, round((faces / 2) ** 0.5))
     order = order_of(sheet.bending)
     mesh = ms.meshes.rectangle(1.0, 1.0, cells=(cells, cells), irregular=0.2, order=order)

@@ -1,6 +1,7 @@
-"""[Qiao21] Table 1: the memory of a gradient over motions of the arch bridge, with and without checkpoints.
+"""Memory of a gradient over motions of the arch bridge, with and without checkpoints: [Qiao21] Table 1.
 
-Each in a process of its own, as a process gives little back: python -m benchmarks.memory_of_bridge STEPS KEEP.
+Each run is in a process of its own, because a process returns little memory to the system: python -m
+benchmarks.memory_of_bridge STEPS STORAGE FOLDER.
 """
 
 from __future__ import annotations
@@ -17,15 +18,20 @@ from .report import print_table
 from .timing import peak_memory
 
 STEPS, QUICK_STEPS = (10, 20, 100, 200), (2,)
-KEEPS = {"factors": "factors kept", "stages": "states kept", "checkpoints": "checkpoints"}
-PAPER = {10: (0.9, 0.1), 20: (1.4, 0.1), 100: (6.9, 0.1), 200: (15.7, 0.1)}  # GB, without and with
-AT_MOST = 1e8  # bytes, with checkpoints over 200 steps
+STORAGES = {"factors": "factors kept", "stages": "states kept", "checkpoints": "checkpoints"}
+PAPER = {
+    10: (0.9, 0.1),
+    20: (1.4, 0.1),
+    100: (6.9, 0.1),
+    200: (15.7, 0.1),
+}  # GB, without and with checkpoints
+AT_MOST = 1e8  # [bytes] largest growth with checkpoints over 200 steps
 
 
 def measure(examples: Path, quick: bool) -> list[dict[str, Any]]:
-    """Prints the table, returns its rows: bytes that the process grew by, by how much of it for the gradient."""
+    """Print the table and return its rows: bytes that the process grew by, and bytes stored for the gradient."""
     rows = [
-        {"steps": steps, **{keep: _in_fresh_process(steps, keep, examples) for keep in KEEPS}}
+        {"steps": steps, **{storage: _in_fresh_process(steps, storage, examples) for storage in STORAGES}}
         for steps in (QUICK_STEPS if quick else STEPS)
     ]
     last = rows[-1]
@@ -36,15 +42,16 @@ def measure(examples: Path, quick: bool) -> list[dict[str, Any]]:
         [
             str(row["steps"]),
             "",
-            *(_megabytes(row[keep]["grown"]) for keep in KEEPS),
-            *(_megabytes(row[keep]["bytes"]) for keep in KEEPS),
-            *(f"{row[keep]['seconds']:.2f} s" for keep in KEEPS),
+            *(_megabytes(row[storage]["grown"]) for storage in STORAGES),
+            *(_megabytes(row[storage]["bytes"]) for storage in STORAGES),
+            *(f"{row[storage]['seconds']:.2f} s" for storage in STORAGES),
             *(f"{each} GB" for each in PAPER.get(row["steps"], ("", ""))),
         ]
         for row in rows
     ]
-    headings = ["steps", "", *(f"grown: {each}" for each in KEEPS.values())]
-    headings += [*(f"kept: {each}" for each in KEEPS.values()), *(f"time: {each}" for each in KEEPS.values())]
+    labels = STORAGES.values()
+    headings = ["steps", "", *(f"grown: {each}" for each in labels)]
+    headings += [*(f"kept: {each}" for each in labels), *(f"time: {each}" for each in labels)]
     headings += ["theirs, without", "theirs, with"]
     print_table("Memory of motion and gradient, the arch bridge ([Qiao21] Table 1)", headings, shown)
     return rows
@@ -54,16 +61,16 @@ def _megabytes(value: float | None) -> str:
     return "" if value is None else f"{value / 1e6:.1f} MB"
 
 
-def _in_fresh_process(steps: int, keep: str, examples: Path) -> dict[str, Any]:
-    command = [sys.executable, "-m", "benchmarks.memory_of_bridge", str(steps), keep, str(examples)]
+def _in_fresh_process(steps: int, storage: str, examples: Path) -> dict[str, Any]:
+    command = [sys.executable, "-m", "benchmarks.memory_of_bridge", str(steps), storage, str(examples)]
     done = subprocess.run(command, cwd=Path(__file__).parents[1], capture_output=True, text=True)
     if done.returncode:
-        raise RuntimeError(f"{steps} steps with {keep} failed: {done.stderr.strip().splitlines()[-1:]}")
+        raise RuntimeError(f"{steps} steps with {storage} failed: {done.stderr.strip().splitlines()[-1:]}")
     return json.loads(done.stdout)
 
 
-def _one(steps: int, keep: str, examples: str) -> dict[str, Any]:
-    """Bytes that the peak rises by, from one step with its gradient to the motion asked for with its own."""
+def _one(steps: int, storage: str, examples: str) -> dict[str, Any]:
+    """Measure the bytes by which the peak rises, from one step with its gradient to the whole motion with its own."""
     import torch
 
     sys.path.insert(0, examples)
@@ -75,7 +82,7 @@ def _one(steps: int, keep: str, examples: str) -> dict[str, Any]:
     def gradient(count: int):
         task = Task(arch(), gravity=9.81, steps=count)
         x = torch.tensor(task.start, requires_grad=True)
-        motion = task.motion(x, adjoint_storage=keep, record_every=count)
+        motion = task.motion(x, adjoint_storage=storage, record_every=count)
         task.distance(motion).backward()
         return motion
 

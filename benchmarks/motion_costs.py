@@ -1,4 +1,4 @@
-"""Time a step, cost of a gradient, memory of what is kept for it, and long runs."""
+"""Time per step, cost of a gradient, memory stored for it, and long runs."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from .timing import peak_memory, resident_memory
 if TYPE_CHECKING:
     from magshell.solve.options import Integrator
 
-ALLOWED_STEP = 0.015  # s, at 768 faces
-# Of the time of the same motion without gradients.
+ALLOWED_STEP = 0.015  # [s] largest time of a step at 768 faces
+# Largest time of the gradient over that of the same motion without gradients, by adjoint storage.
 ALLOWED_SHARE = {"factors": 0.25, "stages": 0.5, "checkpoints": 1.2}
 STEPS, TIME_STEP = 50, 1e-3
 KEPT_STEPS = (100, 1_000, 10_000)
-MOST_FACTORS = 1_000  # steps whose factorizations fit: some 200 kB each
+MOST_FACTORS = 1_000  # steps whose factorizations fit into memory: some 200 kB each
 SMALL = (6, 2)  # cells of the strip in long runs
 
 
 def strip(cells: tuple[int, int] = (48, 8)) -> ms.Scene:
-    """12 cm x 2 cm, soft; 768 faces by default."""
+    """Return a soft strip, 12 cm x 2 cm; 768 faces by default."""
     mesh = ms.meshes.rectangle(0.12, 0.02, cells=cells)
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e5, poisson_ratio=0.45, mass_density=1e3)
     return ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
 
 
 def turning(steps: int) -> np.ndarray:
-    """T, at the ends of the steps: once around in 0.16 s."""
+    """Return a field [T] at the ends of the steps that rotates once in 0.16 s."""
     angle = 40.0 * TIME_STEP * np.arange(steps + 1)
     return 3e-3 * np.stack([np.cos(angle), 0.0 * angle, np.sin(angle)], axis=1)
 
@@ -48,14 +48,14 @@ def drive(scene: ms.Scene, steps: int, **options: Any) -> ms.Trajectory:
 
 
 def budget(scene: ms.Scene, integrator: Integrator, steps: int) -> float:
-    """Bytes with which checkpoints suffice to take every step again but once."""
-    of_a_state = 4 if isinstance(integrator, ms.TRBDF2) else 2  # vectors, beside one a stage
+    """Return bytes with which checkpoints are enough to compute each step again only once."""
+    of_a_state = 4 if isinstance(integrator, ms.TRBDF2) else 2  # vectors of a state, and one more per stage
     record = 8.0 * scene._model.size * (of_a_state + len(integrator._times))
     return min(0.6 * record * steps, 4e6)
 
 
 def measure(rounds: int, quick: bool, cells: tuple[int, int], memory: bool = True) -> dict[str, Any]:
-    """Prints the tables, returns their numbers."""
+    """Print the tables and return their numbers."""
     steps = 5 if quick else STEPS
     results = {
         "step": _steps(strip(cells), steps, rounds),
@@ -63,8 +63,8 @@ def measure(rounds: int, quick: bool, cells: tuple[int, int], memory: bool = Tru
     }
     if not memory:
         return results
-    kept = _memory(["checkpoints"], KEPT_STEPS[:1]) if quick else _memory(ALLOWED_SHARE, KEPT_STEPS)
-    return {**results, "memory": kept}
+    stored = _memory(["checkpoints"], KEPT_STEPS[:1]) if quick else _memory(ALLOWED_SHARE, KEPT_STEPS)
+    return {**results, "memory": stored}
 
 
 def _steps(scene: ms.Scene, steps: int, rounds: int) -> dict[str, Any]:
@@ -90,34 +90,37 @@ def _steps(scene: ms.Scene, steps: int, rounds: int) -> dict[str, Any]:
 
 
 def _gradients(scene: ms.Scene, steps: int, rounds: int) -> dict[str, Any]:
-    """By the field of every step and the magnetization; all of an integrator's runs in turn, as loads change."""
+    """Measure the gradient by the field of every step and the magnetization.
+
+    The runs of one integrator alternate, because the load of the machine varies.
+    """
     results, rows = {}, []
     for integrator in (ms.ImplicitEuler(), ms.TRBDF2()):
         name = type(integrator).__name__
-        plain, kept = [], {keep: [] for keep in ALLOWED_SHARE}
+        plain, by_storage = [], {storage: [] for storage in ALLOWED_SHARE}
         for _ in range(rounds):
             began = time.process_time()
             drive(scene, steps, integrator=integrator)
             plain.append(time.process_time() - began)
-            for keep, runs in kept.items():
-                runs.append(_forward_and_back(scene, steps, integrator, keep))
-        for keep, allowed in ALLOWED_SHARE.items():
-            runs = kept[keep]
+            for storage, runs in by_storage.items():
+                runs.append(_forward_and_back(scene, steps, integrator, storage))
+        for storage, allowed in ALLOWED_SHARE.items():
+            runs = by_storage[storage]
             forward, back = (min(run[k] for run in runs) for k in (0, 1))
-            share = back / min(plain)
-            results[f"{name}, {keep}"] = {
+            ratio = back / min(plain)
+            results[f"{name}, {storage}"] = {
                 "plain": min(plain),
                 "forward": forward,
                 "back": back,
-                "share": share,
+                "share": ratio,
                 "bytes": runs[0][2],
             }
             times = (f"{1e3 * seconds:.0f}" for seconds in (min(plain), forward, back))
-            verdict = f"{share:.2f}" + note(
-                "share", f"{name}, {keep}: gradient over motion", share, at_most=allowed
+            verdict = f"{ratio:.2f}" + note(
+                "share", f"{name}, {storage}: gradient over motion", ratio, at_most=allowed
             )
-            note("memory", f"{name}, {keep}: bytes a step", runs[0][2] / steps)
-            rows.append([name, keep, *times, verdict, f"{allowed:g}", f"{runs[0][2] / 1e6:.3g}"])
+            note("memory", f"{name}, {storage}: bytes a step", runs[0][2] / steps)
+            rows.append([name, storage, *times, verdict, f"{allowed:g}", f"{runs[0][2] / 1e6:.3g}"])
     print_table(
         f"The gradient of {steps} steps by the field of each and by the magnetization, {scene.mesh.n_faces} faces",
         ["integrator", "kept", "motion, ms", "kept so, ms", "gradient, ms", "share", "at most", "MB"],
@@ -126,8 +129,8 @@ def _gradients(scene: ms.Scene, steps: int, rounds: int) -> dict[str, Any]:
     return results
 
 
-def _forward_and_back(scene: ms.Scene, steps: int, integrator, keep: str) -> tuple[float, float, int]:
-    """Time of each, s, and the bytes kept."""
+def _forward_and_back(scene: ms.Scene, steps: int, integrator, storage: str) -> tuple[float, float, int]:
+    """Return the times of a motion and its gradient, s, and the bytes stored."""
     import torch
 
     magnetization = torch.tensor([2e4, 0.0, 0.0], dtype=torch.float64, requires_grad=True)
@@ -139,25 +142,30 @@ def _forward_and_back(scene: ms.Scene, steps: int, integrator, keep: str) -> tup
         integrator=integrator,
         remanent_magnetization=magnetization,
         applied_flux_density=field,
-        adjoint_storage=ms.AdjointStorage(keep, memory_budget=budget(scene, integrator, steps)),
+        adjoint_storage=ms.AdjointStorage(storage, memory_budget=budget(scene, integrator, steps)),
     )
     done = time.process_time()
     (move.positions[-1] ** 2).sum().backward()
     return done - began, time.process_time() - done, move.bytes
 
 
-def _memory(keeps: Iterable[str], counts: Iterable[int]) -> dict[str, Any]:
-    """Each run in a process of its own, because only the largest size of a process is told."""
+def _memory(storages: Iterable[str], counts: Iterable[int]) -> dict[str, Any]:
+    """Measure each run in a process of its own, because systems report only the largest size of a process so far."""
     results, rows = {}, []
-    for keep in keeps:
+    for storage in storages:
         for steps in counts:
-            if keep == "factors" and steps > MOST_FACTORS:
+            if storage == "factors" and steps > MOST_FACTORS:
                 continue
             with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as executor:
-                forward, back, kept, grown = executor.submit(_grown, steps, keep).result()
-            results[f"{keep}, {steps}"] = {"forward": forward, "back": back, "bytes": kept, "grown": grown}
+                forward, back, stored, grown = executor.submit(_grown, steps, storage).result()
+            results[f"{storage}, {steps}"] = {
+                "forward": forward,
+                "back": back,
+                "bytes": stored,
+                "grown": grown,
+            }
             times = f"{forward:.2f}", f"{back:.2f}", f"{back / forward:.2f}"
-            rows.append([keep, f"{steps}", *times, f"{kept / 1e6:.3g}", _megabytes(grown)])
+            rows.append([storage, f"{steps}", *times, f"{stored / 1e6:.3g}", _megabytes(grown)])
     print_table(
         f"What is kept for a gradient, {2 * SMALL[0] * SMALL[1]} faces, TRBDF2",
         ["kept", "steps", "motion, s", "gradient, s", "share", "kept, MB", "process grew by, MB"],
@@ -166,32 +174,34 @@ def _memory(keeps: Iterable[str], counts: Iterable[int]) -> dict[str, Any]:
     return results
 
 
-def _grown(steps: int, keep: str) -> tuple[float, float, int, int | None]:
-    """Times, bytes kept, and by how much this process grew."""
+def _grown(steps: int, storage: str) -> tuple[float, float, int, int | None]:
+    """Return the times, the bytes stored, and the growth of this process."""
     scene = strip(SMALL)
-    _forward_and_back(scene, 10, ms.TRBDF2(), "checkpoints")  # what every run needs
+    _forward_and_back(scene, 10, ms.TRBDF2(), "checkpoints")  # memory that every run needs
     before = peak_memory()
-    forward, back, kept = _forward_and_back(scene, steps, ms.TRBDF2(), keep)
+    forward, back, stored = _forward_and_back(scene, steps, ms.TRBDF2(), storage)
     after = peak_memory()
-    return forward, back, kept, None if before is None or after is None else after - before
+    return forward, back, stored, None if before is None or after is None else after - before
 
 
 def long_run(steps: int, parts: int = 10) -> dict[str, Any]:
-    """A small driven strip for so many steps, in parts that go on from one another."""
+    """Simulate a small strip in a rotating field for many steps, in parts that continue one another."""
     results, rows = {}, []
     for integrator in (ms.ImplicitEuler(), ms.TRBDF2()):
         scene, began = strip(SMALL), time.process_time()
-        move, sizes, done, halved = None, [], 0, 0
+        move, sizes, done, subdivided = None, [], 0, 0
         for _ in range(parts):
             move = drive(scene, steps // parts, integrator=integrator, start=move)
             sizes.append(resident_memory())
             done += move.steps_done
-            halved += len(move.substeps)
+            subdivided += len(move.substeps)
         grown = None if sizes[0] is None else sizes[-1] - sizes[0]
         name = type(integrator).__name__
         seconds = time.process_time() - began
-        results[name] = {"steps": done, "halved": halved, "seconds": seconds, "grown": grown}
-        rows.append([name, "", done, halved, f"{move.times[-1]:.6g}", f"{seconds:.1f}", _megabytes(grown)])
+        results[name] = {"steps": done, "halved": subdivided, "seconds": seconds, "grown": grown}
+        rows.append(
+            [name, "", done, subdivided, f"{move.times[-1]:.6g}", f"{seconds:.1f}", _megabytes(grown)]
+        )
     print_table(
         f"A long run of {2 * SMALL[0] * SMALL[1]} faces in a turning field",
         ["integrator", "", "steps", "in parts", "until, s", "took, s", "process grew by, MB"],
@@ -201,4 +211,4 @@ def long_run(steps: int, parts: int = 10) -> dict[str, Any]:
 
 
 def _megabytes(grown: int | None) -> str:
-    return "not told" if grown is None else f"{grown / 1e6:.3g}"
+    return "unknown" if grown is None else f"{grown / 1e6:.3g}"

@@ -1,4 +1,4 @@
-"""python -m benchmarks paper: the examples beside Table 1 of Chen et al. 2022, time an iteration."""
+"""Part `paper` of the benchmarks: time of an iteration of the examples, compared with Table 1 of Chen et al. 2022."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 from .paper_rows import ROWS, Row
 from .ratios import note
 from .report import chosen, print_table
-from .timing import with_share
+from .timing import with_processor_fraction
 
 ITERATIONS, QUICK_ITERATIONS = 5, 1
 PAPER_MACHINE = "six cores of an i7-8700, 3.2 GHz"
@@ -35,11 +35,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
-    """Prints the table, returns its numbers."""
+    """Print the table and return its numbers."""
     if options.iterations is not None and options.iterations < 1:
         raise SystemExit("--iterations must be at least 1")
     folder = examples_folder(options.examples)
-    import torch  # which examples need too; before any work
+    import torch  # imported before any work, because examples need it too
 
     torch.set_num_threads(1)
     rows = [row for row in ROWS if options.only is None or row.example in options.only]
@@ -55,14 +55,15 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def examples_folder(given: Path | None) -> Path:
-    """Where the examples are: given, or those of the source checkout that this package lies in, or of this folder."""
-    places = [given] if given else [Path(__file__).parents[1] / "examples", Path("examples")]
-    for place in places:
-        if (place / f"{ROWS[1].example}.py").is_file():
-            return place.resolve()
+    """Return the folder of the examples: the given one, or that of the source checkout, or that of the working
+    folder."""
+    folders = [given] if given else [Path(__file__).parents[1] / "examples", Path("examples")]
+    for folder in folders:
+        if (folder / f"{ROWS[1].example}.py").is_file():
+            return folder.resolve()
     raise SystemExit(
         f"the scenes of the paper are examples/ of magshell's source checkout; they are not in "
-        f"{' nor in '.join(str(place) for place in places)}. Give --examples FOLDER"
+        f"{' nor in '.join(str(folder) for folder in folders)}. Give --examples FOLDER"
     )
 
 
@@ -87,8 +88,8 @@ def _measured(row: Row, iterations: int) -> dict[str, Any]:
     }
     if importlib.util.find_spec(row.example) is None:
         return {**known, "absent": True}
-    found, share = with_share(lambda: row.run(iterations))
-    seconds = found.seconds * share
+    found, fraction = with_processor_fraction(lambda: row.run(iterations))
+    seconds = found.seconds * fraction
     note("time", f"{row.name}: {row.of}, s", seconds)
     return {
         **known,

@@ -1,7 +1,7 @@
-"""The rows of [Chen22] Table 1 that examples/ reproduces, each with how to run a few of its iterations.
+"""Rows of [Chen22] Table 1 that examples/ reproduces, each with a function that runs a few of its iterations.
 
-A new row is an entry of ROWS: the paper's numbers, the module of its example, and a function of the number of iterations
-that runs them. The functions import the example, which must be on the path by then.
+A new row is an entry of ROWS: the paper's numbers, the module of its example, and a function of the number of
+iterations that runs them. The functions import the example, which must be on the path by then.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 
 class Run(NamedTuple):
-    """What a row took. seconds: of an iteration, by the clock on the wall. objective: the last; None without one."""
+    """The cost of a row. seconds: wall-clock time of an iteration. objective: the last one; None without one."""
 
     seconds: float
     iterations: int
@@ -23,8 +23,11 @@ class Run(NamedTuple):
 
 
 class Row(NamedTuple):
-    """example: the module in examples/. seconds, iterations: the paper's optimization; None where it gives none.
-    residual: the paper's, without a unit. of: what the time is of."""
+    """A row of the table.
+
+    example: the module in examples/. seconds, iterations: those of the paper's optimization; None where it gives
+    none. residual: the paper's, without a unit. of: the unit of work that is timed.
+    """
 
     figure: str
     name: str
@@ -69,7 +72,8 @@ def track(curve: str) -> Callable[[int], Run]:
 
 
 def octopus(channel: str) -> Callable[[int], Run]:
-    """An iteration is a horizon's motion with the gradient of its objective, by the fields of all steps."""
+    """Return a function that runs iterations: each is one horizon's motion with the gradient by the fields of all
+    steps."""
 
     def run(iterations: int) -> Run:
         import torch
@@ -140,11 +144,12 @@ ROWS = (
 
 
 def _of_history(history: list[Any], meaning: str) -> Run:
-    """Of records of ms.minimize."""
+    """Return the cost of a search from the Records of ms.minimize."""
     seconds = _a_step([record.seconds for record in history])
     return Run(seconds, history[-1].iteration, history[-1].objective, meaning)
 
 
 def _a_step(seconds) -> float:
-    """The mean of an iteration, the evaluation of the start left out; seconds since the start, at each iteration."""
+    """Return the mean time of an iteration, without the evaluation of the start; seconds: since the start, at each
+    iteration."""
     return float((seconds[-1] - seconds[0]) / max(1, len(seconds) - 1))

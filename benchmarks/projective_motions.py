@@ -1,4 +1,4 @@
-"""Projective Dynamics beside Newton's method: tables of `python -m benchmarks dynamics`."""
+"""Projective Dynamics compared with Newton's method: tables of `python -m benchmarks dynamics`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .ratios import note
 from .report import print_table
 from .timing import peak_memory
 
-ALLOWED_ITERATION = 8e-4  # s of processor time, at 5184 four-node tetrahedra
+ALLOWED_ITERATION = 8e-4  # [s] largest processor time of an iteration at 5184 four-node tetrahedra
 CELLS, QUICK_CELLS = (24, 6, 6), (12, 3, 3)
 TIME_STEP, STEPS = 1e-2, 4
 ROUNDS = (1, 2, 5, 10, 20, 50, 100)
@@ -25,20 +25,20 @@ MATERIALS = {
     "Corotated": ms.Corotated(**MODULI),
     "NeoHookean": ms.NeoHookean(**MODULI),
 }
-WAYS = {"as they are": 0, "accelerated": 8}  # ProjectiveDynamics.history
-# Of the arch bridge in [Qiao21] Table 1, which has 821 nodes and 2911 tetrahedra: 820 and 2880 here.
+HISTORIES = {"as they are": 0, "accelerated": 8}  # ProjectiveDynamics.history
+# The arch bridge of [Qiao21] Table 1, which has 821 nodes and 2911 tetrahedra there, 820 and 2880 here.
 ARCH_CELLS, ARCH_STEPS = (40, 4, 3), 200
-ALLOWED_ARCH = 0.1e9  # bytes with checkpoints; 15.7e9 there without
+ALLOWED_ARCH = 0.1e9  # [bytes] largest storage with checkpoints; without, 15.7e9 in the paper
 
 
 def measure(rounds: int, quick: bool, memory: bool = True) -> dict[str, Any]:
-    """Prints the tables, returns their numbers."""
+    """Print the tables and return their numbers."""
     errors = {"projective errors": _errors(rounds, quick)}
     return {**errors, "projective memory": _memory(quick)} if memory else errors
 
 
 def beam(material: ms.bodies.materials.SolidMaterial, cells: tuple[int, int, int]) -> ms.Scene:
-    """10 cm x 2.5 cm x 2.5 cm, clamped at one end, that falls."""
+    """Return a beam, 10 cm x 2.5 cm x 2.5 cm, clamped at one end, that falls under gravity."""
     mesh = ms.meshes.box((0.1, 0.025, 0.025), cells=cells)
     solid = ms.Solid(mesh, material=material, mass_density=1e3, element="linear")
     return ms.Scene(solid, supports=[ms.Pin(mesh.vertices_at(x=0.0))], gravity=(0, 0, -9.81))
@@ -51,7 +51,7 @@ def _drive(scene: ms.Scene, integrator, steps: int, solver=None) -> ms.Trajector
 
 
 def _seconds(call, rounds: int) -> float:
-    """Of the processor, the best of some rounds."""
+    """Measure the processor time of a call, the best of some rounds."""
     best = np.inf
     for _ in range(rounds):
         began = time.process_time()
@@ -61,7 +61,7 @@ def _seconds(call, rounds: int) -> float:
 
 
 def _errors(rounds: int, quick: bool) -> dict[str, Any]:
-    """Root mean square of the positions of all steps, over the way of the point that moves farthest."""
+    """Measure the rms error of the positions of all steps, over the displacement of the point that moves farthest."""
     cells, counts = (QUICK_CELLS, ROUNDS[:3]) if quick else (CELLS, ROUNDS)
     results: dict = {}
     for name, material in MATERIALS.items():
@@ -74,15 +74,15 @@ def _errors(rounds: int, quick: bool) -> dict[str, Any]:
 
         found: dict = {"tetrahedra": scene.bodies[0].mesh.n_tetrahedra}
         once = _seconds(lambda: _drive(scene, ms.ProjectiveDynamics(1, None), 1), rounds)  # noqa: B023
-        for way, history in WAYS.items():
+        for label, history in HISTORIES.items():
             errors, times = [], []
             for count in counts:
                 method = ms.ProjectiveDynamics(count, None, history)
                 errors.append(error(_drive(scene, method, STEPS)))
                 times.append(_seconds(lambda: _drive(scene, method, 1 + STEPS), rounds) - once)  # noqa: B023
-            found[way] = {"rounds": list(counts), "error": errors, "time": [t / STEPS for t in times]}
-            rows.append([f"rounds {way}", "error", *(f"{each:.1e}" for each in errors)])
-            rows.append(["", "ms a step", *(f"{1e3 * each:.2f}" for each in found[way]["time"])])
+            found[label] = {"rounds": list(counts), "error": errors, "time": [t / STEPS for t in times]}
+            rows.append([f"rounds {label}", "error", *(f"{each:.1e}" for each in errors)])
+            rows.append(["", "ms a step", *(f"{1e3 * each:.2f}" for each in found[label]["time"])])
         iteration = (found["accelerated"]["time"][-1] - found["accelerated"]["time"][0]) / (counts[-1] - 1)
         found["iteration"] = iteration
         newton: dict = {"tolerance": [], "error": [], "time": []}
@@ -115,7 +115,7 @@ def _errors(rounds: int, quick: bool) -> dict[str, Any]:
 
 
 def arch(cells: tuple[int, int, int] = ARCH_CELLS) -> ms.Scene:
-    """A bridge of half a circle, 8 m wide, that stands on its ends and falls under its weight."""
+    """Return a bridge of half a circle, 8 m wide, that stands on its ends and falls under its weight."""
     flat = ms.meshes.box((1.0, 0.8, 0.4), cells=cells)
     along, across, up = flat.rest_positions.T
     angle, radius = np.pi * (1.0 - along / along.max()), 3.6 + up - up.min()
@@ -131,19 +131,19 @@ def arch(cells: tuple[int, int, int] = ARCH_CELLS) -> ms.Scene:
 
 
 def _memory(quick: bool) -> list[dict[str, Any]]:
-    """Each run in a process of its own, because only the largest size of a process is told."""
+    """Measure each run in a process of its own, because systems report only the largest size of a process so far."""
     cells, steps = ((10, 2, 1), 20) if quick else (ARCH_CELLS, ARCH_STEPS)
     results, rows = [], []
-    for keep in ("stages", "checkpoints"):
+    for storage in ("stages", "checkpoints"):
         with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as executor:
-            found = executor.submit(_grown, cells, steps, keep).result()
-        results.append({"kept": keep, "steps": steps, **found})
-        size, kept, grown = found["nodes"], found["bytes"], found["grown"]
-        limit = None if quick or keep == "stages" else ALLOWED_ARCH
-        missed = note("memory", f"arch, {keep}: bytes kept for the gradient", kept, at_most=limit)
-        shown = "not told" if grown is None else f"{grown / 1e6:.1f}"
+            found = executor.submit(_grown, cells, steps, storage).result()
+        results.append({"kept": storage, "steps": steps, **found})
+        size, stored, grown = found["nodes"], found["bytes"], found["grown"]
+        limit = None if quick or storage == "stages" else ALLOWED_ARCH
+        missed = note("memory", f"arch, {storage}: bytes kept for the gradient", stored, at_most=limit)
+        shown = "unknown" if grown is None else f"{grown / 1e6:.1f}"
         times = f"{found['forward']:.2f}", f"{found['back']:.2f}"
-        rows.append([keep, f"{size}", f"{steps}", *times, f"{kept / 1e6:.2f}{missed}", shown])
+        rows.append([storage, f"{size}", f"{steps}", *times, f"{stored / 1e6:.2f}{missed}", shown])
     print_table(
         f"Gradient of an arch of {results[0]['tetrahedra']} tetrahedra by its moduli, Projective Dynamics "
         "([Qiao21] Table 1: 15,700 and 100 MB at 200 steps)",
@@ -153,8 +153,8 @@ def _memory(quick: bool) -> list[dict[str, Any]]:
     return results
 
 
-def _grown(cells, steps: int, keep: str) -> dict[str, Any]:
-    """Times, bytes kept, and by how much this process grew."""
+def _grown(cells, steps: int, storage: str) -> dict[str, Any]:
+    """Return the times, the bytes stored, and the growth of this process."""
     import torch
 
     scene = arch(cells)
@@ -170,22 +170,24 @@ def _grown(cells, steps: int, keep: str) -> dict[str, Any]:
             values={solid: {"young_modulus": young}},
             integrator=ms.ProjectiveDynamics(tolerance=1e-8),
             record_every=count,
-            adjoint_storage=ms.AdjointStorage(keep, memory_budget=2e6 if keep == "checkpoints" else 2e9),
+            adjoint_storage=ms.AdjointStorage(
+                storage, memory_budget=2e6 if storage == "checkpoints" else 2e9
+            ),
             progress=False,
         )
         done = time.process_time()
         (move.positions[-1] ** 2).sum().backward()
         return done - began, time.process_time() - done, move.bytes
 
-    run(2)  # what every run needs
+    run(2)  # memory that every run needs
     before = peak_memory()
-    forward, back, kept = run(steps)
+    forward, back, stored = run(steps)
     after = peak_memory()
     return {
         "nodes": solid.mesh.n_vertices,
         "tetrahedra": solid.mesh.n_tetrahedra,
         "forward": forward,
         "back": back,
-        "bytes": kept,
+        "bytes": stored,
         "grown": None if before is None or after is None else after - before,
     }

@@ -1,6 +1,6 @@
-"""Numbers of the bench that say the same on every machine, and the targets among them.
+"""Numbers of the benchmarks that are the same on every machine, and their targets.
 
-A part notes them where it measures them. What it prints as MISSED comes from here, so that `check` sees it too.
+A part notes them where it measures them. MISSED is printed from here, so that `check` sees it too.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 
 class Kind(NamedTuple):
-    """What a number is, and what of it is worse than before: beyond factor times the old one and slack more."""
+    """The meaning and tolerance of a number: it is worse if it exceeds factor times the old one plus slack."""
 
     means: str
     factor: float
@@ -29,8 +29,11 @@ KINDS = {
 
 
 class Ratio(NamedTuple):
-    """limit: the target, of which a larger value falls short, or with at_least a smaller one; None: there is none.
-    With at_least the larger of two values is the better one."""
+    """A number with its target.
+
+    limit: the largest allowed value, or with at_least the smallest one; None: no target. With at_least the larger
+    of two values is the better one.
+    """
 
     kind: str
     name: str
@@ -40,20 +43,20 @@ class Ratio(NamedTuple):
 
     @property
     def missed(self) -> bool:
-        """True of what is no number, as well."""
+        """Return whether the target is missed; NaN misses it."""
         if self.limit is None:
             return False
         return not (self.value >= self.limit if self.at_least else self.value <= self.limit)
 
     def worse_than(self, old: float) -> bool:
-        """By more than the tolerance of its kind."""
+        """Return whether the number is worse than an old one by more than the tolerance of its kind."""
         kind = KINDS[self.kind]
         if self.at_least:
             return not self.value >= old / kind.factor - kind.slack
         return not self.value <= old * kind.factor + kind.slack
 
     def better_than(self, old: float) -> bool:
-        """By as much as would have been too much the other way."""
+        """Return whether the old number would be worse than this one."""
         return Ratio(self.kind, self.name, old, None, self.at_least).worse_than(self.value)
 
 
@@ -63,8 +66,10 @@ _listening: list[list[Ratio]] = []
 def note(
     kind: str, name: str, value: float, *, at_most: float | None = None, at_least: float | None = None
 ) -> str:
-    """Notes a number, smaller is better unless it has to be at_least something. Returns " MISSED" where its target is,
-    to print beside it. A time is in s, or in any unit that stays."""
+    """Record a number, and return " MISSED" to print beside it if it misses its target.
+
+    Smaller is better, unless it has to be at_least something. A time is in s, or in any fixed unit.
+    """
     ratio = Ratio(kind, name, float(value), at_most if at_least is None else at_least, at_least is not None)
     if kind not in KINDS:
         raise ValueError(f"kind must be one of {', '.join(KINDS)}, got {kind!r}")
@@ -75,7 +80,7 @@ def note(
 
 @contextmanager
 def collected() -> Iterator[list[Ratio]]:
-    """What is noted meanwhile."""
+    """Yield a list of the numbers that are noted inside the block."""
     notes: list[Ratio] = []
     _listening.append(notes)
     try:

@@ -1,4 +1,4 @@
-"""What all parts of the bench share: their common options, tables, and results as JSON."""
+"""Shared parts of the benchmarks: common options, tables, and results as JSON."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def add_common_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_rounds(parser: argparse.ArgumentParser, usual: int) -> None:
-    """Of a part that measures times several times."""
+    """Add the option --rounds, for a part that repeats its measurements of time."""
     parser.add_argument(
         "--rounds",
         type=int,
@@ -49,8 +49,8 @@ def add_rounds(parser: argparse.ArgumentParser, usual: int) -> None:
     parser.set_defaults(usual_rounds=usual)
 
 
-def settle_rounds(options: argparse.Namespace) -> None:
-    """Puts the number in place, where the part has one."""
+def set_default_rounds(options: argparse.Namespace) -> None:
+    """Set the number of rounds if it was not given, for a part with that option."""
     if hasattr(options, "rounds"):
         options.rounds = chosen(options.rounds, options.quick, 1, options.usual_rounds)
         if options.rounds < 1:
@@ -58,7 +58,7 @@ def settle_rounds(options: argparse.Namespace) -> None:
 
 
 def chosen(given: Any, quick: bool, small: Any, usual: Any) -> Any:
-    """What was asked for, or else what `--quick` or its lack says."""
+    """Return the given value, or else the one for `--quick` or without it."""
     return given if given is not None else small if quick else usual
 
 
@@ -70,7 +70,7 @@ def set_threads(count: int) -> None:
 
 
 def writable_path(text: str) -> Path:
-    """A path that can be written, its folder made if need be: refused before hours of work, not after."""
+    """Return a path that can be written, and make its folder. Raises before hours of work, not after."""
     path = Path(text)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -82,14 +82,14 @@ def writable_path(text: str) -> Path:
 
 
 def writable_folder(text: str) -> Path:
-    """A folder in which files can be written, made if need be."""
+    """Return a folder in which files can be written, and make it if needed."""
     folder = Path(text)
     writable_path(str(folder / "part.json"))
     return folder
 
 
 def read_results(text: str) -> dict[str, Any]:
-    """What write_json wrote."""
+    """Read a file that write_json wrote. Raises ArgumentTypeError on any other."""
     try:
         content = json.loads(Path(text).read_text())
     except OSError as error:
@@ -104,24 +104,24 @@ def read_results(text: str) -> dict[str, Any]:
 
 
 def as_json(results: dict[str, Any]) -> dict[str, Any]:
-    """The same as JSON would hold it: figures draw what a run hands over and what a file holds."""
+    """Convert results to the form that a JSON file returns, so that figures get the same from a run and from a file."""
     return json.loads(json.dumps(results, default=_plain_number))
 
 
 def _plain_number(value):
-    """Of numpy's."""
+    """Convert a number or an array of numpy's to plain Python."""
     if isinstance(value, numpy.ndarray | numpy.generic):
         return value.tolist()
     raise TypeError(f"{type(value).__name__} is no JSON")
 
 
 def bar(title: str, total: int) -> tqdm[Any]:
-    """A progress bar, where someone looks on."""
+    """Return a progress bar that is shown only in a terminal."""
     return progress_bar(title, total, shown=sys.stderr.isatty(), leave=False, delay=2.0)
 
 
 def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Columns as wide as they need; the first two to the left, the others to the right."""
+    """Print columns as wide as needed; the first two are aligned left, the others right."""
     rows = [[str(cell) for cell in row] for row in rows]
     widths = [max(len(row[c]) for row in [list(headings), *rows]) for c in range(len(headings))]
 
@@ -146,7 +146,7 @@ def write_json(path: Path, part: str, results: dict[str, Any]) -> None:
 
 
 def setting() -> dict[str, str | int]:
-    """On what the numbers were made: machine, versions, threads."""
+    """Return the machine, the versions and the threads that produced the numbers."""
     return {
         "machine": platform.machine(),
         "processor": _processor(),
@@ -162,7 +162,7 @@ def setting() -> dict[str, str | int]:
 
 
 def _processor() -> str:
-    """The processor's name, where the system tells it (Linux does in /proc/cpuinfo)."""
+    """Return the processor's name, if the system tells it (Linux does in /proc/cpuinfo)."""
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:

@@ -1,5 +1,4 @@
-"""python -m benchmarks scaling: time and memory against the number of faces, the exponents they grow with, and what
-threads gain and cost."""
+"""Part `scaling` of the benchmarks: growth of time and memory with the number of faces; gain and cost of threads."""
 
 from __future__ import annotations
 
@@ -25,16 +24,19 @@ from .timing import Clocked, clocked, peak_memory, resident_memory
 FACES = (2048, 8192, 32768, 131072, 500_000)
 QUICK_FACES = (128, 512)
 THREADS = (1, 2)
-FIELDS = 0.02, 0.05  # of the one that turns the sheet up: from the first to the second is what is timed
-ALLOWED_EXPONENT = 1.4  # of a Newton iteration
-ALLOWED_MEMORY = 1.3  # what the process grows by, over the factor's own
-ALLOWED_ANALYSIS = 0.5  # of a factorization, from 100,000 faces on
-ALLOWED_FILL = 1.1  # operations over those of the best of other orderings
-REQUIRED_GAIN, GAINING_FACES = 1.7, 8192  # of two threads over one in an iteration, from so many faces on
+FIELDS = 0.02, 0.05  # over the field that bends the sheet up: the solve from the first to the second is timed
+ALLOWED_EXPONENT = 1.4  # [-] largest exponent of a Newton iteration
+ALLOWED_MEMORY = 1.3  # [-] growth of the process over the factor's own memory
+ALLOWED_ANALYSIS = 0.5  # [-] time of an analysis over that of a factorization, from 100,000 faces on
+ALLOWED_FILL = 1.1  # [-] operations over those of the best other ordering
+REQUIRED_GAIN, GAINING_FACES = (
+    1.7,
+    8192,
+)  # [-] smallest speedup of an iteration by two threads, from so many faces on
 
 _WHY = "as systems do with one that takes more memory than there is"
 
-# What is timed, s: its heading.
+# {name of a time [s]: its heading}.
 TIMES = {
     "assembly": "gradient and Hessian",
     "analysis": "analysis",
@@ -66,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
-    """Prints the tables, returns their numbers."""
+    """Print the tables and return their numbers."""
     faces = chosen(options.faces, options.quick, QUICK_FACES, FACES)
     if min(faces) < 2:
         raise SystemExit("--faces must be at least 2")
@@ -97,7 +99,8 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
 def _sizes(
     faces: list[int], options: argparse.Namespace
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]], int | None]:
-    """Costs on one thread and on two, by size; and the size whose process was ended, if one was."""
+    """Measure the costs on one thread and on two, by size; also returns the size whose process was killed, if one
+    was."""
     one, two = [], []
     with bar("sizes", 2 * len(faces)) as shown:
         for count in faces:
@@ -120,23 +123,23 @@ def _exponents(sizes: list[dict[str, Any]]) -> dict[str, float | None]:
 
 
 def fitted_exponent(faces: Sequence[float], values: Sequence[float | None]) -> float | None:
-    """p of values ~ faces^p, by least squares in the logarithms; None of a single size, or of what is not known."""
+    """Fit p of values ~ faces^p, by least squares of the logarithms; None for a single size or unknown values."""
     if len(set(faces)) < 2 or any(value is None or value <= 0 for value in values):
         return None
     return float(np.polyfit(np.log(faces), np.log(values), 1)[0])
 
 
 def _in_its_own_process(faces: int, threads: int, options: argparse.Namespace) -> dict[str, Any]:
-    """Because only the largest size of a process is told."""
+    """Measure in a new process, because systems report only the largest size of a process so far."""
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as executor:
         return executor.submit(costs, faces, threads, options.bending, options.rounds).result()
 
 
 def costs(faces: int, threads: int, bending: str, rounds: int) -> dict[str, Any]:
-    """Of a square sheet that a field bends; times in s by both clocks, memory in bytes."""
+    """Measure the costs of a square sheet bent by a field; times in s by both clocks, memory in bytes."""
     ms.set_num_threads(threads)
     other, inputs = strongly_bent(32, bending)
-    ms.equilibrium(other, **inputs)  # what any solve needs of the process
+    ms.equilibrium(other, **inputs)  # memory that any solve needs
     before = resident_memory()
     scene, inputs = strongly_bent(faces, bending)
     start = ms.equilibrium(scene, **_in_field(inputs, FIELDS[0]))  # the pattern is analysed here
@@ -171,12 +174,12 @@ def costs(faces: int, threads: int, bending: str, rounds: int) -> dict[str, Any]
     }
 
 
-def _in_field(inputs: dict[str, Any], share: float) -> dict[str, Any]:
-    return {**inputs, "applied_flux_density": share * np.array(inputs["applied_flux_density"])}
+def _in_field(inputs: dict[str, Any], factor: float) -> dict[str, Any]:
+    return {**inputs, "applied_flux_density": factor * np.array(inputs["applied_flux_density"])}
 
 
 def _gradient(scene: ms.Scene, inputs: dict[str, Any], found: ms.Equilibrium, rounds: int) -> Clocked:
-    """By everything that the solve takes, of a function of all positions, from the factorization that was kept."""
+    """Measure the gradient of a function of all positions by all inputs, from the stored factorization."""
     options = ms.MixedNewton()._options()
     options.keep_factor = True
     state, turns, controls = found._state, found._turns, found._controls
@@ -188,7 +191,7 @@ def _gradient(scene: ms.Scene, inputs: dict[str, Any], found: ms.Equilibrium, ro
 
 
 def _linear_algebra(scene: ms.Scene, found: ms.Equilibrium, rounds: int) -> tuple[dict[str, Clocked], int]:
-    """Each step of an iteration by itself, at the equilibrium; and how many entries L has."""
+    """Measure each step of an iteration separately, at the equilibrium; also returns the number of entries of L."""
     model, state, controls = scene._model, found._state, found._controls
     n, starts, rows, values = model.hessian(state, controls)
     points = model.free_points
@@ -203,7 +206,8 @@ def _linear_algebra(scene: ms.Scene, found: ms.Equilibrium, rounds: int) -> tupl
 
 
 def _orderings(scene: ms.Scene, found: ms.Equilibrium) -> tuple[dict[str, float], float | None]:
-    """Operations of a factorization by each ordering there is, and the time [s] of METIS's analysis if it was built."""
+    """Return the operations of a factorization by each ordering, and the time [s] of METIS's analysis if it was
+    built."""
     n, starts, rows, _ = scene._model.hessian(found._state, found._controls)
     points = scene._model.free_points
     operations = {
@@ -216,7 +220,7 @@ def _orderings(scene: ms.Scene, found: ms.Equilibrium) -> tuple[dict[str, float]
 
 
 def _print_orderings(sizes: list[dict[str, Any]]) -> None:
-    """What the ordering in use costs, and what it is worth beside others."""
+    """Print the cost of the ordering in use, compared with others."""
     others = [name for name in sizes[0]["operations"] if name not in ("best", "dissection")]
     rows = []
     for size in sizes:
@@ -255,7 +259,7 @@ def _print_times(one: list[dict[str, Any]], two: list[dict[str, Any]], exponents
 def _print_memory(sizes: list[dict[str, Any]], exponents: dict[str, Any]) -> None:
     rows = []
     for size in sizes:
-        known = ["not told" if size[name] is None else f"{size[name] / 1e6:.1f}" for name in MEMORIES]
+        known = ["unknown" if size[name] is None else f"{size[name] / 1e6:.1f}" for name in MEMORIES]
         ratio = "" if size["peak"] is None else f"{size['peak'] / size['factor']:.2f}"
         rows.append([f"{size['faces']}", f"{size['unknowns']}", *known, ratio])
     rows.append(["grows with", "faces to the", *(_exponent(exponents[name]) for name in MEMORIES), ""])
@@ -282,8 +286,8 @@ def _print_targets(one: list[dict[str, Any]], two: list[dict[str, Any]], exponen
     note("count", f"entries of L at {last['faces']} faces", last["entries"] / 8)
     note("memory", f"bytes of the factor a face at {last['faces']} faces", last["factor"] / last["faces"])
     for name in ("factorization", "analysis", "gradient"):
-        share = last["processor"][name] / last["processor"]["iteration"]
-        note("share", f"{TIMES[name]} over an iteration at {last['faces']} faces", share)
+        ratio = last["processor"][name] / last["processor"]["iteration"]
+        note("share", f"{TIMES[name]} over an iteration at {last['faces']} faces", ratio)
     for size in one:
         others = [size["operations"][name] for name in ("amd", "metis") if name in size["operations"]]
         ratio = size["operations"]["best"] / min(others)

@@ -1,4 +1,5 @@
-"""How costs of skeletons grow with their links, and what one adds to a solid: of `python -m benchmarks scaling`."""
+"""Growth of the cost of skeletons with their links, and the cost they add to a solid: a part of `python -m benchmarks
+scaling`."""
 
 from __future__ import annotations
 
@@ -17,14 +18,14 @@ LINKS = (25, 50, 100, 200)
 QUICK_LINKS = (5, 10)
 CELLS, QUICK_CELLS = (15, 6, 6), (8, 4, 4)  # 3240 tetrahedra
 BONES = 6
-ALLOWED_TWISTS = 1e-4  # s, of a chain of 100 links
-ALLOWED_SHARE = 1.3  # of an iteration with bones over one without
-ALLOWED_EXPONENT = 1.2  # of B against the sum of depths
+ALLOWED_TWISTS = 1e-4  # [s] largest time of B for a chain of 100 links
+ALLOWED_SHARE = 1.3  # [-] largest time of an iteration with bones over one without
+ALLOWED_EXPONENT = 1.2  # [-] largest exponent of the time of B against the sum of depths
 STEPS = 3
 
 
 def tree(links: int, children: int) -> ms.Scene:
-    """Rods on hinges, each on one before it: with one child a chain."""
+    """Return rods on hinges, each on an earlier one; with one child each they form a chain."""
     length, made, joints = 0.05, [], []
     for k in range(links):
         parent = (k - 1) // children if k else -1
@@ -38,7 +39,7 @@ def tree(links: int, children: int) -> ms.Scene:
 
 
 def fleshed(cells: tuple[int, int, int]) -> ms.Scene:
-    """The beam with bones on hinges along its middle."""
+    """Return the beam with bones on hinges along its middle."""
     bare = beam(cells)
     solid = bare.bodies[0]
     at = solid.mesh.rest_positions
@@ -62,7 +63,7 @@ def fleshed(cells: tuple[int, int, int]) -> ms.Scene:
 
 
 def measure(rounds: int, quick: bool) -> dict[str, Any]:
-    """Prints the tables, returns their numbers; on one thread."""
+    """Print the tables and return their numbers, on one thread."""
     threads = ms.num_threads()
     ms.set_num_threads(1)
     try:
@@ -70,11 +71,11 @@ def measure(rounds: int, quick: bool) -> dict[str, Any]:
             name: [_costs(links, children, rounds) for links in (QUICK_LINKS if quick else LINKS)]
             for name, children in (("chain", 1), ("binary", 2))
         }
-        share = _share(QUICK_CELLS if quick else CELLS, rounds)
+        ratio = _ratio_with_skeleton(QUICK_CELLS if quick else CELLS, rounds)
     finally:
         ms.set_num_threads(threads)
-    _print(trees, share, quick)
-    return {"trees": trees, "share of bones": share}
+    _print(trees, ratio, quick)
+    return {"trees": trees, "share of bones": ratio}
 
 
 def _costs(links: int, children: int, rounds: int) -> dict[str, Any]:
@@ -108,8 +109,8 @@ def _swing(scene: ms.Scene):
     )
 
 
-def _share(cells: tuple[int, int, int], rounds: int) -> float:
-    """Of an iteration of a step with bones over one without, the better of alternating rounds each."""
+def _ratio_with_skeleton(cells: tuple[int, int, int], rounds: int) -> float:
+    """Measure an iteration of a step with bones over one without, from the best of alternating rounds."""
     scenes = beam(cells), fleshed(cells)
     best = [np.inf, np.inf]
     for _ in range(rounds + 1):
@@ -119,7 +120,7 @@ def _share(cells: tuple[int, int, int], rounds: int) -> float:
     return best[1] / best[0]
 
 
-def _print(trees: dict[str, Any], share: float, quick: bool) -> None:
+def _print(trees: dict[str, Any], ratio: float, quick: bool) -> None:
     rows = [
         [
             name,
@@ -154,8 +155,8 @@ def _print(trees: dict[str, Any], share: float, quick: bool) -> None:
                     f"  B of a {name} of 100 links takes {1e3 * size['twists']:.3f} ms (at most 0.1){missed}"
                 )
     missed = note(
-        "share", "an iteration with bones over one without", share, at_most=None if quick else ALLOWED_SHARE
+        "share", "an iteration with bones over one without", ratio, at_most=None if quick else ALLOWED_SHARE
     )
     print(
-        f"  six bones in a solid: {share:.2f} times the iteration without (at most {ALLOWED_SHARE}){missed}"
+        f"  six bones in a solid: {ratio:.2f} times the iteration without (at most {ALLOWED_SHARE}){missed}"
     )

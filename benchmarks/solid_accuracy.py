@@ -1,4 +1,4 @@
-"""Errors of solids against references, linear tetrahedra beside quadratic ones: a table of `python -m benchmarks
+"""Errors of solids against references, with linear and quadratic tetrahedra: a table of `python -m benchmarks
 accuracy`."""
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from .report import print_table
 
 
 def measure(cases: list[SolidCase], coarse: bool) -> dict[str, Any]:
-    """Prints the table, returns its numbers, times in s of processor time."""
+    """Print the table and return its numbers, times in s of processor time."""
     outcomes = {
         (case.name, element): _outcome(case, element, coarse) for case in cases for element in ELEMENTS
     }
@@ -26,7 +26,7 @@ def measure(cases: list[SolidCase], coarse: bool) -> dict[str, Any]:
 
 
 def _outcome(case: SolidCase, element: str, coarse: bool) -> SolidOutcome | str:
-    """Or why there is none."""
+    """Return the outcome of a case, or the message of the failed solve."""
     try:
         return case.run(case.coarse if coarse else case.cells[element], element)
     except ms.NotConverged as error:
@@ -54,7 +54,7 @@ def _rows(case: SolidCase, element: str, outcomes: dict[str, Any]) -> list[list[
 
 
 def _plain(run: SolidOutcome | str) -> dict[str, Any]:
-    """For JSON."""
+    """Convert an outcome to plain values for JSON."""
     if isinstance(run, str):
         return {"failed": run}
     compared = [

@@ -1,4 +1,4 @@
-"""What a gradient and a Hessian of a solid cost, a tetrahedron: a table of `python -m benchmarks kernels`."""
+"""Cost of a gradient and a Hessian of a solid for each tetrahedron: a table of `python -m benchmarks kernels`."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from .report import print_table
 from .timing import measure
 
 CELLS, QUICK_CELLS = ((24, 6, 6), (52, 13, 13)), ((4, 1, 1),)
-ALLOWED = 0.10  # us a tetrahedron, gradient and Hessian, linear, NeoHookean, on one core
+ALLOWED = 0.10  # [us] time per linear NeoHookean tetrahedron, gradient and Hessian, on one core
 
 
 def solids(quick: bool, rounds: int) -> list[dict[str, Any]]:
-    """Prints the table of bars near their rest shape, held at one end; returns its numbers, times in s."""
+    """Print the table of bars near their rest shape, held at one end; returns its numbers, times in s."""
     found = [
         cost(element, volume, cells, rounds)
         for cells in (QUICK_CELLS if quick else CELLS)
@@ -52,15 +52,15 @@ FORMS: dict[str, dict[str, Any]] = {
 
 
 def muscles(quick: bool, rounds: int) -> list[dict[str, Any]]:
-    """Prints what a muscle in all of a solid adds to its gradient and Hessian, over what those of the solid alone cost."""
+    """Print the time that a muscle in all of a solid adds to its gradient and Hessian, over that of the solid alone."""
     found = []
     for element in ("linear", "quadratic"):
         cells = QUICK_CELLS[0] if quick else CELLS[0]
         for form, law in FORMS.items():
             alone, pulled = (cost(element, "ln J", cells, rounds, each) for each in (None, law))
             more = (pulled["hessian"] - alone["hessian"]) / alone["tetrahedra"]
-            share = more * alone["tetrahedra"] / alone["hessian"]
-            found.append({"element": element, "form": form, "added": more, "share": share})
+            ratio = more * alone["tetrahedra"] / alone["hessian"]
+            found.append({"element": element, "form": form, "added": more, "share": ratio})
     rows = [
         [f"{each['element']}, {each['form']}", f"{1e6 * each['added']:.3f}", f"{each['share']:.2f}"]
         for each in found

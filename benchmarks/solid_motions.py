@@ -1,4 +1,4 @@
-"""What steps of solids cost, and gradients of their motions: tables of `python -m benchmarks dynamics`."""
+"""Cost of time steps of solids, and of gradients of their motions: tables of `python -m benchmarks dynamics`."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ if TYPE_CHECKING:
 
 TIME_STEP = 1e-2
 TOLERANCE = 1e-8
-# Cells of the clamped beam of four-node tetrahedra: s of processor time that a step may take, and a linearized one.
+# {cells of the clamped beam of four-node tetrahedra: largest processor time [s] of a step, and of a linearized one}.
 ALLOWED_STEP = {(24, 6, 6): (0.012, 0.004), (52, 13, 13): (0.450, None)}
 QUICK_CELLS = (12, 3, 3)
-LINEARIZED = 0.03  # the tolerance of a step that ends after its first iteration
-ALLOWED_SHARE = {"factors": 0.4, "checkpoints": 1.5}  # of the time of the same motion without gradients
+LINEARIZED = 0.03  # [-] tolerance with which a step ends after its first iteration
+ALLOWED_SHARE = {"factors": 0.4, "checkpoints": 1.5}  # largest time over that of the motion without gradients
 STEPS = 20
 
 
 def beam(cells: tuple[int, int, int]) -> ms.Scene:
-    """10 cm x 2.5 cm x 2.5 cm of rubber, clamped at one end, that a field bends."""
+    """Return a beam of rubber, 10 cm x 2.5 cm x 2.5 cm, clamped at one end, in a field."""
     material = ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.45)
     solid = ms.Solid(
         ms.meshes.box((0.1, 0.025, 0.025), cells=cells),
@@ -41,7 +41,7 @@ def beam(cells: tuple[int, int, int]) -> ms.Scene:
 
 
 def turning(steps: int) -> np.ndarray:
-    """T, at the ends of the steps: once around in 0.4 s."""
+    """Return a field [T] at the ends of the steps that rotates once in 0.4 s."""
     angle = 2 * np.pi / 0.4 * TIME_STEP * np.arange(steps + 1)
     return 0.02 * np.stack([np.cos(angle), 0.0 * angle, np.sin(angle)], axis=1)
 
@@ -54,7 +54,7 @@ def drive(
     field: ArrayLike | None = None,
     **options: Any,
 ) -> ms.Trajectory:
-    """A Trajectory."""
+    """Simulate the beam in steps of implicit Euler, by default in the rotating field."""
     return ms.simulate(
         scene,
         steps=steps,
@@ -69,7 +69,7 @@ def drive(
 
 
 def measure(rounds: int, quick: bool) -> dict[str, Any]:
-    """Prints the tables, returns their numbers."""
+    """Print the tables and return their numbers."""
     return {"solid steps": _steps(rounds, quick), "solid gradients": _gradients(rounds, quick)}
 
 
@@ -105,8 +105,10 @@ def _limit(seconds: float | None) -> str:
 
 
 def _step(scene: ms.Scene, tolerance: float, steps: int, rounds: int) -> tuple[float, float]:
-    """(s of processor time, iterations) a step, the best of some rounds. What a call costs once is not in it: that is the
-    time of a motion of one step."""
+    """Measure (processor time [s], iterations) of a step, the best of some rounds.
+
+    The cost of a call is excluded by subtracting the time of a motion of one step.
+    """
     times: dict[int, list[float]] = {1: [], 1 + steps: []}
     iterations = {}
     for _ in range(rounds):
@@ -120,26 +122,28 @@ def _step(scene: ms.Scene, tolerance: float, steps: int, rounds: int) -> tuple[f
 
 
 def _gradients(rounds: int, quick: bool) -> list[dict[str, Any]]:
-    """By the field of every step, the moduli and the magnetization of every element."""
+    """Measure the gradient by the field of every step, and the moduli and magnetization of every element."""
     scene = beam(QUICK_CELLS if quick else next(iter(ALLOWED_STEP)))
     steps, results, rows = 5 if quick else STEPS, [], []
-    plain, kept = [], {keep: [] for keep in ALLOWED_SHARE}
+    plain, by_storage = [], {storage: [] for storage in ALLOWED_SHARE}
     for _ in range(rounds):
         began = time.process_time()
         drive(scene, steps)
         plain.append(time.process_time() - began)
-        for keep, runs in kept.items():
-            runs.append(_forward_and_back(scene, steps, keep))
-    for keep, allowed in ALLOWED_SHARE.items():
-        forward, back = (min(run[k] for run in kept[keep]) for k in (0, 1))
-        share, held = back / min(plain), kept[keep][0][2]
-        results.append({"kept": keep, "plain": min(plain), "forward": forward, "back": back, "bytes": held})
-        missed = note(
-            "share", f"solid, {keep}: gradient over motion", share, at_most=None if quick else allowed
+        for storage, runs in by_storage.items():
+            runs.append(_forward_and_back(scene, steps, storage))
+    for storage, allowed in ALLOWED_SHARE.items():
+        forward, back = (min(run[k] for run in by_storage[storage]) for k in (0, 1))
+        ratio, stored = back / min(plain), by_storage[storage][0][2]
+        results.append(
+            {"kept": storage, "plain": min(plain), "forward": forward, "back": back, "bytes": stored}
         )
-        note("memory", f"solid, {keep}: bytes a step", held / steps)
+        missed = note(
+            "share", f"solid, {storage}: gradient over motion", ratio, at_most=None if quick else allowed
+        )
+        note("memory", f"solid, {storage}: bytes a step", stored / steps)
         times = (f"{1e3 * seconds:.0f}" for seconds in (min(plain), forward, back))
-        rows.append([keep, *times, f"{share:.2f}{missed}", f"{allowed:g}", f"{held / 1e6:.3g}"])
+        rows.append([storage, *times, f"{ratio:.2f}{missed}", f"{allowed:g}", f"{stored / 1e6:.3g}"])
     count = scene.bodies[0].mesh.n_tetrahedra
     headings = ["kept", "motion, ms", "kept so, ms", "gradient, ms", "share", "at most", "MB"]
     print_table(
@@ -150,8 +154,8 @@ def _gradients(rounds: int, quick: bool) -> list[dict[str, Any]]:
     return results
 
 
-def _forward_and_back(scene: ms.Scene, steps: int, keep: str) -> tuple[float, float, int]:
-    """Time of each, s, and the bytes kept."""
+def _forward_and_back(scene: ms.Scene, steps: int, storage: str) -> tuple[float, float, int]:
+    """Return the times of a motion and its gradient, s, and the bytes stored."""
     import torch
 
     solid = scene.bodies[0]
@@ -164,7 +168,7 @@ def _forward_and_back(scene: ms.Scene, steps: int, keep: str) -> tuple[float, fl
     }
     field = torch.tensor(turning(steps), requires_grad=True)
     began = time.process_time()
-    move = drive(scene, steps, field=field, values={solid: values}, adjoint_storage=keep)
+    move = drive(scene, steps, field=field, values={solid: values}, adjoint_storage=storage)
     done = time.process_time()
     (move.positions[-1] ** 2).sum().backward()
     return done - began, time.process_time() - done, move.bytes

@@ -1,4 +1,4 @@
-"""How solids' time and memory grow with their elements: a table of `python -m benchmarks scaling`."""
+"""Growth of time and memory of solids with their elements: a table of `python -m benchmarks scaling`."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from .timing import clocked, peak_memory, resident_memory
 
 CELLS = (24, 6, 6), (52, 13, 13), (110, 27, 28)  # 5184, 52,728 and 498,960 linear tetrahedra
 QUICK_CELLS = (8, 2, 2), (16, 4, 4)
-# Of a Newton iteration: a factorization in three dimensions grows with the square, all else in proportion; of what the
-# model holds, and of the factor, of which nested dissection promises 4/3.
+# Largest exponents. In three dimensions a factorization grows with the square of the number of elements, and the factor
+# of nested dissection with the power 4/3; all else grows in proportion.
 ALLOWED = {"assembly": 1.1, "iteration": 2.0, "model": 1.05, "entries": 1.45}
 TIMES = {"assembly": "assembly", "analysis": "analysis", "factorization": "factorization", "solve": "solve"}
 TIMES["iteration"] = "iteration of an Euler step"
@@ -28,7 +28,10 @@ MEMORIES = {"model": "model", "entries": "entries of L", "peak": "process grew b
 
 
 def measure(rounds: int, quick: bool) -> list[dict[str, Any]]:
-    """Prints the table, returns its numbers. Each size in a process of its own, because only its largest size is told."""
+    """Print the table and return its numbers.
+
+    Each size has a process of its own, because systems report only the largest size of a process so far.
+    """
     sizes: list[dict] = []
     for cells in QUICK_CELLS if quick else CELLS:
         try:
@@ -45,14 +48,14 @@ def measure(rounds: int, quick: bool) -> list[dict[str, Any]]:
 
 
 def costs(cells: tuple[int, int, int], rounds: int) -> dict[str, Any]:
-    """Of one thread; s of processor time, bytes."""
+    """Measure the costs on one thread: s of processor time, bytes."""
     ms.set_num_threads(1)
-    drive(beam((4, 1, 1)), 1)  # what any motion needs of the process
+    drive(beam((4, 1, 1)), 1)  # memory that any motion needs
     before = resident_memory()
     scene = beam(cells)
     model, controls = scene._model, scene._control_layout.zeros()
     state = model.rest_state()
-    move = drive(scene, 1)  # which analyses the pattern
+    move = drive(scene, 1)  # analyses the sparsity pattern
     step = clocked(lambda: drive(scene, 1), rounds=rounds)
     peak = peak_memory()
     n, starts, rows, values = model.hessian(state, controls)
@@ -78,7 +81,7 @@ def costs(cells: tuple[int, int, int], rounds: int) -> dict[str, Any]:
 
 
 def exponents(sizes: list[dict[str, Any]]) -> dict[str, float]:
-    """p of values ~ tetrahedra^p between the first size and the last; what is not known is left out."""
+    """Return p of values ~ tetrahedra^p between the first size and the last; unknown values are left out."""
     first, last = sizes[0], sizes[-1]
     growth = np.log(last["tetrahedra"] / first["tetrahedra"])
     return {
@@ -94,7 +97,7 @@ def _print(sizes: list[dict[str, Any]], quick: bool) -> None:
     for size in sizes:
         row = [str(size["tetrahedra"]), str(size["unknowns"])]
         row += [f"{1e3 * size[name]:.3g}" for name in TIMES]
-        row += ["not told" if size[name] is None else f"{size[name] / 1e6:.1f}" for name in MEMORIES]
+        row += ["unknown" if size[name] is None else f"{size[name] / 1e6:.1f}" for name in MEMORIES]
         rows.append(row)
     last = ["grows with", "tetrahedra to the"]
     for name in (*TIMES, *MEMORIES):

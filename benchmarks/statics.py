@@ -1,4 +1,4 @@
-"""python -m benchmarks statics: factorizations from flat, the cost of a Newton iteration, threads, backends."""
+"""Part `statics` of the benchmarks: factorizations from flat, the cost of a Newton iteration, threads, backends."""
 
 from __future__ import annotations
 
@@ -18,10 +18,12 @@ from .report import add_rounds, chosen, print_table
 from .timing import clocked, measure, peak_memory
 
 FACES, QUICK_FACES = 8192, 128
-ALLOWED_WORTH = 12.0  # of the whole solve from flat, in factorizations with their back-substitutions
-ALLOWED_RATIO = 1.25  # a Newton iteration over its factorization and back-substitution
+ALLOWED_WORTH = (
+    12.0  # [-] time of the whole solve from flat over that of a factorization with back-substitution
+)
+ALLOWED_RATIO = 1.25  # [-] time of a Newton iteration over that of its factorization and back-substitution
 
-# Name: a scene of a bending, the controls, how many factorizations it may take from flat in one call.
+# {name: (scene for a kind of bending, controls, largest number of factorizations from flat in one call)}.
 CASES: dict[str, tuple[Callable[[str], ms.Scene], dict[str, Any], int]] = {
     "A1, full load": (lambda b: shear_strip.scene(shear_strip.strip((40, 4), b), b), {}, 12),
     "A4, full load": (lambda b: hemisphere.scene(hemisphere.quarter((64, 16), b), b, 400.0), {}, 25),
@@ -36,11 +38,12 @@ CASES: dict[str, tuple[Callable[[str], ms.Scene], dict[str, Any], int]] = {
         40,
     ),
 }
-# Angle [degrees] of the field to the magnetization of C1, beta: how many factorizations the stable state may take.
+# {(angle [degrees] between field and magnetization of C1, beta): largest number of factorizations to the stable state}.
 OBLIQUE: dict[tuple[int, float], int] = {
     (angle, beta): 30 for angle in (30, 60, 90, 120, 150) for beta in (5.0, 20.0)
 }
-# 60 is a goal: -2000 N on 16x16 and on 24x24 cells miss it, 69 and 63 factorizations for a snap from fold to fold.
+# {(cells, force [N]): the same}. 60 is a goal: -2000 N on 16x16 and 24x24 cells misses it with 69 and 63 factorizations,
+# for a snap from fold to fold.
 PULLED: dict[tuple[int, float], int] = {
     (cells, force): 60 for cells in (8, 16, 24) for force in (2000.0, -2000.0)
 }
@@ -54,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
-    """Prints the tables, returns their numbers."""
+    """Print the tables and return their numbers."""
     faces = chosen(options.faces, options.quick, QUICK_FACES, FACES)
     if faces < 2:
         raise SystemExit("--faces must be at least 2")
@@ -76,7 +79,8 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def strongly_bent(faces: int, bending: str = "midedge") -> tuple[ms.Scene, dict[str, Any]]:
-    """A square sheet magnetised along one side and clamped across it, that a field turns up by almost a right angle."""
+    """Return a square sheet magnetised along one side and clamped across it, which a field bends up by almost a right
+    angle."""
     cells = max(1, round((faces / 2) ** 0.5))
     mesh = ms.meshes.rectangle(0.1, 0.1, cells=(cells, cells))
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.45, bending=bending)
@@ -116,7 +120,8 @@ def _from_flat() -> dict[str, Any]:
 
 
 def semi_cylinder(cells: int, force: float) -> ms.Scene:
-    """A8: half of a semi-cylinder clamped at one end, a force [N] on the top of the other (Sze, Liu, Lo 2004)."""
+    """Return case A8: half of a semi-cylinder clamped at one end, a force [N] on the top of the other (Sze, Liu, Lo
+    2004)."""
     radius, length = 1.016, 3.048
     mesh = ms.meshes.cylinder(radius, length, (0.0, np.pi / 2), cells=(cells, cells))
     sheet = ms.Shell(mesh, thickness=0.03, young_modulus=2.0685e7, poisson_ratio=0.3)
@@ -132,14 +137,14 @@ def semi_cylinder(cells: int, force: float) -> ms.Scene:
 def oblique_field(
     angle: float, beta: float, cells: tuple[int, int] = (10, 1)
 ) -> tuple[ms.Scene, dict[str, Any]]:
-    """C1: a strip in a field at an angle [degrees] to its magnetization; and the controls."""
+    """Return case C1 with a field at an angle [degrees] to its magnetization, and the controls."""
     mesh = ms.meshes.rectangle(magnetic_strip.LENGTH, magnetic_strip.WIDTH, cells=cells)
     direction = (np.cos(np.radians(angle)), 0.0, np.sin(np.radians(angle)))
     return magnetic_strip.scene(mesh, "midedge"), magnetic_strip.controls(beta, direction)
 
 
 def _to_stable(quick: bool) -> dict[str, Any]:
-    """Where steps of the load go astray, or snap: the stable state from rest in one call."""
+    """Measure solves from rest to the stable state in cases where load steps leave the path or snap."""
     cases = [
         (f"C1-{angle}, beta {beta:g}", *oblique_field(angle, beta), allowed)
         for (angle, beta), allowed in OBLIQUE.items()
@@ -172,7 +177,7 @@ def _to_stable(quick: bool) -> dict[str, Any]:
 
 
 def _iteration(scene: ms.Scene, controls: dict[str, Any], rounds: int) -> dict[str, Any]:
-    """The cost of an iteration: everything, over what the linear algebra takes."""
+    """Measure the cost of an iteration over that of its linear algebra."""
     runs = [ms.equilibrium(scene, **controls) for _ in range(rounds)]
     best = min(runs, key=lambda run: run.wall_time)
     ratio = best.wall_time / best.linear_time
@@ -196,7 +201,7 @@ def _iteration(scene: ms.Scene, controls: dict[str, Any], rounds: int) -> dict[s
 
 
 def _threads(scene: ms.Scene, controls: dict[str, Any], rounds: int) -> dict[str, Any]:
-    """Time and bits on one thread and on two."""
+    """Compare times and bits on one thread and on two."""
     before = ms.num_threads()
     times, positions = {}, {}
     try:
@@ -216,7 +221,7 @@ def _threads(scene: ms.Scene, controls: dict[str, Any], rounds: int) -> dict[str
 
 
 def _backends(scene: ms.Scene, controls: dict[str, Any], rounds: int) -> dict[str, Any]:
-    """The Hessian of the bent sheet, factorized by each backend there is."""
+    """Measure the factorization of the bent sheet's Hessian by each backend."""
     found = ms.equilibrium(scene, **controls)
     n, starts, matrix_rows, values = scene._model.hessian(found._state, found._controls)
     points = scene._model.free_points
@@ -239,7 +244,7 @@ def _backends(scene: ms.Scene, controls: dict[str, Any], rounds: int) -> dict[st
 
 
 def _worth(scene: ms.Scene, controls: dict[str, Any], backends: dict[str, Any], rounds: int) -> float:
-    """The whole solve from flat over a factorization with its back-substitution, in processor time."""
+    """Measure the whole solve from flat over a factorization with back-substitution, in processor time."""
     whole = clocked(lambda: ms.equilibrium(scene, **controls), rounds=rounds).processor
     best = min(times["factorization"] + times["solve"] for times in backends.values())
     worth = whole / best

@@ -1,4 +1,4 @@
-"""What contact, friction and water cost a time step: one sheet that falls on a floor in a turning field."""
+"""Cost of contact, friction and water per time step: one sheet that falls on a floor in a rotating field."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .report import print_table
 
 CELLS, QUICK_CELLS = ((48, 8), (128, 32)), ((6, 2),)
 TIME_STEP, STEPS, QUICK_STEPS = 1e-3, 100, 20
-ALLOWED = 2.5  # times a step without contact
+ALLOWED = 2.5  # [-] largest time of a step over one without contact
 EXACT = "contact, friction"
 SURROUNDINGS: dict[
     str, tuple[dict[str, Any] | None, bool]
@@ -29,7 +29,7 @@ SURROUNDINGS: dict[
 
 
 def falling(cells: tuple[int, int], friction: dict[str, Any] | None, in_water: bool) -> ms.Scene:
-    """12 cm x 2 cm, soft, 1 mm above the floor if there is one."""
+    """Return a soft sheet, 12 cm x 2 cm, 1 mm above the floor if there is one."""
     mesh = ms.meshes.rectangle(0.12, 0.02, cells=cells, irregular=0.2)
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e5, mass_density=1e3)
     floor = ms.obstacles.Plane(center=(0, 0, -1e-3))
@@ -44,7 +44,10 @@ def falling(cells: tuple[int, int], friction: dict[str, Any] | None, in_water: b
 
 
 def measure(rounds: int, quick: bool) -> dict[str, Any]:
-    """Prints the tables; {faces: {surroundings: {"step" s, "iterations", "halved", "way" m}}}, steps of implicit Euler."""
+    """Print the tables of steps of implicit Euler.
+
+    Returns {faces: {surroundings: {"step" [s], "iterations", "halved", "way" [m]}}}.
+    """
     results, steps = {}, QUICK_STEPS if quick else STEPS
     for cells in QUICK_CELLS if quick else CELLS:
         rows = {name: _motion(falling(cells, *each), steps, rounds) for name, each in SURROUNDINGS.items()}

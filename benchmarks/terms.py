@@ -1,4 +1,4 @@
-"""python -m benchmarks terms: what each part of a scene costs, the same sheet with one part more at a time."""
+"""Part `terms` of the benchmarks: cost of each part of a scene, measured by adding one part at a time to a sheet."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ SIDE, THICKNESS = 0.1, 1e-3  # m
 IN_PLANE, OUT_OF_PLANE = (4e4, 0.0, 0.0), (4e4, 0.0, 1e4)  # A/m
 FLUX_DENSITY = (0.0, 0.0, 1e-3)  # T
 
-COLUMNS = {"assembly": 2, "iteration": 1, "step_iteration": 1}  # of the table, and their digits
+COLUMNS = {"assembly": 2, "iteration": 1, "step_iteration": 1}  # {column of the table: its digits}
 
 
 class Part(NamedTuple):
-    """What a scene gets more, beyond the parts before it.
+    """A part that a scene gets in addition to the parts before it.
 
-    sheet: keywords for ms.Shell. scene: for ms.Scene, given the mesh; lists are added to what is there, all else
-    replaces it. solve: for ms.equilibrium and ms.simulate. What only motions know: in_motion, as scene; motion, for
+    sheet: keywords for ms.Shell. scene: for ms.Scene, given the mesh; lists are added to those before, all else replaces
+    the earlier value. solve: for ms.equilibrium and ms.simulate. For motions only: in_motion, as scene; motion, for
     ms.simulate.
     """
 
@@ -72,9 +72,9 @@ PARTS = (
 
 
 def _dipole(count: int) -> ms.Dipoles:
-    """In a row under the sheet."""
-    places = [(SIDE * (k + 0.5) / count, 0.3 * SIDE, -2.0 * SIDE) for k in range(count)]
-    return ms.Dipoles(places, [(0.0, 0.0, 0.3 / count)] * count)
+    """Return dipoles in a row under the sheet."""
+    positions = [(SIDE * (k + 0.5) / count, 0.3 * SIDE, -2.0 * SIDE) for k in range(count)]
+    return ms.Dipoles(positions, [(0.0, 0.0, 0.3 / count)] * count)
 
 
 def _floor(**options) -> ms.Contact:
@@ -87,7 +87,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
-    """Prints the table, returns its numbers."""
+    """Print the table and return its numbers."""
     faces = chosen(options.faces, options.quick, QUICK_FACES, FACES)
     if faces < 2:
         raise SystemExit("--faces must be at least 2")
@@ -106,7 +106,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
 def _costs(
     mesh: ms.TriangleMesh, parts: tuple[Part, ...], rounds: int, of_rest: dict[str, Any] | None
 ) -> dict[str, Any]:
-    """s: of gradient and Hessian, of a Newton iteration, of a time step and of an iteration of it."""
+    """Measure the times [s] of gradient and Hessian, of a Newton iteration, of a time step and of an iteration of it."""
     if of_rest is None:
         scene, solve, _ = _together(mesh, parts, moving=False)
         found = ms.equilibrium(scene, **solve)
@@ -141,7 +141,7 @@ def _costs(
 def _together(
     mesh: ms.TriangleMesh, parts: tuple[Part, ...], moving: bool
 ) -> tuple[ms.Scene, dict[str, Any], dict[str, Any]]:
-    """A scene with all parts, what its solves take and what its motions take beside."""
+    """Return a scene with all parts, the arguments of its solves, and further arguments of its motions."""
     shell = {"thickness": THICKNESS, "young_modulus": 1e6, "poisson_ratio": 0.45, "mass_density": 1e3}
     scene: dict[str, Any] = {"supports": [ms.Clamp(mesh.edges_at(x=0.0))]}
     solve, motion = {}, {}

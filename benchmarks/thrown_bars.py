@@ -1,4 +1,4 @@
-"""What contact of two bars costs a time step: a table of `python -m benchmarks dynamics`."""
+"""Cost of contact between two bars per time step: a table of `python -m benchmarks dynamics`."""
 
 from __future__ import annotations
 
@@ -14,24 +14,27 @@ from .report import print_table
 
 CELLS, QUICK_CELLS = (24, 9, 2), (6, 3, 1)
 TIME_STEP, STEPS, QUICK_STEPS = 1e-3, 10, 4
-SPEED = 0.1  # m/s, of the upper one
-ALLOWED = 0.4  # of a step's time, that contact takes
+SPEED = 0.1  # [m/s] speed of the upper bar
+ALLOWED = 0.4  # [-] largest fraction of a step's time that contact takes
 
 
-def bars(cells: tuple[int, int, int], touching: bool) -> ms.Scene:
-    """Two of rubber, 10 cm x 4 cm x 1 cm, one within reach of the other; the lower one is held at its bottom."""
+def bars(cells: tuple[int, int, int], in_contact: bool) -> ms.Scene:
+    """Return two bars of rubber, 10 cm x 4 cm x 1 cm, one within the activation distance of the other.
+
+    The lower one is held at its bottom. in_contact: whether there is contact between them.
+    """
     material = ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.4)
     lower = ms.meshes.box((0.1, 0.04, 0.01), cells=cells)
     cell = 0.1 / cells[0]
     upper = lower.transformed(translation=(0.3 * cell, 0.2 * cell, 0.01 + 2e-4))
     pair = [ms.Solid(mesh, material=material, mass_density=1e3, element="linear") for mesh in (lower, upper)]
     held = ms.Pin(lower.vertices_at(z=lower.rest_positions[:, 2].min()), body=pair[0])
-    contacts = [ms.Contact(*pair)] if touching else []
+    contacts = [ms.Contact(*pair)] if in_contact else []
     return ms.Scene(pair, supports=[held], contacts=contacts, allow_rigid_motions=True)
 
 
 def thrown(scene: ms.Scene, steps: int) -> ms.Trajectory:
-    """The upper one, at the lower one, in steps of implicit Euler."""
+    """Simulate the upper bar thrown at the lower one, in steps of implicit Euler."""
     velocities = np.zeros((scene.mesh.n_vertices, 3))
     velocities[scene.mesh.n_vertices // 2 :, 2] = -SPEED
     return ms.simulate(
@@ -45,7 +48,10 @@ def thrown(scene: ms.Scene, steps: int) -> ms.Trajectory:
 
 
 def without_contact(scene: ms.Scene, motion: ms.Trajectory) -> dict[str, Any]:
-    """What the steps of a motion take without contact, each from where it began: what has collided vibrates."""
+    """Return the counts for the steps of a motion repeated without contact, each from its own start.
+
+    These differ from a free motion because bars vibrate after a collision.
+    """
     steps = len(motion.positions) - 1
     counts = {"iterations": 0, "factorizations": 0}
     for positions, velocities in zip(motion.positions[:-1], motion.velocities[:-1], strict=True):
@@ -64,11 +70,11 @@ def without_contact(scene: ms.Scene, motion: ms.Trajectory) -> dict[str, Any]:
 
 
 def measure(rounds: int, quick: bool) -> dict[str, Any]:
-    """Prints the table; {"touching", "free": {"step" s, "iterations", "factorizations"}, "same states": the last two,
-    "pairs", "share", "of iteration"}.
+    """Print the table of steps with contact and without.
 
-    What is free moves on as it is, in one iteration a step. So contact's share is told of an iteration as well, and what
-    the same steps take without contact.
+    Returns {"touching", "free": {"step" [s], "iterations", "factorizations"}, "same states": the last two, "pairs",
+    "share", "of iteration"}. A bar without contact moves on unchanged, in one iteration a step. So the fraction of contact
+    is given for an iteration as well, and the counts of the same steps without contact.
     """
     cells, steps = (QUICK_CELLS, QUICK_STEPS) if quick else (CELLS, STEPS)
     results: dict = {}

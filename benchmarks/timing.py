@@ -1,4 +1,4 @@
-"""Times of short calls on a noisy machine: several rounds, the best and the median of them."""
+"""Measures times of short calls on a noisy machine: several rounds, the best and the median of them."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ Result = TypeVar("Result")
 
 
 class Timing(NamedTuple):
-    """Seconds a call."""
+    """The best and the median time of a call, s."""
 
     best: float
     median: float
 
 
 def measure(call: Callable[[], object], *, rounds: int = 7, seconds: float = 0.1) -> Timing:
-    """`rounds` rounds of about `seconds` each, after one call that warms up.
+    """Measure `rounds` rounds of about `seconds` each, after one call that warms up.
 
-    On one thread the processor's time counts, which other people's work disturbs less; on several, the clock's.
+    On one thread this is processor time, which other programs disturb less; on several threads, wall-clock time.
     """
     clock = time.process_time if ms.num_threads() == 1 else time.perf_counter
     call()
@@ -41,19 +41,21 @@ def measure(call: Callable[[], object], *, rounds: int = 7, seconds: float = 0.1
 
 
 class Clocked(NamedTuple):
-    """Seconds a call by both clocks. Beside other people's work that of the processor is the steadier one; what several
-    threads gain shows on the wall's only."""
+    """The time of a call by both clocks, s.
+
+    Processor time is steadier beside other programs; only wall-clock time shows the gain of several threads.
+    """
 
     processor: float
     wall: float
 
 
-SHORT = 0.02  # s: what a call may take to be left alone for once
-LONG = 1.0  # s: a call that takes longer is measured in one round, after one that takes its memory from the system
+SHORT = 0.02  # [s] a shorter call is likely to run undisturbed in some rounds
+LONG = 1.0  # [s] a longer call is measured in one round, after one that allocates its memory
 
 
 def clocked(call: Callable[[], object], *, rounds: int = 3, seconds: float = 0.1) -> Clocked:
-    """The best of `rounds` rounds of about `seconds` each, by each clock."""
+    """Return the best of `rounds` rounds of about `seconds` each, by each clock."""
     first = _timed(call, 1)
     repeats = max(1, round(seconds / max(first.wall, 1e-6)))
     runs = [_timed(call, repeats) for _ in range(1 if first.processor > LONG else rounds)]
@@ -67,10 +69,11 @@ def _timed(call: Callable[[], object], repeats: int) -> Clocked:
     return Clocked((time.process_time() - processor) / repeats, (time.perf_counter() - wall) / repeats)
 
 
-def with_share(call: Callable[[], Result]) -> tuple[Result, float]:
-    """What it returns, and the share of the wall's time that this process had meanwhile: wall times that were measured
-    inside, times this, are what they would have been without other people's work. 1 on several threads, and for short
-    calls, of which one in a few goes undisturbed.
+def with_processor_fraction(call: Callable[[], Result]) -> tuple[Result, float]:
+    """Return the call's result, and the fraction of the wall-clock time that this process had the processor.
+
+    Wall-clock times measured inside the call, times this fraction, are those without other programs. It is 1 on
+    several threads, and for short calls, a few of which run undisturbed.
     """
     processor, wall = time.process_time(), time.perf_counter()
     result = call()
@@ -80,8 +83,10 @@ def with_share(call: Callable[[], Result]) -> tuple[Result, float]:
 
 @contextmanager
 def processor_clock() -> Iterator[None]:
-    """Within it the times that solves measure of themselves are the processor's, on one thread: other people's work does
-    not count. On several threads they stay the wall's."""
+    """Let solves inside the block measure processor time instead of wall-clock time, on one thread.
+
+    Other programs then do not count. On several threads wall-clock time stays.
+    """
     walls = time.perf_counter
     if ms.num_threads() == 1:
         time.perf_counter = time.process_time
@@ -92,8 +97,8 @@ def processor_clock() -> Iterator[None]:
 
 
 def peak_memory() -> int | None:
-    """The largest resident set of this process so far, bytes; None where the system does not tell."""
-    own = _status("VmHWM")  # Linux: rusage would count what the process was forked from
+    """Return the largest resident memory of this process so far, bytes; None if the system does not report it."""
+    own = _status("VmHWM")  # Linux: rusage would include the process that this one was forked from
     if own is not None:
         return own
     try:
@@ -104,7 +109,7 @@ def peak_memory() -> int | None:
 
 
 def resident_memory() -> int | None:
-    """The resident set of this process now, bytes; None where the system does not tell (Linux does)."""
+    """Return the resident memory of this process now, bytes; None if the system does not report it (Linux does)."""
     return _status("VmRSS")
 
 

@@ -1,4 +1,4 @@
-"""Error against wall time: every case from rest in one call, on finer and finer meshes, regular and irregular."""
+"""Error against time: every case from rest in one call, on finer and finer meshes, regular and irregular."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from .report import bar, print_table
 from .timing import LONG, SHORT, processor_clock
 
 BENDINGS = ("midedge", "midedge2", "hinge")
-IRREGULAR = 0.25  # of the spacing: how far vertices are moved
+IRREGULAR = 0.25  # largest displacement of vertices, over the spacing
 SOLVERS: dict[str, ms.Newton] = {"mixed": ms.MixedNewton(), "plain": ms.Newton()}
-WITHIN = 0.01  # the error that the table gives times for, where the case's reference is known that well
-QUICK_MESHES = 2  # of each case
+WITHIN = 0.01  # error for which the table gives times, if the case's reference is that accurate
+QUICK_MESHES = 2  # number of meshes of each case
 
 
 class Study(NamedTuple):
-    """run(mesh, bending, irregular=, and solver= where it is nonlinear) -> Outcome.
+    """A case on several meshes. run(mesh, bending, irregular=, and solver= if it is nonlinear) -> Outcome.
 
-    reference: whose numbers the errors are relative to. known_to: the relative error of the reference itself, or by
-    how much its model differs from a Kirchhoff-Love sheet; below it an error says nothing.
+    reference: the source of the numbers that errors are relative to. known_to: the relative error of the reference
+    itself, or the difference of its model from a Kirchhoff-Love sheet; smaller errors mean nothing.
     """
 
     name: str
@@ -104,8 +104,11 @@ STUDIES = (
 
 
 class Point(NamedTuple):
-    """One case on one mesh in one way. error: the largest of the case, relative; None where the solve failed.
-    time: s, of all its solves, others' work on the processor left out."""
+    """One case on one mesh with one solver.
+
+    error: the largest relative error of the case; None if the solve failed. time: s, of all its solves, without
+    other programs' use of the processor.
+    """
 
     case: str
     bending: str
@@ -120,7 +123,7 @@ class Point(NamedTuple):
 
 
 def measure(studies: Iterable[Study] = STUDIES, *, quick: bool = False, rounds: int = 3) -> list[Point]:
-    """The points of all cases; of each time the best of so many rounds."""
+    """Return the points of all cases, with the best time of several rounds."""
     asked = [
         (study, mesh, bending, solver, irregular)
         for study in studies
@@ -137,7 +140,7 @@ def measure(studies: Iterable[Study] = STUDIES, *, quick: bool = False, rounds: 
 
 
 def _meshes(study: Study, bending: str, quick: bool) -> tuple[Any, ...]:
-    """Of second order all but the finest, which has as many unknowns as others have on it."""
+    """Return the meshes of a study; second order omits the finest, because it has as many unknowns on the one before."""
     meshes = study.meshes[:-1] if bending == "midedge2" else study.meshes
     return meshes[:QUICK_MESHES] if quick else meshes
 
@@ -175,7 +178,7 @@ def _worth_repeating(seconds: float, rounds: int) -> int:
 
 
 def print_points(points: list[Point]) -> None:
-    """How long each way takes to a wanted error, and how far it gets."""
+    """Print the time that each method needs to a given error, and its smallest error."""
     headings = ["case", "mesh", "within", *(each for b in BENDINGS for each in (b, "plain Newton"))]
     headings += [f"smallest error, {BENDINGS[0]}", *BENDINGS[1:]]
     rows = []
@@ -185,7 +188,7 @@ def print_points(points: list[Point]) -> None:
             continue
         within = max(WITHIN, 1.2 * study.known_to)
         for irregular in (False, True):
-            ways = {
+            by_method = {
                 (bending, solver): [
                     point
                     for point in of_case
@@ -196,7 +199,8 @@ def print_points(points: list[Point]) -> None:
             }
             times = [
                 _until(
-                    ways[bending, solver] or (ways[bending, "linear"] if solver == "mixed" else []), within
+                    by_method[bending, solver] or (by_method[bending, "linear"] if solver == "mixed" else []),
+                    within,
                 )
                 for bending in BENDINGS
                 for solver in ("mixed", "plain")
@@ -205,8 +209,8 @@ def print_points(points: list[Point]) -> None:
                 min(
                     (
                         p.error
-                        for way, each in ways.items()
-                        if way[0] == bending
+                        for method, each in by_method.items()
+                        if method[0] == bending
                         for p in each
                         if p.error is not None
                     ),
@@ -236,7 +240,7 @@ def print_points(points: list[Point]) -> None:
 
 
 def _until(points: list[Point], within: float) -> str:
-    """ms."""
+    """Format the shortest time to an error, ms."""
     if not points:
         return ""
     good = [point.time for point in points if point.error is not None and point.error <= within]

@@ -1,4 +1,4 @@
-"""An objective that counts how often it is asked for, and stops a search whose budget is spent."""
+"""Objective that counts its evaluations, and stops a search when the budget is spent."""
 
 from __future__ import annotations
 
@@ -10,14 +10,16 @@ import numpy as np
 
 
 class BudgetSpent(Exception):
-    """Ends a search from within its objective. Not an error: what was found is in the Counted."""
+    """An exception that ends a search from within its objective. It is no error: the result is in the Counted."""
 
 
 @dataclass
 class Counted:
-    """objective: of unknowns (n,) in -1 to 1. goal: a value at which a search may end.
+    """An objective with a count of its evaluations.
 
-    best: (k,), the lowest value so far, one a simulation; seconds: (k,), of the processor since the first began.
+    objective: function of the variables (n,) in -1 to 1. budget: largest number of evaluations. goal: a value at
+    which a search may end. best: (k,), the lowest value after each simulation; seconds: (k,), processor time since
+    the first one began.
     """
 
     objective: Callable[[np.ndarray], float]
@@ -28,7 +30,7 @@ class Counted:
     _began: float | None = None
 
     def begin(self) -> None:
-        """A simulation begins: the clock runs from the first on."""
+        """Start the clock with the first simulation."""
         if self._began is None:
             self._began = time.process_time()
 
@@ -37,7 +39,7 @@ class Counted:
         return self.counted(float(self.objective(np.clip(np.asarray(unknowns, dtype=float), -1.0, 1.0))))
 
     def counted(self, value: float) -> float:
-        """Notes a value that was found in another way, after `begin`. Raises BudgetSpent after the last one."""
+        """Record a value that was computed elsewhere, after `begin`. Raises BudgetSpent after the last one."""
         self.begin()
         if not np.isfinite(value):
             raise ValueError(f"the objective must be finite, got {value}")

@@ -1,7 +1,7 @@
 """Reinforcement learning by stable-baselines3 on the environment of a task: SAC and PPO.
 
-[Qiao21] has soft Q-learning too. No implementation that is kept takes continuous actions: its authors' needs TensorFlow 1,
-coax's is for discrete ones. SAC is what its authors made of it.
+[Qiao21] has soft Q-learning too. No maintained implementation takes continuous actions: its authors' one needs
+TensorFlow 1, that of coax is for discrete actions. SAC is the successor by the same authors.
 """
 
 from __future__ import annotations
@@ -36,7 +36,10 @@ def ppo(task: Task, counted: Counted, seed: int) -> None:
 
 
 def _learn(make, task, counted: Counted) -> None:
-    """An episode is a simulation, and what it lost the value. Policies begin anew, not at the task's start."""
+    """Run the training of a policy; an episode counts as a simulation, with its loss as the value.
+
+    Policies start untrained, not at the task's start.
+    """
     from gymnasium import Wrapper
 
     class Episodes(Wrapper):

@@ -1,6 +1,7 @@
-"""The searches. Each is method(task, counted, seed): it minimizes until the budget of `counted` is spent or it ends.
+"""Searches that minimize a task: method(task, counted, seed) runs until the budget of `counted` is spent or it ends.
 
-A library that is not installed raises ImportError; it is an extra of the bench, and no part of the package needs it.
+A library that is not installed raises ImportError; it is an extra of the benchmarks, and no part of the package
+needs it.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from .counted import BudgetSpent, Counted
 if TYPE_CHECKING:
     from .tasks import Task
 
-_SPREAD = 0.2  # of unknowns in -1 to 1: how far methods without a gradient look around at first
+_FIRST_STEP = 0.2  # first step or standard deviation of methods without a gradient, for variables in -1 to 1
 
 
 def lbfgs(task: Task, counted: Counted, seed: int) -> None:
@@ -36,7 +37,7 @@ def adam(task: Task, counted: Counted, seed: int) -> None:
 
 
 def _by_gradient(make: Callable[..., Any], task, counted: Counted, seed: int) -> None:
-    """A motion with its gradient counts as one simulation; the time says what it costs."""
+    """Run an optimizer with gradients. A motion with its gradient counts as one simulation; the time shows its cost."""
     import torch
 
     x = torch.tensor(task.start(seed), requires_grad=True)
@@ -59,7 +60,7 @@ def _by_gradient(make: Callable[..., Any], task, counted: Counted, seed: int) ->
     while True:
         before = len(counted.best)
         optimizer.step(closure)
-        if len(counted.best) == before:  # it stands still
+        if len(counted.best) == before:  # the optimizer has stopped
             return
 
 
@@ -69,7 +70,7 @@ def cma_es(task: Task, counted: Counted, seed: int) -> None:
     options = {"bounds": [-1, 1], "seed": seed + 1, "verbose": -9, "maxfevals": counted.budget}
     if task.unknowns > 500:
         options["CMA_diagonal"] = True  # a full covariance of thousands takes longer than the simulations
-    search = cma.CMAEvolutionStrategy(task.start(seed), _SPREAD, options)
+    search = cma.CMAEvolutionStrategy(task.start(seed), _FIRST_STEP, options)
     while not search.stop():
         asked = search.ask()
         search.tell(asked, [counted(each) for each in asked])
@@ -79,7 +80,7 @@ def nelder_mead(task: Task, counted: Counted, seed: int) -> None:
     from scipy.optimize import minimize
 
     start = task.start(seed)
-    away = np.where(start > 0, -_SPREAD, _SPREAD)
+    away = np.where(start > 0, -_FIRST_STEP, _FIRST_STEP)
     options = {"maxfev": counted.budget, "adaptive": True}
     options["initial_simplex"] = np.concatenate([start[None], start + np.diag(away)])
     minimize(counted, start, method="Nelder-Mead", bounds=[(-1, 1)] * task.unknowns, options=options)
@@ -91,22 +92,22 @@ def bobyqa(task: Task, counted: Counted, seed: int) -> None:
     search = nlopt.opt(nlopt.LN_BOBYQA, task.unknowns)
     search.set_lower_bounds(-1.0)
     search.set_upper_bounds(1.0)
-    search.set_initial_step(_SPREAD)
+    search.set_initial_step(_FIRST_STEP)
     search.set_maxeval(counted.budget)
     search.set_min_objective(lambda x, _: counted(x))
-    search.optimize(np.clip(task.start(seed), -1 + _SPREAD, 1 - _SPREAD))
+    search.optimize(np.clip(task.start(seed), -1 + _FIRST_STEP, 1 - _FIRST_STEP))
 
 
 def evolution(task: Task, counted: Counted, seed: int) -> None:
-    """As LEAP's usual pipeline: parents by tournaments of two, Gaussian mutation of their copies, the best is kept."""
+    """Run LEAP's usual pipeline: parents by tournaments of two, Gaussian mutation of their copies, the best survives."""
     rng, size = np.random.default_rng(seed), 10
-    people = np.clip(task.start(seed) + _SPREAD * rng.standard_normal((size, task.unknowns)), -1, 1)
+    people = np.clip(task.start(seed) + _FIRST_STEP * rng.standard_normal((size, task.unknowns)), -1, 1)
     people[0] = task.start(seed)
     values = np.array([counted(each) for each in people])
     while True:
         pairs = rng.integers(size, size=(size, 2))
         parents = people[np.where(values[pairs[:, 0]] < values[pairs[:, 1]], pairs[:, 0], pairs[:, 1])]
-        children = np.clip(parents + 0.5 * _SPREAD * rng.standard_normal(parents.shape), -1, 1)
+        children = np.clip(parents + 0.5 * _FIRST_STEP * rng.standard_normal(parents.shape), -1, 1)
         found = np.array([counted(each) for each in children])
         best = int(np.argmin(values))
         worst = int(np.argmax(found))
@@ -126,7 +127,7 @@ SEARCHES: dict[str, Callable[..., Any]] = {
 
 
 def run(search: Callable[..., Any], task: Task, budget: int, seed: int) -> dict[str, Any]:
-    """{"best": (k,), "seconds": (k,)} of one run."""
+    """Run one search: returns {"best": (k,), "seconds": (k,)}."""
     counted = Counted(task.objective, budget, task.goal)
     with suppress(BudgetSpent):
         search(task, counted, seed)

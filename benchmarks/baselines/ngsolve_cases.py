@@ -1,5 +1,4 @@
-"""Cases of `python -m benchmarks accuracy` by NGSolve, on the same meshes: irregular ones have their corners
-where ours have."""
+"""Cases of `python -m benchmarks accuracy` computed by NGSolve, on the same meshes: irregular ones share the corners."""
 
 from __future__ import annotations
 
@@ -16,11 +15,11 @@ from . import ngsolve_linear, ngsolve_strips
 from .ngsolve_linear import Material
 from .ngsolve_mesh import netgen_mesh, onto_cylinder
 
-_MOST_LOADS = 16  # parts of a load, if Newton's method does not converge with fewer
+_MOST_LOADS = 16  # largest number of load steps, if Newton's method does not converge with fewer
 
 
 class Found(NamedTuple):
-    """One number that a case compares: its relative error, and the seconds of the processor that it took."""
+    """One number that a case compares: its relative error, and the processor time [s] that it took."""
 
     error: float
     seconds: float
@@ -30,7 +29,7 @@ Run = Callable[[tuple[int, int], float | None, int], list[Found]]
 
 
 def roof(cells: tuple[int, int], irregular: float | None, order: int) -> list[Found]:
-    """B1."""
+    """Solve case B1, the Scordelis-Lo roof."""
     radius, half = linear_cylinders.ROOF_RADIUS, linear_cylinders.ROOF_HALF_ANGLE
     middle = linear_cylinders.ROOF_LENGTH / 2
     mesh = ms.meshes.cylinder(radius, middle, (0.0, half), cells=cells, irregular=irregular)
@@ -42,7 +41,7 @@ def roof(cells: tuple[int, int], irregular: float | None, order: int) -> list[Fo
 def roof_on(
     mesh: ms.TriangleMesh | ms.QuadraticTriangleMesh, order: int, onto: bool
 ) -> ngsolve_linear.Solved:
-    """A quarter of B1. onto: whether flat elements are bent onto the cylinder."""
+    """Solve a quarter of B1. onto: whether flat elements are bent onto the cylinder."""
     middle = linear_cylinders.ROOF_LENGTH / 2
     names = {
         "diaphragm": lambda x: abs(x[1]) < 1e-9,
@@ -63,7 +62,7 @@ def roof_on(
 
 
 def cylinder(cells: tuple[int, int], irregular: float | None, order: int) -> list[Found]:
-    """B2."""
+    """Solve case B2, the pinched cylinder."""
     radius, end = linear_cylinders.PINCHED_RADIUS, linear_cylinders.PINCHED_LENGTH / 2
     mesh = linear_cylinders.eighth(cells, irregular, order=1)
     names = {
@@ -84,7 +83,7 @@ def cylinder(cells: tuple[int, int], irregular: float | None, order: int) -> lis
 
 
 def square_plate(cells: tuple[int, int], irregular: float | None, order: int) -> list[Found]:
-    """B5: its four deflections, each with a matrix of its own."""
+    """Solve case B5, the square plate: four deflections, each with its own matrix."""
     mesh = plates.graded_quarter(cells, irregular)
     names = {"rim": lambda x: x[:2].max() > 0.5 - 1e-9, "symmetry": lambda _: True}
     other = netgen_mesh(mesh, names, dim=2)
@@ -99,13 +98,13 @@ def square_plate(cells: tuple[int, int], irregular: float | None, order: int) ->
 
 
 def end_shear(cells: tuple[int, int], irregular: float | None, order: int) -> list[Found]:
-    """A1 at its full load."""
+    """Solve case A1, a strip under end shear, at its full load."""
     mesh = _strip(shear_strip, cells, irregular)
     material = Material(shear_strip.THICKNESS, shear_strip.YOUNG_MODULUS, 0.0)
     other = netgen_mesh(mesh, _ends(shear_strip.LENGTH))
 
-    def pull(share, u, _):
-        return -share * shear_strip.FULL_LOAD / shear_strip.WIDTH * u[2] * _right(other)
+    def pull(load_factor, u, _):
+        return -load_factor * shear_strip.FULL_LOAD / shear_strip.WIDTH * u[2] * _right(other)
 
     u, seconds = _end(other, order, material, mesh, shear_strip.LENGTH, pull)
     shortening, deflection = shear_strip.ELASTICA[1.0]
@@ -113,14 +112,14 @@ def end_shear(cells: tuple[int, int], irregular: float | None, order: int) -> li
 
 
 def shear_by_a_field(cells: tuple[int, int], irregular: float | None, order: int) -> list[Found]:
-    """C4."""
+    """Solve case C4, a strip that a field bends as end shear does."""
     mesh = _strip(shear_strip, cells, irregular)
     thickness, magnetization = shear_strip.THICKNESS, magnetic_strip.MAGNETIZATION
     flux_density = shear_strip.FULL_LOAD / (thickness * shear_strip.WIDTH * magnetization)
     material = Material(thickness, shear_strip.YOUNG_MODULUS, 0.0)
     other = netgen_mesh(mesh, _ends(shear_strip.LENGTH))
-    turn = _in_a_field(thickness, magnetization * flux_density)
-    u, seconds = _end(other, order, material, mesh, shear_strip.LENGTH, turn)
+    load = _in_a_field(thickness, magnetization * flux_density)
+    u, seconds = _end(other, order, material, mesh, shear_strip.LENGTH, load)
     shortening, deflection = shear_strip.ELASTICA[1.0]
     return [Found(max(abs(u[2] / deflection - 1.0), abs(-u[0] / shortening - 1.0)), seconds)]
 
@@ -128,7 +127,7 @@ def shear_by_a_field(cells: tuple[int, int], irregular: float | None, order: int
 def field_across(
     cells: tuple[int, int], irregular: float | None, order: int, beta: float = 20.0
 ) -> list[Found]:
-    """C1-90."""
+    """Solve case C1-90, a magnetised strip in a field across it."""
     mesh = _strip(magnetic_strip, cells, irregular)
     length, thickness = magnetic_strip.LENGTH, magnetic_strip.THICKNESS
     material = Material(thickness, magnetic_strip.YOUNG_MODULUS, 0.0)
@@ -141,10 +140,10 @@ def field_across(
 
 
 def _in_a_field(thickness: float, density: float) -> Callable[..., Any]:
-    """density: M B, J/m3, magnetised along x in a field along z."""
+    """Return the energy of a strip magnetised along x in a field along z; density: M B, J/m3."""
 
-    def energy(share, _, deformed):
-        return -share * thickness * density * deformed[2, 0] * ng.ds
+    def energy(load_factor, _, deformed):
+        return -load_factor * thickness * density * deformed[2, 0] * ng.ds
 
     return energy
 
@@ -167,17 +166,18 @@ def _right(other: ng.Mesh):
 
 
 def _end(other, order: int, material, mesh, length: float, load) -> tuple[np.ndarray, float]:
-    """The mean displacement (3,) of the end, and the seconds, with as few parts of the load as Newton's method takes."""
-    for loads in _parts():
+    """Return the mean displacement (3,) of the end, and the seconds, with as few load steps as Newton's method needs."""
+    for loads in _load_steps():
         try:
             solved = ngsolve_strips.strip(other, order, material, load, loads, tolerance=1e-8)
         except ngsolve_strips.DidNotConverge:
             continue
         return solved.displacements[mesh.vertices_at(x=length)].mean(axis=0), solved.seconds
-    raise ngsolve_strips.DidNotConverge(f"in {_MOST_LOADS} parts of the load")
+    raise ngsolve_strips.DidNotConverge(f"in {_MOST_LOADS} load steps")
 
 
-def _parts() -> Iterator[int]:
+def _load_steps() -> Iterator[int]:
+    """Yield numbers of load steps, each twice the one before."""
     loads = 1
     while loads <= _MOST_LOADS:
         yield loads

@@ -1,8 +1,9 @@
 """NGSolve's Hellan-Herrmann-Johnson shells and plates of any order, to first order in the load.
 
-Neunteufel and Schoeberl 2019, 2021: displacements of order k, moments of order k - 1 whose normal components are held
-together by rotations of edges, and membrane strains interpolated by Regge's elements of order k - 1. Moments are condensed
-out element by element. Of order 1 and 2 with these points of integration they are `midedge` and `midedge2`.
+Neunteufel and Schoeberl 2019, 2021: displacements of order k; moments of order k - 1, whose normal components are
+made continuous by rotations of edges; and membrane strains interpolated by Regge elements of order k - 1. Moments
+are condensed out element by element. At orders 1 and 2, with these integration points, the elements are those of
+`midedge` and `midedge2`.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from .ngsolve_mesh import at_vertices, by_axis
 
 
 class Material(NamedTuple):
-    """m, Pa, -."""
+    """A shell's thickness [m], Young's modulus [Pa] and Poisson's ratio [-]."""
 
     thickness: float
     young_modulus: float
@@ -26,8 +27,11 @@ class Material(NamedTuple):
 
 
 class Solved(NamedTuple):
-    """displacements: (n_v, 3) m, or (n_v, 1) across of a plate. seconds: of the processor, for matrix, factor and
-    solution. unknowns: that the matrix has."""
+    """The result of a solve.
+
+    displacements: (n_v, 3) m, or (n_v, 1) across a plate. seconds: processor time of assembly, factorization and
+    solution. unknowns: those of the matrix.
+    """
 
     displacements: np.ndarray
     seconds: float
@@ -35,11 +39,12 @@ class Solved(NamedTuple):
 
 
 def inside(order: int) -> Any:
-    """dx or ds with the points of integration that `midedge2` has where the order is 2."""
+    """Return dx or ds with the integration points of `midedge2` if the order is 2."""
     return {ng.TRIG: ng.IntegrationRule(ng.TRIG, 2 * order)}
 
 
 def on_edges(order: int) -> Any:
+    """Return the integration rule on edges that belongs to `inside`."""
     return {ng.SEGM: ng.IntegrationRule(ng.SEGM, 2 * order - 1)}
 
 
@@ -51,20 +56,23 @@ def shell(
     clamped: str,
     load: Callable[..., Any],
 ) -> Solved:
-    """fixed: {"x": names of edges on the border that do not move along x, "a|b"}; clamped: those that do not turn.
-    load(v): the work of the loads on displacements v, a sum of integrals; or {vertex: force (3,) N}."""
+    """Solve a shell to first order in the load.
+
+    fixed: {"x": names of border edges that do not move along x, "a|b"}; clamped: those that do not rotate.
+    load(v): the work of the loads on displacements v, a sum of integrals; or {vertex: force (3,) N}.
+    """
     t, modulus, nu = material
-    places = ng.VectorH1(
+    displacements = ng.VectorH1(
         mesh, order=order, **{f"dirichlet{axis}_bbnd": names for axis, names in fixed.items()}
     )
     space = (
-        places
+        displacements
         * ng.HDivDivSurface(mesh, order=order - 1, discontinuous=True)
         * ng.NormalFacetSurface(mesh, order=order - 1, dirichlet_bbnd=clamped)
     )
     regge = ng.HCurlCurl(mesh, order=order - 1, discontinuous=True)
-    (u, moments, turns), (v, tests, others) = space.TnT()
-    moments, turns, tests, others = (each.Trace() for each in (moments, turns, tests, others))
+    (u, moments, rotations), (v, tests, others) = space.TnT()
+    moments, rotations, tests, others = (each.Trace() for each in (moments, rotations, tests, others))
     normal, along = ng.specialcf.normal(3), ng.specialcf.tangential(3)
     across = ng.Cross(normal, along)
     plane = ng.Id(3) - ng.OuterProduct(normal, normal)
@@ -75,8 +83,8 @@ def shell(
     def bent(u):
         return ng.CF(u.Operator("hesseboundary").trans * normal, dims=(3, 3))
 
-    def turned(u, turns):
-        return normal * (ng.Grad(u).Trace() * across) - turns * across
+    def relative_rotation(u, rotations):
+        return normal * (ng.Grad(u).Trace() * across) - rotations * across
 
     first, second = strain(u), strain(v)
     form = ng.BilinearForm(space, symmetric=True, condense=True)
@@ -85,44 +93,48 @@ def shell(
     inner = t * modulus / (1 - nu**2) * stretched - 12 / (modulus * t**3) * compliance
     inner += ng.InnerProduct(moments, bent(v)) + ng.InnerProduct(tests, bent(u))
     form += inner * ng.ds(intrules=inside(order))
-    rim = turned(u, turns) * ((tests * across) * across) + turned(v, others) * ((moments * across) * across)
+    rim = relative_rotation(u, rotations) * ((tests * across) * across)
+    rim += relative_rotation(v, others) * ((moments * across) * across)
     form += -rim * ng.ds(element_boundary=True, intrules=on_edges(order))
-    return _solved(space, form, lambda: _work(space, places, load, v))
+    return _solved(space, form, lambda: _work(space, displacements, load, v))
 
 
 def plate(
     mesh: ng.Mesh, order: int, stiffness: float, nu: float, fixed: str, clamped: str, load: Callable[..., Any]
 ) -> Solved:
-    """Of a flat sheet the part across it alone, on a mesh of dimension 2. stiffness: D, N m. fixed, clamped, load as for a
-    shell, of the one displacement that there is."""
-    places = ng.H1(mesh, order=order, dirichlet=fixed)
+    """Solve the deflection of a flat plate on a mesh of dimension 2.
+
+    stiffness: D, N m. fixed, clamped, load: as for a shell, for the single displacement.
+    """
+    deflections = ng.H1(mesh, order=order, dirichlet=fixed)
     space = (
-        places
+        deflections
         * ng.HDivDiv(mesh, order=order - 1, discontinuous=True)
         * ng.NormalFacetFESpace(mesh, order=order - 1, dirichlet=clamped)
     )
-    (w, moments, turns), (v, tests, others) = space.TnT()
+    (w, moments, rotations), (v, tests, others) = space.TnT()
     normal = ng.specialcf.normal(2)
     form = ng.BilinearForm(space, symmetric=True, condense=True)
     compliance = (1 + nu) * ng.InnerProduct(moments, tests) - nu * ng.Trace(moments) * ng.Trace(tests)
     inner = ng.InnerProduct(moments, v.Operator("hesse")) + ng.InnerProduct(tests, w.Operator("hesse"))
     form += (inner - compliance / (stiffness * (1 - nu**2))) * ng.dx(intrules=inside(order))
-    rim = (ng.Grad(w) - turns) * normal * (tests * normal * normal)
+    rim = (ng.Grad(w) - rotations) * normal * (tests * normal * normal)
     rim += (ng.Grad(v) - others) * normal * (moments * normal * normal)
     form += -rim * ng.dx(element_boundary=True, intrules=on_edges(order))
-    return _solved(space, form, lambda: _work(space, places, load, v))
+    return _solved(space, form, lambda: _work(space, deflections, load, v))
 
 
-def _work(space, places, load, tests):
+def _work(space, displacements, load, tests):
+    """Return the load vector, from a linear form or from forces at vertices."""
     work = ng.LinearForm(space)
     if callable(load):
         work += load(tests)
     work.Assemble()
     if not callable(load):
-        starts = np.cumsum([0, *(part.ndof for part in by_axis(places))])
+        starts = np.cumsum([0, *(part.ndof for part in by_axis(displacements))])
         for vertex, force in load.items():
-            for start, share in zip(starts, np.atleast_1d(force), strict=False):
-                work.vec[int(start) + vertex] += float(share)
+            for start, component in zip(starts, np.atleast_1d(force), strict=False):
+                work.vec[int(start) + vertex] += float(component)
     return work.vec
 
 

@@ -1,4 +1,4 @@
-"""magshell's meshes of sheets as NGSolve's, flat elements or bent ones."""
+"""Converts magshell's meshes of sheets to NGSolve's, with flat or curved elements."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ Names = dict[str, Callable[[np.ndarray], bool]]
 
 
 def netgen_mesh(mesh: ms.TriangleMesh | ms.QuadraticTriangleMesh, names: Names, dim: int = 3) -> ng.Mesh:
-    """names: {name: of which edges on the border, a function of their middles (3,) m}, the last one for all others.
+    """Return the mesh as one of NGSolve's, with the same numbers of vertices.
 
-    Vertices keep their numbers. The bent edges of a QuadraticTriangleMesh, whose corners must come first, are
-    a deformation of the
-    mesh: NGSolve integrates over elements of the same shape.
+    names: {name: function that selects border edges by their middles (3,) m}; the last one takes all others.
+    The corners of a QuadraticTriangleMesh must come first. Its curved edges become a deformation of the mesh: NGSolve
+    integrates over elements of the same shape.
     """
     corners = mesh.first_order() if isinstance(mesh, ms.QuadraticTriangleMesh) else mesh
     points = corners.rest_positions
@@ -43,39 +43,40 @@ def netgen_mesh(mesh: ms.TriangleMesh | ms.QuadraticTriangleMesh, names: Names, 
 
 
 def _bend(other: ng.Mesh, mesh: ms.QuadraticTriangleMesh) -> None:
+    """Give the elements the curved edges of a QuadraticTriangleMesh."""
     if not np.array_equal(mesh.corner_vertices, np.arange(mesh.corners.n_vertices)):
         raise ValueError("the corners of the QuadraticTriangleMesh must be its first vertices")
     bows = mesh.edge_midpoints - mesh.rest_positions[mesh.edges].mean(axis=1)
     if not bows.any():
         return
     number = {tuple(edge): k for k, edge in enumerate(mesh.edges.tolist())}
-    places = ng.VectorH1(other, order=2)
-    bent = ng.GridFunction(places)
+    displacements = ng.VectorH1(other, order=2)
+    bent = ng.GridFunction(displacements)
     for edge in other.edges:
         bow = bows[number[tuple(sorted(vertex.nr for vertex in edge.vertices))]]
-        for axis, space in enumerate(places.components):
-            # its shape on an edge is -s (1 - s) / 2 in lambda's there: -1/8 in the middle
+        for axis, space in enumerate(displacements.components):
+            # its shape function on an edge is -s (1 - s) / 2: -1/8 in the middle
             bent.components[axis].vec[space.GetDofNrs(edge)[0]] = -8.0 * bow[axis]
     other.SetDeformation(bent)
 
 
 def onto_cylinder(other: ng.Mesh, radius: float, order: int) -> None:
-    """Bends flat elements, whose corners lie on the cylinder around the axis y, to its polynomials of this order."""
+    """Move flat elements, with corners on the cylinder around the axis y, onto its polynomials of this order."""
     if order == 1:
         return
     away = ng.sqrt(ng.x**2 + ng.z**2)
     bent = ng.GridFunction(ng.VectorH1(other, order=order))
-    share = radius / away - 1.0
-    bent.Set(ng.CF((share * ng.x, 0.0, share * ng.z)), definedon=other.Boundaries(".*"), dual=True)
+    excess = radius / away - 1.0
+    bent.Set(ng.CF((excess * ng.x, 0.0, excess * ng.z)), definedon=other.Boundaries(".*"), dual=True)
     other.SetDeformation(bent)
 
 
 def by_axis(of: Any) -> tuple[Any, ...]:
-    """The parts along the axes of a function or a space of NGSolve's VectorH1; of H1, which has one, itself."""
+    """Return the components along the axes of a function or a space of NGSolve's VectorH1, or of H1, which has one."""
     space = of.space if isinstance(of, ng.GridFunction) else of
     return tuple(of.components) if isinstance(space, ng.VectorH1) else (of,)
 
 
 def at_vertices(found: ng.GridFunction) -> np.ndarray:
-    """(n_v, axes) of a function of H1 or VectorH1, whose first unknowns are those at vertices."""
+    """Return the values at vertices, (n_v, axes), of a function of H1 or VectorH1, whose first unknowns these are."""
     return np.stack([np.array(part.vec)[: found.space.mesh.nv] for part in by_axis(found)], axis=1)

@@ -1,6 +1,7 @@
-"""A clamped strip through large rotations by NGSolve's shells of any order, as in its tutorial of nonlinear shells.
+"""Clamped strip through large rotations by NGSolve's shells of any order, as in its tutorial of nonlinear shells.
 
-Neunteufel and Schoeberl 2019, 2021. The averaged normals at edges are found anew in each step of Newton's method.
+Neunteufel and Schoeberl 2019, 2021. The averaged normals at edges are computed again in each step of Newton's
+method.
 """
 
 from __future__ import annotations
@@ -14,11 +15,11 @@ import ngsolve as ng
 from .ngsolve_linear import Material, Solved, inside, on_edges
 from .ngsolve_mesh import at_vertices
 
-_MOST_STEPS = 40  # of Newton's method at a load
+_MOST_STEPS = 40  # Newton iterations at one load
 
 
 class DidNotConverge(Exception):
-    """At one of the loads Newton's method did not converge."""
+    """An error raised if Newton's method does not converge at one of the loads."""
 
 
 def strip(
@@ -29,22 +30,23 @@ def strip(
     loads: int,
     tolerance: float = 1e-13,
 ) -> Solved:
-    """Flat at rest in the plane z = 0, clamped at the edges named "left", of no Poisson's ratio.
+    """Solve a strip that is flat at rest in the plane z = 0, clamped at the edges named "left", with zero Poisson's
+    ratio.
 
-    load(share, u, deformed): the energy of this share of the loads at the displacements u and deformation gradient, a sum
-    of integrals. loads: in how many equal parts it is applied, from rest. tolerance: of the last step's energy, over the
-    first one's. seconds: of all steps, without what sets up the forms.
+    load(load_factor, u, deformed): the energy of the loads times a factor, at the displacements u and the deformation
+    gradient, a sum of integrals. loads: number of equal load steps, from rest. tolerance: energy of the last Newton step
+    over that of the first. seconds: of all steps, without setting up the forms.
     """
     if material.poisson_ratio != 0.0:
-        raise ValueError(f"the strip has no Poisson's ratio, got {material.poisson_ratio}")
-    places = ng.VectorH1(mesh, order=order, dirichlet_bbnd="left")
+        raise ValueError(f"the strip must have a Poisson's ratio of 0, got {material.poisson_ratio}")
+    displacements = ng.VectorH1(mesh, order=order, dirichlet_bbnd="left")
     space = (
-        places
+        displacements
         * ng.HDivDivSurface(mesh, order=order - 1, discontinuous=True)
         * ng.NormalFacetSurface(mesh, order=order - 1, dirichlet_bbnd="left")
     )
-    u, moments, turns = space.TrialFunction()
-    moments, turns = moments.Trace(), turns.Trace()
+    u, moments, rotations = space.TrialFunction()
+    moments, rotations = moments.Trace(), rotations.Trace()
     solution = ng.GridFunction(space)
     rest_normal, along = ng.specialcf.normal(3), ng.specialcf.tangential(3)
     rest_across = ng.Cross(rest_normal, along)
@@ -58,27 +60,28 @@ def strip(
     projected = ng.Normalize(mean.now - (tangent * mean.now) * tangent)
 
     t, modulus, _ = material
-    share = ng.Parameter(0.0)
+    load_factor = ng.Parameter(0.0)
     energy = ng.BilinearForm(space, symmetric=True, condense=True)
     green = 0.5 * (deformed.trans * deformed - plane)
     strain = ng.Interpolate(green, ng.HCurlCurl(mesh, order=order - 1, discontinuous=True))
     energy += ng.Variation(0.5 * t * modulus * ng.InnerProduct(strain, strain) * ng.ds)
     bent = ng.InnerProduct(moments, curvature) - 6 / (modulus * t**3) * ng.InnerProduct(moments, moments)
     energy += ng.Variation(bent * ng.ds(intrules=inside(order)))
-    turned = ng.acos(rest_across * mean.at_rest) - ng.acos(across * projected) - turns * rest_across
+    turned = ng.acos(rest_across * mean.at_rest) - ng.acos(across * projected) - rotations * rest_across
     at_edges = ng.ds(element_boundary=True, intrules=on_edges(order))
     energy += ng.Variation(-turned * ((moments * rest_across) * rest_across) * at_edges)
-    energy += ng.Variation(load(share, u, deformed))
+    energy += ng.Variation(load(load_factor, u, deformed))
 
     began = time.process_time()
     for k in range(loads):
-        share.Set((k + 1) / loads)
+        load_factor.Set((k + 1) / loads)
         _newton(energy, solution, mean, tolerance)
     seconds = time.process_time() - began
     return Solved(at_vertices(solution.components[0]), seconds, sum(space.FreeDofs(True)))
 
 
 def _newton(energy: ng.BilinearForm, solution: ng.GridFunction, mean: _Mean, tolerance: float) -> None:
+    """Solve for equilibrium at one load by Newton's method. Raises DidNotConverge."""
     residual, right, step = (solution.vec.CreateVector() for _ in range(3))
     free = solution.space.FreeDofs(True)
     first = None
@@ -102,7 +105,7 @@ def _newton(energy: ng.BilinearForm, solution: ng.GridFunction, mean: _Mean, tol
 
 
 class _Mean:
-    """The normals of both sides of an edge in the mean, at rest on clamped ones."""
+    """The averaged normals of both sides of an edge; on clamped edges those at rest."""
 
     def __init__(self, mesh: ng.Mesh, order: int, normal):
         space = ng.VectorFacetSurface(mesh, order=order)
@@ -121,10 +124,10 @@ class _Mean:
         self.now, self.at_rest = (ng.Normalize(ng.CF(each.components)) for each in (self._found, at_rest))
 
     def take(self) -> None:
-        """From where the sheet is now."""
+        """Compute the averages for the current deformation."""
         rest = self._found.vec.CreateVector()
         self._form.Apply(self._found.vec, rest)
-        if self._matrix is None:  # it does not depend on where the sheet is
+        if self._matrix is None:  # it does not depend on the deformation
             self._form.AssembleLinearization(self._found.vec)
             self._matrix = self._form.mat.Inverse(self._form.space.FreeDofs(), inverse="sparsecholesky")
         self._found.vec.data -= self._matrix * rest

@@ -1,4 +1,4 @@
-"""What is searched for: moduli of bridges, the field that lifts a strip, what robots have to do to reach a target."""
+"""Tasks of the searches: moduli of bridges, the field that lifts a strip, controls with which robots reach a target."""
 
 from __future__ import annotations
 
@@ -14,24 +14,25 @@ if TYPE_CHECKING:
 
     from magshell.envs.environment import Environment
 
-_NOISE = 0.05  # of unknowns in -1 to 1: how far the starts of the seeds are apart
+_NOISE = 0.05  # standard deviation of the starts of different seeds, for variables in -1 to 1
 
 
 class Task:
-    """unknowns: how many, each in -1 to 1. objective(unknowns) -> float; differentiable: the same of a tensor, with a
-    gradient, or its square. goal: where a search may end."""
+    """A minimization for all searches.
+
+    unknowns: number of variables, each in -1 to 1. objective(unknowns) -> float; differentiable: the same function
+    of a tensor, with a gradient, or its square. goal: a value at which a search may end.
+    """
 
     name: str
     unknowns: int
     goal: float | None = None
-    squared: bool = False  # differentiable is: of a distance, which has a kink at its goal
-    learned: bool = (
-        False  # whether it is an environment too: then with `actions` an episode, `environment` and `lost`
-    )
-    searches: tuple[str, ...] | None = None  # names of those that are tried; None: all
+    squared: bool = False  # whether differentiable returns the square: a distance has a kink at its goal
+    learned: bool = False  # whether there is an environment too: then with `actions` per episode, `environment` and `lost`
+    searches: tuple[str, ...] | None = None  # names of the searches that are tried; None: all
 
     def start(self, seed: int) -> np.ndarray:
-        """(unknowns,): the same for every method."""
+        """Return the start of a seed, (unknowns,), the same for every method."""
         around = _NOISE * np.random.default_rng([17, seed]).standard_normal(self.unknowns)
         return np.clip(self.middle + around, -1, 1)
 
@@ -41,7 +42,7 @@ class Task:
 
 
 class BridgeTask(Task):
-    """[Qiao21] Figure 3: the miss of the mean node, over the sag that is asked for. Needs examples/."""
+    """The task of [Qiao21] Figure 3: the error of the mean node, over the desired sag. Needs examples/."""
 
     goal: float | None = 0.01
     squared: bool = True
@@ -72,8 +73,11 @@ class BridgeTask(Task):
 
 
 class StripTask(Task):
-    """The registered magnetic strip without its disturbance: 50 actions of three numbers. The mean miss of the tip, over
-    the strip's length. An episode counts as one simulation."""
+    """The task of the registered magnetic strip without its disturbance: 50 actions of three numbers.
+
+    The objective is the mean error of the tip's height, over the strip's length. An episode counts as one
+    simulation.
+    """
 
     name: str = "strip"
     learned: bool = True
@@ -95,7 +99,7 @@ class StripTask(Task):
         return -sum(rewards) / self.actions
 
     def lost(self, rewarded: float) -> float:
-        """The value of an episode, of all its rewards."""
+        """Return the objective of an episode from the sum of its rewards."""
         return -rewarded / self.actions
 
     def differentiable(self, unknowns: Any) -> torch.Tensor:
@@ -121,7 +125,10 @@ class StripTask(Task):
 
 
 class RobotTask(Task):
-    """[Qiao21] Figure 4: controls of a robot in every step; how far from the target it ends, over the way there."""
+    """The task of [Qiao21] Figure 4: controls of a robot in every step.
+
+    The objective is the distance from the target at the end, over that at the start.
+    """
 
     name: str
 
@@ -131,9 +138,11 @@ class RobotTask(Task):
     searches: tuple[str, ...] | None = (
         "L-BFGS",
         "CMA-ES",
-    )  # as [Qiao21]'s; some others would need n + 1 motions before they begin
+    )  # those of [Qiao21]; some others need n + 1 motions before they begin
 
-    _FAILED = 2.0  # the miss where a motion fails: as an episode that ends where it began, and is fined
+    _FAILED = (
+        2.0  # relative distance if a motion fails: that of an episode that ends at its start, plus a penalty
+    )
 
     def __init__(self, name: str, robot: Robot, environment: str):
         self.name, self._robot, self._environment = name, robot, environment
@@ -154,19 +163,20 @@ class RobotTask(Task):
 
     def objective(self, unknowns: Any) -> float:
         try:
-            return float(self._miss(unknowns))
+            return float(self._relative_distance(unknowns))
         except ms.NotConverged:
             return self._FAILED
 
     def differentiable(self, unknowns: Any) -> torch.Tensor:
-        return self._miss(unknowns) ** 2
+        return self._relative_distance(unknowns) ** 2
 
-    def _miss(self, unknowns):
+    def _relative_distance(self, unknowns):
+        """Return the relative distance from the target at the end of the motion."""
         return self._robot.relative_distance(self._robot.motion(unknowns.reshape(self.actions, -1)))
 
 
 def robot_task(name: str) -> RobotTask:
-    """name: fish, octopus or gripper."""
+    """Return the task of a robot. name: fish, octopus or gripper."""
     from robots.cell_gripper import CellGripper
     from robots.fish import Fish
     from robots.muscle_octopus import MuscleOctopus

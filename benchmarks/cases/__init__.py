@@ -1,4 +1,4 @@
-"""The cases of the accuracy table. The tests run the same ones."""
+"""Cases of the accuracy table. The tests run the same ones."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .solids import SOLID_CASES
 
 @dataclass(frozen=True)
 class Case:
-    """A row of the table. run(mesh, bending) -> Outcome; mesh: the table's; coarse: one for a quick look."""
+    """A row of the table. run(mesh, bending) -> Outcome; mesh: that of the table; coarse: one for a quick look."""
 
     name: str
     title: str

@@ -1,4 +1,4 @@
-"""B7: buckling loads of columns and of a square plate, from the change of the Hessian."""
+"""Case B7: buckling loads of columns and of a square plate, from the change of the Hessian."""
 
 from __future__ import annotations
 
@@ -17,11 +17,12 @@ COLUMNS = {
     "clamped-pinned": 20.19072855642663,
     "clamped": 4 * np.pi**2,
 }
-PLATE_FACTOR = 4.0  # k of N = k pi^2 D / b^2 for a simply supported square, pushed along one axis
+PLATE_FACTOR = 4.0  # k in N = k pi^2 D / b^2 for a simply supported square, compressed along one axis
 
 
 def column(mesh: ms.TriangleMesh, ends: str, bending: str) -> ms.Scene:
-    """A strip along x, pushed at its far end by its Euler load; a clamped end is moved until it bears it."""
+    """Return a strip along x, compressed at its far end by its Euler load; a clamped end is moved until it carries
+    that."""
     sheet = ms.Shell(
         mesh, thickness=THICKNESS, young_modulus=YOUNG_MODULUS, poisson_ratio=0.0, bending=bending
     )
@@ -41,7 +42,7 @@ def column(mesh: ms.TriangleMesh, ends: str, bending: str) -> ms.Scene:
 def columns(
     cells: tuple[int, int] = (40, 4), bending: str = "midedge", *, irregular: float | None = 0.25
 ) -> Outcome:
-    """The four Euler columns: the computed load over each one's closed form, times that form."""
+    """Compute the loads of the four Euler columns: each over its closed form, times that form."""
     mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells, irregular=irregular, order=order_of(bending))
     found = [ms.linear_buckling(column(mesh, ends, bending)) for ends in COLUMNS]
     loads = [factor * buckling.factors[0] for factor, buckling in zip(COLUMNS.values(), found, strict=True)]
@@ -52,7 +53,7 @@ def columns(
 def plate(
     cells: tuple[int, int] = (32, 32), bending: str = "midedge", *, irregular: float | None = None
 ) -> Outcome:
-    """A simply supported square under uniaxial compression."""
+    """Compute the buckling load of a simply supported square under uniaxial compression."""
     mesh = ms.meshes.rectangle(LENGTH, LENGTH, cells, irregular=irregular, order=order_of(bending))
     sheet = ms.Shell(
         mesh, thickness=THICKNESS, young_modulus=YOUNG_MODULUS, poisson_ratio=POISSON_RATIO, bending=bending

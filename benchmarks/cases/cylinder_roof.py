@@ -1,4 +1,4 @@
-"""A7a: a shallow cylindrical roof, hinged along its straight edges, snaps through under a central force."""
+"""Case A7a: a shallow cylindrical roof, hinged along its straight edges, snaps through under a central force."""
 
 from __future__ import annotations
 
@@ -53,13 +53,13 @@ LOADS_AT = {
     28.663: 0.9643,
     29.374: 1.0835,
 }
-BEYOND = 1.2  # times the full load: towards there the path is followed, past the last deflection
+BEYOND = 1.2  # [-] final load of the path, over the full load: it lies past the last deflection
 
 
 def quarter(
     cells: tuple[int, int], bending: str = "midedge", irregular: float | None = None
 ) -> ms.TriangleMesh | ms.QuadraticTriangleMesh:
-    """A quarter of the roof, from its center at x = y = 0 to the hinge and to the free curved edge."""
+    """Return a quarter of the roof, from its center at x = y = 0 to the hinge and to the free curved edge."""
     span = (0.0, HALF_ANGLE)
     return ms.meshes.cylinder(
         RADIUS, LENGTH / 2, span, cells=cells, irregular=irregular, order=order_of(bending)
@@ -67,7 +67,7 @@ def quarter(
 
 
 def scene(mesh: ms.TriangleMesh, bending: str) -> ms.Scene:
-    """A quarter of BEYOND times the full load on its center; its hinge may turn."""
+    """Return the scene of a quarter, with BEYOND times the full load on its center and a hinge that can rotate."""
     sheet = ms.Shell(
         mesh, thickness=THICKNESS, young_modulus=YOUNG_MODULUS, poisson_ratio=POISSON_RATIO, bending=bending
     )
@@ -85,11 +85,11 @@ def snap_through(
     max_step: float = 0.002,
     solver: ms.Newton | None = None,
 ) -> Outcome:
-    """The load at each listed deflection, by arc length through both limit points.
+    """Compute the load at each listed deflection, by arc length through both limit points.
 
-    Finer meshes converge to loads up to 2.6 % of the full one beside these (at the last deflection), because
-    S4R shears under the point force and a Kirchhoff-Love sheet does not: an extra deflection of
-    0.155 mm P / Pmax explains all but 0.45 %.
+    Finer meshes converge to loads up to 2.6 % of the full one away from these (at the last deflection), because
+    S4R has shear under the point force and a Kirchhoff-Love sheet does not: an extra deflection of 0.155 mm P /
+    Pmax explains all but 0.45 %.
     """
     mesh = quarter(cells, bending, irregular)
     center = mesh.nearest_vertex((0, 0, RADIUS))

@@ -1,4 +1,4 @@
-"""The elastica that stretches: what strips of sheets under end forces tend to on ever finer meshes."""
+"""Extensible elastica: the limit of strips of sheets under end forces on ever finer meshes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import scipy
 
 
 def end_of_strip(length: float, EA: float, EI: float, force: float) -> np.ndarray:
-    """(x, z) m of the end of a strip along x, clamped at 0, under a dead end force [N] along z, to 1e-11.
+    """Return the end (x, z) m of a strip along x, clamped at 0, under a dead end force [N] along z, to 1e-11.
 
     A strip of St. Venant-Kirchhoff material has the energy EI/2 (s theta')^2 + EA/8 (s^2 - 1)^2 a rest length, s its stretch
     (its curvature is the change of its second fundamental form, by rest lengths). With the moment m = EI s^2 theta',
@@ -33,6 +33,6 @@ def end_of_strip(length: float, EA: float, EI: float, force: float) -> np.ndarra
             rates, (0, length), start, rtol=1e-12, atol=1e-14, method="DOP853"
         ).y[:, -1]
 
-    largest = np.sqrt(2 * force * EI)  # of an end that has turned by a right angle
+    largest = np.sqrt(2 * force * EI)  # moment for which the end rotates by a right angle
     m = scipy.optimize.brentq(lambda m: end(m)[1], 0.5 * largest, 0.999999 * largest, xtol=1e-15 * largest)
     return end(m)[2:]

@@ -1,4 +1,4 @@
-"""A4 and B3: a hemisphere with or without a hole at its pole, pulled and pushed at four points of its rim."""
+"""Cases A4 and B3: a hemisphere with or without a hole at its pole, pulled and pushed at four points of its rim."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ HOLE = np.radians(18.0)
 def quarter(
     cells: tuple[int, int], bending: str, hole: float = HOLE, irregular: float | None = None
 ) -> ms.TriangleMesh | ms.QuadraticTriangleMesh:
-    """A quarter of the hemisphere, cells as those of the whole: around, along the meridian."""
+    """Return a quarter of the hemisphere; cells: those of the whole, around and along the meridian."""
     if cells[0] % 4:
         raise ValueError(f"a quarter needs a multiple of 4 cells around, got {cells[0]}")
     of_quarter = (cells[0] // 4, cells[1])
@@ -26,7 +26,8 @@ def quarter(
 
 
 def scene(mesh: ms.TriangleMesh, bending: str, force: float) -> ms.Scene:
-    """Pulled outwards by `force` [N] along x and pushed inwards along y; half of each acts on a quarter."""
+    """Return a scene pulled outwards by `force` [N] along x and pushed inwards along y; half of each acts on a
+    quarter."""
     sheet = ms.Shell(
         mesh, thickness=THICKNESS, young_modulus=YOUNG_MODULUS, poisson_ratio=POISSON_RATIO, bending=bending
     )
@@ -37,7 +38,7 @@ def scene(mesh: ms.TriangleMesh, bending: str, force: float) -> ms.Scene:
 
 
 def radial_displacements(mesh: ms.TriangleMesh, displacements: np.ndarray) -> tuple[float, float]:
-    """Outwards where it is pulled, inwards where it is pushed, m."""
+    """Return the displacements outwards at the pulled point and inwards at the pushed one, m."""
     pulled, pushed = mesh.nearest_vertex((RADIUS, 0, 0)), mesh.nearest_vertex((0, RADIUS, 0))
     return displacements[pulled, 0], -displacements[pushed, 1]
 
@@ -49,12 +50,11 @@ def large_deflection(
     irregular: float | None = None,
     solver: ms.Newton | None = None,
 ) -> Outcome:
-    """A4: at the full load of 400, in one call from rest.
+    """Compute case A4 at the full load of 400, in one solve from rest.
 
-    References: 4.0742 outwards, 8.1495 inwards, the limit of Kirchhoff-Love theory as this project's issue 18 states it,
-    known to 0.4 % as points of force converge slowly; `midedge2` has 4.0730 and 8.1455 on 128 x 32 cells, and three of its
-    meshes extrapolate to 4.0753 and 8.1495. Abaqus S4R, whose shells shear: 4.067, 8.178 (Sze, Liu, Lo, Finite Elem. Anal.
-    Des. 40 (2004) 1551).
+    References: 4.0742 outwards, 8.1495 inwards, the limit of Kirchhoff-Love theory, known to 0.4 % because point forces
+    converge slowly; `midedge2` has 4.0730 and 8.1455 on 128 x 32 cells, and three of its meshes extrapolate to 4.0753 and
+    8.1495. Abaqus S4R, whose shells have shear: 4.067, 8.178 (Sze, Liu, Lo, Finite Elem. Anal. Des. 40 (2004) 1551).
     """
     mesh = quarter(cells, bending, irregular=irregular)
     state = ms.equilibrium(scene(mesh, bending, force=400.0), solver=solver)
@@ -69,10 +69,9 @@ def large_deflection(
 def small_deflection(
     cells: tuple[int, int] = (128, 32), bending: str = "midedge", *, irregular: float | None = None
 ) -> Outcome:
-    """B3: the radial displacement under forces of 2 to first order, with the hole and without.
+    """Compute case B3: the radial displacement under forces of 2 to first order, with the hole and without.
 
-    References: FinEtools (0.0924 without the hole, 0.093 with a slightly larger one), MacNeal and Harder
-    (0.094).
+    References: FinEtools (0.0924 without the hole, 0.093 with a slightly larger one), MacNeal and Harder (0.094).
     """
     meshes = quarter(cells, bending, HOLE, irregular), quarter(cells, bending, 0.0, irregular)
     responses = [ms.linear_response(scene(mesh, bending, force=2.0)) for mesh in meshes]

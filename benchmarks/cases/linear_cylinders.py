@@ -1,4 +1,4 @@
-"""B1 and B2, to first order: the Scordelis-Lo roof under its weight, and a cylinder pinched at mid-length."""
+"""Cases B1 and B2, to first order: the Scordelis-Lo roof under its weight, and a cylinder pinched at mid-length."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ PINCHED_RADIUS, PINCHED_LENGTH = 300.0, 600.0
 def scordelis_lo(
     cells: tuple[int, int] = (48, 48), bending: str = "midedge", *, irregular: float | None = None
 ) -> Outcome:
-    """B1: a barrel vault on rigid diaphragms, its straight edges free; a quarter of it.
+    """Compute case B1: a quarter of a barrel vault on rigid diaphragms, with free straight edges.
 
-    Reference: the free edge sinks by 0.3006 at mid-length in Kirchhoff-Love theory (isogeometric, PENGoLINS);
-    the classical target of 0.3024 has shear in it.
+    Reference: the free edge sinks by 0.3006 at mid-length in Kirchhoff-Love theory (isogeometric, PENGoLINS); the
+    classical target of 0.3024 includes shear.
     """
     span = (0.0, ROOF_HALF_ANGLE)
     mesh = ms.meshes.cylinder(
@@ -34,7 +34,7 @@ def scordelis_lo(
 
 
 def roof_response(mesh: ms.TriangleMesh | ms.QuadraticTriangleMesh, bending: str) -> ms.LinearResponse:
-    """Of a quarter of B1 under its weight."""
+    """Return the linear response of a quarter of B1 to its weight."""
     sheet = ms.Shell(mesh, thickness=0.25, young_modulus=4.32e8, poisson_ratio=0.0, bending=bending)
     middle = ROOF_LENGTH / 2
     supports = [
@@ -49,10 +49,11 @@ def roof_response(mesh: ms.TriangleMesh | ms.QuadraticTriangleMesh, bending: str
 def pinched_cylinder(
     cells: tuple[int, int] = (64, 64), bending: str = "midedge", *, irregular: float | None = None
 ) -> Outcome:
-    """B2: a cylinder on rigid diaphragms, pinched by two opposite forces of 1 at mid-length; an eighth of it.
+    """Compute case B2: an eighth of a cylinder on rigid diaphragms, pinched by two opposite forces of 1 at
+    mid-length.
 
-    Reference: 1.82842e-5 under the force, the limit of Kirchhoff-Love theory, as this project's issue 18 states it and
-    `midedge2` converges to (2e-5 of it on 32 x 32 elements); the classical 1.8248e-5 lies 0.2 % below it.
+    Reference: 1.82842e-5 under the force, the limit of Kirchhoff-Love theory, to which `midedge2` converges (2e-5
+    of it on 32 x 32 elements); the classical 1.8248e-5 lies 0.2 % below it.
     """
     mesh = eighth(cells, irregular, order_of(bending))
     sheet = ms.Shell(mesh, thickness=3.0, young_modulus=3e6, poisson_ratio=0.3, bending=bending)
@@ -72,7 +73,7 @@ def pinched_cylinder(
 def eighth(
     cells: tuple[int, int], irregular: float | None, order: int, grading: float = 1.8
 ) -> ms.TriangleMesh | ms.QuadraticTriangleMesh:
-    """An eighth of the cylinder, its cells smaller towards the force, where the deflection is."""
+    """Return an eighth of the cylinder, with smaller cells towards the force, where the deflection is."""
     even = ms.meshes.cylinder(1.0, 1.0, (0.0, 1.0), cells=cells, irregular=irregular)
     x, y, z = even.rest_positions.T
     angle = (np.arctan2(x, z) ** grading) * np.pi / 2
@@ -83,5 +84,6 @@ def eighth(
 
 
 def _onto_the_cylinder(points: np.ndarray) -> np.ndarray:
+    """Move points radially onto the cylinder."""
     points[:, [0, 2]] *= PINCHED_RADIUS / np.linalg.norm(points[:, [0, 2]], axis=1, keepdims=True)
     return points

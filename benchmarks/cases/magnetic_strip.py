@@ -1,4 +1,4 @@
-"""C1-90, C1-180 and C4: a cantilever strip magnetised along its length, in a uniform field."""
+"""Cases C1-90, C1-180 and C4: a cantilever strip magnetised along its length, in a uniform field."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .elastica import end_of_strip
 from .outcome import Comparison, Outcome, mesh_name, order_of, outcome, sweep, tip
 
 LENGTH, WIDTH, YOUNG_MODULUS, MAGNETIZATION = 0.1, 0.01, 1e6, 1e5
-THICKNESS = LENGTH / 400  # thin, because the elastica does not stretch: 1e-5 of its length here
+THICKNESS = LENGTH / 400  # thin, so that the strip stretches by only 1e-5: the elastica is inextensible
 
 # beta = M B A L^2 / (EI): end (x, y) / L of the hard-magnetic elastica
 #
@@ -35,7 +35,7 @@ ACROSS = {  # phi = 90 degrees
     15.0: (0.3647142196379147, 0.8477156743322971),
     20.0: (0.3161144324335249, 0.8686958982854378),
 }
-AGAINST = {  # phi = 180 degrees; it leaves the straight state at beta = pi^2 / 4 = 2.467
+AGAINST = {  # phi = 180 degrees; the straight state is stable up to beta = pi^2 / 4 = 2.467
     2.5: (0.9739635267692205, 0.20376920056591263),
     2.6: (0.8986594809001192, 0.392277528512775),
     3.0: (0.6531780573992787, 0.6636293494490895),
@@ -56,7 +56,7 @@ def scene(mesh: ms.TriangleMesh, bending: str) -> ms.Scene:
 
 
 def stretched_end(beta: float) -> np.ndarray:
-    """(x, y) / L of the end in a field across, of a strip that stretches: as under a dead force M B A there."""
+    """Return the end (x, y) / L of an extensible strip in a field across it: that under a dead force M B A."""
     stiffness = YOUNG_MODULUS * WIDTH * THICKNESS
     bending = stiffness * THICKNESS**2 / 12.0
     return end_of_strip(LENGTH, stiffness, bending, beta * bending / LENGTH**2) / LENGTH
@@ -69,7 +69,7 @@ def _strip(
 
 
 def controls(beta: float, direction: tuple[float, float, float]) -> dict[str, Any]:
-    """Magnetised along x, in the field [T] along `direction` that makes beta."""
+    """Return the load parameters: magnetised along x, in the field [T] along `direction` that gives beta."""
     flux_density = beta * YOUNG_MODULUS * THICKNESS**2 / (12.0 * MAGNETIZATION * LENGTH**2)
     return {
         "remanent_magnetization": (MAGNETIZATION, 0.0, 0.0),
@@ -86,7 +86,7 @@ def field_across(
     betas: Sequence[float] = tuple(ACROSS),
     solver: ms.Newton | None = None,
 ) -> Outcome:
-    """C1-90: the end of the strip against the elastica, at every beta."""
+    """Compute case C1-90: the end of the strip against the elastica, at every beta."""
     mesh = _strip(cells, bending, irregular, seed)
     references = {beta: ACROSS[beta] for beta in betas}
     return _against_elastica(mesh_name(cells, irregular), mesh, bending, references, (0.0, 0.0, 1.0), solver)
@@ -101,7 +101,8 @@ def field_against(
     betas: Sequence[float] = tuple(AGAINST),
     solver: ms.Newton | None = None,
 ) -> Outcome:
-    """C1-180: the same past the critical field, where the straight strip is a saddle that has to be left."""
+    """Compute case C1-180: as C1-90 in an opposite field, past the critical one, where the straight strip is a saddle
+    point."""
     mesh = _strip(cells, bending, irregular, seed)
     references = {beta: AGAINST[beta] for beta in betas}
     return _against_elastica(mesh_name(cells, irregular), mesh, bending, references, (-1.0, 0.0, 0.0), solver)
@@ -124,7 +125,8 @@ def _against_elastica(
 def magnetic_end_shear(
     cells: tuple[int, int] = (40, 4), bending: str = "midedge", *, seed: int = 0
 ) -> Outcome:
-    """C4: the strip of A1, magnetised along x in a field along z, deflects as under a dead force at its end.
+    """Compute case C4: the strip of A1, magnetised along x in a field along z, deflects as under a dead force at its
+    end.
 
     For a tangential uniform M and a uniform B the magnetic energy is the work of the dead traction h (M . nu)
     B on the boundary (divergence theorem), nu its outward normal: here the end load P = h w M B.
@@ -148,7 +150,7 @@ def shear_against_elastica(
     seed: int = 0,
     solver: ms.Newton | None = None,
 ) -> Outcome:
-    """C4 against the exact elastica under the force that the field stands for."""
+    """Compare case C4 with the exact elastica under the force that is equivalent to the field."""
     mesh = shear_strip.strip(cells, bending, seed, irregular)
     state = _sheared_by_a_field(mesh, bending, solver)
     end = tip(mesh, state.displacements, x=shear_strip.LENGTH)
@@ -161,7 +163,7 @@ def shear_against_elastica(
 
 
 def _sheared_by_a_field(mesh, bending: str, solver: ms.Newton | None = None) -> ms.Equilibrium:
-    """The strip of A1 in the field that stands for its full load."""
+    """Return the equilibrium of the strip of A1 in the field that is equivalent to its full load."""
     sheet = shear_strip.shell(mesh, bending)
     strip = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
     flux_density = shear_strip.FULL_LOAD / (shear_strip.THICKNESS * shear_strip.WIDTH * MAGNETIZATION)

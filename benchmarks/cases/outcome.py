@@ -1,4 +1,4 @@
-"""What a case hands back: computed numbers beside their references, and what they cost."""
+"""Result of a case: computed numbers with their references, and their cost."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 
 
 class Comparison:
-    """Computed numbers beside their references.
+    """Computed numbers with their references.
 
-    quantity: what they are. computed, reference: (k,). at: (k,) names of the entries, such as loads.
-    scale: what an error is relative to: a number, or (k,) one each; the references themselves by default.
-    allowed: how large a relative error may be; None where the case only informs.
+    quantity: their name. computed, reference: (k,). at: (k,) names of the entries, such as loads.
+    scale: the denominators of relative errors, a number or (k,); by default the references themselves.
+    allowed: the largest relative error allowed; None if the comparison is for information only.
     """
 
     def __init__(
@@ -48,12 +48,12 @@ class Comparison:
 
     @property
     def errors(self) -> np.ndarray:
-        """(k,), relative."""
+        """The relative errors, (k,)."""
         return np.abs(self.computed - self.reference) / self.scale
 
     @property
     def worst(self) -> int:
-        """The entry with the largest error; one that is not a number is the worst."""
+        """The index of the largest error; NaN counts as the largest."""
         return int(np.argmax(np.where(np.isnan(self.errors), np.inf, self.errors)))
 
     @property
@@ -80,7 +80,7 @@ class Outcome:
 
     @property
     def time(self) -> float:
-        """s."""
+        """The time of all solves, s."""
         return sum(self.times)
 
     @property
@@ -91,7 +91,7 @@ class Outcome:
 def outcome(
     mesh_name: str, mesh: ms.TriangleMesh, comparisons: Iterable[Comparison], results: Iterable[Any]
 ) -> Outcome:
-    """An Outcome from what the solves handed back: Equilibrium, LinearResponse, Buckling or Path objects."""
+    """Return the Outcome of solves that returned Equilibrium, LinearResponse, Buckling or EquilibriumPath objects."""
     results = list(results)
     return Outcome(
         mesh=mesh_name,
@@ -105,7 +105,8 @@ def outcome(
 
 
 def sweep(scene: ms.Scene, controls: Iterable[dict[str, Any]], **common: Any) -> list[ms.Equilibrium]:
-    """Equilibria at one set of controls after the other, each from the one before and the first from rest."""
+    """Solve for equilibria with one set of controls after the other, each from the one before and the first from
+    rest."""
     found: list[ms.Equilibrium] = []
     for each in controls:
         found.append(ms.equilibrium(scene, start=found[-1] if found else None, **common, **each))
@@ -117,10 +118,10 @@ def mesh_name(cells: tuple[int, int], irregular: float | None = None) -> str:
 
 
 def order_of(bending: str) -> int:
-    """Of the meshes that a way of bending is for."""
+    """Return the order of the meshes that a kind of bending element needs."""
     return 2 if bending == "midedge2" else 1
 
 
 def tip(mesh: ms.TriangleMesh, displacements: np.ndarray, **at: float) -> np.ndarray:
-    """The mean displacement (3,) m of the vertices at the given coordinates."""
+    """Return the mean displacement (3,) m of the vertices at the given coordinates."""
     return displacements[mesh.vertices_at(**at)].mean(axis=0)

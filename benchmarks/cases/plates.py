@@ -1,4 +1,4 @@
-"""B5, to first order: square and circular plates, supported and clamped, under a pressure and a force."""
+"""Case B5, to first order: square and circular plates, supported and clamped, under a pressure and a force."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ CIRCULAR = {
 }
 
 
-GRADING = 1.3  # a quarter's vertices at (i / n)^1.3 of its side: finer where the force is
+GRADING = 1.3  # a quarter has vertices at (i / n)^1.3 of its side: smaller cells near the force
 
 
 def square_plate(
     cells: tuple[int, int] = (32, 32), bending: str = "midedge", *, irregular: float | None = None
 ) -> Outcome:
-    """The four deflections of a unit square, on crossed and graded cells of a quarter of it."""
+    """Compute the four deflections of a unit square, on crossed and graded cells of a quarter of it."""
     mesh = _of_order(graded_quarter(cells, irregular), bending)
     return _quarter(mesh, bending, f"{mesh_name(cells, irregular)} crossed, graded, a quarter", allowed=0.005)
 
 
 def graded_quarter(cells: tuple[int, int], irregular: float | None) -> ms.TriangleMesh:
-    """Of the unit square, its middle at the origin."""
+    """Return a graded mesh of a quarter of the unit square, with the square's middle at the origin."""
     even = ms.meshes.rectangle(0.5, 0.5, cells, diagonals="crossed", irregular=irregular)
     positions = even.rest_positions.copy()
     positions[:, :2] = 0.5 * (2.0 * positions[:, :2]) ** GRADING
@@ -52,9 +52,10 @@ def graded_quarter(cells: tuple[int, int], irregular: float | None) -> ms.Triang
 def even_plate(
     cells: tuple[int, int] = (32, 32), bending: str = "midedge", *, irregular: float | None = None
 ) -> Outcome:
-    """The same on an even mesh of the whole square, for information: Morley's errors there are larger.
+    """Compute the same on an even mesh of the whole square, for information: errors of the Morley element are larger
+    there.
 
-    Computed on a quarter; the cells are those of the whole.
+    The solves are on a quarter; the cells are those of the whole.
     """
     if cells[0] % 2 or cells[1] % 2:
         raise ValueError(f"a quarter needs even numbers of cells, got {cells}")
@@ -64,10 +65,10 @@ def even_plate(
 
 
 def circular_plate(rings: int = 48, bending: str = "midedge", *, irregular: float | None = None) -> Outcome:
-    """The four deflections of a disk of radius 1.
+    """Compute the four deflections of a disk of radius 1.
 
-    Its rim is a polygon, of second order one of parabolas, simply supported at its vertices. The lowest-order
-    Hellan-Herrmann-Johnson element does not fall for Babuska's paradox there (Arnold and Walker 2020).
+    Its rim is a polygon, or of parabolas at second order, simply supported at its vertices. The lowest-order
+    Hellan-Herrmann-Johnson element does not show Babuska's paradox there (Arnold and Walker 2020).
     """
     mesh = _disk(rings, irregular, bending)
     name = f"{'irregular ' if irregular else ''}{rings} rings"
@@ -79,7 +80,11 @@ def _of_order(mesh: ms.TriangleMesh, bending: str) -> ms.TriangleMesh | ms.Quadr
 
 
 def _disk(rings: int, irregular: float | None, bending: str) -> ms.TriangleMesh | ms.QuadraticTriangleMesh:
-    """Of radius 1. irregular: by which share of a ring's width its vertices move, but for the rim's and the middle."""
+    """Return a mesh of the disk of radius 1.
+
+    irregular: largest random displacement of its vertices, but for the rim's and the middle, in units of a ring's
+    width.
+    """
     mesh = ms.meshes.disk(1.0, rings)
     if irregular is None:
         return ms.meshes.disk(1.0, rings, order=order_of(bending))
@@ -101,7 +106,7 @@ def _disk(rings: int, irregular: float | None, bending: str) -> ms.TriangleMesh 
 
 
 def middle_deflection(mesh: ms.TriangleMesh | ms.QuadraticTriangleMesh, support: str, load: str) -> float:
-    """Of a quarter of the unit square, its middle at the origin."""
+    """Return the deflection of the middle of the unit square, from a mesh of a quarter with the middle at the origin."""
     bending = "midedge" if isinstance(mesh, ms.TriangleMesh) else "midedge2"
     response = _response(mesh, _rim(mesh), _symmetry(), 4, bending, support, load)
     return float(response.displacements[mesh.nearest_vertex((0, 0, 0)), 2])
@@ -129,7 +134,8 @@ def _middle_deflections(
     name: str,
     allowed: float | None,
 ) -> Outcome:
-    """`mesh` is one of `parts` equal parts of the plate, its middle at the origin."""
+    """Compute the deflections of a plate's middle; `mesh` is one of `parts` equal parts of the plate, its middle at
+    the origin."""
     middle = mesh.nearest_vertex((0, 0, 0))
     comparisons, responses = [], []
     for (support, load), reference in references.items():

@@ -1,4 +1,4 @@
-"""A2: a cantilever strip rolled up into a full circle by a couple at its end."""
+"""Case A2: a cantilever strip rolled up into a full circle by a moment at its end."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def scene(mesh: ms.TriangleMesh, bending: str) -> ms.Scene:
 
 
 def exact(load: float) -> tuple[float, float]:
-    """Shortening and deflection of the end: the strip is an arc of the angle a = 2 pi M / Mmax."""
+    """Return shortening and deflection of the end: the strip is an arc of the angle a = 2 pi M / Mmax."""
     a = 2.0 * np.pi * load
     return LENGTH * (1.0 - np.sin(a) / a), LENGTH * (1.0 - np.cos(a)) / a
 
@@ -37,10 +37,10 @@ def end_moment(
     loads: Sequence[float] = LOADS,
     solver: ms.Newton | None = None,
 ) -> Outcome:
-    """Deflection and shortening of the end against the exact arc, at every load."""
+    """Compute deflection and shortening of the end, against the exact arc, at every load."""
     mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells, irregular=irregular, order=order_of(bending))
-    # Beyond 0.928 Mmax the plane arc bends sideways (on finer meshes too); the closed form is that of the
-    # plane one.
+    # Beyond 0.928 Mmax the plane arc is unstable and bends sideways (on finer meshes too); the closed form is that of
+    # the plane arc.
     controls = [{"load_factor": load} for load in loads]
     states = sweep(scene(mesh, bending), controls, require_stable=False, solver=solver)
     tips = np.array([tip(mesh, state.displacements, x=LENGTH) for state in states])

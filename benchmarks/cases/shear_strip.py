@@ -1,4 +1,4 @@
-"""A1: a cantilever strip under a dead transverse force at its end."""
+"""Case A1: a cantilever strip under a dead transverse force at its end."""
 
 from __future__ import annotations
 
@@ -54,13 +54,14 @@ def shell(mesh: ms.TriangleMesh, bending: str) -> ms.Shell:
 
 
 def scene(mesh: ms.TriangleMesh, bending: str) -> ms.Scene:
-    """Clamped at x = 0, with the full load along z at its other end."""
+    """Return a scene clamped at x = 0, with the full load along z at its other end."""
     load = ms.EdgeLoad(mesh.edges_at(x=LENGTH), (0.0, 0.0, FULL_LOAD / WIDTH))
     return ms.Scene(shell(mesh, bending), supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[load])
 
 
 def stretched_end() -> np.ndarray:
-    """(W, U) under the full load of a strip that stretches, which the elastica does not: 4e-6 and 4e-5 more of them."""
+    """Return (W, U) of an extensible strip under the full load, which are 4e-6 and 4e-5 larger than those of the
+    elastica."""
     stiffness = YOUNG_MODULUS * WIDTH * THICKNESS
     x, z = end_of_strip(LENGTH, stiffness, stiffness * THICKNESS**2 / 12.0, FULL_LOAD)
     return np.array((z, LENGTH - x))
@@ -75,7 +76,7 @@ def end_shear(
     loads: Sequence[float] = tuple(ELASTICA),
     solver: ms.Newton | None = None,
 ) -> Outcome:
-    """Deflection and shortening of the end against the exact elastica, at every load."""
+    """Compute deflection and shortening of the end, against the exact elastica, at every load."""
     mesh = strip(cells, bending, seed, irregular)
     states = sweep(scene(mesh, bending), [{"load_factor": load} for load in loads], solver=solver)
     tips = [tip(mesh, state.displacements, x=LENGTH) for state in states]

@@ -1,9 +1,8 @@
-"""Solids against exact and published numbers, linear tetrahedra beside quadratic ones.
+"""Solids against exact and published numbers, with linear and quadratic tetrahedra.
 
-T4a Cook's membrane, T5 and T6 a beam bent far, T11a the modes of a free cube, M1 a beam bent by a field, M3a by the field
-on its skins, T7a one of silicone under its weight. M2 and I1 hold to round-off with both elements:
-tests/physics/test_skin_cases.py,
-tests/physics/test_solid_validation.py.
+T4a Cook's membrane, T5 and T6 a beam with large deflection, T11a the modes of a free cube, M1 a beam bent by a
+field, M3a by the field on its skins, T7a one of silicone under its weight. M2 and I1 hold to round-off with both
+elements: tests/physics/test_skin_cases.py, tests/physics/test_solid_validation.py.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ ELEMENTS = ("linear", "quadratic")
 
 
 class SolidOutcome(NamedTuple):
-    """One run: times in s of processor time, of all solves together; iterations is None where nothing iterates."""
+    """The result of one run: time [s] of the processor, of all solves together; iterations is None if there are none."""
 
     mesh: str
     tetrahedra: int
@@ -36,8 +35,11 @@ class SolidOutcome(NamedTuple):
 
 
 class SolidCase(NamedTuple):
-    """run(cells, element) -> SolidOutcome; cells: of each element's mesh, with as many unknowns; coarse: for a quick look.
-    What a quadratic mesh must reach is in its comparisons, a linear one only informs."""
+    """A case for solids. run(cells, element) -> SolidOutcome; cells: of each element's mesh, with about equal numbers
+    of unknowns; coarse: for a quick look.
+
+    The errors that a quadratic mesh must stay below are in its comparisons; a linear mesh is for information only.
+    """
 
     name: str
     title: str
@@ -54,8 +56,11 @@ def at(solid: ms.Solid, **where: float) -> np.ndarray:
 
 
 def pulled_end(solid: ms.Solid, axis_value: float, force: ArrayLike) -> ms.PointLoad:
-    """A force [N] that is spread evenly over the plane face at x = axis_value: to the corners of its triangles, or to the
-    middles of their edges where the element has them, as their shape functions integrate."""
+    """Return a force [N] spread evenly over the plane face at x = axis_value.
+
+    The nodal forces are integrals of the shape functions: at the corners of linear triangles, at the edge middles
+    of quadratic ones.
+    """
     end = np.zeros(len(solid.mesh.rest_positions), dtype=bool)
     end[at(solid, x=axis_value)] = True
     weights, x = np.zeros(len(end)), solid.mesh.rest_positions
@@ -94,7 +99,7 @@ COOK = {0.45: 7.23204151, 0.499: 6.940766625}
 
 
 def cook(cells: tuple[int, int, int], element: str) -> SolidOutcome:
-    """Cook's membrane in plane strain, in mm and MPa."""
+    """Compute Cook's membrane in plane strain, in mm and MPa."""
     unit = ms.meshes.box((1, 1, 1), cells=cells)
     x, y, z = unit.rest_positions.T
     mesh = ms.TetMesh(np.stack([48 * x, 44 * x + y * (44 - 28 * x), z], axis=1), unit.tetrahedra)
@@ -120,14 +125,14 @@ BEAM_MODULUS, BEAM_FORCE = 1e5, 2e5 / 1200
 
 
 def bent_beam(cells: tuple[int, int, int], element: str) -> SolidOutcome:
-    """By a dead force on its end."""
+    """Compute a beam bent by a dead force on its end."""
     return _bent(
         cells, element, BEAM, lambda solid: {"loads": [pulled_end(solid, 10.0, (0, 0, BEAM_FORCE))]}, {}
     )
 
 
 def magnetic_beam(cells: tuple[int, int, int], element: str) -> SolidOutcome:
-    """By a field across its magnetization, which is the same force on its end."""
+    """Compute the beam bent by a field across its magnetization, which is equivalent to the same force on its end."""
     flux = 0.1
     magnetization = (BEAM_FORCE / flux, 0.0, 0.0)
     return _bent(
@@ -166,7 +171,7 @@ CUBE = {
 
 
 def free_cube(cells: tuple[int, int, int], element: str) -> SolidOutcome:
-    """With lumped masses, whose error is of second order."""
+    """Compute the vibration modes of a free cube, with lumped masses, whose error is of second order."""
     comparisons, seconds = [], 0.0
     for poisson_ratio, reference in CUBE.items():
         material = ms.NeoHookean(young_modulus=1.0, poisson_ratio=poisson_ratio)
@@ -191,10 +196,10 @@ SKINS = {0.5: (0.9665630825, 0.2213158696), 2.0: (0.8323702576, 0.4709996116)}
 
 
 def skinned_beam(cells: tuple[int, int, int], element: str) -> SolidOutcome:
-    """Skins magnetized along the beam and against, in a field along it: a constant curvature."""
+    """Compute a beam with skins magnetized along and against it, in a field along it: its curvature is constant."""
     length, side, modulus, thickness, flux = 0.1, 0.01, 1e5, 1e-4, 0.02
     found, comparisons = [], []
-    for g, place in SKINS.items():
+    for g, end in SKINS.items():
         mesh = ms.meshes.box((length, side, side), cells=cells)
         sides = mesh.faces_at(z=side), mesh.faces_at(z=0.0)
         strength = g * modulus * side**3 / 12 / (flux * side * length * thickness)
@@ -212,16 +217,14 @@ def skinned_beam(cells: tuple[int, int, int], element: str) -> SolidOutcome:
         moved = (found[-1][0].positions[tip] - [0, 0, x[tip, 2]]) / length
         computed = [moved[0], abs(moved[2])]
         comparisons.append(
-            Comparison(
-                f"tip, g = {g}", computed, place, at=("x", "y"), scale=1.0, allowed=asked(element, 0.02)
-            )
+            Comparison(f"tip, g = {g}", computed, end, at=("x", "y"), scale=1.0, allowed=asked(element, 0.02))
         )
     iterations = max(rest.iterations for rest, _ in found)
     return outcome(cells, scene, comparisons, iterations, sum(seconds for _, seconds in found))
 
 
-# A cantilever of silicone, z up: N on the tip's upper edge: dz of a marker [mm] by Taylor-Hood elements of order 3. Where
-# on its arm the marker is was not told: here it is the middle of the tip, and no error is allowed or refused.
+# A cantilever of silicone, z up. {force [N] on the tip's upper edge: dz of a marker [mm]}, by Taylor-Hood elements of
+# order 3. The position of the marker was not published: here it is the middle of the tip, for information only.
 SILICONE = {0.0: -6.769326202, 1.00062: -26.51584384}
 
 
@@ -236,8 +239,8 @@ def silicone(cells: tuple[int, int, int], element: str) -> SolidOutcome:
         supports = [ms.Pin(at(solid, x=0.0))]
         scene = ms.Scene(solid, supports=supports, loads=loads, gravity=(0, 0, -9.807))
         found.append(solved(scene))
-        places = solid.mesh.rest_positions[tip, 1:] - 0.015
-        plane = np.column_stack([np.ones(len(tip)), places])
+        offsets = solid.mesh.rest_positions[tip, 1:] - 0.015
+        plane = np.column_stack([np.ones(len(tip)), offsets])
         dz = np.linalg.lstsq(plane, found[-1][0].displacements[tip, 2], rcond=None)[0][0]
         comparisons.append(Comparison(f"dz [mm], {weight:g} N", 1e3 * dz, reference))
     iterations = max(rest.iterations for rest, _ in found)

@@ -1,1 +1,1 @@
-"""The figures of the bench: functions of a part's results, as they stand in its JSON, that return a matplotlib Figure."""
+"""Figures of the benchmarks: functions of a part's results, as they are in its JSON, that return a matplotlib Figure."""

@@ -1,4 +1,4 @@
-"""Integrators: error against steps and against time; the energy each loses."""
+"""Figure of the integrators: error against steps and against time, and the energy that each loses."""
 
 from __future__ import annotations
 
@@ -54,10 +54,10 @@ def draw(results: dict[str, Any], setting: dict[str, Any]) -> Figure:
 
 
 def _energies(axes, energies: dict[str, Any], looks: dict[str, Any]) -> None:
-    """What is lost of that of a vibration, by how far its tip swings; some methods gain as little as they lose."""
+    """Draw the energy lost by a vibration against its amplitude; some methods gain as little as they lose."""
     for name, rows in energies.items():
         swings = [float(each) for each in rows["kept"]]
-        lost = [float("nan") if share is None else 100 * abs(1 - share) for share in rows["kept"].values()]
+        lost = [float("nan") if left is None else 100 * abs(1 - left) for left in rows["kept"].values()]
         axes.loglog(swings, lost, label=name, **looks[name])
     axes.set_xticks(swings, [f"{each:g}" for each in swings])
     axes.xaxis.set_minor_locator(NullLocator())

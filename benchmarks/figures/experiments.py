@@ -1,4 +1,4 @@
-"""Objective against simulations and time, of each task and method; memory over steps."""
+"""Figure of the searches: objective against simulations and time, of each task and method; memory over steps."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .style import COLOURS, FAINT, INK, machine, new_figure, note, panel_title, 
 _BY_GRADIENT = ("L-BFGS", "MMA", "Adam")
 
 
-_ROW = 3  # tasks; where there are more, only what they need of simulations is drawn
+_ROW = 3  # tasks in a row; with more tasks, only the curves over simulations are drawn
 
 
 def draw(results: dict[str, Any], setting: dict[str, Any]) -> Figure:
@@ -21,28 +21,28 @@ def draw(results: dict[str, Any], setting: dict[str, Any]) -> Figure:
     both = len(tasks) <= _ROW
     columns = max(panels, 1) if both else _ROW
     rows = (2 if tasks else 1) if both else -(-panels // _ROW)
-    if panels == 1 and tasks:  # what it needs of simulations and of time beside each other
+    if panels == 1 and tasks:  # curves over simulations and over time, side by side
         rows, columns = 1, 2
     figure = new_figure(3.6 * columns, 3.0 * rows if rows > 1 else 3.2)
     axes = figure.subplots(rows, columns, squeeze=False)
-    places = axes[0] if both else axes.ravel()
+    first_panels = axes[0] if both else axes.ravel()
     of_time = axes[-1] if rows > 1 else axes[0, 1:]
     looks = _looks(tasks)
     for k, (name, task) in enumerate(tasks.items()):
-        _curves(places[k], task, looks, "simulations")
+        _curves(first_panels[k], task, looks, "simulations")
         if both:
             _curves(of_time[k], task, looks, "seconds")
-        panel_title(places[k], name, f"{task['unknowns']} unknowns, {_told(task)}")
+        panel_title(first_panels[k], name, f"{task['unknowns']} unknowns, {_describe_runs(task)}")
     if memory:
-        _memory(places[len(tasks)], memory)
-    unused = places[panels:] if not both else axes[1:, -1] if memory and rows > 1 else []
+        _memory(first_panels[len(tasks)], memory)
+    unused = first_panels[panels:] if not both else axes[1:, -1] if memory and rows > 1 else []
     for each in unused:
         each.set_visible(False)
     for each in axes.ravel():
         tidy(each)
     if tasks:
         shown: dict = {}
-        for each in places[: len(tasks)]:
+        for each in first_panels[: len(tasks)]:
             shown |= {label: handle for handle, label in zip(*each.get_legend_handles_labels(), strict=True)}
         labels = [name for name in looks if name in shown]
         figure.legend(
@@ -58,8 +58,8 @@ def draw(results: dict[str, Any], setting: dict[str, Any]) -> Figure:
     return figure
 
 
-def _told(task: dict[str, Any]) -> str:
-    """How many runs the curves are of; methods may have different numbers of them."""
+def _describe_runs(task: dict[str, Any]) -> str:
+    """Say how many runs the curves show; methods may have different numbers of them."""
     counts = {len(found["runs"]) for found in task["methods"].values() if found.get("runs")} or {0}
     fewest, most = min(counts), max(counts)
     many = str(most) if fewest == most else f"{fewest} to {most}"
@@ -96,18 +96,18 @@ def _curves(axes, task: dict[str, Any], looks: dict[str, Any], of_what: str) -> 
 
 
 def _filled(values: list[Any], length: int) -> np.ndarray:
-    """A run that ended early keeps what it had."""
+    """Extend a run that ended early by its last value."""
     return np.array([*values, *[values[-1]] * (length - len(values))])
 
 
 def _memory(axes, rows: list[dict[str, Any]]) -> None:
     steps = [row["steps"] for row in rows]
-    for (keep, name), colour in zip(
+    for (storage, name), colour in zip(
         {"factors": "factors kept", "stages": "states kept", "checkpoints": "checkpoints"}.items(),
         COLOURS,
         strict=False,
     ):
-        axes.plot(steps, [row[keep]["bytes"] / 1e6 for row in rows], "o-", color=colour, label=name)
+        axes.plot(steps, [row[storage]["bytes"] / 1e6 for row in rows], "o-", color=colour, label=name)
     axes.set(xscale="log", yscale="log")
     axes.set_xlabel("steps", fontsize=9)
     axes.legend(frameon=False, fontsize=8)

@@ -1,4 +1,4 @@
-"""The gradient's time beside that of its equilibrium."""
+"""Figure of the time of a gradient beside that of its equilibrium."""
 
 from __future__ import annotations
 
@@ -21,15 +21,21 @@ def draw(results: dict[str, Any], setting: dict[str, Any]) -> Figure:
     axes = figure.subplots()
     width = 0.26
     for k, (name, (label, colour)) in enumerate(BARS.items()):
-        places = [row + (k - 1) * width for row in range(len(results))]
+        positions = [row + (k - 1) * width for row in range(len(results))]
         values = [1e3 * cost[name] for cost in results.values()]
-        axes.barh(places, values, height=width, color=colour, label=label)
-        for place, value, cost in zip(places, values, results.values(), strict=True):
+        axes.barh(positions, values, height=width, color=colour, label=label)
+        for position, value, cost in zip(positions, values, results.values(), strict=True):
             text = f"{value:,.0f}" if value >= 100 else f"{value:.3g}"
             if name == "gradient":
                 text += f"  {100 * cost['share']:.1f} % of the equilibrium"
             axes.annotate(
-                text, (value, place), (4, 0), textcoords="offset points", va="center", fontsize=8.5, color=INK
+                text,
+                (value, position),
+                (4, 0),
+                textcoords="offset points",
+                va="center",
+                fontsize=8.5,
+                color=INK,
             )
     axes.set_yticks(range(len(results)), list(results))
     axes.invert_yaxis()

@@ -1,4 +1,4 @@
-"""How many times as fast an iteration is as the paper's, a bar a row."""
+"""Figure of the speed of an iteration over that in the paper, one bar for each row of its table."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ def draw(results: dict[str, Any], setting: dict[str, Any]) -> Figure:
     rows = [row for row in results["rows"] if not row["absent"] and row["ratio"] is not None]
     figure = new_figure(8.0, 1.6 + 0.42 * max(1, len(rows)))
     axes = figure.subplots()
-    places = range(len(rows))
-    axes.barh(places, [row["ratio"] for row in rows], color=BLUE, height=0.62)
-    for place, row in zip(places, rows, strict=True):
+    positions = range(len(rows))
+    axes.barh(positions, [row["ratio"] for row in rows], color=BLUE, height=0.62)
+    for position, row in zip(positions, rows, strict=True):
         axes.annotate(
-            _two_digits(row["ratio"]), (row["ratio"], place), (5, 0), textcoords="offset points", va="center",
+            _two_digits(row["ratio"]), (row["ratio"], position), (5, 0), textcoords="offset points", va="center",
             fontsize=9, fontweight="bold", color=INK,
         )  # fmt: skip
         axes.annotate(
-            f"{_seconds(row['seconds'])}, theirs {_seconds(row['paper'])}", (1.0, place), (6, 0),
+            f"{_seconds(row['seconds'])}, theirs {_seconds(row['paper'])}", (1.0, position), (6, 0),
             textcoords="offset points", va="center", fontsize=8, color="white",
         )  # fmt: skip
-    axes.set_yticks(places, [f"{row['name']} (Fig. {row['figure']})" for row in rows])
+    axes.set_yticks(positions, [f"{row['name']} (Fig. {row['figure']})" for row in rows])
     axes.set(xscale="log", xlim=(1.0, 3.0 * max((row["ratio"] for row in rows), default=10.0)))
     axes.invert_yaxis()
     axes.axvline(1.0, color=FAINT, linewidth=0.8)

@@ -1,4 +1,4 @@
-"""Times and memory against the number of faces, with the exponents they grow with; two threads over one."""
+"""Figure of times and memory against the number of faces, with their exponents; two threads over one."""
 
 from __future__ import annotations
 
@@ -83,14 +83,14 @@ def draw(results: dict[str, Any], setting: dict[str, Any]) -> Figure:
 
 
 def _company(axes, results: dict[str, Any]) -> None:
-    """Two threads' time over one's, with what each may be at most."""
-    places, ratios = range(len(COMPANY)), [ratio(results["company"][name]) for name in COMPANY]
-    axes.barh(places, ratios, color=SKY, height=0.55)
-    for place, (_, _, allowed) in zip(places, COMPANY.values(), strict=True):
+    """Draw the time of two threads over that of one, with the largest allowed ratios."""
+    positions, ratios = range(len(COMPANY)), [ratio(results["company"][name]) for name in COMPANY]
+    axes.barh(positions, ratios, color=SKY, height=0.55)
+    for position, (_, _, allowed) in zip(positions, COMPANY.values(), strict=True):
         if allowed:
-            axes.plot([allowed] * 2, [place - 0.36, place + 0.36], color=VERMILION, linewidth=1.6)
-    label_bars(axes, places, ratios, ".2f")
-    axes.set_yticks(places, COMPANY)
+            axes.plot([allowed] * 2, [position - 0.36, position + 0.36], color=VERMILION, linewidth=1.6)
+    label_bars(axes, positions, ratios, ".2f")
+    axes.set_yticks(positions, COMPANY)
     axes.set(xlim=(0, 1.25 * max(1.15, *ratios)))
     axes.invert_yaxis()
     tidy(axes, grid=None)
@@ -98,29 +98,31 @@ def _company(axes, results: dict[str, Any]) -> None:
 
 
 def _line(axes, faces, values, colour: str, label: str, exponent: float | None) -> None:
-    """With its name and exponent at its end."""
+    """Draw a line with its name and exponent as the label."""
     text = label if exponent is None else f"{label}  {exponent:.2f}"
     axes.plot(faces, values, color=colour, marker="o", markersize=4, linewidth=1.6, label=text)
 
 
 def _ends(axes) -> None:
-    """Names at the ends of the lines, pushed apart where they would lie on each other."""
+    """Write the names at the ends of the lines, moved apart where they would overlap."""
     lines = sorted(
         (line for line in axes.lines if not line.get_label().startswith("_")),
         key=lambda line: line.get_ydata()[-1],
     )
     apart = 0.062
     low, high = (axes.transData.transform((1, y))[1] for y in axes.get_ylim())
-    places = [(axes.transData.transform((1, line.get_ydata()[-1]))[1] - low) / (high - low) for line in lines]
-    for k in range(1, len(places)):
-        places[k] = max(places[k], places[k - 1] + apart)
-    places[-1] = min(places[-1], 1.0)
-    for k in reversed(range(len(places) - 1)):
-        places[k] = min(places[k], places[k + 1] - apart)
-    for line, place in zip(lines, places, strict=True):
+    positions = [
+        (axes.transData.transform((1, line.get_ydata()[-1]))[1] - low) / (high - low) for line in lines
+    ]
+    for k in range(1, len(positions)):
+        positions[k] = max(positions[k], positions[k - 1] + apart)
+    positions[-1] = min(positions[-1], 1.0)
+    for k in reversed(range(len(positions) - 1)):
+        positions[k] = min(positions[k], positions[k + 1] - apart)
+    for line, position in zip(lines, positions, strict=True):
         axes.annotate(
             line.get_label(),
-            (1.02, place),
+            (1.02, position),
             xycoords="axes fraction",
             fontsize=8,
             color=line.get_color(),

@@ -1,4 +1,4 @@
-"""Factorizations from flat by each method; what each backend's factorization takes."""
+"""Figure of the factorizations from flat by each method, and of the time of each backend's factorization."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def draw(results: dict[str, Any], setting: dict[str, Any]) -> Figure:
     _backends(right, results["backends"])
     for axes in (left, right):
         axes.tick_params(axis="y", length=0, labelsize=8.5)
-        place = "lower right" if axes is left else "upper right"
-        axes.legend(frameon=False, fontsize=8, labelcolor=INK, loc=place)
+        position = "lower right" if axes is left else "upper right"
+        axes.legend(frameon=False, fontsize=8, labelcolor=INK, loc=position)
     iteration = results["iteration"]
     note(
         figure,
@@ -42,19 +42,25 @@ def draw(results: dict[str, Any], setting: dict[str, Any]) -> Figure:
 
 
 def _from_flat(axes, found: dict[str, Any]) -> None:
-    ways = [(bending, solver) for bending in BENDINGS for solver in SOLVERS]
-    width = 0.8 / len(ways)
-    for k, (bending, solver) in enumerate(ways):
+    methods = [(bending, solver) for bending in BENDINGS for solver in SOLVERS]
+    width = 0.8 / len(methods)
+    for k, (bending, solver) in enumerate(methods):
         look = {"color": BENDING_COLOURS[bending], "alpha": 1.0 if solver == "mixed" else 0.4}
         for row, case in enumerate(CASES):
             run = found[f"{case}, {bending}, {solver}"]
-            place = row + (k - (len(ways) - 1) / 2) * width
+            position = row + (k - (len(methods) - 1) / 2) * width
             count = run["factorizations"]
             label = f"{bending}, {solver} Newton" if row == 0 else None
-            axes.barh(place, count, height=width, label=label, **look)
+            axes.barh(position, count, height=width, label=label, **look)
             text = f"{count}, failed" if run["failed"] else str(count)
             axes.annotate(
-                text, (count, place), (4, 0), textcoords="offset points", va="center", fontsize=8, color=INK
+                text,
+                (count, position),
+                (4, 0),
+                textcoords="offset points",
+                va="center",
+                fontsize=8,
+                color=INK,
             )
     for row, (_, _, allowed) in enumerate(CASES.values()):
         axes.plot([allowed, allowed], [row - 0.4, row + 0.4], color=FAINT, linestyle="--", linewidth=1.2)
@@ -68,10 +74,10 @@ def _from_flat(axes, found: dict[str, Any]) -> None:
 def _backends(axes, backends: dict[str, Any]) -> None:
     width = 0.8 / len(STEPS)
     for k, (step, colour) in enumerate(zip(STEPS, COLOURS, strict=False)):
-        places = [row + (k - 1) * width for row in range(len(backends))]
+        positions = [row + (k - 1) * width for row in range(len(backends))]
         values = [1e3 * times[step] for times in backends.values()]
-        axes.barh(places, values, height=width, color=colour, label=step)
-        label_bars(axes, places, values, ".3g")
+        axes.barh(positions, values, height=width, color=colour, label=step)
+        label_bars(axes, positions, values, ".3g")
     axes.set_yticks(range(len(backends)), list(backends))
     axes.invert_yaxis()
     axes.margins(x=0.12)

@@ -1,4 +1,4 @@
-"""Error against time, a small panel a case."""
+"""Figure of error against time, with a small panel for each case."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def _panel(axes, study: Study, points: list[dict[str, Any]]) -> None:
 
 
 def _others(axes, points: list[dict[str, Any]]) -> None:
-    """NGSolve's, regular meshes alone: the number of its order at each."""
+    """Draw NGSolve's points on regular meshes, each as the number of its order."""
     for point in points:
         if not point["irregular"]:
             axes.plot(point["time"], max(point["error"], _SMALLEST), **_number(point["order"]))
@@ -90,11 +90,12 @@ def _curve(axes, points: list[dict[str, Any]], colour: str, irregular: bool, pla
         return
     times = np.array([point["time"] for point in points])
     errors = np.maximum([point["error"] for point in points], _SMALLEST)
-    axes.plot(times, errors, **_look(colour, irregular, plain))
+    axes.plot(times, errors, **_line_style(colour, irregular, plain))
 
 
-def _look(colour: str, irregular: bool, plain: bool) -> dict[str, Any]:
-    """Filled: the mixed method, or linear theory; hollow: plain Newton. Dashed: irregular."""
+def _line_style(colour: str, irregular: bool, plain: bool) -> dict[str, Any]:
+    """Return the style of a curve: filled for the mixed method or linear theory, hollow for plain Newton; dashed if
+    irregular."""
     return {
         "color": colour,
         "linestyle": (0, (3, 1.5)) if irregular else "-",
@@ -111,15 +112,18 @@ def _look(colour: str, irregular: bool, plain: bool) -> dict[str, Any]:
 
 def _legend(figure: Figure, others: bool) -> None:
     lines = [
-        (f"{bending}, {'irregular' if irregular else 'regular'} mesh", _look(colour, irregular, plain=False))
+        (
+            f"{bending}, {'irregular' if irregular else 'regular'} mesh",
+            _line_style(colour, irregular, plain=False),
+        )
         for bending, colour in BENDING_COLOURS.items()
         for irregular in (False, True)
     ]
-    lines.append(("the same by plain Newton", _look(INK, irregular=False, plain=True)))
-    handles = [Line2D([], [], label=label, **look) for label, look in lines]
+    lines.append(("the same by plain Newton", _line_style(INK, irregular=False, plain=True)))
+    handles = [Line2D([], [], label=label, **style) for label, style in lines]
     if others:
         handles.append(Line2D([], [], label="NGSolve, of the order written, regular mesh", **_number(2)))
-    handles.append(Patch(color=SHADE, label="below what the reference tells"))
+    handles.append(Patch(color=SHADE, label="below the reference's accuracy"))
     figure.legend(
         handles=handles, loc="outside upper left", ncols=3, frameon=False, fontsize=8.5, labelcolor=INK
     )

@@ -67,7 +67,7 @@ def _converted(block: list[str]) -> list[str]:
 
 
 def _escaped(text: str) -> str:
-    """Escape the markup of reStructuredText; text in backticks becomes code."""
+    """Return text with the markup of reStructuredText escaped; text in backticks becomes code."""
     parts = text.split("`")
     if len(parts) % 2 == 0:
         return _plain(text)

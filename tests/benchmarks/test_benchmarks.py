@@ -11,7 +11,7 @@ import pytest
 from bench_figures import is_a_picture
 
 import magshell as ms
-from benchmarks import beside_ngsolve
+from benchmarks import compare_ngsolve
 from benchmarks.__main__ import MISSING_LIBRARY, PARTS, main
 from benchmarks.cases import CASES, SOLID_CASES
 from benchmarks.cases.solids import pulled_end
@@ -128,12 +128,14 @@ def test_ngsolve_is_missed_before_any_work(monkeypatch, capsys) -> None:
 
 def test_rows_beside_ngsolve(monkeypatch, capsys) -> None:
     """The table, with numbers in place of NGSolve's: errors that fall as the fourth power, a second a cell."""
-    case = beside_ngsolve.CASES[0]
-    theirs = lambda order: lambda mesh: beside_ngsolve.Tried(mesh, (mesh[0] ** -order,), (float(mesh[0]),))  # noqa: E731
-    monkeypatch.setattr(beside_ngsolve, "_ways", lambda *_: {way: theirs(way or 3) for way in (0, 2, 3, 4)})
-    found = beside_ngsolve.measure([case.name], rounds=1, quick=True)
+    case = compare_ngsolve.CASES[0]
+    theirs = lambda order: lambda mesh: compare_ngsolve.Tried(mesh, (mesh[0] ** -order,), (float(mesh[0]),))  # noqa: E731
+    monkeypatch.setattr(
+        compare_ngsolve, "_solvers", lambda *_: {way: theirs(way or 3) for way in (0, 2, 3, 4)}
+    )
+    found = compare_ngsolve.measure([case.name], rounds=1, quick=True)
     with collected() as notes:
-        beside_ngsolve.print_rows(found["rows"])
+        compare_ngsolve.print_rows(found["rows"])
     (row,) = found["rows"]
     assert (row["mesh"], row["their_order"], row["their_mesh"]) == ((10, 1), 4, (6, 1))
     assert row["seconds"] == 10.0 and row["their_seconds"] == 6.0

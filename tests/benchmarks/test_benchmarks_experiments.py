@@ -11,9 +11,9 @@ import magshell as ms
 from benchmarks.__main__ import main
 from benchmarks.baselines import methods
 from benchmarks.baselines.counted import BudgetSpent, Counted
-from benchmarks.baselines.kept import Kept
+from benchmarks.baselines.stored_runs import StoredRuns
 from benchmarks.baselines.tasks import RobotTask, StripTask, Task
-from benchmarks.experiments import beside_ours
+from benchmarks.experiments import compare_with_ours
 
 pytest.importorskip("gymnasium")
 torch = pytest.importorskip("torch")
@@ -108,7 +108,7 @@ class Hop:
         return controls.sum(0)
 
     @staticmethod
-    def miss(motion):
+    def relative_distance(motion):
         return ((motion - 0.5) ** 2).sum() ** 0.5
 
     @staticmethod
@@ -160,8 +160,8 @@ def results(ours, theirs, goal):
 )
 def test_baselines_beside_ours_at_ten_times_the_simulations(ours, theirs, goal, verdict) -> None:
     task = results(ours, theirs, goal)
-    assert beside_ours("CMA-ES", task) == verdict
-    assert beside_ours("L-BFGS", task) == "ours"
+    assert compare_with_ours("CMA-ES", task) == verdict
+    assert compare_with_ours("L-BFGS", task) == "ours"
 
 
 def test_quick_run_draws_a_figure(tmp_path, capsys) -> None:
@@ -209,15 +209,15 @@ def test_runs_are_kept_and_gone_on_with(tmp_path, capsys, monkeypatch) -> None:
 
 def test_processes_that_share_a_file_keep_each_others_runs(tmp_path) -> None:
     path = tmp_path / "runs.json"
-    one, other = Kept(path), Kept(path)
+    one, other = StoredRuns(path), StoredRuns(path)
     for kept, seed in ((one, 0), (other, 1), (one, 2)):
         kept.run("bowl", "L-BFGS", seed, 4, lambda seed=seed: {"best": [float(seed)], "seconds": [0.0]})
-    again = Kept(path)
+    again = StoredRuns(path)
     assert [again.known("bowl", "L-BFGS", seed, 4)["best"] for seed in range(3)] == [[0.0], [1.0], [2.0]]
 
 
 def test_runs_of_other_budgets_that_are_the_same(tmp_path) -> None:
-    kept, never = Kept(tmp_path / "runs.json"), lambda: pytest.fail("it is known")
+    kept, never = StoredRuns(tmp_path / "runs.json"), lambda: pytest.fail("it is known")
     kept.run("bowl", "spent", 0, 3, lambda: {"best": [3.0, 2.0, 1.0], "seconds": [0.1, 0.2, 0.3]})
     kept.run("bowl", "ended", 0, 3, lambda: {"best": [3.0, 2.0], "seconds": [0.1, 0.2]})
     assert kept.run("bowl", "spent", 0, 2, never) == {"best": [3.0, 2.0], "seconds": [0.1, 0.2]}

@@ -151,11 +151,11 @@ def test_a_long_call_is_measured_in_one_round(monkeypatch, long: bool) -> None:
 @pytest.mark.alone
 def test_share_of_the_processor() -> None:
     ms.set_num_threads(1)
-    slept, share = timing.with_share(lambda: time.sleep(0.05))
+    slept, share = timing.with_processor_fraction(lambda: time.sleep(0.05))
     assert slept is None and share < 0.5
-    assert timing.with_share(lambda: None)[1] == 1.0
+    assert timing.with_processor_fraction(lambda: None)[1] == 1.0
     ms.set_num_threads(2)
-    assert timing.with_share(lambda: time.sleep(0.01))[1] == 1.0
+    assert timing.with_processor_fraction(lambda: time.sleep(0.01))[1] == 1.0
 
 
 def test_solves_measure_the_processor_if_told_to():

@@ -1,4 +1,4 @@
-"""Runs that are kept in a file as they end, so that hours of them may be stopped and gone on with."""
+"""Storage of runs in a file as they end, so that hours of them can be stopped and continued."""
 
 from __future__ import annotations
 
@@ -12,16 +12,22 @@ from magshell._runtime.files import replace_file
 _KEYS = ("task", "method", "seed", "budget")
 
 
-class Kept:
-    """path: of a JSON file, which may not be there yet; None: nothing is kept. Processes with other parts may share it."""
+class StoredRuns:
+    """Runs of searches, stored in a JSON file that processes with other parts may share.
+
+    path: the file, which need not exist yet; None: nothing is stored.
+    """
 
     def __init__(self, path: Path | None):
         self._path = path
         self._runs = {} if path is None or not path.exists() else _read(path)
 
     def known(self, task: str, method: str, seed: int, budget: int) -> dict[str, Any] | None:
-        """{"best", "seconds"} of a run, if one was kept: what a larger budget began with, too, and all of one that ended
-        before its own budget was spent."""
+        """Return {"best", "seconds"} of a stored run, None if there is none.
+
+        A run with a larger budget is cut to this one; a run that ended before its own budget was spent is returned
+        whole.
+        """
         for (*which, given), run in self._runs.items():
             if which == [task, method, seed] and (given >= budget or len(run["best"]) < given):
                 return {name: values[:budget] for name, values in run.items()}
@@ -30,13 +36,13 @@ class Kept:
     def run(
         self, task: str, method: str, seed: int, budget: int, make: Callable[[], dict[str, Any]]
     ) -> dict[str, Any]:
-        """The one known, or what `make` returns, which is kept."""
+        """Return the stored run, or what `make` returns, which is then stored."""
         known = self.known(task, method, seed, budget)
         if known is not None:
             return known
         run = self._runs[task, method, seed, budget] = make()
         if self._path is not None:
-            if self._path.exists():  # another process may have kept some there
+            if self._path.exists():  # another process may have stored runs there
                 self._runs = _read(self._path) | self._runs
             rows = [dict(zip(_KEYS, each, strict=True)) | run for each, run in self._runs.items()]
             text = "[\n" + ",\n".join(map(json.dumps, rows)) + "\n]\n"
@@ -52,5 +58,5 @@ def _read(path: Path) -> dict[str, Any]:
         }
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise SystemExit(
-            f"{path} does not hold runs that `python -m benchmarks experiments` has kept: {error!r}"
+            f"{path} does not hold runs that `python -m benchmarks experiments` has stored: {error!r}"
         ) from error

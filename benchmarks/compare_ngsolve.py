@@ -1,4 +1,5 @@
-"""Time to an error of 0.1 % beside NGSolve's shells of each order, on meshes as fine as each needs, in one run."""
+"""Time to an error of 0.1 %, compared with NGSolve's shells of each order, on meshes as fine as each needs, in one
+run."""
 
 from __future__ import annotations
 
@@ -18,20 +19,23 @@ from .report import bar, print_table
 from .timing import processor_clock
 
 BOUND = 1e-3
-GOAL = 0.7  # of NGSolve's time
-ORDERS = (2, 3, 4)  # of NGSolve's; its first is ours
+GOAL = 0.7  # [-] largest ratio of magshell's time to NGSolve's
+ORDERS = (2, 3, 4)  # orders of NGSolve's elements; order 1 is the same element as `midedge`
 IRREGULAR = 0.25
 NAME = "NGSolve"
-_LONG = 0.5  # s: disturbances make no difference
+_LONG = 0.5  # [s] longer solves are timed once, because disturbances hardly matter
 
 _AROUND = (2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 18, 20, 24, 28, 32)
 SQUARES = tuple((n, n) for n in _AROUND)
 STRIPS = tuple((n, 1) for n in _AROUND)
-WIDER = tuple((n, 2) for n in _AROUND)  # of irregular ones, so that there is something inside to be moved
+WIDER = tuple((n, 2) for n in _AROUND)  # for irregular meshes, which need inner vertices to move
 
 
 class Case(NamedTuple):
-    """run: of ours on a mesh; parts: names of its comparisons where each is a solve of its own."""
+    """A case to compare.
+
+    run: magshell's solve on a mesh; parts: names of its comparisons if each is a solve of its own.
+    """
 
     name: str
     run: Callable[..., Outcome]
@@ -51,7 +55,7 @@ CASES = (
 
 
 class Tried(NamedTuple):
-    """One mesh in one way. errors, seconds: of each part."""
+    """One mesh solved in one way. errors, seconds: of each part."""
 
     mesh: tuple[int, int]
     errors: tuple[float, ...]
@@ -59,7 +63,10 @@ class Tried(NamedTuple):
 
 
 class Row(NamedTuple):
-    """How long each takes to the bound; None where no mesh is fine enough. their_order: the one that is fastest."""
+    """The times that magshell and NGSolve need to the bound; None if no mesh is fine enough.
+
+    their_order: NGSolve's fastest order.
+    """
 
     case: str
     part: str
@@ -74,22 +81,25 @@ class Row(NamedTuple):
 
 
 def check_ngsolve() -> None:
-    """Raises ImportError where there is no NGSolve."""
+    """Raise ImportError if NGSolve is missing; else restrict it to one thread."""
     import ngsolve
 
     ngsolve.SetNumThreads(1)
 
 
 def measure(names: list[str] | None, rounds: int, quick: bool = False) -> dict[str, Any]:
-    """{"rows": of the table, "points": of the figure}, plain. quick: regular meshes alone, which the figure shows."""
+    """Return {"rows": those of the table, "points": those of the figure}, plain. quick: only the regular meshes of
+    the figure."""
     cases = [case for case in CASES if names is None or case.name in names]
     asked = [(case, irregular) for case in cases for irregular in ((False,) if quick else (False, True))]
     rows, points = [], []
     with bar("beside NGSolve", len(asked)) as shown:
         for case, irregular in asked:
-            ways = _ways(case, irregular)
-            tried = {way: list(_until_within(run, _meshes(case, irregular))) for way, run in ways.items()}
-            _again(ways, tried, rounds)
+            solvers = _solvers(case, irregular)
+            tried = {
+                order: list(_until_within(run, _meshes(case, irregular))) for order, run in solvers.items()
+            }
+            _repeat(solvers, tried, rounds)
             rows += _rows(case, irregular, tried)
             points += _points(case, irregular, tried)
             shown.update()
@@ -100,8 +110,8 @@ def _meshes(case: Case, irregular: bool) -> tuple[Any, ...]:
     return case.irregular if irregular else case.regular
 
 
-def _ways(case: Case, irregular: bool) -> dict[int, Callable[..., Any]]:
-    """{order of NGSolve's, 0 of ours: mesh -> Tried, or None where that does not converge}."""
+def _solvers(case: Case, irregular: bool) -> dict[int, Callable[..., Any]]:
+    """Return {order of NGSolve's elements, 0 for magshell: function mesh -> Tried, or None without convergence}."""
     from .baselines.ngsolve_cases import RUNS
     from .baselines.ngsolve_strips import DidNotConverge
 
@@ -132,8 +142,10 @@ def _ways(case: Case, irregular: bool) -> dict[int, Callable[..., Any]]:
 
 
 def _until_within(run: Callable[..., Any], meshes: tuple[Any, ...]) -> Iterator[Tried]:
-    """Finer and finer, until all parts are within the bound on two meshes that follow each other: one alone may be so by
-    chance."""
+    """Yield results on finer and finer meshes, until all parts are within the bound on two successive ones.
+
+    A single mesh may be within the bound by chance.
+    """
     before = False
     for mesh in meshes:
         tried = run(mesh)
@@ -147,31 +159,30 @@ def _until_within(run: Callable[..., Any], meshes: tuple[Any, ...]) -> Iterator[
 
 
 def _first(tried: list[Tried], part: int) -> Tried | None:
-    """The first of two that are within."""
+    """Return the first of two successive results within the bound."""
     for one, following in itertools.pairwise(tried):
         if one.errors[part] <= BOUND and following.errors[part] <= BOUND:
             return one
     return None
 
 
-def _again(ways: dict[str, Any], tried: dict[str, Any], rounds: int) -> None:
-    """Times of the meshes that rows name become the best of rounds in which all ways have their turns, but for long
-    ones."""
+def _repeat(solvers: dict[int, Any], tried: dict[int, Any], rounds: int) -> None:
+    """Repeat the short solves that the table names, in rounds over all solvers, and take the best times."""
     named = {
-        way: {
+        order: {
             one.mesh
             for part in range(len(each[0].errors))
             if (one := _first(each, part)) and sum(one.seconds) < _LONG
         }
-        for way, each in tried.items()
+        for order, each in tried.items()
     }
-    taken: dict = {(way, mesh): [] for way, meshes in named.items() for mesh in meshes}
+    taken: dict = {(order, mesh): [] for order, meshes in named.items() for mesh in meshes}
     for _ in range(rounds):
-        for way, mesh in taken:
-            taken[way, mesh].append(ways[way](mesh).seconds)
-    for way, each in tried.items():
+        for order, mesh in taken:
+            taken[order, mesh].append(solvers[order](mesh).seconds)
+    for order, each in tried.items():
         for k, one in enumerate(each):
-            if times := taken.get((way, one.mesh)):
+            if times := taken.get((order, one.mesh)):
                 seconds = tuple(min(part) for part in zip(*times, strict=True))
                 each[k] = one._replace(seconds=seconds)
 
@@ -196,7 +207,7 @@ def _rows(case: Case, irregular: bool, tried: dict[str, Any]) -> Iterator[Row]:
 
 
 def _points(case: Case, irregular: bool, tried: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """NGSolve's of the figure, whose panels have all parts of a case together."""
+    """Yield NGSolve's points of the figure, whose panels show all parts of a case together."""
     for order in ORDERS:
         for one in tried[order]:
             yield {
@@ -210,7 +221,7 @@ def _points(case: Case, irregular: bool, tried: dict[str, Any]) -> Iterator[dict
 
 
 def print_rows(rows: list[dict[str, Any]]) -> None:
-    """And notes how ours compares."""
+    """Print the table, and note how magshell's times compare."""
     table = []
     for row in (Row(**each) for each in rows):
         name = f"{row.case}{', ' if row.part else ''}{row.part}"
@@ -223,9 +234,9 @@ def print_rows(rows: list[dict[str, Any]]) -> None:
             [
                 name,
                 kind,
-                *_told(row.mesh, row.error, row.seconds),
+                *_format_solve(row.mesh, row.error, row.seconds),
                 row.their_order or "",
-                *_told(row.their_mesh, row.their_error, row.their_seconds),
+                *_format_solve(row.their_mesh, row.their_error, row.their_seconds),
                 "" if ratio is None else f"{ratio:.2g}{missed}",
             ]
         )
@@ -237,7 +248,8 @@ def print_rows(rows: list[dict[str, Any]]) -> None:
     )
 
 
-def _told(mesh, error, seconds) -> tuple[Any, ...]:
+def _format_solve(mesh, error, seconds) -> tuple[Any, ...]:
+    """Format mesh, error and time of a solve for the table."""
     if mesh is None:
         return "never", "", ""
     return "x".join(map(str, mesh)), f"{100 * error:.2g} %", f"{1e3 * seconds:.3g}"
