@@ -231,7 +231,7 @@ def test_what_has_no_digest_is_refused_before_a_file_is_there(tmp_path):
         sheet, supports=[ms.Clamp(MESH.edges_at(x=0.0))], field=ms.CustomField(Locked(), length_scale=1.0)
     )
     rest = ms.equilibrium(scene, remanent_magnetization=(4e4, 0, 0))
-    with pytest.raises(ValueError, match=r"cannot for field\[0\]"):
+    with pytest.raises(ValueError, match=r"but field\[0\]"):
         ms.save(tmp_path / "rest.npz", rest)
     assert not list(tmp_path.iterdir())
 

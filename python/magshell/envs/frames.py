@@ -44,7 +44,7 @@ class Camera:
                 state,
                 positions=state.positions + sign * _AROUND * size * axis,
                 flux_density=strongest,
-                bones=(),
+                links=(),
             )
             for axis in np.eye(3)
             for sign in (-1, 1)

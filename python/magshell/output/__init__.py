@@ -1,1 +1,1 @@
-"""Writes results to files and draws them."""
+"""Output of results: tables, files, pictures, movies and pages."""

@@ -10,7 +10,7 @@ from motions import lifted_strip
 import magshell as ms
 from magshell.output.plot import films
 from magshell.output.plot.colors import FIELD, rgb
-from magshell.output.plot.playback import moments, speed_of, spoken, state_at
+from magshell.output.plot.playback import describe_speed, moments, speed_of, state_at
 from magshell.output.results.state import states_of, with_times
 
 image = pytest.importorskip("PIL.Image")
@@ -101,7 +101,7 @@ def test_a_motion_that_rests_and_one_that_follows_another() -> None:
 def test_the_speed_makes_a_movie_one_can_watch(duration, speed, text) -> None:
     states = with_times(states_of(MESH, positions=rising(2)), [0, duration])
     assert speed_of(states, None) == pytest.approx(speed)
-    assert spoken(speed_of(states, None)) == text
+    assert describe_speed(speed_of(states, None)) == text
 
 
 def test_states_without_times_are_a_frame_each(tmp_path) -> None:

@@ -122,7 +122,7 @@ def test_numbers_at_vertices_are_those_between(pressed):
     heights = pressed.positions @ (1.0, -2.0, 3.0)
     scalar = scalar_of(states, heights, None, None, length_unit(0.1), True)
     ends = scalar.inside[0][found.between]
-    values = ends[:, 0] + found.share * (ends[:, 1] - ends[:, 0])
+    values = ends[:, 0] + found.fraction * (ends[:, 1] - ends[:, 0])
     assert values == pytest.approx(found.points @ (1.0, -2.0, 3.0))
     assert section_solid(found, plane, scalar, 0).colors.shape == (len(found.points), 3)
 

@@ -60,7 +60,7 @@ def test_a_magnet_of_a_motion_is_where_it_is_then(motion, tmp_path):
 
 
 def test_between_two_states_it_is_on_the_way(motion):
-    state = state_at(states_of(motion), Moment(before=1, share=0.25, time=2.5e-3))
+    state = state_at(states_of(motion), Moment(before=1, fraction=0.25, time=2.5e-3))
     np.testing.assert_allclose(center(state), there(2.5e-3).center, atol=1e-12)
     np.testing.assert_allclose(state.sources(PLACE), there(2.5e-3).flux_density(PLACE), rtol=1e-12)
     sides = np.linalg.norm(np.diff(state.magnets[0][0][state.magnets[0][1]], axis=1), axis=2)
@@ -111,7 +111,7 @@ def test_along_a_path_magnets_and_obstacles_are_where_they_are_there():
         [floor] = state.obstacles
         np.testing.assert_allclose(floor.center, (0, 0, -0.2 + 0.1 * parameter), atol=1e-12)
     timed = [replace(state, time=float(k)) for k, state in enumerate(states[:2])]
-    between = state_at(timed, Moment(before=0, share=0.5, time=0.5))
+    between = state_at(timed, Moment(before=0, fraction=0.5, time=0.5))
     np.testing.assert_allclose(center(between), 0.5 * (center(states[0]) + center(states[1])), atol=1e-12)
     np.testing.assert_allclose(
         between.obstacles[0].center, 0.5 * (states[0].obstacles[0].center + states[1].obstacles[0].center)

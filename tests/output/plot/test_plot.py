@@ -217,7 +217,7 @@ def test_magnetization_turns_with_the_sheet(mesh, bent) -> None:
 
 def test_arrows_spread_evenly(mesh) -> None:
     spacing = glyphs.spacing_of(mesh, 40)
-    faces = glyphs.spread_faces(mesh, spacing)
+    faces = glyphs.sample_faces(mesh, spacing)
     assert 25 <= len(faces) <= 55
     centers = mesh.face_barycenters[faces]
     gaps = np.linalg.norm(centers[:, None] - centers, axis=2) + np.eye(len(faces))

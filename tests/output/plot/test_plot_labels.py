@@ -11,7 +11,7 @@ from text_boxes import texts, wrong_texts
 import magshell as ms
 from magshell.output.plot import frames
 from magshell.output.plot.colors import Scalar, scalar_of
-from magshell.output.plot.label_layout import Box, Room, places_around
+from magshell.output.plot.label_layout import Box, Room, candidate_centers
 from magshell.output.plot.legend import ticks_of
 from magshell.output.plot.panels import Drawing, Label, Options, Panel, size_of
 from magshell.output.plot.picture import paint
@@ -208,13 +208,13 @@ def test_a_place_is_free_and_clear_where_there_is_one():
     room = Room(Box(np.zeros(2), np.array([1.0, 1.0])), drawn=np.array([[0.5, 0.6]]))
     point = np.array([0.5, 0.5])
     size = (0.2, 0.1)
-    first = room.take(size, places_around(point, size, (0, 1)))
+    first = room.take(size, candidate_centers(point, size, (0, 1)))
     assert not first.covers(room.drawn)  # though it was to be above
-    others = [room.take(size, places_around(point, size, (0, 1))) for _ in range(60)]
+    others = [room.take(size, candidate_centers(point, size, (0, 1))) for _ in range(60)]
     kept = [each for each in others if each is not None]
     assert 5 < len(kept) < 50  # a text that has no room is left out
     for k, one in enumerate([first, *kept]):
-        assert room.area.holds(one) and not any(one.crosses(other) for other in [first, *kept][:k])
+        assert room.area.contains(one) and not any(one.crosses(other) for other in [first, *kept][:k])
 
 
 def test_lines_break_between_words_and_not_within_formulas():

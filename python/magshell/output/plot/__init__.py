@@ -1,4 +1,4 @@
-"""Pictures and pages of sheets. Nothing outside this package sees a plotting library."""
+"""Pictures, movies and pages. No other package of magshell imports a plotting library."""
 
 from .animation import animate
 from .drawing import plot

@@ -1,4 +1,4 @@
-"""ms.animate: a motion as a movie."""
+"""The function ms.animate, which writes a movie of a motion."""
 
 from __future__ import annotations
 
@@ -21,7 +21,16 @@ from .drawing import check_contacts
 from .frames import Reel, Scenery
 from .limits import checked_width
 from .panels import Drawing, Options, size_of
-from .playback import Moment, between, moments, same_faces, speed_of, spoken, spread, state_at
+from .playback import (
+    Moment,
+    between,
+    describe_speed,
+    evenly_spaced,
+    moments,
+    same_faces,
+    speed_of,
+    state_at,
+)
 from .style import Color, Style, colored, style_of
 from .surfaces import on_surfaces, scalar_on_surfaces
 from .view import View, view_of
@@ -30,8 +39,8 @@ if TYPE_CHECKING:
     from ..._input.kinds import Fielded, FilePath, Numbers, Shown
     from ...model.contact.obstacles.obstacle import Obstacle
 
-SLOWEST, FASTEST = 0.01, 1000.0  # frames a second that the formats can hold
-PALETTE_FRAMES = 12  # that a GIF's colours are chosen from
+SLOWEST, FASTEST = 0.01, 1000.0  # [1/s] smallest and largest number of frames per second
+PALETTE_FRAMES = 12  # frames from which the colours of a GIF are chosen
 
 
 @register_method
@@ -55,23 +64,24 @@ def animate(
     style: Style | None = None,
     progress: bool = True,
 ) -> Path:
-    """Writes a movie of a motion, a .gif or an .mp4, with the field's arrow as it changes.
+    """Write a movie of a motion as .gif or .mp4; the arrow of a uniform field follows its changes.
 
-    what: a Trajectory, a Path, or whatever else `plot` takes, of at least two states of one mesh.
-    times: s, one a state, where positions (n, n_v, 3) of a mesh are given. States without times are shown one a frame;
-        between states with times the frames go in straight lines.
-    speed: seconds of the motion that one second of the movie shows, 0.1 for ten times slower. By default 1 for a motion
-        of 3 to 20 s, else a round number that makes the movie about 8 s long. The movie says which.
-    obstacles: as in `plot`; a moving one moves.
-    fps: frames a second; a .gif keeps a whole number of hundredths of a second a frame, and at most 50 a second. A movie
-        has at most 20,000 frames.
-    title: stands before the time. progress: show a bar once it has taken two seconds. The rest is as in `plot`.
+    what: a Trajectory, an EquilibriumPath, or anything else that `plot` takes, with at least two states of one mesh.
+    times: s, one per state, if positions (n, n_v, 3) of a mesh are given. States without times are shown one per frame;
+        between states with times, frames are interpolated linearly.
+    speed: seconds of the motion per second of the movie, such as 0.1 for ten times slower. By default 1 for a motion of 3
+        to 20 s, and otherwise a round number that makes the movie about 8 s long. The movie shows it.
+    obstacles: as in `plot`; obstacles with a motion move.
+    fps: frames per second. A .gif stores the time of a frame in hundredths of a second, and at most 50 frames per second. A
+        movie has at most 20,000 frames.
+    title: the text before the time. progress: show a progress bar once writing has taken two seconds. The other arguments
+        are as in `plot`.
 
-    Colours, arrows and the window are scaled once, for the whole motion. An .mp4 needs ffmpeg (the extra `movie`).
-    The file appears when it is complete; an error or Ctrl-C leaves an older one as it was.
+    Colours, arrows and the window have one scale for the whole motion. An .mp4 needs ffmpeg (the extra `movie`).
+    An existing file is replaced once the new one is complete; after an error or Ctrl-C it stays as it was.
 
-    Raises ValueError on bad input, FileNotFoundError without the folder, OSError if the file cannot be written,
-    ImportError without matplotlib or, for an .mp4, ffmpeg.
+    Raises ValueError on bad input, FileNotFoundError if the folder does not exist, OSError if the file cannot be written,
+    ImportError without matplotlib or, for an .mp4, without ffmpeg.
 
     >>> import magshell as ms, tempfile, numpy as np
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -87,7 +97,7 @@ def animate(
     style = style_of(style)
     path = films.checked_path(path, fps)
     if path.suffix.lower() == ".gif":
-        fps = 100 / round(100 / fps)  # what the format can hold
+        fps = 100 / round(100 / fps)  # the format stores hundredths of a second
     painter = backends.choose(style.backend)
     states = states_of(
         what,
@@ -115,7 +125,7 @@ def animate(
         return scenery.drawing(state, _values(scalar, moment), _caption(title, state, states[-1], speed))
 
     with Reel(drawing(shown[-1]), width, painter) as reel, SolveBar("animate", progress) as bar:
-        some = spread(shown, PALETTE_FRAMES) if path.suffix.lower() == ".gif" else []
+        some = evenly_spaced(shown, PALETTE_FRAMES) if path.suffix.lower() == ".gif" else []
         samples = [reel.image(drawing(moment)) for moment in some]
         films.write(path, (reel.image(drawing(moment)) for moment in bar.through(shown)), samples, fps)
     return path
@@ -124,14 +134,14 @@ def animate(
 def _values(scalar: Scalar | None, moment: Moment) -> np.ndarray | None:
     if scalar is None:
         return None
-    if not moment.share:
+    if not moment.fraction:
         return scalar.values[moment.before]
-    return between(scalar.values[moment.before], scalar.values[moment.before + 1], moment.share)
+    return between(scalar.values[moment.before], scalar.values[moment.before + 1], moment.fraction)
 
 
 def _caption(title: str | None, state: State, last: State, speed: float) -> str:
-    """What stands above a frame: the title, the time, and how fast it goes."""
+    """Return the text above a frame: the title, the time, and the speed of playback."""
     parts = [title] if title else []
     if state.time is None:
         return "   ".join([*parts, state.title])
-    return "   ".join([*parts, state.title.rjust(len(last.title), "\N{FIGURE SPACE}"), spoken(speed)])
+    return "   ".join([*parts, state.title.rjust(len(last.title), "\N{FIGURE SPACE}"), describe_speed(speed)])

@@ -1,4 +1,4 @@
-"""Which library paints: pyvista where it can render off the screen, else matplotlib."""
+"""Choice of the library that paints: pyvista if it can render off-screen, otherwise matplotlib."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ print("painted" if plotter.screenshot(return_img=True).min() < 128 else "blank")
 
 
 def choose(backend: str | None = None) -> str:
-    """The backend asked for here or in the environment, or the best there is.
+    """Choose the backend requested by the argument or the environment variable, or the best one available.
 
     Raises:
-        ValueError: a name that is none of BACKENDS.
-        ImportError: matplotlib is not installed, or pyvista was asked for and is not.
-        RuntimeError: pyvista was asked for and cannot render here.
+        ValueError: if the name is not one of BACKENDS.
+        ImportError: if matplotlib is not installed, or pyvista was requested and is not installed.
+        RuntimeError: if pyvista was requested and cannot render off-screen here.
     """
     asked = backend or os.environ.get(VARIABLE) or None
     if asked is not None and asked not in BACKENDS:
         source = "backend" if backend else f"the environment variable {VARIABLE}"
         raise ValueError(f"{source} must be 'pyvista' or 'matplotlib', got {asked!r}")
     try:
-        importlib.import_module("matplotlib.backends.backend_agg")  # what paints, with all that it needs
+        importlib.import_module("matplotlib.backends.backend_agg")  # the canvas, with all of its dependencies
     except ImportError as error:
         raise ImportError(
             f"pictures need matplotlib, and better ones pyvista as well: {_INSTALL} ({error})"
@@ -49,6 +49,7 @@ def choose(backend: str | None = None) -> str:
 
 
 def _installed(name: str) -> bool:
+    """Return whether a package is installed, without importing it."""
     try:
         return importlib.util.find_spec(name) is not None
     except (ImportError, ValueError):  # hidden from this process
@@ -57,9 +58,9 @@ def _installed(name: str) -> bool:
 
 @functools.cache
 def why_not_pyvista() -> str | None:
-    """None where pyvista renders off the screen.
+    """Return the reason why pyvista cannot render off-screen, or None if it can.
 
-    A GL driver may end or hang the process that asks it, so another process does.
+    A graphics driver may crash or hang the process that uses it, so this is tried in another process.
     """
     if not _installed("pyvista"):
         return "it is not installed"

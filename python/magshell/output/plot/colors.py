@@ -1,4 +1,4 @@
-"""The colours of a picture: a few fixed ones, three scales, and the scalars that can colour a sheet."""
+"""The colours of a picture: fixed ones, three colour scales, and the scalars that can colour bodies."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def rgb(code: str) -> np.ndarray:
-    """(3,), 0 to 1, of "#rrggbb"."""
+    """Convert a colour "#rrggbb" to its components, (3,) from 0 to 1."""
     return np.array([int(code[k : k + 2], 16) for k in (1, 3, 5)]) / 255.0
 
 
@@ -32,13 +32,13 @@ FIELD = "#1b7f5c"
 CONTACT = "#b3202c"
 OBSTACLE = "#b59a76"
 MAGNET = "#8d949e"
-BONE = "#f0e6d2"
+LINK = "#f0e6d2"
 TENDON = "#8c1c3c"
 NO_VALUE = "#d9dbde"
-# Sheets that lie over each other in one picture, when no scalar colours them.
+# Colours of bodies that lie over each other in one picture and are not coloured by a scalar.
 SERIES = ("#7fa8d1", "#e8b36a", "#8fbf9f", "#d58b8b", "#b3a2d0", "#9fa8b2")
 
-# Anchors at equal distances, linear in between. All are light enough for dark arrows to be seen on them.
+# Equidistant anchors of each colour scale, with linear interpolation; all are light enough for dark arrows to be visible.
 SCALES = {
     "sequential": ("#6c76b8", "#5b9ec4", "#62bdb0", "#a9d37f", "#f7e57a"),
     "diverging": ("#5b8fc9", "#aecbe8", "#f3f1ee", "#f3b9a2", "#d8705f"),
@@ -48,10 +48,11 @@ SCALES = {
 
 @dataclass(frozen=True)
 class Scalar:
-    """Numbers on the faces or the vertices of each state, and how to show them.
+    """A scalar field on the faces or the vertices of each state, and its colour scale.
 
-    values: one array a state; NaN is drawn grey. limits: the ends of the scale, in the unit of the values.
-    inside: what a cut shows, one array a state: (n_t,) of the tetrahedra of all bodies where `of_tetrahedra`, else (n_v,).
+    values: one array per state; NaN is drawn grey. limits: the ends of the scale, in the unit of the values.
+    inside: the values on a section, one array per state: (n_t,) of the tetrahedra of all bodies if `of_tetrahedra`,
+        otherwise (n_v,).
     """
 
     label: str
@@ -62,16 +63,17 @@ class Scalar:
     of_tetrahedra: bool = False
 
     def colors(self, state: int) -> np.ndarray:
-        """(n, 3), 0 to 1."""
+        """Return the colours of the values in a state, (n, 3) from 0 to 1."""
         return scale_colors(self.scale, self.values[state], self.limits)
 
 
 def scale_colors(scale: str, values: np.ndarray, limits: tuple[float, float]) -> np.ndarray:
-    """(n, 3), 0 to 1, of values (n,)."""
+    """Return the colours of values (n,) on a scale between two limits, (n, 3) from 0 to 1."""
     anchors = np.array([rgb(code) for code in SCALES[scale]])
     low, high = limits
-    place = np.clip((values - low) / (high - low), 0.0, 1.0) * (len(anchors) - 1)
-    colors = np.stack([np.interp(place, np.arange(len(anchors)), channel) for channel in anchors.T], axis=1)
+    position = np.clip((values - low) / (high - low), 0.0, 1.0) * (len(anchors) - 1)
+    numbers = np.arange(len(anchors))
+    colors = np.stack([np.interp(position, numbers, channel) for channel in anchors.T], axis=1)
     colors[np.isnan(values)] = rgb(NO_VALUE)
     return colors
 
@@ -79,10 +81,10 @@ def scale_colors(scale: str, values: np.ndarray, limits: tuple[float, float]) ->
 def scalar_of(
     states: list[State], color: Any, label: str | None, limits: Numbers, unit: LengthUnit, cut: bool = False
 ) -> Scalar | None:
-    """The scalar that `color` asks for: None, "auto", a name, an array, or one array a state. cut: the scale holds what is
-    inside too.
+    """Return the scalar that `color` names: None, "auto", a name, an array, or one array per state.
 
-    Raises ValueError on an unknown name, one whose data is missing, or an array of a wrong length.
+    cut: extend the colour scale to the values inside solids. Raises ValueError for an unknown name, a name whose data are
+    missing, or an array of a wrong length.
     """
     if isinstance(color, str) and color == "auto":
         color = _automatic(states)
@@ -103,7 +105,7 @@ def scalar_of(
 
 
 def _wider(scalar: Scalar) -> tuple[float, float]:
-    """The limits with what is inside; even on both sides of the middle where they are."""
+    """Return the limits extended to the values inside solids; those of a diverging scale stay symmetric."""
     low, high = scalar.limits
     inside = np.concatenate([*scalar.inside, (low, high)])
     least, most = float(inside.min()), float(inside.max())
@@ -115,6 +117,7 @@ def _wider(scalar: Scalar) -> tuple[float, float]:
 
 
 def _automatic(states: list[State]) -> str | None:
+    """Choose the magnetization if it varies, otherwise the displacement if there is one, otherwise nothing."""
     magnetizations = [s.remanent_magnetization for s in states if s.is_magnetized]
     if any(np.ptp(m, axis=0).any() for m in magnetizations):
         return "magnetization"
@@ -122,7 +125,11 @@ def _automatic(states: list[State]) -> str | None:
 
 
 def _magnetization(states: list[State], _: LengthUnit) -> Scalar:
-    """The component along the axis all share; else the angle in the plane all share; else the magnitude."""
+    """Return the scalar of the magnetization.
+
+    It is the component along an axis to which all of it is parallel; else the angle in a plane that contains all of it, if
+    the magnitude is uniform; else the magnitude.
+    """
     if not any(state.is_magnetized for state in states):
         raise ValueError("color='magnetization' needs magnetized faces: give remanent_magnetization [A/m]")
     vectors = [
@@ -130,10 +137,10 @@ def _magnetization(states: list[State], _: LengthUnit) -> Scalar:
         for s in states
     ]
     together = np.concatenate(vectors)
-    _, spread, axes = np.linalg.svd(together, full_matrices=False)
+    _, singular_values, axes = np.linalg.svd(together, full_matrices=False)
     magnitudes = np.linalg.norm(together, axis=1)
     factor, unit = prefixed(magnitudes.max(), "A/m")
-    if spread[1] <= 1e-6 * spread[0]:
+    if singular_values[1] <= 1e-6 * singular_values[0]:
         axis = axes[0] * np.sign(axes[0][np.argmax(np.abs(axes[0]))])
         values = [v @ axis / factor for v in vectors]
         bound = magnitudes.max() / factor
@@ -156,7 +163,7 @@ def _displacement(states: list[State], unit: LengthUnit) -> Scalar:
 
 
 def _magnetic_energy(states: list[State], _: LengthUnit) -> Scalar:
-    """- (F_0 M_r) . B at the barycenters, per rest volume, [Chen22] (24)."""
+    """Compute the magnetic energy per reference volume, - (F_0 M_r) . B at the barycenters, [Chen22] (24)."""
     densities = []
     for state in states:
         if not state.is_magnetized or (state.flux_density is None and not state.has_sources):
@@ -170,7 +177,7 @@ def _magnetic_energy(states: list[State], _: LengthUnit) -> Scalar:
 
 
 def _volume_ratio(states: list[State], _: LengthUnit) -> Scalar:
-    """J, even on both sides of 1."""
+    """Return the scalar of the volume ratio J, with limits symmetric about 1."""
     values, inside = _of_elements(
         states, "volume_ratio", lambda found: found.mean(found.volume_ratios), SolidStates
     )
@@ -189,7 +196,11 @@ def _von_mises(states: list[State], _: LengthUnit) -> Scalar:
 
 
 def _of_muscles(name: str):
-    """Of tetrahedra with fibres: activation from 0, or even on both sides of it; stretch even about 1; tension in Pa."""
+    """Return the function that makes the scalar of a muscle quantity on tetrahedra with fibres.
+
+    The limits of the activation and tension begin at 0, or are symmetric about 0 if there are negative values; those of the
+    stretch are symmetric about 1. The tension is in Pa.
+    """
 
     def rows(found: SolidStates) -> np.ndarray:
         return np.full(len(found.volumes), np.nan) if found.muscles is None else found.muscles[name]
@@ -224,7 +235,11 @@ def _contact_pressure(states: list[State], _: LengthUnit) -> Scalar:
 
 
 def _resultant(name: str, text: str, unit: str, of_faces: str):
-    """Of sheets: the principal value of larger magnitude, even on both sides of 0."""
+    """Return the function that makes the scalar of a stress resultant of shells.
+
+    It is the principal value of larger magnitude, with limits symmetric about 0. of_faces: the attribute of ShellStresses
+    with the two principal values.
+    """
 
     def scalar(states: list[State], _: LengthUnit) -> Scalar:
         def largest(found):
@@ -242,8 +257,12 @@ def _resultant(name: str, text: str, unit: str, of_faces: str):
 
 
 def _of_elements(states: list[State], name: str, of_element, kind=(SolidStates, ShellStresses)):
-    """What each face of a sheet has, and the tetrahedron behind each face of a solid; NaN on bodies that are not of this
-    kind. Beside it what all tetrahedra have; one array a state each."""
+    """Evaluate a quantity of elements in each state.
+
+    of_element: the function that returns it from SolidStates or ShellStresses; kind: which of them it is for.
+    Returns the values on faces, those of the tetrahedron behind a face of a solid, NaN on bodies of another kind; and the
+    values of all tetrahedra. Both are lists with one array per state.
+    """
     bodies = {SolidStates: "solids", ShellStresses: "shells"}.get(kind, "bodies")
     wrong = f"color={name!r} is of the {bodies} of a result"
     found: tuple[list[np.ndarray], list[np.ndarray]] = ([], [])
@@ -284,6 +303,7 @@ NAMED = {
 
 
 def _given(states: list[State], color) -> list[np.ndarray]:
+    """Return the caller's numbers as one array per state, (n_f,) or (n_v,). Raises ValueError for another length."""
     if not hasattr(color, "__len__"):
         raise ValueError(f"color must be None, a name or an array, got {color!r}")
     several = len(states) > 1 and len(color) == len(states) and len(shape_of("color", color[0])) == 1

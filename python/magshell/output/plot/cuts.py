@@ -1,4 +1,4 @@
-"""A plane that opens what is drawn: what lies before it is taken away, and solids show what is inside."""
+"""Cutting planes: the part in front of the plane is removed, and the section shows the inside of solids."""
 
 from __future__ import annotations
 
@@ -18,28 +18,30 @@ from .view import View
 if TYPE_CHECKING:
     from ..._input.kinds import Cutting
 
-EDGE_ON = 0.02  # of a plane's normal towards the eye: less is seen as a line
+EDGE_ON = (
+    0.02  # [-] smallest component of a plane's normal towards the eye; below it the plane is seen as a line
+)
 _FORM = "cut must be 'x', 'y' or 'z', such a letter and where [m], or a point [m] and a normal, (3,) each"
 
 
 @dataclass(frozen=True)
 class Cut:
-    """The plane normal . x = offset, m; what is beyond is taken away."""
+    """A plane normal . x = offset [m]; the part with normal . x > offset is removed."""
 
     normal: np.ndarray
     offset: float
 
     def heights(self, points: np.ndarray) -> np.ndarray:
-        """How far points (..., 3) are beyond, m."""
+        """Return the signed distances of points (..., 3) from the plane, m, positive on the removed side."""
         return points @ self.normal - self.offset
 
 
 @dataclass(frozen=True)
 class Section:
-    """Triangles (m, 3) in the plane and the lines (k, 2) between tetrahedra in it, of points (n, 3), m.
+    """The section of solids by a plane: triangles (m, 3), and lines (k, 2) along tetrahedra, on points (n, 3) m.
 
-    tetrahedra: (m,), which of all it is that each is cut from. between: (n, 2), the vertices that each point is between,
-    at `share` (n,) of the way.
+    tetrahedra: (m,), the tetrahedron that each triangle is cut from. between: (n, 2), the two vertices between which each
+    point lies. fraction: (n,), its distance from the first over the distance between them.
     """
 
     points: np.ndarray
@@ -47,12 +49,14 @@ class Section:
     lines: np.ndarray
     tetrahedra: np.ndarray
     between: np.ndarray
-    share: np.ndarray
+    fraction: np.ndarray
 
 
 def checked_cut(cut: Cutting | None, states: list[State], view: View) -> Cut | None:
-    """The plane that is asked for, turned to the eye. Raises ValueError where it is none, is seen edge-on, or leaves
-    nothing."""
+    """Return the plane that a caller describes, with its normal towards the eye.
+
+    Raises ValueError if it is not a plane, is seen edge-on, or removes all of a state.
+    """
     if cut is None:
         return None
     rest = states[0].mesh.rest_positions
@@ -86,13 +90,17 @@ def checked_cut(cut: Cutting | None, states: list[State], view: View) -> Cut | N
 
 
 def _axis(letter: str) -> np.ndarray:
+    """Return the unit vector of the axis "x", "y" or "z"."""
     if letter not in ("x", "y", "z"):
         raise ValueError(f"{_FORM}, got {letter!r}")
     return np.eye(3)["xyz".index(letter)]
 
 
 def section(state: State, cut: Cut) -> Section:
-    """Of the solids at a state. A plane along faces between tetrahedra shows those of the side that is taken away."""
+    """Compute the section of the solids in a state.
+
+    If the plane coincides with faces between tetrahedra, the section consists of the tetrahedra on the removed side.
+    """
     corners, owners = _tetrahedra(state.mesh)
     heights = cut.heights(state.positions)
     beyond = heights[corners] > 0
@@ -104,7 +112,7 @@ def section(state: State, cut: Cut) -> Section:
     first = 0
     for number in (1, 2, 3):
         chosen = count == number
-        order = np.argsort(~beyond[chosen], axis=1, kind="stable")  # those beyond first
+        order = np.argsort(~beyond[chosen], axis=1, kind="stable")  # corners on the removed side first
         nodes = np.take_along_axis(corners[chosen], order, axis=1)
         ring = {
             1: [(0, 1), (0, 2), (0, 3)],
@@ -121,18 +129,21 @@ def section(state: State, cut: Cut) -> Section:
         first += points.size
     pairs = np.concatenate(between)
     upper, lower = heights[pairs].T
-    share = upper / np.where(upper > lower, upper - lower, 1.0)
+    fraction = upper / np.where(upper > lower, upper - lower, 1.0)
     ends = state.positions[pairs]
-    points = ends[:, 0] + share[:, None] * (ends[:, 1] - ends[:, 0])
-    return Section(points, np.concatenate(triangles), np.concatenate(lines), np.concatenate(of), pairs, share)
+    points = ends[:, 0] + fraction[:, None] * (ends[:, 1] - ends[:, 0])
+    tetrahedra = np.concatenate(of)
+    return Section(points, np.concatenate(triangles), np.concatenate(lines), tetrahedra, pairs, fraction)
 
 
 def section_solid(found: Section, cut: Cut, scalar: Scalar | None, number: int) -> Solid:
-    """Coloured by what tetrahedra have, or by what vertices have; grey where only faces have something. number: of the
-    state."""
+    """Return the section as coloured triangles for state `number`.
+
+    The colours are those of the scalar on tetrahedra or at vertices; the section is grey if the scalar is on faces only.
+    """
     corners = found.points[found.triangles]
-    turned = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) @ cut.normal < 0
-    faces = np.where(turned[:, None], found.triangles[:, ::-1], found.triangles)
+    inverted = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) @ cut.normal < 0
+    faces = np.where(inverted[:, None], found.triangles[:, ::-1], found.triangles)
     inside = None if scalar is None or scalar.inside is None else scalar.inside[number]
     if scalar is None or inside is None:
         shade = rgb(SHEET if scalar is None else NO_VALUE)
@@ -141,17 +152,20 @@ def section_solid(found: Section, cut: Cut, scalar: Scalar | None, number: int) 
         shades = scale_colors(scalar.scale, inside[found.tetrahedra], scalar.limits)
         return Solid(found.points, faces, shades, per_face=True)
     ends = inside[found.between]
-    values = ends[:, 0] + found.share * (ends[:, 1] - ends[:, 0])
+    values = ends[:, 0] + found.fraction * (ends[:, 1] - ends[:, 0])
     return Solid(found.points, faces, scale_colors(scalar.scale, values, scalar.limits), per_face=False)
 
 
 def _tetrahedra(mesh) -> tuple[np.ndarray, np.ndarray]:
-    """Flat ones of all solids, (k, 4) vertices, and which of the tetrahedra each is part of, (k,)."""
+    """Return flat tetrahedra of all solids, (k, 4), and the number of the tetrahedron that each is a part of, (k,).
+
+    A ten-node tetrahedron is divided into eight flat ones.
+    """
     corners, owners = [np.zeros((0, 4), dtype=int)], [np.zeros(0, dtype=int)]
     vertex = tetrahedron = 0
     for each in getattr(mesh, "meshes", [mesh]):
         if isinstance(each, TetMesh):
-            # the sides of the flat parts of a curved one are the triangles that are drawn of it
+            # the outer sides of the flat parts of a ten-node tetrahedron are the triangles that are drawn
             parts = CHILDREN if each.order == 2 else np.arange(4)[None]
             corners.append(each.tetrahedra[:, parts].reshape(-1, 4) + vertex)
             owners.append(tetrahedron + np.repeat(np.arange(each.n_tetrahedra), len(parts)))
@@ -161,7 +175,7 @@ def _tetrahedra(mesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def cut_edges(state: State, cut: Cut) -> np.ndarray:
-    """Where the plane meets the triangles of sheets and surfaces, (k, 2, 3), m."""
+    """Return the segments in which the plane cuts the triangles of shells and surfaces, (k, 2, 3) m."""
     corners = state.positions[state.mesh.faces]
     heights = cut.heights(corners)
     beyond = heights > 0
@@ -170,21 +184,21 @@ def cut_edges(state: State, cut: Cut) -> np.ndarray:
     alone = np.where(beyond.sum(axis=1) == 1, beyond.argmax(axis=1), (~beyond).argmax(axis=1))
     rows = np.arange(len(corners))
     ends = []
-    for turn in (1, 2):
-        other = (alone + turn) % 3
+    for step in (1, 2):
+        other = (alone + step) % 3
         from_, to = heights[rows, alone], heights[rows, other]
-        share = (from_ / (from_ - to))[:, None]
-        ends.append(corners[rows, alone] + share * (corners[rows, other] - corners[rows, alone]))
+        fraction = (from_ / (from_ - to))[:, None]
+        ends.append(corners[rows, alone] + fraction * (corners[rows, other] - corners[rows, alone]))
     return np.stack(ends, axis=1)
 
 
 def opened(solid: Solid, cut: Cut) -> Solid:
-    """Without the part beyond the plane, which triangles that it crosses are cut at."""
+    """Return the solid without the part on the removed side; triangles that the plane crosses are divided."""
     heights = cut.heights(solid.positions)
     positions, faces = solid.positions, solid.faces
     beyond = heights[faces] > 0
     count = beyond.sum(axis=1)
-    kept, rows = [faces[count == 0]], [np.flatnonzero(count == 0)]
+    remaining, rows = [faces[count == 0]], [np.flatnonzero(count == 0)]
     between = []
     first = len(positions)
     for number in (1, 2):
@@ -194,19 +208,18 @@ def opened(solid: Solid, cut: Cut) -> Solid:
         p, q = first + np.arange(2 * len(chosen)).reshape(2, -1)
         between.append(np.concatenate([np.stack([a, b], 1), np.stack([a, c], 1)]))
         new = [np.stack([p, b, c], 1), np.stack([p, c, q], 1)] if number == 1 else [np.stack([a, p, q], 1)]
-        kept += new
+        remaining += new
         rows += [chosen] * len(new)
         first += 2 * len(chosen)
     pairs = np.concatenate(between)
-    share = (heights[pairs[:, 0]] / (heights[pairs[:, 0]] - heights[pairs[:, 1]]))[:, None]
+    fraction = (heights[pairs[:, 0]] / (heights[pairs[:, 0]] - heights[pairs[:, 1]]))[:, None]
 
     def joined(values: np.ndarray) -> np.ndarray:
-        return np.concatenate(
-            [values, values[pairs[:, 0]] + share * (values[pairs[:, 1]] - values[pairs[:, 0]])]
-        )
+        new_values = values[pairs[:, 0]] + fraction * (values[pairs[:, 1]] - values[pairs[:, 0]])
+        return np.concatenate([values, new_values])
 
     colors = solid.colors[np.concatenate(rows)] if solid.per_face else joined(solid.colors)
-    faces = np.concatenate(kept)
+    faces = np.concatenate(remaining)
     used, numbers = np.unique(faces, return_inverse=True)
     return replace(
         solid,

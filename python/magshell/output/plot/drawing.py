@@ -1,4 +1,4 @@
-"""ms.plot: a picture of sheets."""
+"""The function ms.plot, which draws a picture of bodies."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .cuts import checked_cut, section
 from .limits import check_columns, checked_width
 from .panels import Options, draw, size_of
 from .picture import Picture, paint
-from .playback import spread
+from .playback import evenly_spaced
 from .style import Color, Style, colored, style_of
 from .surfaces import on_surfaces, scalar_on_surfaces
 from .view import View, view_of
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ..._input.kinds import Cutting, Fielded, Numbers, Shown
     from ...model.contact.obstacles.obstacle import Obstacle
 
-MOST_STATES = 9  # of a path, unless asked for more
+MOST_STATES = 9  # states of a path or motion that are drawn by default
 
 
 @register_method
@@ -52,36 +52,39 @@ def plot(
     width: int = 1600,
     style: Style | None = None,
 ) -> Picture:
-    """A picture of a sheet, its magnetization and the field; of several, side by side or over each other.
+    """Draw a picture of bodies with their magnetization and the field; several states side by side or over each other.
 
-    what: a mesh, a Shell, a Solid, a Scene, a result, or a list of those. Of solids, their surface is drawn.
-    positions, remanent_magnetization, applied_flux_density, field: (n_v, 3) m, (n_f, 3) A/m, (3,) T and
-        fields that vary in space: for a mesh, which has none, or instead of a result's own.
-    obstacles: what is around the sheet, one one sees through; by default what the contacts of a scene are about.
-    states: numbers of those to draw, of a path or a motion; by default all, or nine evenly spread ones.
-    color: "magnetization" (the component of M_r along the axis that all of it shares, else its angle or
-        magnitude), "displacement", "magnetic_energy" (a rest volume), of a result "contact_pressure" (of all contacts, on
-        both sides of a sheet) and "von_mises_stress" (the mean of the tetrahedron behind a face; of a sheet the larger of
-        both surfaces'), of its solids "volume_ratio" (J), of its sheets "membrane_force" or "bending_moment" (the larger
-        principal one),
-        with muscles "activation", "fibre_stretch" or "fibre_tension",
-        an array with a number a face or a vertex, a list of such arrays, one a state, or None for plain sheets.
+    what: a mesh, a Shell, a Solid, a Scene, a result, or a list of those. Of solids, the surface is drawn.
+    positions, remanent_magnetization, applied_flux_density, field: (n_v, 3) m, (n_f, 3) A/m, (3,) T and fields that vary in
+        space: for a mesh, which has none, or instead of those of a result.
+    obstacles: obstacles around the bodies, drawn transparent; by default those of a scene's contacts.
+    states: numbers of the states to draw, of a path or a motion; by default all, or nine evenly spaced ones.
+    color: the quantity that colours the bodies.
+        "magnetization": the component of M_r along its axis if all of it is parallel, else its angle or magnitude.
+        "displacement".
+        "magnetic_energy": per reference volume.
+        "contact_pressure": of a result, the sum over all contacts, on both sides of a shell.
+        "von_mises_stress": of a result, the mean of the tetrahedron behind a face, or the larger one of a shell's surfaces.
+        "volume_ratio": of the solids of a result, J.
+        "membrane_force", "bending_moment": of the shells of a result, the principal value of larger magnitude.
+        "activation", "fibre_stretch", "fibre_tension": of solids with muscles.
+        An array with a number per face or vertex, or a list of such arrays, one per state. None for uniform colours.
         "auto": magnetization if it varies, else displacement.
-        An ms.Color has a text for the colour bar, its ends and its scale.
-    titles: one a state; that a sheet passes through itself is added, where there are at most 20,000 faces to look at.
-    overlay: all states in one panel, each with its title beside it; one that finds no room, as of many states in a small
-        picture, is left out. fade: with the earlier ones paler, as a strobe light shows a motion.
-    columns: of panels, by default what fits best.
-    view: (elevation, azimuth) in degrees of the eye, as in matplotlib, "top", "front" (both with x to the right) or "side";
-        by default what suits the sheet. An ms.View says also what the window holds.
-    cut: a plane that opens solids (and cuts sheets): "x", "y" or "z" through the middle of the rest shape, ("x", 0.05) at
-        that place [m], or a point [m] and a normal, (3,) each. What is on the eye's side of it, in every state as it is,
-        is taken away; the section has the colours of the tetrahedra for what they have, of displacements and numbers at
-        vertices those between, and is grey where a color is one of faces; with the mesh's lines, the tetrahedra's edges.
-    width: pixels, 400 to 8000; a picture has at most 16 million of them.
-    style: an ms.Style: arrows of magnetization, field and contacts, the rest shape, the mesh's lines, who paints.
+        An ms.Color adds a text for the colour bar, its limits and its scale.
+    titles: one per state. If a shell passes through itself, this is added, for at most 20,000 faces.
+    overlay: draw all states in one panel, each with its title next to it. A title that finds no room is left out.
+        fade: the same, with earlier states paler.
+    columns: the number of columns of panels, by default the one that fits best.
+    view: the direction from which the picture is seen: (elevation, azimuth) in degrees, as in matplotlib, "top", "front"
+        (both with x to the right) or "side"; by default one that suits the shape. An ms.View also sets the window.
+    cut: a plane that opens solids and cuts shells: "x", "y" or "z" through the middle of the reference shape, ("x", 0.05)
+        at that coordinate [m], or a point [m] and a normal, (3,) each. The part on the eye's side of the plane is removed in
+        every state. The section is coloured by quantities of tetrahedra, or at vertices by interpolation, and is grey for
+        quantities on faces. With mesh lines, it shows the edges of tetrahedra.
+    width: pixels, 400 to 8000; a picture has at most 16 million pixels.
+    style: an ms.Style: arrows of magnetization, field and contacts, the reference shape, mesh lines, the backend.
 
-    Magnets and wires of fields, magpylib's too, are drawn where they were in each state.
+    Magnets and wires of fields, magpylib's as well, are drawn at their positions in each state.
 
     Raises ValueError on bad input, ImportError without matplotlib.
 
@@ -105,10 +108,10 @@ def plot(
     titles = noted_crossings(checked_titles(titles, drawn), drawn)
     unit = length_unit(size_of(drawn))
     scalar = scalar_on_surfaces(colored(drawn, color, unit, cut is not None), drawn)
-    whole, drawn = drawn, on_surfaces(drawn)
+    volumes, drawn = drawn, on_surfaces(drawn)
     seen = view_of(drawn, view)
-    plane = checked_cut(cut, whole, seen)
-    sections = () if plane is None else tuple(section(state, plane) for state in whole)
+    plane = checked_cut(cut, volumes, seen)
+    sections = () if plane is None else tuple(section(state, plane) for state in volumes)
     groups = [drawn] if overlay or fade else [[state] for state in drawn]
     check_contacts(style, drawn)
     options = replace(Options.of(style), fade=fade, cut=plane, sections=sections)
@@ -117,13 +120,13 @@ def plot(
 
 
 def check_contacts(style: Style, states: list[State]) -> None:
-    """Raises ValueError where contacts are asked for and there are none."""
+    """Raise ValueError if the style shows contact forces and no state has contacts."""
     if style.contacts and not any(state.loads for state in states):
         raise ValueError("contacts are drawn of a result of a scene with contacts: there is none")
 
 
 def checked_titles(titles: str | Sequence[str] | None, states: list[State]) -> list[str]:
-    """One title a state; by default what its result calls it."""
+    """Return one title per state, by default that of its result. Raises ValueError for another number of titles."""
     if titles is None:
         return [state.title for state in states]
     listed = [titles] if isinstance(titles, str) else list(titles)
@@ -133,7 +136,10 @@ def checked_titles(titles: str | Sequence[str] | None, states: list[State]) -> l
 
 
 def noted_crossings(titles: list[str], states: list[State]) -> list[str]:
-    """The titles, with a word where the sheet passes through itself. As they are where looking costs much."""
+    """Return the titles, with a note for states in which a shell passes through itself.
+
+    Meshes with many faces are not checked, because this would take long.
+    """
     if sum(state.mesh.n_faces for state in states) > AFFORDABLE_FACES:
         return titles
     crosses = [len(state.mesh.self_intersections(state.positions)) > 0 for state in states]
@@ -145,9 +151,9 @@ def noted_crossings(titles: list[str], states: list[State]) -> list[str]:
 
 
 def _chosen(states: list[State], chosen) -> list[State]:
-    """The states of the given numbers; by default all, and of many some evenly spread ones."""
+    """Return the states with the given numbers; by default all, or some evenly spaced ones if there are many."""
     if chosen is None:
-        return spread(states, MOST_STATES)
+        return evenly_spaced(states, MOST_STATES)
     numbers = np.atleast_1d(index_array("states", chosen))
     if not numbers.size or numbers.min() < -len(states) or numbers.max() >= len(states):
         raise ValueError(f"states must be numbers of the {len(states)} states, got {numbers.tolist()}")

@@ -1,4 +1,4 @@
-"""Images, one after the other, into a GIF or an MP4 that is there whole or not at all."""
+"""Writing of images as a GIF or MP4 file, which is complete or not written at all."""
 
 from __future__ import annotations
 
@@ -26,8 +26,11 @@ COLORS = 256
 
 
 def checked_path(path: FilePath, fps: float) -> Path:
-    """Raises ValueError on another ending or a pace that the format cannot hold, ImportError without its writer,
-    FileNotFoundError without the folder."""
+    """Return the path of a movie after checks.
+
+    Raises ValueError for another ending or too many frames per second for the format, ImportError if the library that
+    writes it is not installed, FileNotFoundError if the folder does not exist.
+    """
     path = Path(path)
     ending = path.suffix.lower()
     if ending not in (".gif", ".mp4"):
@@ -42,7 +45,10 @@ def checked_path(path: FilePath, fps: float) -> Path:
 
 
 def write(path: Path, images: Iterable[np.ndarray], samples: list[np.ndarray], fps: float) -> None:
-    """Writes images (height, width, 3) uint8. `samples`: some of them, which between them have all colours."""
+    """Write images (height, width, 3) uint8 as a movie.
+
+    samples: images from which the colours of a GIF are chosen; together they should have all colours.
+    """
     with replacing(path) as part:
         if path.suffix.lower() == ".gif":
             _write_gif(part, images, samples, fps)
@@ -51,7 +57,7 @@ def write(path: Path, images: Iterable[np.ndarray], samples: list[np.ndarray], f
 
 
 def _write_gif(path: Path, images: Iterable[np.ndarray], samples: list[np.ndarray], fps: float) -> None:
-    """One palette for all frames and no dither, else still parts would flicker."""
+    """Write a GIF with one palette for all frames and no dithering, so that parts at rest do not flicker."""
     image = _pillow()
     palette = _palette(samples)
     frames = (image.fromarray(each).quantize(palette=palette, dither=image.Dither.NONE) for each in images)
@@ -68,7 +74,10 @@ def _write_gif(path: Path, images: Iterable[np.ndarray], samples: list[np.ndarra
 
 
 def _palette(samples: list[np.ndarray]):
-    """An image with the colours of the samples, white among them; a common colour counts little more than a rare one."""
+    """Return an image whose palette has the main colours of the samples, and white.
+
+    Colours are weighted by the logarithm of their frequency, so that rare ones are represented as well.
+    """
     image = _pillow()
     codes = [each.astype(np.uint32) @ np.array([1 << 16, 1 << 8, 1], dtype=np.uint32) for each in samples]
     distinct, counts = np.unique(np.concatenate(codes, axis=None), return_counts=True)
@@ -76,9 +85,8 @@ def _palette(samples: list[np.ndarray]):
     rgb = np.stack([weighed >> 16, weighed >> 8 & 255, weighed & 255], axis=1).astype(np.uint8)
     few = image.fromarray(rgb[None]).quantize(COLORS - 1, method=image.Quantize.MEDIANCUT).getpalette()
     chosen = np.array([255, 255, 255, *few], dtype=np.uint8).reshape(-1, 3)
-    chosen[chosen.min(axis=1) > 240] = (
-        255  # else pillow, which is not exact, might take one of these for white
-    )
+    # pillow's search for the nearest colour is not exact: without nearly white colours, white stays white
+    chosen[chosen.min(axis=1) > 240] = 255
     palette = image.new("P", (1, 1))
     palette.putpalette(chosen.ravel().tolist())
     return palette
@@ -92,7 +100,7 @@ def _write_mp4(path: Path, images: Iterable[np.ndarray], fps: float) -> None:
     coding = ["-an", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "18", "-movflags", "+faststart"]
     command = [ffmpeg(), "-y", "-loglevel", "error", *raw, *coding, str(path)]
     with tempfile.TemporaryFile() as complaints:
-        # a session of its own: Ctrl-C is for this process, which then ends the other
+        # a new session, so that Ctrl-C reaches this process only, which then ends ffmpeg
         process = subprocess.Popen(
             command,
             stdin=subprocess.PIPE,
@@ -118,7 +126,7 @@ def _write_mp4(path: Path, images: Iterable[np.ndarray], fps: float) -> None:
 
 
 def ffmpeg() -> str:
-    """The program of imageio-ffmpeg, which brings it along, or the one on the PATH. Raises ImportError."""
+    """Return the path of ffmpeg, from the package imageio-ffmpeg or the PATH. Raises ImportError if there is none."""
     try:
         return importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe()
     except (ImportError, RuntimeError):

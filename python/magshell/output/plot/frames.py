@@ -1,4 +1,4 @@
-"""The frames of a motion: one view, one scale and one place for the field's arrow, whatever moves."""
+"""The frames of a movie, with one view, one scale and one position of the field's arrow for the whole motion."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from .panels import (
     strongest_contact,
 )
 from .picture import paint, paint_panel, screen_of, title_height
-from .playback import SAMPLES, spread
+from .playback import SAMPLES, evenly_spaced
 from .solids import arrows
 from .surroundings import box_of, obstacle_solids
 from .texts import Ruler
@@ -37,7 +37,10 @@ DPI = 140
 
 
 class Scenery:
-    """What all frames share, and the drawing of each. `states`: all that the motion goes through."""
+    """The properties that all frames of a motion share, such as scales and the window, and the drawing of each frame.
+
+    states: all states of the motion.
+    """
 
     options: Options
     scalar: Scalar | None
@@ -50,7 +53,7 @@ class Scenery:
         self.scalar, self.view, self.unit, self.options = scalar, view, unit, options
         self.size: float = size_of(states)
         self.strongest: float = glyphs.largest(states)
-        some = spread(states, SAMPLES) if options.contacts else []
+        some = evenly_spaced(states, SAMPLES) if options.contacts else []
         self._strongest_contact = strongest_contact(some)
         self._points, self._full_length = self._surroundings(states)
         low, high = self._bounds(states)
@@ -58,7 +61,7 @@ class Scenery:
         self._hold = np.stack([low, high]) @ view.axes
 
     def drawing(self, state: State, values: np.ndarray | None, title: str) -> Drawing:
-        """A frame; `values`: of the scalar."""
+        """Return the drawing of a frame. values: those of the scalar in this state, or None."""
         shades = rgb(colors.SHEET)
         if self.scalar is not None and values is not None:
             shades = colors.scale_colors(self.scalar.scale, values, self.scalar.limits)
@@ -79,24 +82,26 @@ class Scenery:
         return magnetization_solids(state, self.strongest, self.options.arrows) if self.options.arrows else []
 
     def _surroundings(self, states: list[State]) -> tuple[np.ndarray, float]:
-        """Where fields that vary in space are drawn, and the flux density [T] of full length."""
-        some = spread(states, SAMPLES)
+        """Return the points (n, 3) m at which varying fields are drawn, and the flux density [T] of full length."""
+        some = evenly_spaced(states, SAMPLES)
         if not self.options.field or not any(state.has_sources for state in some):
             return np.zeros((0, 3)), 0.0
         points = glyphs.halo(some, self.size)
         return points, glyphs.sources_glyphs(some, [points] * len(some), self.size)[1]
 
     def _bounds(self, states: list[State]) -> tuple[np.ndarray, np.ndarray]:
-        """The box (right, up, towards the eye) around all sheets and their arrows, m."""
+        """Return the lower and upper corner (right, up, towards the eye) of a box around all bodies and arrows, m."""
         points = [state.positions for state in states]
-        points += [s.positions for state in spread(states, SAMPLES) for s in self._magnetization(state)]
+        points += [
+            s.positions for state in evenly_spaced(states, SAMPLES) for s in self._magnetization(state)
+        ]
         points += [states[0].mesh.rest_positions] if self.options.rest else []
         points += [self._points] if len(self._points) else []
-        around = [each.positions for each in obstacle_solids(spread(states, SAMPLES), self.size)]
+        around = [each.positions for each in obstacle_solids(evenly_spaced(states, SAMPLES), self.size)]
         return box_of(*([self.view.project(each) for each in some] for some in (points, around)))
 
     def _prepare_uniform_field(self, states: list[State], low: np.ndarray, high: np.ndarray) -> None:
-        """A place for the uniform field's arrow to the left of the box, which then holds it."""
+        """Choose a position for the uniform field's arrow to the left of the box, and extend the box to contain it."""
         fields = np.array([s.flux_density for s in states if s.flux_density is not None]).reshape(-1, 3)
         magnitude = float(np.linalg.norm(fields, axis=1).max(initial=0.0))
         self._has_uniform = self.options.field and magnitude > 0.0
@@ -126,7 +131,7 @@ class Scenery:
 
 
 class Reel:
-    """Paints drawings, one after the other, into the same layout: that of the first. A context manager."""
+    """A context manager that paints drawings one after the other, with the layout of the first one."""
 
     def __init__(self, first: Drawing, width: int, backend: str):
         self._figure = paint(first, width, 1, backend, DPI).figure
@@ -143,7 +148,7 @@ class Reel:
         self._screens.__exit__(*error)
 
     def image(self, drawing: Drawing) -> np.ndarray:
-        """(height, width, 3) uint8, both even, as films want them."""
+        """Paint a drawing as an image (height, width, 3) uint8, with an even height and width as movies need."""
         self._axes.clear()
         panel, room = drawing.panels[0], (self._title, self._ruler)
         paint_panel(self._axes, panel, drawing, self._window, self._screen, *room)

@@ -1,4 +1,4 @@
-"""Where arrows stand and how long they are: magnetization on the sheet, a field around it."""
+"""Positions and lengths of arrows: magnetization on bodies, fields around them, contact forces."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ import scipy
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ..results.state import State
 
-ARROWS = 60  # on a sheet, about
-LENGTH = 0.85  # of the longest arrow, in spacings
-RADIUS = 0.04  # of the shafts, in spacings
-NEGLIGIBLE = 1e-3  # of the longest vector: not drawn
+ARROWS = 60  # approximate number of arrows on a body
+LENGTH = 0.85  # [-] length of the longest arrow over the spacing of arrows
+RADIUS = 0.04  # [-] radius of the shafts over the spacing of arrows
+NEGLIGIBLE = 1e-3  # [-] shorter vectors, relative to the longest one, are not drawn
 
 
 @dataclass(frozen=True)
 class Glyphs:
-    """Arrows: starts and vectors, (k, 3), m; the radius of their shafts and their lift off a sheet, m."""
+    """Arrows with starts and vectors (k, 3) m, the radius [m] of their shafts, and their lift [m] towards the eye."""
 
     starts: np.ndarray
     vectors: np.ndarray
@@ -28,18 +28,18 @@ class Glyphs:
 
 
 def largest(states: list[State]) -> float:
-    """The largest remanent magnetization in all states, A/m; 0 if none is magnetized."""
+    """Return the largest remanent magnetization in all states, A/m; 0 if none is magnetized."""
     given = [state.remanent_magnetization for state in states if state.remanent_magnetization is not None]
     return max((float(np.linalg.norm(m, axis=1).max()) for m in given), default=0.0)
 
 
 def spacing_of(mesh: TriangleMesh, count: int) -> float:
-    """The distance between `count` arrows spread over the sheet, m."""
+    """Return the distance between `count` arrows distributed over a surface, m."""
     return float(np.sqrt(mesh.face_areas.sum() / count))
 
 
-def spread_faces(mesh: TriangleMesh, spacing: float) -> np.ndarray:
-    """Faces about a spacing apart: the one next to the center of each box of a lattice at rest."""
+def sample_faces(mesh: TriangleMesh, spacing: float) -> np.ndarray:
+    """Choose faces about a spacing [m] apart: one near the center of each box of a lattice around the rest shape."""
     centers = mesh.face_barycenters
     low, extent = mesh.rest_positions.min(axis=0), np.ptp(mesh.rest_positions, axis=0)
     counts = np.maximum(1, np.round(extent / spacing)).astype(np.int64)
@@ -52,12 +52,13 @@ def spread_faces(mesh: TriangleMesh, spacing: float) -> np.ndarray:
 
 
 def magnetization_glyphs(state: State, count: int, unit_vector: float) -> Glyphs:
-    """About `count` arrows F_0 M_r; a vector of length `unit_vector` [A/m] is drawn LENGTH spacings long.
+    """Return about `count` arrows of the magnetization F_0 M_r.
 
-    An arrow in the sheet is centerd on its face, one that leaves it starts there.
+    A vector of length `unit_vector` [A/m] is drawn LENGTH spacings long. A tangential arrow is centered on its face, a
+    normal one starts there.
     """
     spacing = spacing_of(state.mesh, count)
-    faces = spread_faces(state.mesh, spacing)
+    faces = sample_faces(state.mesh, spacing)
     vectors = state.magnetization[faces]
     shown = np.linalg.norm(vectors, axis=1) > NEGLIGIBLE * unit_vector
     vectors = vectors[shown] * (LENGTH * spacing / unit_vector)
@@ -65,21 +66,22 @@ def magnetization_glyphs(state: State, count: int, unit_vector: float) -> Glyphs
     normal = np.cross(x1 - x0, x2 - x0)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     tangential = vectors - np.einsum("ki,ki->k", vectors, normal)[:, None] * normal
-    # an arrow in the sheet would sink into it where it bends; one that leaves it would show through
+    # Tangential arrows are lifted towards the eye, or a curved surface would hide parts of them; normal ones are not, or
+    # they would be visible through the surface.
     flat = float(np.linalg.norm(tangential)) / max(float(np.linalg.norm(vectors)), 1e-300)
     starts = (x0 + x1 + x2) / 3.0 - 0.5 * tangential + 0.02 * (vectors - tangential)
     return Glyphs(starts, vectors, RADIUS * spacing, 0.5 * flat * spacing)
 
 
 class ContactForces(NamedTuple):
-    """Places (k, 3) m and forces (k, 3) N on the vertices there."""
+    """The contact forces (k, 3) N on vertices at positions (k, 3) m."""
 
-    places: np.ndarray
+    positions: np.ndarray
     forces: np.ndarray
 
 
 def contact_forces(state: State) -> ContactForces:
-    """Of one state: none where it has no contacts, and none that is negligible beside its largest."""
+    """Return the contact forces of a state, without those that are negligible compared with the largest one."""
     if state.loads is None:
         return ContactForces(np.zeros((0, 3)), np.zeros((0, 3)))
     forces = state.loads().forces
@@ -89,7 +91,7 @@ def contact_forces(state: State) -> ContactForces:
 
 
 def halo(states: list[State], size: float) -> np.ndarray:
-    """Points (k, 3), m, of a coarse lattice around the sheets, neither on them nor far off."""
+    """Return points (k, 3) m of a coarse lattice around the bodies, neither on them nor far away."""
     positions = np.concatenate([state.positions for state in states])
     spacing = size / 7.0
     low, high = positions.min(axis=0) - spacing, positions.max(axis=0) + spacing
@@ -102,9 +104,9 @@ def halo(states: list[State], size: float) -> np.ndarray:
 
 
 def field_glyphs(points: np.ndarray, flux_densities: np.ndarray, size: float, unit_vector: float) -> Glyphs:
-    """B (k, 3) at points (k, 3), where it has a value, each arrow centerd on its point.
+    """Return arrows of the flux density (k, 3) T, centered on points (k, 3) m.
 
-    Fields of `unit_vector` [T] and more are drawn at full length.
+    Flux densities of `unit_vector` [T] and more are drawn at full length. NaN and very small values are not drawn.
     """
     spacing = size / 7.0
     magnitude = np.linalg.norm(flux_densities, axis=1)
@@ -117,7 +119,7 @@ def field_glyphs(points: np.ndarray, flux_densities: np.ndarray, size: float, un
 def sources_glyphs(
     states: list[State], points: list[np.ndarray], size: float, full_length: float | None = None
 ) -> tuple[list[Glyphs | None], float]:
-    """Arrows of each state's fields that vary in space, at its points, and the flux density [T] of full length."""
+    """Return arrows of each state's fields that vary in space, at its points, and the flux density [T] of full length."""
     sampled = [
         (at, state.flux_density_at(at)) if state.has_sources else (at[:0], at[:0])
         for state, at in zip(states, points, strict=True)
@@ -125,7 +127,7 @@ def sources_glyphs(
     if full_length is None:
         magnitudes = np.concatenate([np.linalg.norm(values, axis=1) for _, values in sampled])
         magnitudes = magnitudes[np.isfinite(magnitudes)]
-        # a field next to its source would leave nothing of the rest
+        # the 90 % quantile: the field close to a source would make all other arrows too short to be seen
         full_length = float(np.quantile(magnitudes, 0.9)) if magnitudes.any() else 0.0
     if not full_length:
         return [None] * len(states), 0.0

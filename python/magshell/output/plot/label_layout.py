@@ -1,4 +1,4 @@
-"""Texts put where there is room for them, so that none crosses another or leaves its area."""
+"""Layout of labels, so that no text overlaps another one or leaves its area."""
 
 from __future__ import annotations
 
@@ -11,40 +11,51 @@ import numpy as np
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
 
-GAP = 0.02  # inches that stay free between texts
-NEAR = 0.055  # inches between a point and its text
-FARTHER = (0.055, 0.16, 0.3, 0.5, 0.8, 1.2)  # at which places for a text are looked for
-DIRECTIONS = 16
+GAP = 0.02  # [inch] smallest gap between texts
+NEAR = 0.055  # [inch] distance between a point and its text
+FARTHER = (
+    0.055,
+    0.16,
+    0.3,
+    0.5,
+    0.8,
+    1.2,
+)  # [inch] distances between a point and its text that are tried in turn
+DIRECTIONS = 16  # directions from a point that are tried at each distance
 
 
 @dataclass(frozen=True)
 class Box:
-    """low, high: (2,), inches, two of its corners."""
+    """A rectangle with the corners low and high, (2,) inches each."""
 
     low: np.ndarray
     high: np.ndarray
 
     @classmethod
     def around(cls, center: Numbers, size: Numbers) -> Box:
+        """Make a rectangle of a size (width, height) around a center."""
         half = 0.5 * np.asarray(size)
         return cls(center - half, center + half)
 
     def crosses(self, other: Box, gap: float = GAP) -> bool:
+        """Return whether the rectangles overlap, or are closer than a gap."""
         return bool((np.minimum(self.high, other.high) - np.maximum(self.low, other.low) > -gap).all())
 
-    def holds(self, other: Box) -> bool:
+    def contains(self, other: Box) -> bool:
+        """Return whether the other rectangle lies inside this one."""
         return bool((other.low >= self.low).all() and (other.high <= self.high).all())
 
     def covers(self, points: np.ndarray) -> bool:
-        """Whether one of the points (n, 2) is in it."""
+        """Return whether one of the points (n, 2) lies inside."""
         return bool(((points > self.low) & (points < self.high)).all(axis=1).any())
 
 
 @dataclass
 class Room:
-    """An area [inches] and the texts that are in it.
+    """An area [inches] in which texts are placed.
 
-    drawn: (n, 2), points of what else is there, which texts cover only where they find no other place.
+    drawn: (n, 2), points of other things drawn there; a text covers them only if it finds no other position.
+    taken: the rectangles of the texts that are there.
     """
 
     area: Box
@@ -52,13 +63,15 @@ class Room:
     taken: list[Box] = field(default_factory=list)
 
     def take(self, size: Numbers, centers: Iterable[np.ndarray]) -> Box | None:
-        """The first of the places for a text of this size (width, height) that is free, which it then is no more; None where
-        there is none."""
+        """Place a text of a size (width, height) at the first free one of several centers.
+
+        Returns its rectangle, which is occupied from then on, or None if no center is free.
+        """
         boxes = (Box.around(center, size) for center in centers)
         free = [
             box
             for box in boxes
-            if self.area.holds(box) and not any(box.crosses(other) for other in self.taken)
+            if self.area.contains(box) and not any(box.crosses(other) for other in self.taken)
         ]
         found = next((box for box in free if not box.covers(self.drawn)), free[0] if free else None)
         if found is not None:
@@ -66,22 +79,22 @@ class Room:
         return found
 
 
-def places_around(point: np.ndarray, size: Numbers, towards: np.ndarray) -> Iterator[np.ndarray]:
-    """Centers of a text of this size beside a point: on the side that is asked for first, close by before farther off."""
+def candidate_centers(point: np.ndarray, size: Numbers, towards: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield centers for a text of a size next to a point: near ones first, and those in the direction `towards` first."""
     begin = np.arctan2(towards[1], towards[0])
-    turns = np.arange(DIRECTIONS) * (2 * np.pi / DIRECTIONS)
-    turns = np.where(turns > np.pi, turns - 2 * np.pi, turns)
-    angles = begin + turns[np.argsort(np.abs(turns), kind="stable")]
+    offsets = np.arange(DIRECTIONS) * (2 * np.pi / DIRECTIONS)
+    offsets = np.where(offsets > np.pi, offsets - 2 * np.pi, offsets)
+    angles = begin + offsets[np.argsort(np.abs(offsets), kind="stable")]
     for distance in FARTHER:
         for angle in angles:
-            yield beside(point, size, np.array([np.cos(angle), np.sin(angle)]), distance)
+            yield text_center(point, size, np.array([np.cos(angle), np.sin(angle)]), distance)
 
 
-def beside(point: np.ndarray, size: Numbers, towards: np.ndarray, distance: float = NEAR) -> np.ndarray:
-    """The center of a text of this size whose side or corner is at a distance [inches] from a point."""
+def text_center(point: np.ndarray, size: Numbers, towards: np.ndarray, distance: float = NEAR) -> np.ndarray:
+    """Return the center of a text of a size whose side or corner is at a distance [inches] from a point."""
     return point + distance * towards + 0.5 * np.asarray(size) * _side(towards)
 
 
 def _side(towards: np.ndarray) -> np.ndarray:
-    """Of each axis -1, 0 or 1: to which side of the point the text goes."""
+    """Return for each axis the side of the point on which the text lies: -1, 0 or 1."""
     return np.where(np.abs(towards) < 0.5, 0.0, np.sign(towards))

@@ -1,4 +1,4 @@
-"""The strip under the panels: axes, scale bar, what arrows mean, the colour bar; in one row where that has room."""
+"""The legend under the panels: coordinate axes, scale bar, keys of arrows and colour bar, in one row if there is room."""
 
 from __future__ import annotations
 
@@ -18,23 +18,31 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 TEXT = 8.0  # points
-ROW = 0.72  # inches
-SMALLER = (1.0, 0.9, 0.8)  # than full size, at which all of it is tried in one row
-EDGE = 0.05  # inches that stay free at the picture's sides
-SPACE = 0.35  # inches between the parts
-TRIAD = np.array([0.36, 0.32])  # where the axes meet
-SCALE_BAR = 0.85  # where it begins, after them
-KEY, KEY_ROW = 0.38, 0.2  # of an arrow and the gap before its text; from one row of them to the next
-NARROWEST, WIDEST, OVERHANG = 0.8, 2.4, 0.25  # of a colour bar; how far its ticks may reach beyond it
-LINE = 0.15  # that one more line of the colour bar's text takes
+ROW = 0.72  # [inch] height of a row
+SMALLER = (1.0, 0.9, 0.8)  # [-] scales at which the legend is tried in one row
+EDGE = 0.05  # [inch] margin at the picture's sides
+SPACE = 0.35  # [inch] gap between the parts
+TRIAD = np.array([0.36, 0.32])  # [inch] origin of the coordinate axes
+SCALE_BAR = 0.85  # [inch] left end of the scale bar
+KEY, KEY_ROW = (
+    0.38,
+    0.2,
+)  # [inch] width of an arrow with the gap before its text; distance between rows of keys
+NARROWEST, WIDEST, OVERHANG = (
+    0.8,
+    2.4,
+    0.25,
+)  # [inch] widths of a colour bar; how far tick labels may reach beyond it
+LINE = 0.15  # [inch] height of an additional line of the colour bar's text
 
 
 @dataclass(frozen=True)
 class Legend:
-    """Where its parts are, in inches times `scale`.
+    """The layout of a legend, in inches at full size; it is painted `scale` times as large.
 
-    rows: heights, from the first on. keys, bar: (row, left end), or None. label: the colour bar's text in lines, and its
-    points. width: of the colour bar.
+    rows: their heights, from the first on. length: of the scale bar, m. keys, bar: (row, left end) of the keys of arrows and
+    of the colour bar, or None. key_size: the text size of keys, points. width: of the colour bar. label: the colour bar's
+    text, broken into lines, and its size in points.
     """
 
     scale: float
@@ -48,23 +56,26 @@ class Legend:
 
     @property
     def height(self) -> float:
-        """Inches, as it is painted."""
+        """The height of the painted legend, inches."""
         return self.scale * sum(self.rows)
 
     def bottom(self, row: int) -> float:
-        """Of a row, above that of the last."""
+        """Return the height of a row's lower edge above that of the last row."""
         return sum(self.rows[row + 1 :])
 
 
 def arranged(drawing: Drawing, inches: float, inches_per_meter: float, ruler: Ruler) -> Legend:
-    """For a picture so many inches wide. At full size if it fits into one row, a little smaller if it does then, else in
-    rows."""
+    """Compute the layout of the legend in a picture of a given width [inches].
+
+    It is one row at full size if that fits, or at a slightly smaller scale, and several rows otherwise.
+    """
     tried = [_arranged(drawing, inches / scale, inches_per_meter / scale, scale, ruler) for scale in SMALLER]
     flat = [each for each in tried if len(each.rows) == 1]
     return flat[0] if flat else tried[1]
 
 
 def _arranged(drawing: Drawing, inches: float, inches_per_meter: float, scale: float, ruler: Ruler) -> Legend:
+    """Compute the layout of the legend at one scale, with a new row for each part that does not fit."""
     length = round_below(min(1.2, 0.2 * inches) / inches_per_meter)
     rows, end = [ROW], _scale_bar_end(drawing, length, inches_per_meter, ruler)
     keys, key_size = None, TEXT
@@ -102,7 +113,7 @@ def _length(drawing: Drawing, length: float) -> str:
 def write(
     axes: Axes, drawing: Drawing, legend: Legend, inches: float, inches_per_meter: float, ruler: Ruler
 ) -> None:
-    """Into axes as wide as the picture and as high as the legend."""
+    """Draw a legend into axes that are as wide as the picture and as high as the legend."""
     scale = legend.scale
     writer = _Writer(axes, inches / scale, legend.height / scale, scale, ruler)
     first = legend.bottom(0)
@@ -124,7 +135,7 @@ def write(
 
 
 class _Writer:
-    """Draws in inches at full size, into axes that may be smaller."""
+    """Drawing commands in inches at full size, for axes that may be smaller."""
 
     def __init__(self, axes, width: float, height: float, scale: float, ruler: Ruler):
         self.axes, self.width, self.height, self.scale, self.ruler = axes, width, height, scale, ruler
@@ -138,10 +149,10 @@ class _Writer:
     def line(self, x, y, width: float) -> None:
         self.axes.plot(x, y, color=colors.OUTLINE, linewidth=width, solid_capstyle="butt")
 
-    def text(self, place, text: str, size: float, across: str, up: str) -> None:
-        self.axes.text(
-            *place, text, ha=across, va=up, fontsize=size * self.scale, color=colors.OUTLINE, linespacing=1.1
-        )
+    def text(self, position, text: str, size: float, across: str, up: str) -> None:
+        size *= self.scale
+        style = {"fontsize": size, "color": colors.OUTLINE, "linespacing": 1.1}
+        self.axes.text(*position, text, ha=across, va=up, **style)
 
     def arrow(self, start, end, color: str, width: float, **style) -> None:
         style = {"arrowstyle": "-|>", "color": color, "linewidth": width, "shrinkA": 0, "shrinkB": 0, **style}
@@ -149,28 +160,28 @@ class _Writer:
 
 
 def _triad(writer: _Writer, drawing: Drawing, origin: np.ndarray) -> None:
-    """The letters of axes that lie over each other stand one after another."""
+    """Draw the coordinate axes; the letters of axes that coincide on the screen are placed next to each other."""
     room = Room(Box(np.zeros(2), np.array([SCALE_BAR, writer.height])))
     size = TEXT - 1
     for name, tip in zip("xyz", 0.24 * drawing.view.axes[:2].T, strict=True):
-        if np.linalg.norm(tip) < 0.03:  # it points at the eye
+        if np.linalg.norm(tip) < 0.03:  # the axis points towards the eye
             continue
         writer.arrow(origin, origin + tip, colors.OUTLINE, 0.9, mutation_scale=6)
         along = tip / np.linalg.norm(tip)
         aside = np.array([-along[1], along[0]])
         box = writer.ruler.size(name, size)
-        places = (
+        centers = (
             origin + tip + out * along + off * aside
             for out in (0.07, 0.0, -0.1)
             for off in (0.0, 0.14, -0.14, 0.28, -0.28)
         )
-        found = room.take(box, places)
+        found = room.take(box, centers)
         if found is not None:
             writer.text(0.5 * (found.low + found.high), name, size, "center", "center")
 
 
 def _color_bar(writer: _Writer, scalar: Scalar, legend: Legend) -> None:
-    """At the right end of its row."""
+    """Draw the colour bar at the right end of its row."""
     low, high = scalar.limits
     right = writer.width - EDGE - OVERHANG
     left = right - legend.width
@@ -184,12 +195,15 @@ def _color_bar(writer: _Writer, scalar: Scalar, legend: Legend) -> None:
         writer.text((x, 0.25), text, TEXT - 1, "center", "top")
     text, points = legend.label
     half = 0.5 * writer.ruler.size(text, points)[0]
-    middle = min((left + right) / 2, writer.width - EDGE - half)  # it may be longer than the bar
+    middle = min((left + right) / 2, writer.width - EDGE - half)  # the text may be longer than the bar
     writer.text((middle, 0.47), text, points, "center", "bottom")
 
 
 def ticks_of(scalar: Scalar, width: float, ruler: Ruler) -> list[tuple[float, str]]:
-    """Numbers beside a bar so many inches wide and what is written there: as many as do not cross, at least one."""
+    """Choose the ticks of a colour bar of a given width [inches]: (number, text) each.
+
+    There are as many as do not overlap, and at least one.
+    """
     from matplotlib.ticker import MaxNLocator
 
     low, high = scalar.limits
@@ -212,7 +226,7 @@ def ticks_of(scalar: Scalar, width: float, ruler: Ruler) -> list[tuple[float, st
 
 
 def _written(ticks: np.ndarray, extent: float) -> list[str]:
-    """With as many digits as tell them apart."""
+    """Format numbers with as many digits as are needed to distinguish them."""
     ticks = np.where(np.abs(ticks) < 1e-9 * extent, 0.0, ticks)
     for digits in range(6, 17):
         texts = [f"{float(f'{tick:.12g}'):.{digits}g}" for tick in ticks.tolist()]

@@ -1,4 +1,4 @@
-"""ms.write_page: a sheet that turns in a browser, in one file that asks the network for nothing."""
+"""The function ms.write_page, which writes an interactive view for browsers to one file that works offline."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from . import colors, glyphs
 from .colors import Scalar, scalar_of
 from .drawing import checked_titles
 from .limits import arrow_count
-from .page_surroundings import Placed
+from .page_surroundings import PageSurroundings
 from .panels import outline, size_of
-from .playback import SAMPLES, same_faces, speed_of, spread
+from .playback import SAMPLES, evenly_spaced, same_faces, speed_of
 from .solids import Solid
 from .style import Color, Style, colored, style_of
 from .surfaces import on_surfaces, scalar_on_surfaces
@@ -55,24 +55,24 @@ def write_page(
     size_limit: float = 10e6,
     style: Style | None = None,
 ) -> Path:
-    """Writes a page that shows a sheet from every side, with its magnetization and the field, offline.
+    """Write an HTML page that shows bodies from all sides, with their magnetization and the field; it works offline.
 
-    Drag to turn, scroll or pinch to zoom, shift-drag to move. Several states, as of a path or a motion, get a slider
-    and play; a motion starts by itself. The reader chooses the colours: magnetization, displacement, and what `color`
-    (a name or arrays, as in `plot`) adds. Obstacles, magnets and wires of fields, magpylib's too, and free rigid parts are
-    where they are in each state.
+    The reader drags to rotate, scrolls or pinches to zoom, and shift-drags to move. The states of a path or a motion can be
+    played and chosen by a slider; a motion starts by itself. The reader chooses the colours: magnetization, displacement,
+    and the quantity that `color` (a name or arrays, as in `plot`) adds. Obstacles, magnets and wires of fields, magpylib's
+    as well, and free rigid bodies are shown at their positions in each state.
 
-    what, obstacles: as in `plot`, but all states on one mesh. titles: one a state. title: of the page.
-    times: s, one a state, where positions (n, n_v, 3) of a mesh are given.
-    speed: seconds of the motion that one second of playing shows, which the reader can change; by default as in
-        `animate`. States without times are shown ten a second.
-    size_limit: bytes for the states. They are kept in float32 (16 bytes a vertex for the positions, 6 for a scalar that
-        changes) if they fit, else in 16 bits (half of it, to 1/65000 of the sheet's size), else as many as fit, evenly
-        spread; the page says how many there were. The mesh takes about 85 bytes a vertex, the viewer 25 kB.
+    what, obstacles: as in `plot`, but all states must have the same mesh. titles: one per state. title: that of the page.
+    positions, remanent_magnetization, applied_flux_density, field, view: as in `plot`.
+    times: s, one per state, if positions (n, n_v, 3) of a mesh are given.
+    speed: seconds of the motion per second of playing, which the reader can change; by default as in `animate`. States
+        without times are shown at ten per second.
+    size_limit: bytes for the states. They are stored in float32 (16 bytes per vertex for the positions, 6 for a scalar that
+        changes) if they fit, else in 16 bits (half the size, accurate to 1/65000 of the shape's size), else as many evenly
+        spaced states as fit; the page says how many there were. The mesh takes about 85 bytes per vertex, the viewer 25 kB.
+    style: as in `plot`; the reader can show and hide the rest shape and the mesh lines. A page does not show contacts.
 
-    style: as in `plot`; what it says of the rest shape and the mesh's lines, the reader can change. A page has no contacts.
-
-    Raises ValueError on bad input, FileNotFoundError without the folder.
+    Raises ValueError on bad input, FileNotFoundError if the folder does not exist.
 
     >>> import magshell as ms, tempfile
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -113,14 +113,14 @@ def write_page(
     states = on_surfaces(states)
     mesh = states[0].mesh
     titles = checked_titles(titles, states)
-    placed = Placed(states, size)
+    surroundings = PageSurroundings(states, size)
     if not style.show_field:
         states = [replace(state, flux_density=None, fields=()) for state in states]
     fields = _sources(states, size)
     numbers = 3 * mesh.n_vertices + 6 * count + sum(len(s.values[0]) for s in scalars if not _is_constant(s))
-    numbers += 20 * max(map(len, placed.places))  # where what is around is
+    numbers += 20 * max(map(len, surroundings.poses))
     numbers += max((6 * len(field.starts) for field in fields[0] if field is not None), default=0)
-    dtype, kept = _that_fit(len(states), numbers, size_limit)
+    dtype, chosen = _choose_states(len(states), numbers, size_limit)
     seen = view_of(states, view)
     data = {
         "view": [seen.elevation, seen.azimuth],
@@ -131,10 +131,10 @@ def write_page(
         "outline": _packed(outline(mesh), "<u4"),
         "edges": _packed(mesh.edges, "<u4"),
         "rest": _packed(mesh.rest_positions, "<f4"),
-        "scalars": [_scalar(s, kept, dtype) for s in scalars],
-        "states": _states(states, kept, titles, fields, count, dtype, placed),
-        "around": [_surface(each) for each in placed.surfaces],
-        "window": _window(placed.window(states, seen)),
+        "scalars": [_scalar(s, chosen, dtype) for s in scalars],
+        "states": _states(states, chosen, titles, fields, count, dtype, surroundings),
+        "around": [_surface(each) for each in surroundings.surfaces],
+        "window": _window(surroundings.window(states, seen)),
         "recorded": len(states),
         "shown": {"rest": style.rest, "edges": style.mesh_lines},
         "speed": None if states[0].time is None else speed,
@@ -142,15 +142,14 @@ def write_page(
     template = files(__package__).joinpath("page.html").read_text(encoding="utf-8")
     text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     parts = {"title": html.escape(title), "data": text}
-    page = re.sub(
-        r"\{\{(title|data)\}\}", lambda place: parts[place[1]], template
-    )  # what is put in is not searched
+    # one pass, so that the inserted texts are not searched
+    page = re.sub(r"\{\{(title|data)\}\}", lambda found: parts[found[1]], template)
     replace_file(path, lambda file: file.write(page.encode()))
     return path
 
 
 def _scalars(states: list[State], color, unit: LengthUnit) -> list[Scalar]:
-    """What the reader can choose from; the first is shown first."""
+    """Return the scalars among which the reader can choose; the first one is shown at the start."""
     chosen = [] if color is None else [colored(states, color, unit)]
     if any(state.is_magnetized for state in states):
         chosen.append(scalar_of(states, "magnetization", None, None, unit))
@@ -163,9 +162,9 @@ def _is_constant(scalar: Scalar) -> bool:
     return all(np.array_equal(value, scalar.values[0], equal_nan=True) for value in scalar.values)
 
 
-def _scalar(scalar: Scalar, kept: list[int], dtype: str) -> dict[Any, Any]:
-    """One array if it is the same in all states, else one a state."""
-    values = scalar.values[:1] if _is_constant(scalar) else [scalar.values[k] for k in kept]
+def _scalar(scalar: Scalar, chosen: list[int], dtype: str) -> dict[Any, Any]:
+    """Encode a scalar, with one array if it is the same in all states, otherwise one per state."""
+    values = scalar.values[:1] if _is_constant(scalar) else [scalar.values[k] for k in chosen]
     return {
         "label": _plain(scalar.label),
         "limits": list(scalar.limits),
@@ -174,36 +173,49 @@ def _scalar(scalar: Scalar, kept: list[int], dtype: str) -> dict[Any, Any]:
     }
 
 
-def _that_fit(count: int, numbers: int, size_limit: float) -> tuple[str, list[int]]:
-    """How the numbers of a state are kept, and the states that are, so that all takes no more bytes."""
+def _choose_states(count: int, numbers: int, size_limit: float) -> tuple[str, list[int]]:
+    """Choose the number format and the states to store, so that they take at most `size_limit` bytes.
+
+    numbers: how many a state has.
+    """
     for dtype, each in (("<f4", 4), ("<u2", 2)):
-        a_state = each * numbers * 4 / 3 + 300  # base64, and what is said about it
-        if count * a_state <= size_limit:
+        bytes_per_state = each * numbers * 4 / 3 + 300  # base64, and the JSON around it
+        if count * bytes_per_state <= size_limit:
             return dtype, list(range(count))
-    return "<u2", spread(list(range(count)), max(2, int(size_limit / a_state)))
+    return "<u2", evenly_spaced(list(range(count)), max(2, int(size_limit / bytes_per_state)))
 
 
 def _sources(states: list[State], size: float) -> tuple[list[glyphs.Glyphs | None], float]:
-    """Fields that vary in space, around each state; around a motion at places that stay."""
+    """Return arrows of fields that vary in space around each state, and the flux density [T] of full length.
+
+    In a motion, their positions are the same for all states.
+    """
     if not any(state.has_sources for state in states):
         return [None] * len(states), 0.0
     if states[0].time is None:
         points = [glyphs.halo([state], size) for state in states]
     else:
-        points = [glyphs.halo(spread(states, SAMPLES), size)] * len(states)
+        points = [glyphs.halo(evenly_spaced(states, SAMPLES), size)] * len(states)
     return glyphs.sources_glyphs(states, points, size)
 
 
 def _states(
-    states: list[State], kept: list[int], titles: list[str], fields, count: int, dtype: str, placed: Placed
+    states: list[State],
+    chosen: list[int],
+    titles: list[str],
+    fields,
+    count: int,
+    dtype: str,
+    surroundings: PageSurroundings,
 ) -> list[dict[Any, Any]]:
+    """Encode the chosen states. fields: as `_sources` returns them; count: the number of magnetization arrows."""
     strongest, (around, full_length) = glyphs.largest(states), fields
     magnitude = max(
         (np.linalg.norm(s.flux_density) for s in states if s.flux_density is not None), default=0.0
     )
     factor, unit = prefixed(float(magnitude), "T")
     packed = []
-    for k in kept:
+    for k in chosen:
         state, field = states[k], around[k]
         one: dict[str, Any] = {"title": titles[k], "positions": _packed(state.positions, dtype)}
         if state.time is not None:
@@ -217,10 +229,10 @@ def _states(
         if field is not None:
             one["field"] = _arrows(field, dtype)
             one["fieldLabel"] = f"field, full length at {with_unit(full_length, 'T')}"
-        if placed.places[k]:
+        if surroundings.poses[k]:
             one["around"] = [
                 {"surface": number} | ({} if moved is None else {"place": _packed(moved, "<f4")})
-                for number, moved in placed.places[k]
+                for number, moved in surroundings.poses[k]
             ]
         packed.append(one)
     return packed
@@ -244,12 +256,16 @@ def _window(found: tuple[np.ndarray, np.ndarray, float] | None) -> dict[str, Any
 
 
 def _arrows(chosen: glyphs.Glyphs, dtype: str) -> dict[Any, Any]:
-    """Six numbers an arrow: start, vector."""
+    """Encode arrows with six numbers each: start, vector."""
     return {"radius": chosen.radius, "arrows": _packed(np.hstack([chosen.starts, chosen.vectors]), dtype)}
 
 
 def _packed(array: np.ndarray, dtype: str) -> str | dict[Any, Any]:
-    """Base64; for "<u2" with the numbers that 0 and a step of 1 stand for, unless an entry is NaN."""
+    """Encode an array in base64.
+
+    For "<u2" the values are scaled to 16 bits, and the values of 0 and of a step of 1 are stored with them; arrays with NaN
+    are stored as "<f4" instead.
+    """
     if dtype != "<u2":
         return base64.b64encode(np.ascontiguousarray(array, dtype=dtype).tobytes()).decode("ascii")
     if not array.size or not np.isfinite(array).all():
@@ -260,5 +276,5 @@ def _packed(array: np.ndarray, dtype: str) -> str | dict[Any, Any]:
 
 
 def _plain(label: str) -> str:
-    """Without matplotlib's mathematics."""
+    """Return a label without matplotlib's mathematical markup."""
     return label.replace("$", "").replace("^3", "³").replace("M_r", "Mᵣ")

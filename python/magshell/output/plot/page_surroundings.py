@@ -1,4 +1,4 @@
-"""What is around sheets, for a page: each surface once, and where it is in each state."""
+"""The surroundings of bodies on a page: each surface is stored once, with its rigid motion in each state."""
 
 from __future__ import annotations
 
@@ -11,30 +11,34 @@ from .solids import Solid, sheet
 from .surroundings import box_of, obstacle_solids
 from .view import View
 
-_RIGID = 1e-6  # of its extent: as far as a surface that only moves is from where a rigid motion has it
+_RIGID = 1e-6  # [-] largest error of a rigid motion between two surfaces, relative to their extent
 
 
-class Placed:
-    """Obstacles, magnets and free rigid parts of the states of one page.
+class PageSurroundings:
+    """Obstacles, magnets and free rigid bodies in the states of one page.
 
-    surfaces: those that differ by more than a rigid motion. places: for each state (number of the surface, rows of its
-    rotation and then its displacement (4, 3), or None where it is as it is kept).
+    surfaces: those that differ by more than a rigid motion. poses: for each state (number of the surface, motion) each. The
+    motion (4, 3) has the rows of a rotation matrix, then the displacement; it is None if the surface has not moved.
     """
 
     def __init__(self, states: list[State], size: float):
         self.surfaces: list[Solid] = []
-        self.places: list[list[tuple[int, np.ndarray | None]]] = []
+        self.poses: list[list[tuple[int, np.ndarray | None]]] = []
         self._known: dict[bytes, int] = {}
         middle = np.concatenate([state.positions for state in states]).mean(axis=0)
         before: list[int] = []
         for state in states:
-            parts = [sheet(*each, colors.rgb(colors.BONE)) for each in state.shapes]
+            parts = [sheet(*each, colors.rgb(colors.LINK)) for each in state.shapes]
             solids = [*obstacle_solids([state], size, middle), *parts]
             likely = before if len(before) == len(solids) else [None] * len(solids)
-            self.places.append([self._place(*pair) for pair in zip(solids, likely, strict=True)])
-            before = [number for number, _ in self.places[-1]]
+            self.poses.append([self._pose(*pair) for pair in zip(solids, likely, strict=True)])
+            before = [number for number, _ in self.poses[-1]]
 
-    def _place(self, solid: Solid, likely: int | None) -> tuple[int, np.ndarray | None]:
+    def _pose(self, solid: Solid, likely: int | None) -> tuple[int, np.ndarray | None]:
+        """Return the number of a surface and its motion; a new surface is stored.
+
+        likely: the number of the surface that it was in the last state, or None.
+        """
         key = solid.positions.tobytes() + solid.faces.tobytes() + solid.colors[0].tobytes()
         if key in self._known:
             return self._known[key], None
@@ -46,17 +50,20 @@ class Placed:
         return self._known[key], None
 
     def points(self, state: int) -> list[np.ndarray]:
-        """(n, 3) m, of each surface in a state."""
+        """Return the positions (n, 3) m of each surface in a state."""
         return [
             self.surfaces[k].positions
             if moved is None
             else self.surfaces[k].positions @ moved[:3].T + moved[3]
-            for k, moved in self.places[state]
+            for k, moved in self.poses[state]
         ]
 
     def window(self, states: list[State], view: View) -> tuple[np.ndarray, np.ndarray, float] | None:
-        """The middle (3,) m of what is shown first, its half extents to the right and upwards (2,) m, and how far anything
-        is from there, m; None where there is nothing around."""
+        """Return the window in which a page begins, or None if there are no surroundings.
+
+        Returns its center (3,) m, half its width and height (2,) m, and the largest distance of any point from its center,
+        m.
+        """
         if not self.surfaces:
             return None
         bodies = [x for state in states for x in (state.positions, state.mesh.rest_positions)]
@@ -68,14 +75,14 @@ class Placed:
 
 
 def _motion(one: Solid, other: Solid) -> np.ndarray | None:
-    """The rigid motion (4, 3), as in `Placed`, from one to the other; None where there is none."""
+    """Find the rigid motion (4, 3), as in PageSurroundings, from one surface to another; None if there is none."""
     same = np.array_equal(one.faces, other.faces) and np.array_equal(one.colors, other.colors)
     if not same or one.positions.shape != other.positions.shape:
         return None
     ends = [each.positions.mean(axis=0) for each in (one, other)]
     arms = [each.positions - end for each, end in zip((one, other), ends, strict=True)]
     extent = float(np.abs(arms[0]).max())
-    turn = scipy.spatial.transform.Rotation.align_vectors(*arms[::-1])[0].as_matrix()
-    if not np.abs(arms[0] @ turn.T - arms[1]).max() <= _RIGID * extent:
+    rotation = scipy.spatial.transform.Rotation.align_vectors(*arms[::-1])[0].as_matrix()
+    if not np.abs(arms[0] @ rotation.T - arms[1]).max() <= _RIGID * extent:
         return None
-    return np.vstack([turn, ends[1] - turn @ ends[0]])
+    return np.vstack([rotation, ends[1] - rotation @ ends[0]])

@@ -1,4 +1,4 @@
-"""A picture before it is painted: panels of solids and labels, seen from one direction at one scale."""
+"""The content of a picture before it is painted: panels of solids and labels, with one view and one scale."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from .style import Style
 from .surroundings import box_of, obstacle_solids
 from .view import View
 
-CREASE = np.cos(np.radians(40.0))  # rest edges that turn by more are drawn as lines
-SOLID_CREASE = np.cos(
-    np.radians(65.0)
-)  # of closed surfaces, where coarse triangles turn by more on what is round
-LINE = 0.0022  # width, in sizes of the drawing
-LONGEST_FIELD = 0.2  # arrow of a uniform field, in sizes of the drawing
-LONGEST_CONTACT = 0.12  # arrow of a contact force, likewise
-FLESH = 0.45  # the opacity of what has bones or tendons inside
-PALEST = 0.8  # the way to white of the first of many states that fade
+# [-] Cosine of the angle between the normals of two faces in the reference configuration; an edge with a larger angle is
+# drawn as a crease. On closed surfaces the angle is larger, since coarse meshes of round bodies have large angles as well.
+CREASE = np.cos(np.radians(40.0))
+SOLID_CREASE = np.cos(np.radians(65.0))
+LINE = 0.0022  # [-] width of lines over the size of the drawing
+LONGEST_FIELD = 0.2  # [-] longest arrow of a uniform field over the size of the drawing
+LONGEST_CONTACT = 0.12  # [-] longest arrow of a contact force over the size of the drawing
+FLESH = 0.45  # [-] opacity of bodies with links or tendons inside
+PALEST = 0.8  # [-] fraction of white in the first of many states that fade
 
 
 @dataclass(frozen=True)
 class Label:
-    """Text beside a point (3,), m, on the side that `towards` (right, up) says."""
+    """A text next to a point (3,) m, on the side in the direction `towards` (right, up)."""
 
     point: np.ndarray
     text: str
@@ -49,9 +49,10 @@ class Panel:
 
 @dataclass(frozen=True)
 class Drawing:
-    """All that a painter and the layout need. `arrows`: what the legend says about arrows: (text, colour).
+    """A complete picture for layout and painting.
 
-    hold: points (n, 3), m, that the window holds beside the solids.
+    arrows: the keys of arrows in the legend, (text, colour) each. hold: points (n, 3) m that the window must contain, in
+    addition to the solids.
     """
 
     panels: list[Panel]
@@ -63,8 +64,10 @@ class Drawing:
 
     @property
     def window(self) -> np.ndarray:
-        """(left, right, bottom, top), m, on the screen: holds the bodies of every panel, and of what is around them as much
-        as leaves them large."""
+        """The window on the screen, (left, right, bottom, top) m.
+
+        It contains the bodies of all panels, and as much of their surroundings as leaves the bodies large.
+        """
         if self.view.corners is not None:
             framed = self.view.project(self.view.corners)[:, :2]
             return np.stack([framed.min(axis=0), framed.max(axis=0)], axis=1).ravel()
@@ -79,20 +82,20 @@ class Drawing:
 
 @dataclass(frozen=True)
 class Options:
-    """What to draw beside the sheets."""
+    """The things to draw in addition to the bodies."""
 
     arrows: int = glyphs.ARROWS  # 0 for none
     field: bool = True
     rest: bool = False
     mesh_lines: bool = False
-    fade: bool = False  # of the states in one panel, the earlier ones are paler
+    fade: bool = False  # earlier states in a panel are paler
     cut: Cut | None = None
-    sections: tuple[Section, ...] = ()  # one a state, where there is a cut
-    contacts: bool = False  # their forces as arrows
+    sections: tuple[Section, ...] = ()  # one per state, if there is a cut
+    contacts: bool = False  # contact forces as arrows
 
     @classmethod
     def of(cls, style: Style) -> Options:
-        """What a caller asks for."""
+        """Make the options from a caller's style."""
         count = arrow_count(style.arrows)
         return cls(count, style.show_field, style.rest, style.mesh_lines, contacts=style.contacts)
 
@@ -105,7 +108,7 @@ def draw(
     unit: LengthUnit,
     options: Options,
 ) -> Drawing:
-    """One panel a group of states; the states of a group lie over each other."""
+    """Draw one panel per group of states; the states of a group lie over each other."""
     states = [state for group in groups for state in group]
     size = size_of(states)
     legend: list[tuple[str, str]] = []
@@ -144,51 +147,54 @@ def draw(
 
 
 def size_of(states: list[State]) -> float:
-    """The diagonal of the box around the sheets and their rest shapes, m."""
+    """Return the diagonal of the box around the bodies and their rest shapes, m."""
     points = np.concatenate([x for state in states for x in (state.positions, state.mesh.rest_positions)])
     return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
 def outline(mesh: TriangleMesh) -> np.ndarray:
-    """Edges to draw as lines: those of the boundary, and creases of the rest shape."""
+    """Return the edges to draw as lines, (k, 2): boundary edges, and creases of the rest shape."""
     return mesh.edges[_outline(mesh)]
 
 
 def _outline(mesh: TriangleMesh) -> np.ndarray:
-    """Their numbers."""
+    """Return the numbers of the edges of the outline, ascending."""
     interior = mesh.interior_edges
     normals = mesh.face_normals[mesh.edge_faces[interior]]
-    turn = np.einsum("ei,ei->e", normals[:, 0], normals[:, 1])
-    creases = interior[turn < np.where(_of_closed(mesh)[interior], SOLID_CREASE, CREASE)]
+    cosine = np.einsum("ei,ei->e", normals[:, 0], normals[:, 1])
+    creases = interior[cosine < np.where(_of_closed(mesh)[interior], SOLID_CREASE, CREASE)]
     return np.sort(np.concatenate([mesh.boundary_edges, creases]))
 
 
 def _of_closed(mesh: TriangleMesh) -> np.ndarray:
-    """(n_e,), whether the piece that each edge belongs to has no boundary."""
+    """Return whether each edge belongs to a connected part without boundary, (n_e,) bool."""
     of_edge = mesh.components[mesh.edges[:, 0]]
     return ~np.isin(of_edge, of_edge[mesh.boundary_edges])
 
 
 def _seen(state: State, edges: np.ndarray, eye: np.ndarray) -> np.ndarray:
-    """Those of the edges (k,) that are not behind a closed surface, where a line's lift would let them shine through."""
+    """Return those of the edges (k,) that are not on the far side of a closed surface.
+
+    Lines are lifted towards the eye, so those on the far side would be visible through the surface.
+    """
     mesh = state.mesh
     x0, x1, x2 = np.moveaxis(state.positions[mesh.faces], 1, 0)
     piece = mesh.components[mesh.faces[:, 0]]
-    volumes = np.bincount(
-        piece, np.einsum("fi,fi->f", x0, np.cross(x1, x2))
-    )  # negative where normals point inwards
+    # volumes of the connected parts, negative if normals point inwards
+    volumes = np.bincount(piece, np.einsum("fi,fi->f", x0, np.cross(x1, x2)))
     towards = np.cross(x1 - x0, x2 - x0) @ eye * np.sign(volumes)[piece] > 0
     hidden = _of_closed(mesh)[edges] & ~towards[mesh.edge_faces[edges]].any(axis=1)
     return edges[~hidden]
 
 
 def sheet_solids(state: State, shades: np.ndarray, view: View, size: float, options: Options) -> list[Solid]:
+    """Return the solids of a state's bodies, with links, tendons, rigid bodies and lines. shades: colours of the bodies."""
     mesh, eye = state.mesh, view.axes[2]
     step = float(mesh.edge_lengths.mean())
     skin = sheet(state.positions, mesh.faces, shades)
-    bones = [sheet(*each, rgb(colors.BONE)) for each in state.bones]
-    inside = [*bones, *(sheet(*each, rgb(colors.TENDON)) for each in state.tendons)]
-    shapes = [sheet(*each, rgb(colors.BONE)) for each in state.shapes]
+    links = [sheet(*each, rgb(colors.LINK)) for each in state.links]
+    inside = [*links, *(sheet(*each, rgb(colors.TENDON)) for each in state.tendons)]
+    shapes = [sheet(*each, rgb(colors.LINK)) for each in state.shapes]
     solids = [*inside, *shapes, replace(skin, opacity=FLESH) if inside else skin]
     if options.mesh_lines:
         edges = mesh.edges[_seen(state, np.arange(mesh.n_edges), eye)]
@@ -205,7 +211,7 @@ def sheet_solids(state: State, shades: np.ndarray, view: View, size: float, opti
 def _section_solids(
     state: State, number: int, scalar: Scalar | None, view: View, size: float, options: Options
 ) -> list[Solid]:
-    """What a cut shows: the plane's part inside solids, and its edges."""
+    """Return the section of state `number` as solids: the part of the plane inside solids, and its edges."""
     found, step, eye = options.sections[number], float(state.mesh.edge_lengths.mean()), view.axes[2]
     solids = [section_solid(found, options.cut, scalar, number)]
     if options.mesh_lines:
@@ -215,18 +221,19 @@ def _section_solids(
 
 
 def magnetization_solids(state: State, strongest: float, count: int, cut: Cut | None = None) -> list[Solid]:
+    """Return about `count` arrows of the magnetization, without those on the removed side of a cut."""
     if not state.is_magnetized:
         return []
     chosen = glyphs.magnetization_glyphs(state, count, strongest)
     starts, vectors = chosen.starts, chosen.vectors
     if cut is not None:
-        kept = cut.heights(starts + 0.5 * vectors) <= 0
-        starts, vectors = starts[kept], vectors[kept]
+        visible = cut.heights(starts + 0.5 * vectors) <= 0
+        starts, vectors = starts[visible], vectors[visible]
     return [arrows(starts, vectors, chosen.radius, colors.MAGNETIZATION, chosen.lift)]
 
 
 def _paleness(count: int, options: Options) -> list[float]:
-    """Of the states in one panel."""
+    """Return the paleness of each of `count` states in one panel, from 0 to 1."""
     fading = options.fade and count > 1
     return [PALEST * (1.0 - k / (count - 1)) if fading else 0.0 for k in range(count)]
 
@@ -238,7 +245,10 @@ def _pale(solids: list[Solid], paleness: float) -> list[Solid]:
 def _uniform_fields(
     panels: list[Panel], groups: list[list[State]], view: View, size: float, options: Options
 ) -> None:
-    """An arrow to the left of the sheets of each panel, as long as the field is strong, and its magnitude."""
+    """Add an arrow of the uniform field to the left of the bodies in each panel, and its magnitude.
+
+    The length of the arrow is proportional to the field.
+    """
     strongest = max((_magnitude(state) for group in groups for state in group), default=0.0)
     if strongest == 0.0:
         return
@@ -250,27 +260,27 @@ def _uniform_fields(
     left, middle = low[0], (low + high) / 2.0
     for panel, group in zip(panels, groups, strict=True):
         fields = _distinct([s.flux_density for s in group if s.flux_density is not None])
-        place = left - 0.07 * size
+        x = left - 0.07 * size
         if options.fade and len(fields) > 1:
-            _fan(panel, np.array(fields), scale, place * right + middle[1] * up + middle[2] * eye, view, size)
+            _fan(panel, np.array(fields), scale, x * right + middle[1] * up + middle[2] * eye, view, size)
             fields = []
         for flux_density in fields:
             vector = scale * flux_density
             width = abs(vector @ right)
-            center = (place - 0.5 * width) * right + middle[1] * up + middle[2] * eye
+            center = (x - 0.5 * width) * right + middle[1] * up + middle[2] * eye
             panel.solids += field_arrow(center, vector, size)
             low = center - (0.5 * abs(vector @ up) + 0.015 * size) * up
             panel.labels.append(field_label(low, with_unit(float(np.linalg.norm(flux_density)), "T")))
-            place -= width + 0.12 * size
+            x -= width + 0.12 * size
 
 
-def _fan(panel: Panel, fields: np.ndarray, scale: float, place: np.ndarray, view: View, size: float) -> None:
-    """Uniform fields (n, 3) that follow each other, as arrows from one tail, to the left of a place (3,), m."""
+def _fan(panel: Panel, fields: np.ndarray, scale: float, point: np.ndarray, view: View, size: float) -> None:
+    """Add successive uniform fields (n, 3) T as arrows from a common start, to the left of a point (3,) m."""
     right, up, _ = view.axes
     vectors = scale * fields
     reach = np.vstack([view.project(vectors), np.zeros(3)])
     low, high = reach.min(axis=0), reach.max(axis=0)
-    tail = place - high[0] * right - 0.5 * (low[1] + high[1]) * up
+    tail = point - high[0] * right - 0.5 * (low[1] + high[1]) * up
     for vector, paleness in zip(vectors, _paleness(len(vectors), Options(fade=True)), strict=True):
         panel.solids += _pale(field_arrow(tail + 0.5 * vector, vector, size), paleness)
     middle = tail + 0.5 * (low[0] + high[0]) * right + (low[1] - 0.015 * size) * up
@@ -279,12 +289,12 @@ def _fan(panel: Panel, fields: np.ndarray, scale: float, place: np.ndarray, view
 
 
 def field_label(point: np.ndarray, magnitude: str) -> Label:
-    """What stands under the arrow of a uniform field."""
+    """Return the label under the arrow of a uniform field."""
     return Label(point, f"$B$ = {magnitude}", colors.FIELD, (0.0, -1.0))
 
 
 def field_arrow(center: np.ndarray, vector: np.ndarray, size: float) -> list[Solid]:
-    """A uniform field as an arrow (3,), m, about its center (3,), m; none if it is zero."""
+    """Return the arrow of a uniform field with a vector (3,) m and a center (3,) m; an empty list if it is zero."""
     if not vector.any():
         return []
     return [arrows(center[None] - vector / 2, vector[None], 0.0065 * size, colors.FIELD)]
@@ -299,7 +309,7 @@ def _distinct(vectors: list[np.ndarray]) -> list[np.ndarray]:
 
 
 def _sources(panels: list[Panel], groups: list[list[State]], size: float) -> list[tuple[str, str]]:
-    """Arrows of the fields that vary in space, and what the legend says."""
+    """Add arrows of the fields that vary in space to each panel. Returns their keys in the legend."""
     points = [glyphs.halo(group, size) if group[-1].has_sources else np.zeros((0, 3)) for group in groups]
     around, strong = glyphs.sources_glyphs([group[-1] for group in groups], points, size)
     for panel, chosen in zip(panels, around, strict=True):
@@ -309,7 +319,7 @@ def _sources(panels: list[Panel], groups: list[list[State]], size: float) -> lis
 
 
 def _contacts(panels: list[Panel], groups: list[list[State]], size: float, options: Options):
-    """Adds the forces of contacts, and returns what the legend says of them: nothing where nothing touches."""
+    """Add arrows of the contact forces to each panel. Returns their keys in the legend; none without contact."""
     strongest = strongest_contact([state for group in groups for state in group])
     if strongest == 0.0:
         return []
@@ -320,35 +330,35 @@ def _contacts(panels: list[Panel], groups: list[list[State]], size: float, optio
 
 
 def strongest_contact(states: list[State]) -> float:
-    """N, the largest force of contacts on a vertex."""
+    """Return the largest contact force on a vertex in all states, N."""
     forces = [glyphs.contact_forces(state).forces for state in states]
     return max((float(np.linalg.norm(each, axis=1).max(initial=0.0)) for each in forces), default=0.0)
 
 
 def contact_solid(state: State, strongest: float, size: float) -> Solid:
-    """The forces of contacts in a state as arrows."""
+    """Return arrows of the contact forces in a state."""
     found = glyphs.contact_forces(state)
     vectors = LONGEST_CONTACT * size / strongest * found.forces
-    return arrows(found.places, vectors, 0.003 * size, colors.CONTACT, 0.5 * size)
+    return arrows(found.positions, vectors, 0.003 * size, colors.CONTACT, 0.5 * size)
 
 
 def contacts_key(strongest: float) -> tuple[str, str]:
-    """What the legend says about arrows of contact forces."""
+    """Return the key of contact forces in the legend, (text, colour)."""
     return f"contact force, up to {with_unit(strongest, 'N')}", colors.CONTACT
 
 
 def magnetization_key(strongest: float) -> tuple[str, str]:
-    """What the legend says about arrows of magnetization."""
+    """Return the key of the magnetization in the legend, (text, colour)."""
     return f"$M_r$, up to {with_unit(strongest, 'A/m')}", colors.MAGNETIZATION
 
 
 def sources_key(full_length: float) -> tuple[str, str]:
-    """What the legend says about arrows of fields that vary in space."""
+    """Return the key of fields that vary in space in the legend, (text, colour)."""
     return f"$B$, full length at {with_unit(full_length, 'T')}", colors.FIELD
 
 
 def _series_labels(group: list[State], titles: list[str], view: View) -> list[Label]:
-    """Each state's title where it is farthest from the others on the screen, on the side away from them."""
+    """Return a label with each state's title, at the vertex that is farthest from the other states on the screen."""
     labels = []
     screens = [view.project(state.positions)[:, :2] for state in group]
     for state, screen, title in zip(group, screens, titles, strict=True):
@@ -364,10 +374,10 @@ def _series_labels(group: list[State], titles: list[str], view: View) -> list[La
 
 
 def _apart(labels: list[Label], view: View, distance: float) -> list[Label]:
-    """Those, the last and the first before the others, that are a distance [m] from each other on the screen."""
-    kept: list[Label] = []
+    """Choose labels at least a distance [m] apart on the screen; the last one and the first take precedence."""
+    chosen: list[Label] = []
     for label in [*labels[-1:], *labels[:-1]]:
-        gaps = [np.linalg.norm(view.project(label.point - other.point)[:2]) for other in kept]
+        gaps = [np.linalg.norm(view.project(label.point - other.point)[:2]) for other in chosen]
         if min(gaps, default=np.inf) >= distance:
-            kept.append(label)
-    return kept
+            chosen.append(label)
+    return chosen

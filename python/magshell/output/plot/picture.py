@@ -1,4 +1,4 @@
-"""A finished picture: the panels in rows, and under them the legend. Texts have their own room, and cross none."""
+"""Finished pictures: panels in rows with the legend below, and texts that do not overlap."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..._input.scalars import positive
 from ..._runtime.files import replace_file
 from ..._runtime.frozen import Frozen
 from . import colors, legend, polygons, vtk
-from .label_layout import NEAR, Box, Room, beside, places_around
+from .label_layout import NEAR, Box, Room, candidate_centers, text_center
 from .legend import TEXT
 from .limits import check_pixels
 from .panels import Drawing, Label, Panel
@@ -27,24 +27,30 @@ if TYPE_CHECKING:
     from ..._input.kinds import FilePath
 
 DPI = 200
-MARGIN = 0.08  # inches
-TITLE, TITLE_GAP, TITLE_LINES = (
+MARGIN = 0.08  # [inch] margin of the picture
+TITLE, TITLE_GAP = (
     0.26,
     0.055,
-    3,
-)  # inches of a line and below it, which is part of it; lines at most
-FLATTEST, TALLEST = 0.16, 1.1  # of a panel's height to its width
-SPREAD, MOST_SPREAD = (
-    0.08,
-    12,
-)  # inches between the points that stand for what texts should not cover; a side of a face
-_WITHOUT_WINDOWS = {"agg", "cairo", "pdf", "pgf", "ps", "svg", "template"}  # of matplotlib's backends
+)  # [inch] height of a line of a title, and the gap below it, which is part of the height
+TITLE_LINES = 3  # largest number of lines of a title
+FLATTEST, TALLEST = 0.16, 1.1  # [-] smallest and largest ratio of a panel's height to its width
+# [inch] distance of the points that represent what texts should not cover, and their largest number along a side of a face
+SPREAD, MOST_SPREAD = 0.08, 12
+_WITHOUT_WINDOWS = {
+    "agg",
+    "cairo",
+    "pdf",
+    "pgf",
+    "ps",
+    "svg",
+    "template",
+}  # matplotlib backends that open no window
 
 
 class Picture(Frozen):
-    """A painted drawing. A notebook shows it; `save` writes it, `show` opens a window where there is one.
+    """A painted picture, which notebooks display, `save` writes to a file and `show` opens in a window.
 
-    figure: the matplotlib Figure, to add to. backend: what painted it.
+    figure: the matplotlib Figure, to which more can be added. backend: the library that painted it.
     """
 
     def __init__(self, figure: Figure, backend: str = "matplotlib"):
@@ -52,9 +58,10 @@ class Picture(Frozen):
         self.backend = backend
 
     def save(self, path: FilePath, dpi: float | None = None) -> Path:
-        """Writes a PNG. dpi: dots an inch, by default the figure's own. An older file is replaced when it is complete.
+        """Write a PNG file. dpi: dots per inch, by default those of the figure.
 
-        Raises ValueError on another ending or too many pixels, FileNotFoundError or another OSError on a bad folder.
+        An existing file is replaced once the new one is complete. Raises ValueError for another ending or too many pixels,
+        FileNotFoundError if the folder does not exist, and OSError if the file cannot be written.
         """
         path = Path(path)
         if path.suffix.lower() != ".png":
@@ -66,7 +73,7 @@ class Picture(Frozen):
         return path
 
     def show(self) -> None:
-        """Opens a window, or displays in a notebook. Raises RuntimeError where neither is to be had."""
+        """Show the picture in a window or a notebook. Raises RuntimeError if there is neither."""
         from matplotlib import pyplot
 
         backend = pyplot.get_backend().lower()
@@ -95,7 +102,7 @@ class Picture(Frozen):
 
 
 def paint(drawing: Drawing, width: int, columns: int | None, backend: str, dpi: int = DPI) -> Picture:
-    """The drawing, `width` pixels wide, in so many columns (None: those that fill the picture best)."""
+    """Paint a drawing, `width` pixels wide, with its panels in `columns` columns (None for the best number)."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -132,7 +139,7 @@ def paint(drawing: Drawing, width: int, columns: int | None, backend: str, dpi: 
 
 @contextmanager
 def screen_of(axes: Axes, backend: str, samples: bool = True) -> Iterator[vtk.Screen | None]:
-    """What pyvista paints on before it comes into axes that have their place in the figure; matplotlib needs none."""
+    """Open the off-screen window on which pyvista paints a panel before it is copied to the axes; None for matplotlib."""
     if backend != "pyvista":
         yield None
         return
@@ -153,8 +160,10 @@ def paint_panel(
     title: float,
     ruler: Ruler,
 ) -> None:
-    """Into axes that have their place in the figure, with so many inches for a title above them, by pyvista if there is a
-    screen."""
+    """Paint a panel into its axes, by pyvista if there is a screen, otherwise by matplotlib.
+
+    window: (left, right, bottom, top) m. title: inches for the title above the axes.
+    """
     axes.set_axis_off()
     axes.set_xlim(window[0], window[1])
     axes.set_ylim(window[2], window[3])
@@ -175,7 +184,7 @@ def paint_panel(
 
 
 def _drawn(panel: Panel, drawing: Drawing, window, size: np.ndarray) -> np.ndarray:
-    """Points (n, 2), inches in the panel, spread over the bodies and arrows in it."""
+    """Return points (n, 2), inches in the panel, distributed over its bodies and arrows."""
     bodies = [each for each in panel.solids if len(each.faces) and not each.around]
     corners = [drawing.view.project(each.positions)[each.faces][:, :, :2] for each in bodies]
     if not corners:
@@ -183,18 +192,19 @@ def _drawn(panel: Panel, drawing: Drawing, window, size: np.ndarray) -> np.ndarr
     corners = (np.concatenate(corners) - window[::2]) / (window[1] - window[0]) * size[0]
     longest = np.ptp(corners, axis=1).max()
     count = int(np.clip(np.ceil(longest / SPREAD), 1, MOST_SPREAD))
-    shares = np.array([(i, j, count - i - j) for i in range(count + 1) for j in range(count + 1 - i)]) / count
-    return np.einsum("ks,fsi->fki", shares, corners).reshape(-1, 2)
+    indices = [(i, j, count - i - j) for i in range(count + 1) for j in range(count + 1 - i)]
+    weights = np.array(indices) / count  # barycentric coordinates
+    return np.einsum("ks,fsi->fki", weights, corners).reshape(-1, 2)
 
 
 def title_height(axes: Axes) -> float:
-    """Inches that a title has above axes at the top of a figure."""
+    """Return the height for a title above axes at the top of a figure, inches."""
     figure = axes.figure
     return figure.get_size_inches()[1] - axes.get_window_extent().y1 / figure.dpi - MARGIN
 
 
 def _title_height(drawing: Drawing, panel_width: float, ruler: Ruler) -> float:
-    """Inches above each panel, for the title with the most lines."""
+    """Return the height above each panel, inches, for the title with the most lines."""
     texts = [panel.title for panel in drawing.panels if panel.title]
     if not texts:
         return 0.0
@@ -203,16 +213,16 @@ def _title_height(drawing: Drawing, panel_width: float, ruler: Ruler) -> float:
 
 
 def _write(axes, label: Label, drawing: Drawing, window, room: Room, ruler: Ruler) -> None:
-    """Beside its point, or where there is room for it, with a line to the point if that is farther off."""
+    """Write a label next to its point, or where there is room, then with a line to the point."""
     from matplotlib.patheffects import withStroke
 
     area = room.area.high
     point = (drawing.view.project(label.point)[:2] - window[::2]) / (window[1] - window[0]) * area[0]
     if drawing.view.frame and ((point < 0) | (point > area)).any():
-        return  # what it is about is not seen
+        return  # its point is not in the window
     text, points = ruler.fitted(label.text, TEXT, area[0], area[1])
     size = ruler.size(text, points)
-    found = room.take(size, places_around(point, size, label.towards))
+    found = room.take(size, candidate_centers(point, size, label.towards))
     if found is None:
         return
     corner, nearest = found.low - point, np.clip(point, found.low, found.high) - point
@@ -234,15 +244,17 @@ def _write(axes, label: Label, drawing: Drawing, window, room: Room, ruler: Rule
 
 
 def _with_room(drawing: Drawing, inches: float, ruler: Ruler) -> np.ndarray:
-    """The window of a panel this wide, with room for its labels' text and of a bearable shape."""
+    """Return the window of a panel of a given width [inches], with room for its labels, neither too flat nor too tall."""
     left, right, bottom, top = drawing.window
-    for _ in range(2):  # the room for text is in inches, which the first pass finds the scale for
+    for _ in range(
+        2
+    ):  # the first pass finds the scale between the inches of texts and the metres of the window
         scale = (right - left) / inches
         for panel in [] if drawing.view.frame else drawing.panels:
             for label in panel.labels:
                 point = drawing.view.project(label.point)[:2] / scale
                 size = np.minimum(ruler.size(label.text, TEXT), 0.6 * inches)
-                middle = beside(point, size, np.array(label.towards))
+                middle = text_center(point, size, np.array(label.towards))
                 (x0, y0), (x1, y1) = scale * (middle - 0.55 * size), scale * (middle + 0.55 * size)
                 left, right, bottom, top = min(left, x0), max(right, x1), min(bottom, y0), max(top, y1)
     width, height = right - left, top - bottom
@@ -253,7 +265,7 @@ def _with_room(drawing: Drawing, inches: float, ruler: Ruler) -> np.ndarray:
 
 
 def _best_columns(count: int, window: np.ndarray) -> int:
-    """Columns for a picture about twice as wide as high, with few empty places."""
+    """Return the number of columns that makes a picture about twice as wide as high, with few empty panels."""
     shape = (window[1] - window[0]) / (window[3] - window[2])
     shape = min(shape, 1.0 / FLATTEST)
 

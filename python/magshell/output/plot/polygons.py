@@ -1,4 +1,4 @@
-"""Sorts and shades the polygons that matplotlib paints."""
+"""Painting of panels by matplotlib, with shaded triangles sorted by depth."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-LIGHT = np.array([-0.35, 0.55, 0.76])  # to the light: right, up, towards the eye
+LIGHT = np.array([-0.35, 0.55, 0.76])  # direction towards the light: right, up, towards the eye
 AMBIENT, DIFFUSE = 0.74, 0.30
 
 
 def shade(colors: np.ndarray, normals: np.ndarray, view: View) -> np.ndarray:
-    """Colours (m, 3) of faces with unit normals (m, 3)."""
+    """Return the shaded colours (m, 3) of faces with unit normals (m, 3)."""
     seen = view.project(normals)
     seen = seen * np.where(seen[:, 2:] < 0, -1.0, 1.0)
     light = LIGHT / np.linalg.norm(LIGHT)
@@ -27,14 +27,14 @@ def shade(colors: np.ndarray, normals: np.ndarray, view: View) -> np.ndarray:
 
 
 def paint(axes: Axes, panel: Panel, view: View) -> None:
-    """Adds the triangles of a panel to matplotlib axes whose coordinates are metres on the screen."""
+    """Add the triangles of a panel to matplotlib axes whose coordinates are metres on the screen."""
     from matplotlib.collections import PolyCollection
 
     parts = [_triangles(solid, view) for solid in panel.solids if len(solid.faces)]
     corners, colors, depths = (np.concatenate(part) for part in zip(*parts, strict=True))
     order = np.argsort(depths, kind="stable")
     colors = colors[order]
-    # an edge in the colour of its face closes the hairline between neighbours; under a clear face it would show
+    # edges in the colour of their face close the gaps between neighbours; those of transparent faces would be visible
     widths = np.where(colors[:, 3] < 1.0, 0.0, 0.25)
     axes.add_collection(
         PolyCollection(
@@ -44,7 +44,7 @@ def paint(axes: Axes, panel: Panel, view: View) -> None:
 
 
 def _triangles(solid: Solid, view: View) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Corners on the screen (m, 3, 2), colours and opacities (m, 4), depths (m,)."""
+    """Return the triangles of a solid: corners on the screen (m, 3, 2), colours with opacities (m, 4), depths (m,)."""
     corners = view.project(solid.positions)[solid.faces]
     colors = solid.colors if solid.per_face else solid.colors[solid.faces].mean(axis=1)
     if solid.lit:
@@ -54,7 +54,7 @@ def _triangles(solid: Solid, view: View) -> tuple[np.ndarray, np.ndarray, np.nda
 
 
 def _normals(solid: Solid) -> np.ndarray:
-    """Unit normals of the faces, (m, 3); of a smooth solid, averaged over the neighbours."""
+    """Return the unit normals of the faces, (m, 3); those of a smooth solid are averaged over the neighbours."""
     x0, x1, x2 = np.moveaxis(solid.positions[solid.faces], 1, 0)
     normals = np.cross(x1 - x0, x2 - x0)
     if solid.smooth:

@@ -1,4 +1,4 @@
-"""Everything in a panel is coloured triangles: sheets, arrows and lines. A painter knows nothing else."""
+"""Coloured triangles, of which everything in a panel consists: bodies, arrows and lines."""
 
 from __future__ import annotations
 
@@ -15,11 +15,12 @@ ARROW_SIDES = 12
 class Solid:
     """Triangles with colours.
 
-    positions: (n, 3), m. faces: (m, 3). colors: (m, 3) a face or (n, 3) a vertex, 0 to 1, as `per_face` says.
-    smooth: shade with the normals averaged at the vertices. lit: shade at all.
-    lift: m, towards the eye, which hides less of it and moves nothing in a parallel projection.
-    opacity: 0 to 1; less than 1 lets what is behind shine through.
-    around: it is what bodies are in, which the window need not hold all of.
+    positions: (n, 3), m. faces: (m, 3). colors: from 0 to 1, (m, 3) for faces if `per_face`, otherwise (n, 3) for vertices.
+    smooth: whether to shade with normals averaged at the vertices. lit: whether to shade at all.
+    lift: m, a displacement towards the eye, so that other solids hide less of it; it is not visible in a parallel
+        projection.
+    opacity: 0 to 1.
+    around: whether it belongs to the surroundings of bodies, which the window need not contain completely.
     """
 
     positions: np.ndarray
@@ -34,14 +35,14 @@ class Solid:
 
 
 def sheet(positions: np.ndarray, faces: np.ndarray, colors: np.ndarray) -> Solid:
-    """A surface; colors (3,), (n_f, 3) or (n_v, 3)."""
+    """Make a smooth surface; colors: (3,), (n_f, 3) or (n_v, 3)."""
     if colors.ndim == 1:
         colors = np.broadcast_to(colors, (len(faces), 3))
     return Solid(positions, faces, colors, per_face=len(colors) == len(faces), smooth=True)
 
 
 def ribbons(segments: np.ndarray, eye: np.ndarray, width: float, color: str, lift: float) -> Solid:
-    """Lines (m, 2, 3) as bands that face the eye (3,), two triangles each."""
+    """Make lines of segments (m, 2, 3) m as bands of two triangles each, perpendicular to the direction (3,) of the eye."""
     along = segments[:, 1] - segments[:, 0]
     across = np.cross(along, eye)
     length = np.linalg.norm(across, axis=1, keepdims=True)
@@ -55,7 +56,7 @@ def ribbons(segments: np.ndarray, eye: np.ndarray, width: float, color: str, lif
 
 
 def arrows(starts: np.ndarray, vectors: np.ndarray, radius: float, color: str, lift: float = 0.0) -> Solid:
-    """Arrows from starts (k, 3) along vectors (k, 3), m, of a shaft and a cone; short ones are thinner."""
+    """Make arrows of a shaft and a cone from starts (k, 3) m along vectors (k, 3) m; short arrows are thinner."""
     length = np.linalg.norm(vectors, axis=1)
     starts, vectors, length = starts[length > 0], vectors[length > 0], length[length > 0, None]
     along = vectors / length
@@ -88,7 +89,9 @@ def arrows(starts: np.ndarray, vectors: np.ndarray, radius: float, color: str, l
         )
         for a in (0, n, 2 * n)
     ]
-    bands[2] = bands[2][:n]  # the tip's ring has no width, and one of its two triangles no area
+    bands[2] = bands[2][
+        :n
+    ]  # the ring at the tip has radius 0, so the second half of its triangles have no area
     bands.append(np.stack([np.zeros(n - 2, dtype=int), here[2:], here[1:-1]], 1))
     pattern = np.concatenate(bands)
     faces = (4 * n * np.arange(len(starts))[:, None, None] + pattern).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""How pictures, movies and pages look: made once, and handed to as many of them as are to look alike."""
+"""Options for the look of pictures, movies and pages: Style and Color."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from .limits import arrow_count
 @immutable
 @dataclass(frozen=True)
 class Style:
-    """What is drawn beside the bodies, and by whom: `style` of ms.plot, ms.animate and ms.write_page.
+    """The things that are drawn in addition to the bodies, and the backend: `style` of ms.plot, ms.animate, ms.write_page.
 
-    arrows: magnetization F_0 M_r as arrows, about 60 on a sheet, or as many as you say.
-    show_field: a uniform field as one arrow beside the sheet, one that varies as arrows around it.
-    rest: the rest shape as a faint outline. mesh_lines: the edges of the mesh.
-    contacts: the forces of all contacts, friction included, as arrows from the vertices on which they act, over everything.
-    backend: "pyvista" or "matplotlib"; by default the environment variable MAGSHELL_PLOT, else pyvista where it can render
-        off the screen, else matplotlib. A page is painted by the browser that shows it.
+    arrows: arrows of the magnetization F_0 M_r: True for about 60 on a body, False for none, or their approximate number.
+    show_field: show a uniform field as one arrow next to the bodies, and a field that varies in space as arrows around them.
+    rest: show the rest shape as a faint outline. mesh_lines: show the edges of the mesh.
+    contacts: show the forces of all contacts, friction included, as arrows at the vertices, in front of everything else.
+    backend: "pyvista" or "matplotlib"; by default that of the environment variable MAGSHELL_PLOT, else pyvista if it can
+        render off-screen, else matplotlib. A page is painted by the browser that shows it.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -51,7 +51,7 @@ class Style:
 
 
 def style_of(style: Style | None) -> Style:
-    """Of a caller, None for the default. Raises ValueError."""
+    """Return the style that a caller gives, or the default for None. Raises ValueError if it is not a Style."""
     if style is None:
         return Style()
     if not isinstance(style, Style):
@@ -62,12 +62,14 @@ def style_of(style: Style | None) -> Style:
 @immutable
 @dataclass(frozen=True)
 class Color:
-    """A quantity that colours bodies, with its own text, ends and scale: `color` of ms.plot, ms.animate and ms.write_page,
-    where several pictures are to have the same, or where the usual ones will not do.
+    """A quantity that colours bodies, with its label, range and scale: `color` of ms.plot, ms.animate and ms.write_page.
 
-    values: what `color` of ms.plot takes: a name, or numbers of faces or vertices. label: the text at the colour bar, with
-    the unit. range: (low, high), in the unit of the values; by default what there is. scale: "sequential", "diverging"
-    (even on both sides of 0 unless there is a range) or "cyclic"; by default what suits a name, "sequential" for numbers.
+    Use it to give several pictures the same colours, or to change the default ones.
+
+    values: as `color` of ms.plot: a name, or numbers on faces or vertices. label: the text at the colour bar, with the unit.
+    range: (low, high), in the unit of the values; by default the range of the values. scale: "sequential", "diverging"
+    (symmetric about 0 unless `range` is given) or "cyclic"; by default the one that suits the name, "sequential" for
+    numbers.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -93,7 +95,7 @@ class Color:
 
 
 def colored(states: list[State], color: Any, unit: LengthUnit, cut: bool = False) -> Scalar | None:
-    """The scalar that a caller asks for, as in `scalar_of`, or by a Color."""
+    """Return the scalar that a caller gives, as in `scalar_of` or as a Color."""
     asked = color if isinstance(color, Color) else Color(color)
     scalar = scalar_of(states, asked.values, asked.label, asked.range, unit, cut)
     if scalar is None or asked.scale is None:

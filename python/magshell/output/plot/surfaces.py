@@ -1,4 +1,4 @@
-"""The surfaces of states: of solids the triangles around them, as what is inside cannot be seen."""
+"""Restriction of states to the surfaces of solids, because their inside is not visible."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .colors import Scalar
 
 
 def on_surfaces(states: list[State]) -> list[State]:
-    """The states with the mesh that is drawn: that of sheets as it is. Faces keep their numbers."""
+    """Return the states with the surfaces of their meshes; triangle meshes stay. Faces keep their numbers."""
     drawn: dict[int, tuple[TriangleMesh, np.ndarray]] = {}
     found = []
     for state in states:
@@ -38,7 +38,7 @@ def _on_vertices(loads, vertices: np.ndarray):
 
 
 def scalar_on_surfaces(scalar: Scalar | None, states: list[State]) -> Scalar | None:
-    """Of the states as they were: numbers at vertices inside solids are left out."""
+    """Return a scalar without its values at vertices inside solids. states: those before `on_surfaces`."""
     if scalar is None:
         return None
     pairs = zip(scalar.values, states, strict=True)

@@ -1,4 +1,4 @@
-"""What is around sheets: obstacles as solids that one sees through, and magnets."""
+"""The surroundings of bodies in a picture: obstacles as transparent solids, and magnets."""
 
 from __future__ import annotations
 
@@ -11,15 +11,17 @@ from . import colors
 from .solids import Solid, sheet
 
 OPACITY = 0.35
-REACH = 1.6  # the side of the square that stands for a plane, in sizes of the drawing
-LARGE = 2.0  # extents of the bodies, beyond which an obstacle is not shown whole
-ROOM = 0.15  # extents of the bodies: how far around them it is shown then
+REACH = 1.6  # [-] side of the square that represents a plane, over the size of the drawing
+LARGE = 2.0  # [-] size of an obstacle over that of the bodies, above which it is shown in part only
+ROOM = 0.15  # [-] distance from the bodies up to which such an obstacle is shown, over their size
 
 
 def obstacle_solids(states: list[State], size: float, middle: np.ndarray | None = None) -> list[Solid]:
-    """Obstacles and magnets of states that lie over each other: one at rest once, a moving one where it is in each state.
+    """Return the obstacles and magnets of states in one panel; those that do not move appear once.
 
-    size: of the drawing, m. middle: (3,) m, the place that a plane's square is nearest to; by default that of each state.
+    size: of the drawing, m. middle: (3,) m, the point around which the square of a plane lies; by default the mean position
+        of
+    each state.
     """
     shown = {}
     for state in states:
@@ -40,8 +42,10 @@ def obstacle_solids(states: list[State], size: float, middle: np.ndarray | None 
 
 
 def box_of(bodies: list[np.ndarray], around: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Two corners of the box, on the screen, around points (n, 2 or 3) of bodies, and of each of what is around them: all of
-    it where it is not much larger than they are, else no more than is close to them."""
+    """Return the lower and upper corner of a box on the screen around points (n, 2 or 3) of bodies and surroundings.
+
+    Surroundings that are much larger than the bodies are included only near the bodies.
+    """
     low, high = (end([end(each, axis=0) for each in bodies], axis=0) for end in (np.min, np.max))
     extent = float((high - low)[:2].max())
     ends = [low, high]

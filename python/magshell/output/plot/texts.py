@@ -1,4 +1,4 @@
-"""How long and high texts are, in inches, and how they are broken into lines and made smaller until they have room."""
+"""The size of texts in inches, and their fitting into a box by line breaks and smaller type."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import functools
 import re
 from collections.abc import Callable
 
-SMALLEST = 4.0  # points, below which a text is cut instead
-_STEP = 0.9  # from one size to the next smaller one
+SMALLEST = 4.0  # [points] smallest size; longer texts are cut
+_STEP = 0.9  # [-] ratio of successive sizes that are tried
 
 
 class Ruler:
-    """Measures texts as the painter will write them."""
+    """A measuring device for texts, with the fonts of the painted picture."""
 
     def __init__(self, dpi: float):
         from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -23,13 +23,13 @@ class Ruler:
         self.size: Callable[[str, float], tuple[float, float]] = functools.cache(self._size)
 
     def _size(self, text: str, points: float) -> tuple[float, float]:
-        """Width and height, inches."""
+        """Return the width and height of a text, inches."""
         self._text.set(text=text, fontsize=points)
         box = self._text.get_window_extent()
         return box.width / self._dpi, box.height / self._dpi
 
     def broken(self, text: str, points: float, width: float) -> str:
-        """With line breaks so that it is no wider than so many inches, as far as words allow."""
+        """Return a text with line breaks between words, so that it is no wider than `width` [inches] if possible."""
         lines = []
         for line in text.split("\n"):
             words = _words(line)
@@ -45,8 +45,10 @@ class Ruler:
         return "\n".join(lines)
 
     def fitted(self, text: str, points: float, width: float, height: float) -> tuple[str, float]:
-        """The text, broken, and a size of at most so many points at which it fits into a box [inches]; at the smallest size
-        what does not fit is cut."""
+        """Return a text with line breaks, and the largest size up to `points` at which it fits into a box [inches].
+
+        At the smallest size, the part that does not fit is cut off.
+        """
         size = points
         while True:
             broken = self.broken(text, size, width)
@@ -57,14 +59,14 @@ class Ruler:
             size = max(_STEP * size, SMALLEST)
 
     def _cut(self, text: str, points: float, width: float, height: float) -> str:
-        """As much of its beginning as fits, and an ellipsis."""
-        text = text.replace("$", "")  # half a formula would not be one
-        kept, cut = 0, len(text)
-        while cut - kept > 1:
-            middle = (kept + cut) // 2
+        """Return as much of the beginning of a text as fits, and an ellipsis."""
+        text = text.replace("$", "")  # a formula that is cut would be invalid
+        fitting, cut = 0, len(text)
+        while cut - fitting > 1:
+            middle = (fitting + cut) // 2
             tried = self.broken(text[:middle].rstrip() + "…", points, width)
-            kept, cut = (middle, cut) if self._fits(tried, points, width, height) else (kept, middle)
-        return self.broken(text[:kept].rstrip() + "…", points, width)
+            fitting, cut = (middle, cut) if self._fits(tried, points, width, height) else (fitting, middle)
+        return self.broken(text[:fitting].rstrip() + "…", points, width)
 
     def _fits(self, text: str, points: float, width: float, height: float) -> bool:
         wide, high = self.size(text, points)
@@ -72,7 +74,7 @@ class Ruler:
 
 
 def _words(line: str) -> list[str]:
-    """Parts between spaces; a formula between dollars is one.
+    """Split a line at spaces; a formula between dollar signs is one word.
 
     >>> _words("a force [10$^{-3} N / m$] of it")
     ['a', 'force', '[10$^{-3} N / m$]', 'of', 'it']

@@ -1,4 +1,4 @@
-"""Solids painted by pyvista off the screen, into an image."""
+"""Painting of panels by pyvista, off-screen into an image."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ OVERSAMPLING = 2
 
 
 class Screen:
-    """What VTK paints on: one for a picture, or one for all frames of a movie, since it takes long to make."""
+    """An off-screen window of VTK; a movie uses one for all frames, because it takes long to open."""
 
     def __init__(self, pixels: tuple[int, int], samples: bool = True):
         import pyvista
@@ -37,7 +37,7 @@ class Screen:
 
 
 def paint(axes: Axes, panel: Panel, view: View, window: np.ndarray, screen: Screen) -> None:
-    """Adds the image of a panel to matplotlib axes whose coordinates are metres on the screen.
+    """Add the image of a panel to matplotlib axes whose coordinates are metres on the screen.
 
     window: (left, right, bottom, top), m.
     """
@@ -56,7 +56,7 @@ def paint(axes: Axes, panel: Panel, view: View, window: np.ndarray, screen: Scre
 
 
 def _quiet_without_a_screen() -> None:
-    """VTK warns of every display it tries and does not find before it turns to one that needs none."""
+    """Turn off VTK's warnings about missing displays if there is none; it then renders without a display."""
     if not os.environ.get("DISPLAY"):
         from vtkmodules.vtkCommonCore import vtkLogger
 
@@ -64,7 +64,7 @@ def _quiet_without_a_screen() -> None:
 
 
 def render(solids: list[Solid], view: View, window: np.ndarray, screen: Screen) -> np.ndarray:
-    """(height, width, 3), 0 to 255, OVERSAMPLING times as fine as the screen's pixels."""
+    """Draw solids as an image (height, width, 3), 0 to 255, with OVERSAMPLING times the resolution of the screen."""
     import pyvista
 
     right, up, eye = view.axes
@@ -72,7 +72,7 @@ def render(solids: list[Solid], view: View, window: np.ndarray, screen: Screen) 
     reach = np.ptp(depths) + window[1] - window[0]
     center = (window[0] + window[1]) / 2 * right + (window[2] + window[3]) / 2 * up + depths.mean() * eye
     plotter = screen.plotter
-    plotter.suppress_rendering = True  # until all is in its place
+    plotter.suppress_rendering = True  # until all solids are added
     plotter.clear_actors()
     plotter.remove_all_lights()
     plotter.add_light(

@@ -1,1 +1,1 @@
-"""Turns results into snapshots, tables and files."""
+"""Conversion of results to snapshots, tables and files."""

@@ -1,4 +1,4 @@
-"""With what forces the contacts of a result load its vertices, and the pressure that they make."""
+"""Contact forces on the vertices of a result, and the contact pressure."""
 
 from __future__ import annotations
 
@@ -14,27 +14,34 @@ if TYPE_CHECKING:
 
 
 class ContactLoads(NamedTuple):
-    """Of all contacts together: forces (n_v, 3) N on every vertex, normal ones and friction; pushed (n_v,) N, what vertices
-    have of the normal forces without regard to their direction."""
+    """The forces of all contacts of a scene on its vertices.
+
+    forces: (n_v, 3) N, the sums of normal and friction forces. normal_force_magnitudes: (n_v,) N, the sums of the magnitudes
+        of normal forces, which do not cancel between the two sides of a shell.
+    """
 
     forces: np.ndarray
     normal_force_magnitudes: np.ndarray
 
     def pressures(self, positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
-        """(n_v,) Pa, of vertices that have a third of each of their faces as these are now. Over the surface of a body its
-        integral, linear on faces, is the sum of the normal forces on it; a sheet has both of its sides' in one."""
+        """Compute the contact pressure at the vertices, (n_v,) Pa.
+
+        It is the normal force over a third of the area of the vertex's faces in the deformed configuration. Interpolated
+        linearly on faces, its integral over the surface of a body is the sum of the normal forces on it. For a shell, both
+        sides are added.
+        """
         x0, x1, x2 = np.moveaxis(positions[faces], 1, 0)
         thirds = np.linalg.norm(np.cross(x1 - x0, x2 - x0), axis=1) / 6.0
         areas = np.bincount(faces.ravel(), np.repeat(thirds, 3), minlength=len(positions))
         return np.divide(self.normal_force_magnitudes, areas, out=np.zeros(len(positions)), where=areas > 0.0)
 
     def of(self, vertices: np.ndarray) -> ContactLoads:
-        """Of some vertices alone."""
+        """Return the forces on some of the vertices only."""
         return ContactLoads(self.forces[vertices], self.normal_force_magnitudes[vertices])
 
 
 def contact_loads(result: SolveResult, index: int) -> ContactLoads:
-    """In one of its states."""
+    """Compute the contact forces in state number `index` of a result."""
     scene, moving = result.scene, isinstance(result, Trajectory)
     values, state = result._values_at(index), result._state_at(index)
     found = [
@@ -43,8 +50,8 @@ def contact_loads(result: SolveResult, index: int) -> ContactLoads:
         else compute_contact_state(scene, values, contact, state)
         for contact in scene.contacts
     ]
-    forces, pushed = np.zeros((scene.mesh.n_vertices, 3)), np.zeros(scene.mesh.n_vertices)
+    forces, magnitudes = np.zeros((scene.mesh.n_vertices, 3)), np.zeros(scene.mesh.n_vertices)
     for each in found:
         forces += each._pushes + each.friction
-        pushed += each.normal_force_magnitudes
-    return ContactLoads(forces, pushed)
+        magnitudes += each.normal_force_magnitudes
+    return ContactLoads(forces, magnitudes)

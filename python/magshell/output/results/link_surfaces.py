@@ -1,4 +1,4 @@
-"""Makes surfaces of links and of tendons, for pictures."""
+"""Surfaces of links, free rigid bodies and tendons, for pictures."""
 
 from __future__ import annotations
 
@@ -20,12 +20,15 @@ if TYPE_CHECKING:
     from ...model.scene.scene import Scene
 
 
-_THICK = 0.06  # the radius of a rod, in its length
-_KNOB = 1.4  # and of its ends, in that
+_THICK = 0.06  # [-] radius of a rod over its length
+_KNOB = 1.4  # [-] radius of the balls at its ends over that of the rod
 
 
 def surface_of(skeleton: Skeleton, link: RigidBody, center: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """At rest: vertices (n, 3) m, faces (m, 3). center: (3,) m, of the link."""
+    """Build the surface of a link in the reference configuration: vertices (n, 3) m, faces (m, 3).
+
+    It is the link's shape or, without one, rods between its joints. center: (3,) m, the link's center.
+    """
     shape = getattr(link, "shape", None)
     if shape is not None:
         return shape.rest_positions, shape.faces
@@ -42,7 +45,7 @@ def surface_of(skeleton: Skeleton, link: RigidBody, center: np.ndarray) -> tuple
 
 
 def joined(parts: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
-    """Several surfaces as one."""
+    """Join several surfaces, (vertices, faces) each, into one."""
     first = np.cumsum([0, *(len(points) for points, _ in parts)])
     faces = [faces + start for (_, faces), start in zip(parts, first[:-1], strict=True)]
     return np.concatenate([points for points, _ in parts]), np.concatenate(faces)
@@ -56,9 +59,12 @@ def _rod(a: np.ndarray, b: np.ndarray, radius: float):
     return Capsule(np.stack([a, b]), radius=radius).surface()
 
 
-def bones_of(result: SolveResult) -> list[list[tuple[np.ndarray, np.ndarray]]]:
-    """Of every state of a result (one, or k of them), the surfaces of its links, where they are."""
-    return _where(
+def link_surfaces_of(result: SolveResult) -> list[list[tuple[np.ndarray, np.ndarray]]]:
+    """Return the surfaces of the links in every state of a result, (vertices (n, 3) m, faces (m, 3)) each.
+
+    The outer list has an entry per state, one or k of them; it is empty if there are no links.
+    """
+    return _moved_surfaces(
         result,
         [
             (link, *surface_of(skeleton, link, result[link]._points.center))
@@ -69,38 +75,41 @@ def bones_of(result: SolveResult) -> list[list[tuple[np.ndarray, np.ndarray]]]:
 
 
 def shapes_of(result: SolveResult) -> list[list[tuple[np.ndarray, np.ndarray]]]:
-    """Likewise of the free parts that have a shape."""
-    return _where(result, _shapes(result.scene))
+    """Return the surfaces of the free rigid bodies with a shape in every state, as `link_surfaces_of` does for links."""
+    return _moved_surfaces(result, _shapes(result.scene))
 
 
 def shapes_at_rest(scene: Scene) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Of a scene."""
+    """Return the surfaces of a scene's free rigid bodies in the reference configuration."""
     return [(points, faces) for _, points, faces in _shapes(scene)]
 
 
 def _shapes(scene) -> list[Any]:
-    """(part, vertices at rest (n, 3) m, faces (m, 3)) of the rigid parts, no links, that have a shape."""
+    """Return (body, rest vertices (n, 3) m, faces (m, 3)) of the rigid bodies with a shape that are not links."""
     bodies = scene._bodies
     parts = [part for part in bodies.rigid if part.shape is not None and bodies.skeleton_of(part) is None]
     return [(part, part.shape.rest_positions, part.shape.faces) for part in parts]
 
 
-def _where(result, surfaces) -> list[list[tuple[np.ndarray, np.ndarray]]]:
-    """surfaces: (part, vertices at rest (n, 3) m, faces (m, 3)) of each."""
+def _moved_surfaces(result, surfaces) -> list[list[tuple[np.ndarray, np.ndarray]]]:
+    """Move surfaces with their rigid bodies in every state of a result.
+
+    surfaces: (body, rest vertices (n, 3) m, faces (m, 3)) each.
+    """
     found: list[list[tuple[np.ndarray, np.ndarray]]] = []
     for part, points, faces in surfaces:
         of = result[part]
-        turns, centers = np.asarray(detached(of.rotation)), np.asarray(detached(of.center))
+        rotations, centers = np.asarray(detached(of.rotation)), np.asarray(detached(of.center))
         around = points - of._points.center
-        moved = np.einsum("kij,nj->kni", turns.reshape(-1, 3, 3), around) + centers.reshape(-1, 1, 3)
+        moved = np.einsum("kij,nj->kni", rotations.reshape(-1, 3, 3), around) + centers.reshape(-1, 1, 3)
         found = found or [[] for _ in moved]
         for state, positions in zip(found, moved, strict=True):
             state.append((positions, faces))
     return found
 
 
-def bones_at_rest(scene: Scene) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Of a scene: the surfaces of its links."""
+def link_surfaces_at_rest(scene: Scene) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return the surfaces of a scene's links in the reference configuration."""
     places = dict(zip(map(id, scene.rigid_parts), scene._rigid, strict=True))
     return [
         surface_of(skeleton, link, places[id(link)].center)
@@ -109,19 +118,17 @@ def bones_at_rest(scene: Scene) -> list[tuple[np.ndarray, np.ndarray]]:
     ]
 
 
-def mesh_of(bones: list[tuple[np.ndarray, np.ndarray]]) -> TriangleMesh:
-    """Of skeletons without flesh, for pictures: the bones as a sheet."""
-    return TriangleMesh(*joined(bones))
+def mesh_of(surfaces: list[tuple[np.ndarray, np.ndarray]]) -> TriangleMesh:
+    """Join surfaces into one mesh, to draw scenes without deformable bodies."""
+    return TriangleMesh(*joined(surfaces))
 
 
-_THICK_TENDONS = (
-    0.012  # the radius, in the length of a tendon at rest, and at most so much of its shortest segment
-)
-_MOST = 0.2
+_THICK_TENDONS = 0.012  # [-] radius of a tendon over its rest length
+_MOST = 0.2  # [-] largest radius of a tendon over the length of its shortest segment
 
 
 def tendons_of(result: SolveResult) -> list[list[tuple[np.ndarray, np.ndarray]]]:
-    """Of every state of a result (one, or k of them), the surfaces of its tendons; none without any."""
+    """Return the surfaces of the tendons in every state of a result; an empty list if there are no tendons."""
     found: list[list[tuple[np.ndarray, np.ndarray]]] = []
     for tendon in _tendons(result.scene):
         points = np.asarray(detached(result[tendon].positions))
@@ -133,7 +140,7 @@ def tendons_of(result: SolveResult) -> list[list[tuple[np.ndarray, np.ndarray]]]
 
 
 def tendons_at_rest(scene: Scene) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Of a scene."""
+    """Return the surfaces of a scene's tendons in the reference configuration."""
     return [_rods(tendon, tendon.points) for tendon in _tendons(scene)]
 
 

@@ -1,4 +1,4 @@
-"""Magnets and wires of fields as surfaces, magpylib's too: vertices (n, 3) m, faces (m, 3) each."""
+"""Surfaces of the magnets and wires of fields, magpylib's as well: vertices (n, 3) m, faces (m, 3) each."""
 
 from __future__ import annotations
 
@@ -15,24 +15,25 @@ from ...model.fields.magnets import CuboidMagnet, CylinderMagnet, Magnet
 from ...model.fields.posed_field import PlacedField
 from .link_surfaces import joined
 
-_AROUND = 32  # cells around what is round
-_HALVED = 3  # times: the edges of a block's faces
-_WIRE = 0.015  # the radius of a wire, in the extent of what it runs along
+_AROUND = 32  # cells around a circle
+_REFINEMENTS = 3  # refinements of a block's faces
+_WIRE = 0.015  # [-] radius of a wire over the longest side of its bounding box
 Surface = tuple[np.ndarray, np.ndarray]
 
 
 def surfaces_of(field: AppliedField) -> list[Surface]:
-    """Of a field's magnets and wires, where they are; none of what has no body."""
+    """Return the surfaces of a field's magnets and wires at their positions; an empty list for other fields."""
     if isinstance(field, PlacedField):
-        return [_placed(each, field.center, field.rotation) for each in surfaces_of(field.field)]
+        return [_moved(each, field.center, field.rotation) for each in surfaces_of(field.field)]
     if isinstance(field, MagpylibField):
         return [each for source in field._made_from["sources"] for each in _of_source(source)]
     if not isinstance(field, Magnet):
         return []
-    return [_placed(_own_surface(field), field.center, field.rotation)]
+    return [_moved(_own_surface(field), field.center, field.rotation)]
 
 
 def _own_surface(magnet: Magnet) -> Surface:
+    """Build the surface of a magnet in its own frame."""
     if isinstance(magnet, CuboidMagnet):
         return _block(magnet.dimensions)
     if isinstance(magnet, CylinderMagnet):
@@ -41,33 +42,40 @@ def _own_surface(magnet: Magnet) -> Surface:
 
 
 def _of_source(source) -> list[Surface]:
-    """Of one of magpylib's, by its name: magshell does not load magpylib to draw."""
-    if hasattr(source, "children"):  # a collection, whose children stand where they stand
+    """Return the surfaces of a magpylib source.
+
+    Its class is recognized by its name, since magshell does not import magpylib to draw.
+    """
+    if hasattr(source, "children"):  # a collection, whose children have absolute positions
         return [each for child in source.children for each in _of_source(child)]
     make = _BY_NAME.get(type(source).__name__)
     if make is None:
         return []
-    turned = np.reshape(source.orientation.as_rotvec(), (-1, 3))[0]
-    return [_placed(make(source), np.reshape(source.position, (-1, 3))[0], turned)]
+    rotation = np.reshape(source.orientation.as_rotvec(), (-1, 3))[0]
+    return [_moved(make(source), np.reshape(source.position, (-1, 3))[0], rotation)]
 
 
-def _placed(surface: Surface, center: np.ndarray, rotation: np.ndarray) -> Surface:
+def _moved(surface: Surface, center: np.ndarray, rotation: np.ndarray) -> Surface:
+    """Rotate a surface by a rotation vector (3,) rad, then move its origin to a center (3,) m."""
     points, faces = surface
     return scipy.spatial.transform.Rotation.from_rotvec(np.array(rotation)).apply(points) + center, faces
 
 
 def _block(edges) -> Surface:
-    """Of small faces: painters sort faces by their middles."""
+    """Build a block of small faces, because matplotlib draws faces in the order of their centers' depths."""
     mesh = TriangleMesh(*Box(edges).surface())
-    for _ in range(_HALVED):
+    for _ in range(_REFINEMENTS):
         mesh = mesh.refined()
     return np.array(mesh.rest_positions), mesh.faces
 
 
 def _ring(inner: float, outer: float, height: float, start: float = 0.0, end: float = 360.0) -> Surface:
-    """A piece of a hollow cylinder from an angle to another [deg], closed; of a whole one without inner radius a disk."""
-    whole = end - start >= 360.0 - 1e-9
-    angles = np.radians(np.linspace(start, end, _AROUND + 1))[: _AROUND + (not whole)]
+    """Build the closed surface of a hollow cylinder, or of its part between two angles [deg].
+
+    An inner radius of 0 gives a solid cylinder.
+    """
+    full_circle = end - start >= 360.0 - 1e-9
+    angles = np.radians(np.linspace(start, end, _AROUND + 1))[: _AROUND + (not full_circle)]
     corners = np.array([(inner, -1), (outer, -1), (outer, 1), (inner, 1)]) * (1.0, 0.5 * height)
     radii, heights = corners.T
     points = np.stack(
@@ -85,7 +93,7 @@ def _ring(inner: float, outer: float, height: float, start: float = 0.0, end: fl
         a, b = 4 * here + corner, 4 * here + (corner + 1) % 4
         c, d = 4 * there + (corner + 1) % 4, 4 * there + corner
         faces += [np.stack([a, c, b], axis=1), np.stack([a, d, c], axis=1)]
-    if not whole:
+    if not full_circle:
         last = 4 * (len(angles) - 1)
         faces += [[(0, 1, 2), (0, 2, 3)], [(last, last + 2, last + 1), (last, last + 3, last + 2)]]
     faces = np.concatenate(faces)

@@ -1,4 +1,4 @@
-"""Saves results and loads them, with the checks of what a file holds."""
+"""Saving and loading of results, with checks of the file's content."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from ...solve.statics.equilibrium import Equilibrium
 
 
 def check_fits(held: dict[Any, Any], scene: Scene) -> None:
-    """Raises ValueError where an array has another shape than one of this scene, or is not finite where it must be."""
+    """Raise ValueError if an array of a result does not have the shape that the scene requires, or is not finite."""
     mesh, model = scene.mesh, scene._model
     of_motion = "times" in held
     n = (len(held["times"]),) if of_motion else ()
@@ -40,7 +40,7 @@ def check_fits(held: dict[Any, Any], scene: Scene) -> None:
         _check_end(held["end"], model)
     else:
         shapes |= {"_state": (model.size,), "_controls": (scene._control_layout.size,)}
-        _check_turns(held["_turns"])
+        _check_angle_branches(held["_turns"])
     shapes["_own_points"] = (*n, own, 3)
     for name, shape in shapes.items():
         optional = name in ("_own_points", "_own_velocities", "applied_flux_density")
@@ -57,35 +57,40 @@ def _check_end(end, model) -> None:
         raise ValueError(f"its end is a {type(end).__name__}")
     quantity("end.state", "SI", end.state, (model.size,))
     quantity("end.velocity", "SI", end.velocity, (model.size,))
-    _check_turns(end.turns)
+    _check_angle_branches(end.turns)
 
 
-def _check_turns(turns) -> None:
-    if not isinstance(turns, list | tuple):
-        raise ValueError(f"turns must be a list, got {type(turns).__name__}")
-    for k, each in enumerate(turns):
+def _check_angle_branches(branches) -> None:
+    """Check that `turns`, the numbers of full turns of angles, is a list of arrays of finite numbers."""
+    if not isinstance(branches, list | tuple):
+        raise ValueError(f"`turns` is a {type(branches).__name__} instead of a list")
+    for k, each in enumerate(branches):
         quantity(f"turns[{k}]", "SI", each, ("n",))
 
 
 def digests(scene: Scene) -> dict[str, str]:
-    """{name of a part: its digest}, the same in every process. Raises ValueError where a part has none."""
+    """Return the digest of each part of a scene, {name: digest}, the same in every process.
+
+    Raises ValueError for a part that has no digest.
+    """
     found = {}
     for name, part in _parts(scene).items():
         try:
             found[name] = content_hash(part)
         except TypeError as error:
             raise ValueError(
-                f"a file must tell of which scene it is, and cannot for {name}, {part!r}: {error}"
+                f"a result can be saved only if its scene can be recognized, but {name}, {part!r}, has no digest: {error}"
             ) from error
     return found
 
 
 def differing(of: dict[str, str], now: dict[str, str]) -> list[str]:
-    """The names of what is not the same."""
+    """Return the names of the parts whose digests differ."""
     return [name for name in {**of, **now} if of.get(name) != now.get(name)]
 
 
 def _parts(scene: Scene) -> dict[str, object]:
+    """Return the parts of a scene by name, such as `bodies[0]`."""
     parts = {}
     for name, part in scene.__getstate__().items():
         if isinstance(part, list | tuple):
@@ -102,16 +107,17 @@ _CONTENTS = "contents"
 
 @register_method
 def save(path: str | Path, result: Equilibrium | EquilibriumSet | Trajectory) -> None:
-    """Writes a result into one file, an .npz of arrays and of JSON text, from which `load` makes it again.
+    """Save a result to an .npz file of arrays and JSON text, from which `load` restores it.
 
-    result: an Equilibrium, EquilibriumSet, or a Trajectory; of an EquilibriumPath its points, `path.equilibrium(k)`. Tensors
-        become arrays, and gradients do not survive.
+    result: an Equilibrium, an EquilibriumSet or a Trajectory. The points of an EquilibriumPath, `path.equilibrium(k)`, can
+        be saved as well. Tensors become arrays, without gradients.
 
-    The file has no scene, only a digest of each of its parts: the script that makes the scene is what to keep beside it.
-    numpy reads it as well: `np.load(path)["positions"]`, m. Written beside its place and then renamed.
+    The file does not contain the scene, only a digest of each of its parts: store the script that makes the scene with it.
+    numpy can read the file as well: `np.load(path)["positions"]`, m. An existing file is replaced once the new one is
+    complete.
 
-    Raises ValueError on what is not such a result, and for a scene with something that has no digest, such as a function
-    that holds a lock; OSError where the file cannot be written.
+    Raises ValueError for other objects, and for a scene with an object that has no digest, such as a function that contains
+    a lock; OSError if the file cannot be written.
 
     >>> import magshell as ms, numpy as np, tempfile
     >>> mesh = ms.meshes.rectangle(0.05, 0.01, cells=(10, 2))
@@ -148,14 +154,13 @@ def save(path: str | Path, result: Equilibrium | EquilibriumSet | Trajectory) ->
 
 
 def load(path: str | Path, scene: Scene) -> Any:  # which of them, the file tells
-    """What `save` wrote, as a result of the scene that it is of, to look at, to draw and to go on from with the same bits.
+    """Load a result that `save` wrote; solves that continue from it give the same bits as from the original.
 
-    scene: made by the same script as the one that was solved.
+    path: of the file. scene: made by the same script as the scene that was solved.
 
-    The file is data: reading it runs nothing, whoever wrote it. Raises ValueError where it is no such file, of a later
-    magshell, or of another scene (and says which of its parts differ); OSError where it cannot be read.
-
-    path: of the file.
+    The file contains data only: reading it executes no code, so files from others are safe. Raises ValueError if it is not
+    such a file, was written by a later version of magshell, or belongs to another scene (the message says which parts
+    differ); OSError if it cannot be read.
 
     >>> import magshell as ms, tempfile
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -204,7 +209,7 @@ class _Later(Exception):
 
 
 def _fields(result, scene: Scene) -> dict[Any, Any]:
-    """What makes it again, with numbers in the place of the scene's objects."""
+    """Return the data of a result, with the scene's objects replaced by their numbers."""
     if isinstance(result, EquilibriumSet):
         return {"_cases": [_fields(case, scene) for case in result]}
     numbers = {id(each): k for k, each in enumerate((scene, *scene.objects))}
@@ -222,10 +227,10 @@ def _numbered(of_objects: dict[Any, Any], numbers: dict[int, int]) -> dict[Any, 
 
 
 def _made(kind: type[Any], held: dict[Any, Any], scene: Scene):
-    """The other way round. Raises an error where it does not fit the scene."""
+    """Restore a result from the data of `_fields`. Raises an error if they do not fit the scene."""
     objects = (scene, *scene.objects)
     if held.keys() != _expected(kind):
-        raise ValueError("it lacks some of what makes a result, or has too much")
+        raise ValueError("it has missing or unknown fields")
     values = dict(held["_values"])
     for name in ("replaced", "paths"):
         if name in values:
@@ -244,7 +249,7 @@ def _expected(kind: type[Any]) -> set[str]:
 
 
 def _names(held, prefix: str = "") -> Iterator[tuple[int, str]]:
-    """(number of an array, where it stands in the result)."""
+    """Yield (number of an array, its path in the result) for each array."""
     if not isinstance(held, dict):
         return
     ((kind, content),) = held.items()

@@ -1,4 +1,4 @@
-"""Writes series of states, with the fields of their elements."""
+"""Series of VTU files of the states of a result, for ParaView."""
 
 from __future__ import annotations
 
@@ -30,8 +30,10 @@ if TYPE_CHECKING:
 
 
 def element_fields(found: ShellStresses | SolidStates) -> dict[str, np.ndarray]:
-    """{name: (n,) or (n, 9)}; von Mises stress of a solid is the mean of an element, of a shell the larger of both
-    surfaces'."""
+    """Return the stresses and strains of elements as fields, {name: (n,) or (n, 9)}.
+
+    Fields of solids are means over each element. The von Mises stress of a shell is the larger one of its two surfaces.
+    """
     if isinstance(found, ShellStresses):
         return {
             "von_mises_stress": found.von_mises_stresses.max(axis=1),
@@ -54,8 +56,11 @@ def write_solids(
     on_faces: dict[str, np.ndarray],
     on_tetrahedra: dict[str, np.ndarray],
 ) -> None:
-    """Tetrahedra and triangles of the bodies, one after another. Triangles of a solid's surface are there where they are
-    magnetized or have fields, as nothing else would say so. Fields have rows for all of the bodies."""
+    """Write the tetrahedra and triangles of several bodies to one VTU file.
+
+    The triangles of a solid's surface are written only if they are magnetized or have fields, which tetrahedra cannot carry.
+    on_vertices, on_faces, on_tetrahedra: name -> values with rows for all bodies, one after another.
+    """
     meshes = [state.mesh] if isinstance(state.mesh, TetMesh) else state.mesh.meshes
     elements = {} if state.elements is None else {first: each for first, _, each in state.elements()}
     magnetization = state.magnetization
@@ -107,31 +112,31 @@ def write_series(
     tetrahedron_fields: dict[Any, Any] | None = None,
     progress: bool = True,
 ) -> Path:
-    """Writes a motion for ParaView: strip.pvd, and in a folder strip/ beside it one VTU a state (the extra `io`).
+    """Write a series of states for ParaView: strip.pvd, and a folder strip/ with one VTU file per state (the extra `io`).
 
-    what: a Trajectory, an EquilibriumPath, EquilibriumSet, a mesh with positions, or whatever else `plot` takes.
-    positions: (n, n_v, 3) m, where `what` has none. times: (n,) s; by default its own, else 0, 1, 2, ...
-    velocities: (n, n_v, 3) m/s; by default its own.
+    what: a Trajectory, an EquilibriumPath, an EquilibriumSet, a mesh with positions, or anything else that `plot` takes.
+    positions: (n, n_v, 3) m, for a mesh. times: (n,) s; by default those of `what`, or 0, 1, 2, ...
+    velocities: (n, n_v, 3) m/s; by default those of `what`.
     remanent_magnetization, applied_flux_density, field: as in `plot`.
     vertex_fields, face_fields, tetrahedron_fields: name -> (n, n_v) or (n, n_v, k), (n, n_f) or (n, n_f, k), and (n, n_t)
-        or (n, n_t, k), which are added; rows are those of one body after another, faces those of solids' surfaces too.
+        or (n, n_t, k), additional fields. Their rows are those of one body after another; faces include those of solids.
+    progress: show a progress bar once writing has taken two seconds.
 
-    Tetrahedra are written as such, with sheets beside them as triangles. Of a result they have their means of
-    `volume_ratio` (J), `von_mises_stress` and `cauchy_stress` [Pa] and `green_strain`, and where muscles are `activation`,
-    `fibre_stretch` and `fibre_tension` [Pa]; sheets have `membrane_force` [N/m]
-    and `bending_moment` [N] as they pull now, and the larger `von_mises_stress` [Pa] of their surfaces. Matrices are
-    by rows; what an element does not have is NaN.
+    Fields on tetrahedra of a result are element means of `volume_ratio` (J), `von_mises_stress` and `cauchy_stress` [Pa] and
+    `green_strain`, and with muscles `activation`, `fibre_stretch` and `fibre_tension` [Pa]. Fields on the triangles of
+    shells are `membrane_force` [N/m] and `bending_moment` [N] in the deformed configuration, and the larger
+    `von_mises_stress` [Pa] of the two surfaces. Matrices are stored row by row. Values that an element does not have are
+    NaN.
 
-    Points have `displacement` [m], `velocity` [m/s], in a field `flux_density` [T], and of a result of a scene with contacts
-    `contact_pressure` [Pa]: what pushes them, on both sides of a sheet, over a third of their faces' area. Faces of a
-    magnetized sheet have `magnetization` [A/m], F_0 M_r, as it turns with them. Returns the path of the PVD. progress: show
-    a bar once it has taken two seconds.
+    Fields on points are `displacement` [m], `velocity` [m/s], in a field `flux_density` [T], and for scenes with contacts
+    `contact_pressure` [Pa], the normal forces on both sides of a shell over a third of the adjacent faces' area. The
+    magnetization F_0 M_r in the deformed configuration is a field on faces, `magnetization` [A/m].
 
-    Replaces an earlier series of this name. The PVD is there at the end, and lists whole files only: after an error,
-    a full disk or Ctrl-C those that are done.
+    Returns the path of the PVD file. An earlier series of the same name is replaced. The PVD file is complete at the end;
+    after an error, a full disk or Ctrl-C it lists the states that were written in full.
 
-    Raises ValueError on bad input, FileNotFoundError without the folder, ImportError without meshio, and OSError, with
-    the states that are on disk, if a file cannot be written.
+    Raises ValueError on bad input, FileNotFoundError if the folder does not exist, ImportError without meshio, and OSError,
+    with the number of states written, if a file cannot be written.
 
     >>> import magshell as ms, tempfile
     >>> strip = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -213,7 +218,7 @@ def _counts(mesh) -> dict[str, int]:
 
 
 def _of_sheets(state: State, magnetized: bool) -> dict[str, np.ndarray]:
-    """What their faces have of themselves."""
+    """Return the fields of a state on the faces of shells: stresses, and the magnetization if `magnetized`."""
     found: dict[str, np.ndarray] = {}
     if state.elements is not None:
         fields = [element_fields(each) for _, _, each in state.elements()]
@@ -227,14 +232,14 @@ def _of_sheets(state: State, magnetized: bool) -> dict[str, np.ndarray]:
 
 @contextmanager
 def _listed(path: Path, names: list[str], states: list[State]) -> Iterator[list[int]]:
-    """Writes the PVD of the states whose numbers are appended to the list it gives, also after an error."""
+    """Write the PVD file of the states whose numbers the caller appends to the yielded list, also after an error."""
     done: list[int] = []
     stopped = None
     try:
         with replacing(path) as part:
             (path.parent / path.stem).mkdir(exist_ok=True)
             _clear(path)
-            # in full at first, so that it has its place on a disk that the states fill
+            # written in full at first, so that its space is reserved if the states fill the disk
             part.write_bytes(_contents(names, states, range(len(states))))
             try:
                 yield done
@@ -257,7 +262,7 @@ def _listed(path: Path, names: list[str], states: list[State]) -> Iterator[list[
 
 
 def _clear(path: Path) -> None:
-    """Removes an earlier series of this name: its list, and the files that bear the names of its states."""
+    """Remove an earlier series of this name: its PVD file, and the VTU files with names of its states."""
     path.unlink(missing_ok=True)
     state = re.compile(rf"\.?{re.escape(path.stem)}_\d+(\.[0-9a-f]+)?\.vtu")
     for file in (path.parent / path.stem).glob("*.vtu"):

@@ -1,4 +1,4 @@
-"""What there is to draw: the states of a sheet or a solid, from whatever holds them."""
+"""The states of a scene that can be drawn or written, collected from meshes, bodies, scenes and results."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ from ...solve.statics.equilibria import EquilibriumSet
 from ...solve.statics.path import EquilibriumPath
 from .contact_loads import ContactLoads, contact_loads
 from .link_surfaces import (
-    bones_at_rest,
-    bones_of,
     joined,
+    link_surfaces_at_rest,
+    link_surfaces_of,
     mesh_of,
     shapes_at_rest,
     shapes_of,
@@ -48,16 +48,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class State:
-    """A sheet at one moment.
+    """The bodies of a scene and their surroundings at one moment.
 
-    positions: (n_v, 3), m. remanent_magnetization: (n_f, 3), A/m, at rest, or None.
+    positions: (n_v, 3), m. remanent_magnetization: (n_f, 3), A/m, in the reference configuration, or None.
     flux_density: (3,), T, the uniform field, or None without one.
-    fields: those that vary in space, with their sources where they are; strength: the factor on them.
-    title: what the result calls it. time: s, of a motion, or None. obstacles: what is around the sheet.
-    bones, tendons: surfaces of links and of tendons inside, vertices (n, 3) m and faces (m, 3) each. shapes: of free rigid
-        parts, likewise.
-    elements: () -> [(first face, mesh, SolidStates or ShellStresses)] of the bodies of a result, or None without any.
-    loads: () -> ContactLoads of a result of a scene with contacts, or None without any.
+    fields: the fields that vary in space, with their sources at their positions; strength: the factor on them.
+    title: what the result calls it. time: s, of a motion, or None. obstacles: those around the bodies.
+    links, tendons, shapes: surfaces of links, of tendons and of free rigid bodies, (vertices (n, 3) m, faces (m, 3)) each.
+    elements: () -> [(first face, mesh, SolidStates or ShellStresses)] of the bodies of a result, or None.
+    loads: () -> ContactLoads of a result of a scene with contacts, or None.
     """
 
     mesh: TriangleMesh | QuadraticTriangleMesh | TetMesh | JoinedMesh
@@ -72,19 +71,19 @@ class State:
     elements: Callable[[], list[tuple[int, TriangleMesh | TetMesh, SolidStates | ShellStresses]]] | None = (
         None
     )
-    bones: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+    links: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
     tendons: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
     loads: Callable[[], ContactLoads] | None = None
     shapes: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
 
     @property
     def contact_pressures(self) -> np.ndarray | None:
-        """(n_v,) Pa, or None without contacts."""
+        """The contact pressure at the vertices, (n_v,) Pa, or None without contacts."""
         return None if self.loads is None else self.loads().pressures(self.positions, self.mesh.faces)
 
     @property
     def magnetization(self) -> np.ndarray:
-        """F_0 M_r, (n_f, 3), A/m: the magnetization as the sheet carries it along, [Chen22] (20)."""
+        """The magnetization in the deformed configuration, F_0 M_r, (n_f, 3) A/m, [Chen22] (20)."""
         if self.remanent_magnetization is None:
             return np.zeros((self.mesh.n_faces, 3))
         coordinates = np.linalg.solve(
@@ -98,32 +97,32 @@ class State:
 
     @property
     def displacements(self) -> np.ndarray:
-        """(n_v, 3), m, from the rest shape."""
+        """The displacements from the reference configuration, (n_v, 3) m."""
         return self.positions - self.mesh.rest_positions
 
     @property
     def barycenters(self) -> np.ndarray:
-        """(n_f, 3), m."""
+        """The barycenters of the faces, (n_f, 3) m."""
         return self.positions[self.mesh.faces].mean(axis=1)
 
     @property
     def has_sources(self) -> bool:
-        """Whether there is a field that varies in space."""
+        """Return whether there is a field that varies in space."""
         return bool(self.fields) and self.strength != 0.0
 
     @property
     def magnets(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Surfaces of the fields' magnets and wires, vertices (n, 3) m and faces (m, 3) each."""
+        """The surfaces of the fields' magnets and wires, (vertices (n, 3) m, faces (m, 3)) each."""
         return (
             [surface for field in self.fields for surface in surfaces_of(field)] if self.has_sources else []
         )
 
     def sources(self, points: np.ndarray) -> np.ndarray:
-        """B, (n, 3), T, of the fields that vary in space at points (n, 3), m."""
+        """Return the flux density of the fields that vary in space at points (n, 3) m, (n, 3) T."""
         return self.strength * np.sum([field.flux_density(points) for field in self.fields], axis=0)
 
     def flux_density_at(self, points: np.ndarray) -> np.ndarray:
-        """All of B, (n, 3), T, at points (n, 3), m."""
+        """Return the total flux density at points (n, 3) m, (n, 3) T."""
         total = np.zeros_like(points)
         if self.flux_density is not None:
             total = total + self.flux_density
@@ -141,9 +140,10 @@ def states_of(
     field: Fielded | None = None,
     obstacles: Obstacle | Sequence[Obstacle] | None = None,
 ) -> list[State]:
-    """The states in a mesh, a Shell, a Solid, a Scene, a result, or a list of those; keywords come before their own.
+    """Collect the states of a mesh, a Shell, a Solid, a Scene, a result, or a list of those.
 
-    A result is anything with a `scene` and `positions`: (n_v, 3) is one state, (k, n_v, 3) are k of them.
+    A result is any object with a `scene` and `positions`, (n_v, 3) for one state or (k, n_v, 3) for k states. The keywords
+    take precedence over the values of `what`.
     """
     given = {
         "positions": positions,
@@ -157,12 +157,12 @@ def states_of(
     if isinstance(what, Shell | Solid):
         return _states(what.mesh, _magnetized(given, [what]))
     if isinstance(what, Scene):
-        bones, shapes = bones_at_rest(what), shapes_at_rest(what)
-        if (bones or shapes) and not what.bodies:
-            return _states(mesh_of([*bones, *shapes]), _with_own(given, what), [what.fields])
+        links, shapes = link_surfaces_at_rest(what), shapes_at_rest(what)
+        if (links or shapes) and not what.bodies:
+            return _states(mesh_of([*links, *shapes]), _with_own(given, what), [what.fields])
         states = _states(what.mesh, _with_own(given, what), [what.fields])
         tendons = tuple(tendons_at_rest(what))
-        return [replace(state, bones=tuple(bones), shapes=tuple(shapes), tendons=tendons) for state in states]
+        return [replace(state, links=tuple(links), shapes=tuple(shapes), tendons=tendons) for state in states]
     is_result = isinstance(getattr(what, "scene", None), Scene) and hasattr(what, "positions")
     if is_result and not isinstance(what, EquilibriumSet):
         own = _held_by(what)
@@ -176,7 +176,7 @@ def states_of(
         if obstacles is None and len(around.obstacles) == len(states):
             pairs = zip(states, around.obstacles, strict=True)
             states = [replace(state, obstacles=each) for state, each in pairs]
-        states = _with_tendons(what, _with_bones(what, states, positions), positions)
+        states = _with_tendons(what, _with_links(what, states, positions), positions)
         states = _with_elements(what, states, positions)
         own_times = isinstance(what, Trajectory) and len(states) == len(what)
         return timed(states, what.times) if own_times else states
@@ -184,7 +184,7 @@ def states_of(
         try:
             states = [state for item in what for state in states_of(item, **given)]
         except RecursionError:
-            raise ValueError("cannot draw a list that holds itself") from None
+            raise ValueError("cannot draw a list that contains itself") from None
         if states:
             return states
         raise ValueError("there is nothing to draw: the list is empty")
@@ -192,17 +192,17 @@ def states_of(
     raise ValueError(f"cannot draw a {type(what).__name__}: give {kinds}")
 
 
-def _with_bones(result, states: list[State], positions) -> list[State]:
-    """With the skeletons inside its bodies and the shapes of free parts, where the states are those that it has itself."""
+def _with_links(result, states: list[State], positions) -> list[State]:
+    """Add the surfaces of links and free rigid bodies to the states of a result, unless other positions were given."""
     if positions is not None or not result.scene.bodies:
         return states
     none = [[] for _ in states]
-    pairs = zip(states, bones_of(result) or none, shapes_of(result) or none, strict=True)
-    return [replace(state, bones=tuple(bones), shapes=tuple(shapes)) for state, bones, shapes in pairs]
+    pairs = zip(states, link_surfaces_of(result) or none, shapes_of(result) or none, strict=True)
+    return [replace(state, links=tuple(links), shapes=tuple(shapes)) for state, links, shapes in pairs]
 
 
 def _with_tendons(result, states: list[State], positions) -> list[State]:
-    """With the tendons in its bodies, where the states are those that it has itself."""
+    """Add the surfaces of tendons to the states of a result, unless other positions were given."""
     tendons = [] if positions is not None else tendons_of(result)
     if not tendons:
         return states
@@ -210,19 +210,19 @@ def _with_tendons(result, states: list[State], positions) -> list[State]:
 
 
 def _skeletons_alone(result) -> tuple[TriangleMesh, np.ndarray]:
-    """Of a result without flesh: its bones as a sheet, and where they are, (k, n, 3) m."""
-    bones, shapes = bones_of(result), shapes_of(result)
-    if not bones and not shapes:
-        raise ValueError("cannot draw a scene of free rigid parts: they have no shape")
-    count = len(bones or shapes)
-    pairs = zip(bones or [[]] * count, shapes or [[]] * count, strict=True)
+    """Return a mesh of the links and rigid bodies of a result without deformable bodies, and its positions, (k, n, 3) m."""
+    links, shapes = link_surfaces_of(result), shapes_of(result)
+    if not links and not shapes:
+        raise ValueError("cannot draw a scene of free rigid bodies without a shape")
+    count = len(links or shapes)
+    pairs = zip(links or [[]] * count, shapes or [[]] * count, strict=True)
     frames = [joined([*each, *others])[0] for each, others in pairs]
-    at_rest = [*bones_at_rest(result.scene), *shapes_at_rest(result.scene)]
+    at_rest = [*link_surfaces_at_rest(result.scene), *shapes_at_rest(result.scene)]
     return mesh_of(at_rest), np.stack(frames)
 
 
 def _with_elements(result, states: list[State], positions) -> list[State]:
-    """With what the elements of its bodies go through, and contacts do, where the states are those that it has itself."""
+    """Add the stresses of elements and the contact forces to the states of a result, unless other positions were given."""
     if positions is not None or not hasattr(result, "_values_at"):
         return states
     bodies = result.scene._bodies
@@ -240,8 +240,10 @@ def _with_elements(result, states: list[State], positions) -> list[State]:
 
 
 def timed(states: list[State], times: Numbers) -> list[State]:
-    """The states at these times, (n,), s, which are their titles too. Raises ValueError unless there is one a state
-    and none falls."""
+    """Return the states with times (n,) s, which also become their titles.
+
+    Raises ValueError unless there is one time per state, and they do not decrease.
+    """
     array = quantity("times", "s", detached(times), ("n",))
     if len(array) != len(states):
         raise ValueError(f"times [s] must be {len(states)} numbers, one a state, got {len(array)}")
@@ -256,7 +258,10 @@ def timed(states: list[State], times: Numbers) -> list[State]:
 
 
 def with_times(states: list[State], times: Numbers) -> list[State]:
-    """The states at the times given; else at their own, which must not fall where a motion follows another."""
+    """Return the states with the given times, or with their own.
+
+    Raises ValueError if the times decrease, such as where one motion follows another.
+    """
     own = [state.time for state in states]
     if times is None and None in own:
         return [replace(state, time=None) for state in states]
@@ -264,7 +269,10 @@ def with_times(states: list[State], times: Numbers) -> list[State]:
 
 
 def _held_by(result) -> dict[str, Any]:
-    """What a result says of its states; `strengths` are the factors on the fields that vary in space."""
+    """Return the positions, magnetization, fields and titles of a result's states.
+
+    `strengths` are the factors on the fields that vary in space.
+    """
     held = {name: getattr(result, name, None) for name in ("positions", "remanent_magnetization", "field")}
     if isinstance(result, EquilibriumPath):
         flux_densities = result.applied_flux_densities
@@ -293,7 +301,7 @@ def _field_factor(result) -> float:
 def _states(
     mesh: TriangleMesh, given: dict[str, Any], fields=((),), strengths=(1.0,), titles=("",)
 ) -> list[State]:
-    """fields, strengths, titles: one a state, or one for all."""
+    """Build the states of a mesh from the given values. fields, strengths, titles: one per state, or one for all."""
     frames = _positions(mesh, given["positions"])
     count = len(frames)
     magnetization = _magnetization(mesh, given["remanent_magnetization"])
@@ -356,14 +364,14 @@ def _flux_densities(values, count: int) -> list[np.ndarray | None]:
 
 
 def _with_own(given: dict[str, Any], scene: Scene, obstacles=None) -> dict[str, Any]:
-    """With the scene's obstacles, as a solve has placed them, and its bodies' magnetization, unless others are given."""
+    """Add the obstacles of a scene, or of a solve, and the magnetization of its bodies, unless others are given."""
     given = _magnetized(given, scene.bodies)
-    placed = scene.obstacles if obstacles is None else obstacles
-    return {**given, "obstacles": placed} if given["obstacles"] is None else given
+    own = scene.obstacles if obstacles is None else obstacles
+    return {**given, "obstacles": own} if given["obstacles"] is None else given
 
 
 def _magnetized(given: dict[str, Any], bodies) -> dict[str, Any]:
-    """With the magnetization that the bodies themselves have, unless another is given."""
+    """Add the magnetization of the bodies, unless another is given."""
     own = [body._face_magnetization for body in bodies]
     if given["remanent_magnetization"] is not None or all(each is None for each in own):
         return given
@@ -389,7 +397,7 @@ def _listed(value) -> tuple[Any, ...]:
 
 
 def _frames(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Columns a_1, a_2 and the unit normal of each face, (n_f, 3, 3)."""
+    """Return the matrices of each face with the columns a_1, a_2 (edges) and unit normal, (n_f, 3, 3)."""
     x0, x1, x2 = np.moveaxis(positions[faces], 1, 0)
     normal = np.cross(x1 - x0, x2 - x0)
     length = np.linalg.norm(normal, axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""The shape of a result as a surface, for printers and renderers."""
+"""Surface files (STL and OBJ) of results, for 3D printers and renderers."""
 
 from __future__ import annotations
 
@@ -37,21 +37,22 @@ def write_surface(
     unit: str = "m",
     positions: Numbers | None = None,
 ) -> None:
-    """Writes a shape as triangles to binary STL or to OBJ: for a printer, a slicer or a renderer.
+    """Write a shape as triangles to a binary STL or an OBJ file, for a 3D printer, a slicer or a renderer.
 
     path: ends in .stl or .obj.
-    what: an Equilibrium, a Trajectory, an EquilibriumPath, EquilibriumSet, a Scene, a Shell, a Solid or a mesh. Solids are
-        their surface, which is closed; of quadratic elements four triangles a face.
-    thickness: None: sheets as they are, without one; "own": as thick as the shells are; or m, a number or (n_f,): closed
-        surfaces with both sides, half of the thickness to either, and walls along the border.
-    index: which state of several, by default the last.
-    unit: of the numbers in the file, "m" or "mm". Neither format has a word for it: printers take mm, read_mesh m.
-    positions: (n_v, 3) m, where they are not those of `what`.
+    what: an Equilibrium, a Trajectory, an EquilibriumPath, an EquilibriumSet, a Scene, a Shell, a Solid or a mesh. Of a
+        solid its closed surface is written; faces of quadratic elements become four triangles.
+    thickness: None writes the middle surface of shells; "own" uses the shells' thickness; a number or (n_f,) in m is used
+        instead of it. A shell with thickness becomes a closed surface: two sides, at half the thickness from the middle
+        surface, and walls along the boundary.
+    index: the state to write, by default the last.
+    unit: of the numbers in the file, "m" or "mm". The formats do not store it: printers expect mm, read_mesh m.
+    positions: (n_v, 3) m, instead of those of `what`.
 
-    Each body is a closed surface of its own. Written beside its place and then renamed.
+    Each body is a separate closed surface. An existing file is replaced once the new one is complete.
 
-    Raises ValueError on bad input, and where a sheet bends more sharply than its thickness allows, with the face; OSError
-    where the file cannot be written.
+    Raises ValueError on bad input, and, with the face, for a shell whose curvature is too large for its thickness; OSError
+    if the file cannot be written.
 
     >>> import magshell as ms, tempfile
     >>> mesh = ms.meshes.rectangle(0.05, 0.01, cells=(10, 2))
@@ -79,7 +80,7 @@ def write_surface(
 
 
 def _surface(state: State, thickness: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-    """Of all bodies, one after another. thickness: (n_f,) m."""
+    """Build the surface of all bodies, one after another: points (n, 3) m, faces (m, 3). thickness: (n_f,) m, or None."""
     parts, vertex, face = [], 0, 0
     for mesh in getattr(state.mesh, "meshes", [state.mesh]):
         there = state.positions[vertex : vertex + mesh.n_vertices]
@@ -99,7 +100,7 @@ def _surface(state: State, thickness: np.ndarray | None) -> tuple[np.ndarray, np
 
 
 def _thickness(what, state: State, given, index: int) -> np.ndarray | None:
-    """(n_f,) m of all bodies, of solids any; None where sheets stay without."""
+    """Return the thickness of all faces, (n_f,) m, or None. Values on the faces of solids are not used."""
     if given is None:
         return None
     n_f = state.mesh.n_faces
@@ -126,7 +127,7 @@ def _thickness(what, state: State, given, index: int) -> np.ndarray | None:
 
 
 def _of_faces(body: Shell | Solid) -> np.ndarray:
-    """(n_f,) m, of a shell; of a solid's faces nobody asks."""
+    """Return the thickness of a shell's faces, (n_f,) m; zeros for a solid, whose values are not used."""
     if isinstance(body, Solid):
         return np.zeros(body.mesh.n_faces)
     return body._face_thickness

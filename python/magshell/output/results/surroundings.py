@@ -1,4 +1,4 @@
-"""What is around the bodies of a result in each of its states, where it is then: fields and obstacles."""
+"""The fields and obstacles around the bodies of a result, at their positions in each state."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
 
 class Surroundings(NamedTuple):
-    """Of each state; of a result that does not say, once.
+    """The fields and obstacles of each state; a single entry for a result that has no values per state.
 
-    Obstacles of a motion move by themselves, with the time of a state.
+    Obstacles with a `motion` are not moved here: their position follows from the time of the state.
     """
 
     fields: list[tuple[AppliedField, ...]]
@@ -24,7 +24,7 @@ class Surroundings(NamedTuple):
 
 
 def surroundings_of(result: SolveResult) -> Surroundings:
-    """Of anything with a scene."""
+    """Return the fields and obstacles in each state of a result, or of any object with a scene."""
     scene = result.scene
     if not hasattr(result, "_values_at"):
         return Surroundings([scene.fields], [scene.obstacles])

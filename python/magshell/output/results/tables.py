@@ -1,4 +1,4 @@
-"""Results as tables of pandas and labelled arrays of xarray, with units."""
+"""Conversion of results to pandas tables and xarray datasets, with units."""
 
 from __future__ import annotations
 
@@ -22,15 +22,14 @@ _PER = ("state", "vertex")
 
 
 def to_xarray(result: Equilibrium | EquilibriumSet | EquilibriumPath | Trajectory) -> xarray.Dataset:
-    """A result as an xarray.Dataset (needs the package xarray).
+    """Convert a result to an xarray.Dataset (needs the package xarray).
 
-    Along `time` [s] of a Trajectory, `parameter` of a EquilibriumPath or `case` of EquilibriumSet:
-    `positions`, `displacements` and, of a
-    motion, `velocities`, (..., vertex, axis); energies, one variable a term, and `kinetic_energy`; the largest strains;
-    `applied_flux_density` (..., axis). Beside them `rest_positions` (vertex, axis) and `faces` (face, corner). What has a
-    unit has it in `attrs["units"]`. Tensors become arrays.
+    The states lie along the coordinate `time` [s] of a Trajectory, `parameter` of an EquilibriumPath or `case` of an
+    EquilibriumSet. The variables are `positions`, `displacements` and, of a motion, `velocities`, (..., vertex, axis); the
+    energies, one variable per term, and `kinetic_energy`; the largest strains; `applied_flux_density` (..., axis);
+    `rest_positions` (vertex, axis) and `faces` (face, corner). Units are in `attrs["units"]`. Tensors become arrays.
 
-    Raises ValueError on what is not a result, ImportError without xarray.
+    Raises ValueError if `result` is not a result, ImportError without xarray.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.05, 0.01, cells=(10, 2))
@@ -62,11 +61,11 @@ def to_xarray(result: Equilibrium | EquilibriumSet | EquilibriumPath | Trajector
 def to_pandas(
     result: Equilibrium | EquilibriumSet | EquilibriumPath | Trajectory, per: str = "state"
 ) -> pandas.DataFrame:
-    """A result as a pandas.DataFrame (needs the package pandas), the units in the names of its columns.
+    """Convert a result to a pandas.DataFrame (needs the package pandas), with units in the names of its columns.
 
-    per: "state": a row for each state, of energies, strains and the uniform field; "vertex": a row for each vertex in each
-        state, of where it is, and of a motion how fast it goes. The index is `time [s]` of a Trajectory, `parameter` of a
-        Path or `case` of EquilibriumSet, and `vertex`.
+    per: "state" gives one row per state, with energies, strains and the uniform field. "vertex" gives one row per vertex and
+        state, with its position and, for a motion, its velocity. The index is `time [s]` of a Trajectory, `parameter` of an
+        EquilibriumPath or `case` of an EquilibriumSet, and `vertex`.
 
     Raises ValueError on bad input, ImportError without pandas.
 
@@ -110,7 +109,7 @@ def _imported(package: str):
 
 
 def _states(result) -> tuple[str | None, np.ndarray | None]:
-    """The coordinate that its states lie along, and where they are."""
+    """Return the name of the coordinate along which the states lie, and its values; None for a single state."""
     if not isinstance(result, _RESULTS):
         raise ValueError(
             f"result must be an Equilibrium, EquilibriumSet, an EquilibriumPath or a Trajectory, got {type(result).__name__}"
@@ -127,7 +126,7 @@ def _states(result) -> tuple[str | None, np.ndarray | None]:
 
 
 def _columns(result) -> dict[str, tuple[str, np.ndarray]]:
-    """{name: (unit, a number a state)}."""
+    """Return the scalars of each state, {name: (unit, (n,) or ())}."""
     if isinstance(result, EquilibriumSet):
         cases = [_columns(case) for case in result]
         return {
@@ -147,7 +146,7 @@ def _columns(result) -> dict[str, tuple[str, np.ndarray]]:
 
 
 def _rows(result) -> dict[str, tuple[str, np.ndarray]]:
-    """{name: (unit, (..., n_v, 3))}."""
+    """Return the vectors at the vertices in each state, {name: (unit, (..., n_v, 3))}."""
     found = {
         name: ("m", np.asarray(detached(getattr(result, name)))) for name in ("positions", "displacements")
     }

@@ -1,4 +1,4 @@
-"""Units and round numbers for a picture's labels."""
+"""Units and round numbers for the labels of pictures."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, 
 
 
 def length_unit(size: float) -> LengthUnit:
-    """The unit in which a length [m] is a number between 1 and 1000."""
+    """Return the unit in which a length [m] is a number between 1 and 1000."""
     return next((unit for unit in reversed(_LENGTHS) if size >= unit.meters), _LENGTHS[0])
 
 
 def prefixed(value: float, unit: str) -> tuple[float, str]:
-    """(factor, "kA/m"): a value divided by the factor is a handy number of the prefixed unit."""
+    """Choose an SI prefix for a value. Returns (factor, prefixed unit): value / factor is the number in that unit."""
     factor, prefix = next(((f, p) for f, p in _PREFIXES if abs(value) >= f * 0.9995), (1.0, ""))
     return factor, prefix + unit
 
 
 def with_unit(value: float, unit: str) -> str:
-    """A magnitude to three digits.
+    """Format a magnitude with three digits and a prefixed unit.
 
     >>> with_unit(0.0057, "T")
     '5.7 mT'
@@ -39,7 +39,7 @@ def with_unit(value: float, unit: str) -> str:
 
 
 def clock(duration: float) -> Callable[[float], str]:
-    """Writes the times of a motion that takes so long [s], all with the same unit and decimals.
+    """Return a function that formats the times of a motion of a given duration [s], all with the same unit and decimals.
 
     >>> clock(0.8)(0.25), clock(2.0)(0.25)
     ('250 ms', '0.25 s')
@@ -50,7 +50,7 @@ def clock(duration: float) -> Callable[[float], str]:
 
 
 def round_below(value: float) -> float:
-    """The largest 1, 2 or 5 times a power of ten that is not above a positive value.
+    """Return the largest number 1, 2 or 5 times a power of ten that is not above a positive value.
 
     >>> round_below(0.034)
     0.02
