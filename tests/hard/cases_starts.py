@@ -69,8 +69,8 @@ def blown_up(factor):
 def half_size():
     """Check that a stable equilibrium is reached, or a refusal names the cure.
 
-    A flat strip at half its size is pressed together symmetrically, so round-off decides how it bursts: starts that differ by
-    1e-12 take 2500 to 7100 factorizations, or end where no step lowers the energy.
+    A flat strip at half its size is pressed together symmetrically, so round-off decides how it bursts. Starts that differ
+    by 1e-12 take 2500 to 7100 factorizations, or end where no step lowers the energy.
     """
     scene = idle_strip()
 
