@@ -139,7 +139,7 @@ def test_a_wrong_keyword_of_an_optimizer() -> None:
         ),
         (
             lambda: ms.PneumaticCells(CUBE, [BOX.vertices_at(x=0.0)], stiffness=1.0),
-            "Cells groups were given as vertices: select tetrahedra",
+            "PneumaticCells groups were given as vertices: select tetrahedra",
         ),
     ],
 )

@@ -1,1 +1,1 @@
-"""Describes a scene: bodies, actuators, supports, loads, contacts and fields."""
+"""The description of a scene: bodies, actuators, supports, loads, contacts and fields."""

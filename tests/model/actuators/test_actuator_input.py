@@ -52,7 +52,10 @@ MISTAKES = {
     "a body twice": (lambda: ms.Cavity([BLOCK, BLOCK], pressure=1.0), "names each body once"),
     "faces of several": (lambda: ms.Cavity([BLOCK, SHEET], [0], pressure=1.0), "faces are those of one body"),
     "lids": (lambda: ms.Cavity(BLOCK, pressure=1.0, close_rims="yes"), "close_rims must be True or False"),
-    "cells of a shell": (lambda: ms.PneumaticCells(SHEET, stiffness=1.0), "Cells are of a Solid, got Shell"),
+    "cells of a shell": (
+        lambda: ms.PneumaticCells(SHEET, stiffness=1.0),
+        "body of PneumaticCells must be a Solid, got Shell",
+    ),
     "cells overlap": (
         lambda: ms.PneumaticCells(BLOCK, [[0, 1, 2], [5, 2]], stiffness=1.0),
         r"must not overlap, but tetrahedron 2 is in cells \[0, 1\]",
@@ -151,7 +154,7 @@ IN_SCENES = {
     "no actuator": (
         BLOCK,
         lambda: ms.Pressure(1.0),
-        "actuators must hold Muscle, Cavity, Cells and Tendon objects, got Pressure",
+        "actuators must hold Muscle, Cavity, PneumaticCells and Tendon objects, got Pressure",
     ),
 }
 

@@ -1,1 +1,1 @@
-"""Defines muscles, cavities, pneumatic cells and tendons."""
+"""Muscles, cavities, pneumatic cells and tendons."""

@@ -128,7 +128,7 @@ class Cavity(Actuator):
     _replaceable = _in_time = tuple(name for names in _LAWS.values() for name in names)
 
     def replaced(self, **values: Any) -> Cavity:
-        """Returns the same cavity with other numbers of what is inside."""
+        """Return the same cavity with other values of its fluid."""
         now = {name: getattr(self, name) for name in self._replaceable} | values
         return self._check_shapes(Cavity(self._parts, close_rims=self.close_rims, **now))
 

@@ -55,7 +55,7 @@ class PneumaticCells(Actuator):
         self, body: Solid, groups: Numbers | None = None, *, stiffness: Numbers, volume_ratio: Numbers = 1.0
     ):
         if not isinstance(body, Solid):
-            raise ValueError(f"Cells are of a Solid, got {body!r:.60}")
+            raise ValueError(f"body of PneumaticCells must be a Solid, got {body!r:.60}")
         self.bodies: tuple[Any, ...] = (body,)
         self._groups = tuple(_groups(groups, body.mesh.n_tetrahedra))
         self.stiffness: np.ndarray = numbers(
@@ -113,11 +113,9 @@ class PneumaticCells(Actuator):
 def _groups(groups, n_tetrahedra: int) -> list[np.ndarray]:
     if groups is None:
         return [np.array([k]) for k in range(n_tetrahedra)]
+    name = "PneumaticCells groups"
     if isinstance(groups, list | tuple) and groups and all(np.ndim(each) == 1 for each in groups):
-        cells = [
-            indices("Cells groups", selection("Cells groups", each, "tetrahedra"), n_tetrahedra)
-            for each in groups
-        ]
+        cells = [indices(name, selection(name, each, "tetrahedra"), n_tetrahedra) for each in groups]
     else:
         array = np.asarray(groups)
         if array.shape != (n_tetrahedra,) or not np.issubdtype(array.dtype, np.integer):

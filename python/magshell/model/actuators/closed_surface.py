@@ -91,9 +91,8 @@ def of_faces(
             more = ", ..." if len(rim) > _NAMED else ""
             raise ValueError(
                 f"the surface of the cavity is not closed: {len(rim)} edges have a face on one side only: {named}{more} "
-                "(vertices of the scene). Choose the faces that are missing, tie the bodies, or say "
-                "close_rims=True for flat "
-                "lids over what is open"
+                "(vertices of the scene). Choose the faces that are missing, tie the bodies, or give "
+                "close_rims=True, which closes open rims by flat lids"
             )
         lids, lid_weights = _lids(rim)
         triangles, weights = np.concatenate([triangles, lids]), np.concatenate([weights, lid_weights])

@@ -1,1 +1,1 @@
-"""Puts the bodies of a scene together, and finds what a result says of each."""
+"""The bodies of a scene together: their numbering, their joined mesh and their ties."""

@@ -1,1 +1,1 @@
-"""Defines contact of bodies with obstacles, with each other and with themselves."""
+"""Contact of bodies with obstacles, with each other and with themselves."""

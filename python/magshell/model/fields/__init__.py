@@ -1,1 +1,1 @@
-"""Defines applied magnetic fields."""
+"""Applied magnetic fields."""

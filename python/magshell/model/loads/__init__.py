@@ -1,1 +1,1 @@
-"""Defines loads, pressures, surface tension and water."""
+"""Loads, pressures, surface tension and water."""

@@ -1,1 +1,1 @@
-"""Defines what results say of each body."""
+"""Results of single bodies, joints and actuators."""

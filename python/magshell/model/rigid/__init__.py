@@ -1,1 +1,1 @@
-"""Defines rigid bodies, links, joints and skeletons."""
+"""Rigid bodies, links, joints and skeletons."""

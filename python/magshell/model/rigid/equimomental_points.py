@@ -26,11 +26,8 @@ if TYPE_CHECKING:
 _CORNERS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=float)
 _POINTS = np.concatenate([_CORNERS, np.eye(3), -np.eye(3)])
 _PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
-_MOMENTS = (
-    np.concatenate(  # (10, 10): a column has the mass, first and second moments of a unit mass at one point
-        [np.ones((1, 10)), _POINTS.T, [_POINTS[:, i] * _POINTS[:, j] for i, j in _PAIRS]]
-    )
-)
+# (10, 10): a column has the mass, first and second moments of a unit mass at one point.
+_MOMENTS = np.concatenate([np.ones((1, 10)), _POINTS.T, [_POINTS[:, i] * _POINTS[:, j] for i, j in _PAIRS]])
 
 
 class RigidBodyPoints(NamedTuple):

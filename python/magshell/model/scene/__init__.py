@@ -1,1 +1,1 @@
-"""Puts a model together, translates it for the core, and checks the inputs of a solve."""
+"""The scene: its translation for the core, its state-dependent quantities, and the checks of a solve's inputs."""

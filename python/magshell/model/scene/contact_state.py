@@ -133,9 +133,8 @@ class ContactState:
     friction: np.ndarray
     normal_force_magnitudes: np.ndarray
     _pushes: np.ndarray  # (n_v, 3) N, the normal forces alone, without the moments on nearly parallel edges
-    _direction: (
-        np.ndarray
-    )  # (k,), 1 if the first part is on the contact's first body or at an obstacle, else -1
+    # (k,), 1 if the first part is on the contact's first body or at an obstacle, else -1
+    _direction: np.ndarray
 
     @property
     def normal_force(self) -> float:
@@ -177,10 +176,10 @@ class ContactState:
 
     def __repr__(self) -> str:
         near = f", {self.smallest_distance:.4g} m apart at least" if len(self.pairs) else ""
-        rubs = ""
+        slip = ""
         if self.coefficient > 0.0 and len(self.pairs):
-            rubs = f", {np.count_nonzero(self.is_sliding)} of them slip"
-        return f"ContactState: {len(self.pairs)} pairs{near}, {self.normal_force:.4g} N{rubs}"
+            slip = f", {np.count_nonzero(self.is_sliding)} of them slip"
+        return f"ContactState: {len(self.pairs)} pairs{near}, {self.normal_force:.4g} N{slip}"
 
 
 def compute_contact_state(

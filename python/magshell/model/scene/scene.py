@@ -63,7 +63,7 @@ if TYPE_CHECKING:
 
 _LOADS = (PointLoad, EdgeLoad, AreaLoad, EdgeCouple, FaceEnergy, Pressure)
 _SUPPORTS = (Pin, Clamp, SymmetryPlane)
-_ACTUATORS = "Muscle, Cavity, Cells and Tendon objects"
+_ACTUATORS = "Muscle, Cavity, PneumaticCells and Tendon objects"
 
 
 class Scene(PlotMixin):
@@ -240,8 +240,8 @@ class Scene(PlotMixin):
     def _grounded_vertices(self) -> np.ndarray:
         """Return the vertices of links that joints hold to the world."""
         held = [
-            place.vertices
-            for part, place in zip(self.rigid_parts, self._rigid, strict=True)
+            points.vertices
+            for part, points in zip(self.rigid_parts, self._rigid, strict=True)
             if self._bodies.is_grounded(part)
         ]
         return np.concatenate([np.zeros(0, dtype=np.int64), *held])
@@ -343,8 +343,8 @@ class Scene(PlotMixin):
     @property
     def has_forces_of_motion(self) -> bool:
         """Return whether there are forces without an energy, which act on moving bodies only: friction, water."""
-        rubs = any(contact.friction_coefficient is not None for contact in self.contacts)
-        return self.water is not None or rubs
+        has_friction = any(contact.friction_coefficient is not None for contact in self.contacts)
+        return self.water is not None or has_friction
 
     @property
     def n_dofs(self) -> int:
@@ -381,13 +381,13 @@ class Scene(PlotMixin):
 
 
 def _refuse_support(parts, held: np.ndarray) -> None:
-    """Raises ValueError where a support holds a vertex of a rigid part."""
-    for k, place in enumerate(parts):
-        both = np.intersect1d(place.vertices, held)
+    """Raise ValueError if a support holds a vertex of a rigid body."""
+    for k, points in enumerate(parts):
+        both = np.intersect1d(points.vertices, held)
         if both.size:
             raise ValueError(
-                f"a support holds vertex {both[0]}, which rigid part {k} carries: leave it out of the part's vertices; what "
-                "is to stand still altogether needs no RigidBody"
+                f"a support holds vertex {both[0]}, which rigid part {k} carries: leave it out of the part's vertices; for "
+                "vertices that do not move at all a support is enough, without a RigidBody"
             )
 
 

@@ -1,1 +1,1 @@
-"""Defines shells, and what results say of their strains and stresses."""
+"""Shells, and their strains and stresses in results."""

@@ -49,9 +49,8 @@ class ObtuseFaces:
         edges = mesh.face_edges[self.faces]  # (k, 3)
         self._bases = np.take_along_axis(edges, np.argmax(mesh.edge_lengths[edges], axis=1)[:, None], 1)[:, 0]
         self._heights = quality.heights[self.faces]
-        around = np.sort(
-            mesh.edge_faces[edges].reshape(-1, 6), axis=1
-        )  # adjacent faces, and the cap three times
+        # The faces at the edges of each cap: adjacent ones, and the cap itself three times.
+        around = np.sort(mesh.edge_faces[edges].reshape(-1, 6), axis=1)
         new = (around >= 0) & (np.diff(around, axis=1, prepend=-1) > 0)
         self._areas = np.where(new, mesh.face_areas[around], 0.0).sum(axis=1)
         self._rest_curvatures = self._curvatures(mesh.rest_positions)

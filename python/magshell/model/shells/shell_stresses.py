@@ -127,13 +127,12 @@ def _axes(rest: np.ndarray, grown: np.ndarray, now: np.ndarray) -> tuple[np.ndar
     rest, now: (n_f, 3, 3) m, the corners. grown: (n_f, 2, 2), the growth in the rest axes.
     """
     axes = corner_axes(rest)
-    flat = grown @ np.einsum(
-        "fai,fki->fak", axes, rest[:, 1:] - rest[:, :1]
-    )  # columns are the edges in these axes
+    # Columns are two edges of the face in these axes.
+    flat = grown @ np.einsum("fai,fki->fak", axes, rest[:, 1:] - rest[:, :1])
     gradients = np.einsum("fki,fkb->fib", now[:, 1:] - now[:, :1], np.linalg.inv(flat))
     stretches = _square_roots(np.einsum("fia,fib->fab", gradients, gradients))
-    turned = np.einsum("fib,fba->fai", gradients, np.linalg.inv(stretches))
-    return axes, turned
+    rotated = np.einsum("fib,fba->fai", gradients, np.linalg.inv(stretches))
+    return axes, rotated
 
 
 def _square_roots(tensors: np.ndarray) -> np.ndarray:

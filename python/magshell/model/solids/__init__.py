@@ -1,1 +1,1 @@
-"""Defines solids, their materials and skins, and what results say of them."""
+"""Solids, their materials and skins, and their strains and stresses in results."""

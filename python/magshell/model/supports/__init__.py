@@ -1,1 +1,1 @@
-"""Defines supports and the constraints that they make."""
+"""Supports, and the constraints that they impose."""

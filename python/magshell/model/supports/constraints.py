@@ -34,9 +34,7 @@ class Constraints:
 
     directed_edges: np.ndarray  # (k, 2): the scene's edge, direction
     directions: np.ndarray  # (n_d, 3)
-    held_nodes: (
-        np.ndarray
-    )  # (m, 5): node, number of held directions, and for each the number of its move or -1
+    held_nodes: np.ndarray  # (m, 5): node, number of held directions, number of the move of each or -1
     held_frames: np.ndarray  # (m, 3, 3): columns, the held directions first
     moves: tuple[RigidMove, ...]
     direction_owners: tuple[Any, ...]  # (n_d,), the support that holds each direction, or None
