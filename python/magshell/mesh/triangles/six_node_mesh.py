@@ -70,7 +70,7 @@ class QuadraticTriangleMesh(MeshBase):
 
     @classmethod
     def _again(cls, rest_positions: Numbers, elements: Numbers) -> QuadraticTriangleMesh:
-        """Make a mesh from another one or its copy, whose straight edges have been warned of."""
+        """Make a mesh from the data of an existing one, without repeating the warning about straight edges."""
         mesh = object.__new__(cls)
         vars(mesh).update(_parts(rest_positions, elements))
         return mesh
@@ -83,7 +83,7 @@ class QuadraticTriangleMesh(MeshBase):
 
         project: a function that moves the midpoints of all edges, (n_e, 3) m, onto the surface; its values are the midside
             nodes. Without it edges stay straight, and on a curved surface most of the accuracy of six nodes is lost
-            (MeshQualityWarning, if the mesh turns from face to face as a smooth surface does).
+            (MeshQualityWarning, if the angles between faces are those of a smooth surface).
 
         >>> import magshell as ms
         >>> coarse = ms.meshes.cylinder(1.0, 1.0, angle=1.0, cells=(4, 4))
@@ -335,7 +335,7 @@ class QuadraticTriangleMesh(MeshBase):
 
 
 def _parts(rest_positions: Numbers, elements: Numbers) -> dict[str, Any]:
-    """Return the attributes of a mesh, checked. Raises ValueError as the class says."""
+    """Check the data of a mesh and return its attributes. Raises ValueError as QuadraticTriangleMesh does."""
     positions = quantity("rest_positions", "m", rest_positions, ("n_v", 3))
     nodes = index_array("elements", elements)
     check_elements(nodes, len(positions))

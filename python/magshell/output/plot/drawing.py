@@ -73,7 +73,7 @@ def plot(
         An ms.Color adds a text for the colour bar, its limits and its scale.
     titles: one per state. If a shell passes through itself, this is added, for at most 20,000 faces.
     overlay: draw all states in one panel, each with its title next to it. A title that finds no room is left out.
-        fade: the same, with earlier states paler.
+    fade: as `overlay`, with earlier states paler.
     columns: the number of columns of panels, by default the one that fits best.
     view: the direction from which the picture is seen: (elevation, azimuth) in degrees, as in matplotlib, "top", "front"
         (both with x to the right) or "side"; by default one that suits the shape. An ms.View also sets the window.
