@@ -31,7 +31,7 @@ class DeadLoad(Owner):
     _for_all = False  # whether a load without a `body` acts on all bodies
 
     def __init__(self, label: str, values: Any, body: Shell | Solid | None):
-        """label: the name and unit of the value."""
+        """Store and check the value of the load. label: its name and unit, as in "force [N]"."""
         self._label, self.body = label, checked_body(body)
         setattr(self, self._replaceable[0], _vectors(*label.rstrip("]").split(" [", 1), values))
 
@@ -60,7 +60,9 @@ class DeadLoad(Owner):
 
 
 class PointLoad(DeadLoad):
-    """A force [N] on each of some vertices: `force` (3,) on every one of them, or (k, 3), one each.
+    """A force [N] on each of some vertices.
+
+    vertices: (k,). force: N, (3,) for all of them, or (k, 3) with one per vertex.
 
     body: the Shell whose vertices they are, in a scene of several.
 

@@ -22,7 +22,7 @@ class Sphere(Obstacle):
 
     Args:
         radius: m.
-        inside: the sheet lives inside it.
+        inside: True if the bodies of the scene are inside of it, a hollow.
         center, rotation, motion: see Obstacle.
 
     >>> Sphere(0.02, inside=True).signed_distance([0, 0, 0]).item()
@@ -53,13 +53,13 @@ class Sphere(Obstacle):
 class Box(Obstacle):
     """A box around the center, its sides along the axes of its own frame.
 
-    With sharp edges the distance of points outside is once continuously differentiable; seen from within, its
-    normals jump where two sides are equally near, as they do in every convex body.
+    With sharp edges the distance of points outside is once continuously differentiable; for points inside, the
+    normals jump where two sides are equally near, as in every convex body.
 
     Args:
-        size: (3,) m, the whole lengths.
+        size: (3,) m, the lengths of its sides.
         rounding: m, the radius of its edges and corners, at most half the shortest side.
-        inside: the sheet lives inside it.
+        inside: True if the bodies of the scene are inside of it, a hollow.
         center, rotation, motion: see Obstacle.
 
     >>> Box((1, 1, 1)).signed_distance([2, 0, 0]).item()
@@ -100,10 +100,10 @@ class Capsule(Obstacle):
     """A cylinder with half a ball at both ends.
 
     Args:
-        ends: (2, 3) m, of the segment that the ball is swept along, in the body's own frame; or its length [m], then it
-            lies along x with the center in its middle.
+        ends: (2, 3) m, of the segment along which the ball is swept, in the body's own frame; or the length [m] of a
+            segment along x around the center.
         radius: m.
-        inside: the sheet lives inside it.
+        inside: True if the bodies of the scene are inside of it, a hollow.
         center, rotation, motion: see Obstacle.
 
     >>> Capsule(0.1, radius=0.02)

@@ -27,7 +27,7 @@ class Tube(Obstacle):
     Args:
         points: (k, 3) m, along the curve, in the body's own frame.
         radius: m, a number, or (k,), one a point.
-        inside: the sheet lives inside it.
+        inside: True if the bodies of the scene are inside of it, a hollow.
         closed: with ends.
         center, rotation, motion: see Obstacle.
 
