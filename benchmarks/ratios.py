@@ -22,7 +22,7 @@ KINDS = {
     "count": Kind("factorizations, iterations", 1.05, 1.0),
     "error": Kind("against a reference", 1.02, 1e-9),
     "memory": Kind("bytes, or their ratio", 1.05, 0.0),
-    "resident": Kind("memory as the system tells it", 1.25, 0.0),
+    "resident": Kind("memory as the system reports it", 1.25, 0.0),
     "share": Kind("a time over another of the same run", 1.5, 0.05),
     "time": Kind("a time over that of a fixed loop of numpy's", 2.0, 0.0),
 }

@@ -134,7 +134,7 @@ def test_functions_called_before_there_is_anything(what):
     scene = scene_of(caller, contacts=[ms.Contact(plane)] if touching else [])
     rest = ms.equilibrium(scene, remanent_magnetization=MAGNETIZATION)
     caller.reset(stop_at=1)
-    with pytest.raises(ms.Interrupted, match="before there was anything") as caught:
+    with pytest.raises(ms.Interrupted, match="before there was a result") as caught:
         if what == "vibration":
             ms.vibration_modes(scene, rest, count=2)
         else:

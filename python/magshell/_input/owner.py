@@ -24,7 +24,7 @@ class Owner(Frozen):
         super().__init_subclass__(**options)
 
     _replaceable: tuple[str, ...] = ()
-    _in_time: tuple[str, ...] = ()  # those that may change during a motion
+    _in_time: tuple[str, ...] = ()  # parameters that may change during a motion
 
     def _add_numbers(self, label: str, values: Any, numbers: dict[tuple[str, str], np.ndarray]) -> None:
         """Write the parameters into `numbers`, by (label, name).

@@ -89,7 +89,7 @@ def array_of(label: str, values: Any, wanted: str) -> np.ndarray:
         raise ValueError(f"{label} has masked entries: fill them first")
     try:
         return numbers_of(values) if is_tensor(values) else np.asarray(values)
-    except (TypeError, ValueError, RuntimeError) as error:  # ragged lists, tensors of kinds that nobody knows
+    except (TypeError, ValueError, RuntimeError) as error:  # ragged lists, tensors of unknown kinds
         raise ValueError(f"{label} must {wanted}: {error}") from None
 
 

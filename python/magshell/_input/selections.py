@@ -67,7 +67,7 @@ def selection(name: str, values: Any, of: str | None = None) -> np.ndarray:
     if array.ndim != 1 or not (array.dtype == bool or np.issubdtype(array.dtype, np.integer)):
         what = f"{values!r:.60}" if np.ndim(values) == 0 else f"{array.dtype} of shape {array.shape}"
         raise ValueError(f"{name} must be integer indices of shape (k,), got {what}")
-    own = array.copy()  # the caller may go on with its array
+    own = array.copy()  # the caller may change its array later
     own.setflags(write=False)
     return own
 

@@ -89,7 +89,7 @@ def dtype_like(*inputs):
 
 
 def stacked(parts: list[Any], axis: int = 0):
-    """Stack arrays along a new axis, or tensors in their graphs. An empty list gives an empty array."""
+    """Join arrays along a new axis, or tensors in their graphs. An empty list gives an empty array."""
     if parts and is_tensor(parts[0]):
         import torch
 

@@ -56,7 +56,7 @@ def solve_entry(function: F) -> F:
             raise
         except KeyboardInterrupt as stopped:
             name = function.__name__
-            raise Interrupted(f"{name}: interrupted before there was anything to hand back") from stopped
+            raise Interrupted(f"{name}: interrupted before there was a result") from stopped
 
     return called
 

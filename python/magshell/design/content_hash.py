@@ -146,7 +146,10 @@ class _Hasher:
                 continue
             if isinstance(each, property):
                 each = (each.fget, each.fset, each.fdel)
-            parts += [name, self._loosely(getattr(each, "__func__", each))]  # of a static or a class method
+            parts += [
+                name,
+                self._loosely(getattr(each, "__func__", each)),
+            ]  # the function of a static or a class method
         return parts
 
     def _loosely(self, value) -> bytes | str:

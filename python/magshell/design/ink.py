@@ -25,10 +25,10 @@ class PrintableSet(Frozen):
 
     strength: A/m, of a face that is magnetized fully.
     directions: (k, 3), or (3,) for one, of any length but zero; in world axes at rest, or in those of `frames`.
-    levels: shares of the strength that can be printed, one or several, each from 0 to 1: 1 where every face is magnetized
-        fully, (0, 1) where it may have no magnetization, (0, 0.5, 1) in three steps. None: any share.
-    frames: (n_f, 3, 3), for directions that are others on every face: rows are three orthogonal unit vectors, in which
-        `directions` are given, see `ms.parametrize.radial_frames` and `ms.parametrize.frames_along`. None: world axes.
+    levels: shares of the strength that can be printed, one or several, each from 0 to 1: 1 if every face is magnetized
+        fully, (0, 1) if faces may also have no magnetization, (0, 0.5, 1) for three levels. None: any share.
+    frames: (n_f, 3, 3), axes of each face in which `directions` are given, as rows of three orthogonal unit vectors; see
+        `ms.parametrize.radial_frames` and `ms.parametrize.frames_along`. None: world axes.
 
     Raises ValueError on bad input.
 
@@ -112,7 +112,7 @@ class PrintableSet(Frozen):
         remanent_magnetization: (n_f, 3) A/m. The result is a differentiable tensor (n_f, choices). A choice is a
         direction with a level, or, without levels, a direction with its best share.
         """
-        torch = require_torch("Ink.squares")
+        torch = require_torch("PrintableSet.squares")
         magnetization = real_tensor("remanent_magnetization", remanent_magnetization, ("n_f", 3))
         self.check_faces(len(magnetization))
         return self._choices(
@@ -160,7 +160,7 @@ class PrintableSet(Frozen):
             "any share" if self.levels is None else f"levels {', '.join(f'{each:g}' for each in self.levels)}"
         )
         axes = "" if self.frames is None else f", in the frames of {len(self.frames)} faces"
-        return f"Ink: {len(self.directions)} directions of {self.strength:g} A/m, {levels}{axes}"
+        return f"PrintableSet: {len(self.directions)} directions of {self.strength:g} A/m, {levels}{axes}"
 
 
 def _checked_levels(levels) -> tuple[float, ...]:

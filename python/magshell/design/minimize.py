@@ -43,28 +43,29 @@ def minimize(
 ) -> MinimizeResult:
     """Minimize objective(*parameters) and leave the parameters at the best design.
 
-    objective: returns a scalar tensor, or a dict of named terms whose sum it is, or a tuple of one of these with a
-    dict of terms to record, with a tensor of constraints (m,) <= 0, or with both.
+    objective: function that returns a scalar tensor, or a dict of named terms to add up, or a tuple of one of these with
+    a dict of terms to record, with a tensor of constraints (m,) <= 0, or with both.
     parameters: tensors with requires_grad, the ones the optimizer was made with.
     optimizer: one of `ms.optim` or of `torch.optim`, or a function that makes one from the list of parameters.
     Those of torch know no bounds and no constraints.
-    tolerance: stops once the objective changed by no more than this share of itself, `patience` times in a row.
-    feasibility: how far a constraint may be broken by a design that counts as feasible when the best is chosen.
-    stateful: objects with state_dict() and load_state_dict(), such as `ms.WarmStart`, that checkpoints take along.
+    tolerance: stops once the relative change of the objective was at most this, `patience` times in a row.
+    feasibility: the largest positive constraint with which a design still counts as feasible when the best is chosen.
+    stateful: objects with state_dict() and load_state_dict(), such as `ms.WarmStart`, that checkpoints include.
     callback: called with each Record; returning True stops.
-    progress: show a bar. checkpoint: a file that is replaced, whole or not at all, every `checkpoint_every`
-    iterations and at the end. resume: continue from it if it exists, with the same bits as without the stop. A checkpoint
-    of another optimizer, of other bounds or options, or of another objective is refused (ValueError says what differs):
-    its best design is evaluated once and compared. max_iterations, tolerance, patience and on_jump may be others.
+    progress: show a bar. checkpoint: a file that is replaced atomically, every `checkpoint_every` iterations and at the
+    end. resume: continue from it if it exists, with the same bits as without the stop. A checkpoint of another optimizer,
+    of other bounds or options, or of another objective is refused (ValueError says what differs): its best design is
+    evaluated once and compared. max_iterations, tolerance, patience and on_jump may be changed.
     The bar, each Record and the printed result say how many designs were evaluated and rejected, and why.
 
-    An objective may raise `ms.DesignRejected` where a design cannot be evaluated; the step then goes less far. Where
-    every shorter one is rejected too, because the equilibrium jumps, the whole step is taken with jumps accepted if
-    the objective or one of `stateful` has accept_jumps(), a context manager, and its Record says so; on_jump="stop",
-    or no such object, ends the minimization there.
+    An objective may raise `ms.DesignRejected` if a design cannot be evaluated; the step is then shortened. If every
+    shorter step is rejected too, because the equilibrium jumps, the full step is taken and the jump accepted, provided
+    that the objective or one of `stateful` has accept_jumps(), a context manager; the Record says so. With
+    on_jump="stop", or without such an object, the minimization ends there.
 
-    Ctrl-C raises `ms.Interrupted`, an error in the objective or the callback `ms.ObjectiveFailed`, once a design is
-    known; both hold the best one, a MinimizeResult, in `last_good`. Before that the error itself comes through.
+    Once a design is known, Ctrl-C raises `ms.Interrupted`, and an error in the objective or the callback
+    `ms.ObjectiveFailed`; both hold the best design, a MinimizeResult, in `last_good`. Before that the error itself is
+    raised.
 
     >>> import torch, magshell as ms
     >>> x = torch.zeros(3, dtype=torch.float64, requires_grad=True)

@@ -127,7 +127,7 @@ class MinimizeResult:
 
     def __repr__(self) -> str:
         broken = f", constraints broken by {self.violation:.2g}" if self.violation > 0 else ""
-        reached = f"Minimum: objective {self.objective:.6g}{broken}"
+        reached = f"MinimizeResult: objective {self.objective:.6g}{broken}"
         evaluations = f", {self.history[-1].evaluations} evaluations" if self.history else ""
         rejected = in_words(self.rejections)
         first = f"{reached} after {self.iterations} iterations{evaluations} ({self.reason})"

@@ -37,7 +37,7 @@ class Answer:
                 constraints = part
             else:
                 raise TypeError(
-                    "beside its value an objective returns a dict of terms and a tensor of constraints, "
+                    "besides its value an objective returns a dict of terms and a tensor of constraints, "
                     f"one of each at most, got {type(part).__name__}"
                 )
         return Answer(head, {name: _number(name, value) for name, value in terms.items()}, constraints)

@@ -1,4 +1,5 @@
-"""Motions by control: objectives of motions, curves to follow, penalties on fields in time, and parametrisations of them.
+"""Optimal control of motions: objectives of motions, curves to follow, penalties on fields in time, and
+parametrizations of them.
 
     times = ms.control.step_times(steps, time_step)
     field = ms.control.spline(times, control_points, duration=steps * time_step)
@@ -7,11 +8,12 @@
     terms = ms.control.track_fitting(tip, curve, start_frame=100, end_frame=-1)
     terms["strength"] = 1e-4 * ms.control.field_strength(field)
 
-[Chen22] bounds every component of the field by 0.05 T: the box of `ms.optim.MMA` or `LBFGS` on per-step values, or on
-the control points of a spline, holds it exactly.
+[Chen22] bounds every component of the field by 0.05 T: bounds of `ms.optim.MMA` or `LBFGS` on per-step values, or
+on the control points of a spline, satisfy this exactly.
 
-Where contact makes gradients of long motions useless, `ms.control.time_windows` searches the first steps first. Where noise
-grows with time, `ms.control.receding_horizon` goes on from where what it found has led.
+If contact makes gradients of long motions useless, `ms.control.time_windows` optimizes the first steps first. If
+perturbations grow with time, `ms.control.receding_horizon` optimizes a short horizon again and again, from the
+state reached.
 """
 
 from .curves import Arc, Chain, Curve, Polyline

@@ -148,8 +148,8 @@ def rotating(
     """Return a field of given magnitude that rotates about an axis, perpendicular to it, T.
 
     times: (n,) or one, s. magnitude: T, a number or, as times, one a time. axis: (3,), of any length but zero; seen
-    against it the field turns counter-clockwise. angular_frequency: rad/s. start: (3,), the direction at the time zero,
-    of which the part perpendicular to the axis counts; not along the axis.
+    against it the field rotates counter-clockwise. angular_frequency: rad/s. start: (3,), the direction at time zero,
+    projected onto the plane perpendicular to the axis; not along the axis.
 
     >>> import magshell as ms
     >>> import numpy as np

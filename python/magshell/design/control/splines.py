@@ -25,7 +25,7 @@ def spline(
 
     The N_i are not negative and their sum is 1, so each component stays within the bounds of the control points', and
     |B| below the largest |P_i|: bounds of an optimizer on P hold for the field at all times. The spline begins at
-    its first control point and ends at its last; a periodic one goes on smoothly from its end to its beginning.
+    its first control point and ends at its last; a periodic one is smooth across its end.
 
     times: (n,) or one, s, within 0 ... duration; any if periodic. control_points: (k, 3) T, k > degree. duration: s.
     Differentiable in times, control points and duration.

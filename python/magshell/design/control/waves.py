@@ -34,12 +34,12 @@ def wave(
 
         a(s, t) = R(t) (mean + amplitude sin(2 pi (speed (t - delay) - s) / wavelength)).
 
-    times: (n,) or one, s; places: (m,) m, as muscle.places: gives (n, m), or (m,) at one time. speed: m/s, towards larger
-    places; negative, the other way. wavelength: m. amplitude, mean: 1; mean +- amplitude must stay in the muscle's range.
-    delay: s. ramp: s, R rises smoothly from 0 to 1 in it, as t/ramp; None: at once.
+    times: (n,) or one, s; places: (m,) m, as muscle.places; the result is (n, m), or (m,) at one time. speed: m/s, towards
+    larger places if positive. wavelength: m. amplitude, mean: 1; mean +- amplitude must stay in the muscle's range.
+    delay: s. ramp: s, the time in which R rises smoothly from 0 to 1; None: R = 1.
 
-    Any of speed, wavelength, amplitude, mean and delay may be (k,), of k muscles: then (n, k, m), or (k, m); or (n, k), at
-    each of the times. Differentiable in all arguments, the times and places among them.
+    Any of speed, wavelength, amplitude, mean and delay may be (k,), for k muscles, with the result (n, k, m) or (k, m); or
+    (n, k), with values at each of the times. Differentiable in all arguments, including the times and places.
 
     >>> import magshell as ms
     >>> times = ms.control.step_times(100, 1e-2)
@@ -70,9 +70,10 @@ def pulse(
 
         a(s, t) = amplitude exp(-4 (s - speed (t - delay))^2 / width^2).
 
-    times, places, speed, delay: as of `wave`; it passes place 0 at the delay. width: m: a width from its middle 2 % of the
-    amplitude is left. period: s, after which another follows, without end: each as exp(kappa (cos phi - 1)), phi the phase
-    and kappa such that its top is the same; None: one only. Arguments may be (k,), of k muscles, or (n, k), as of `wave`.
+    times, places, speed, delay: as in `wave`; the pulse passes place 0 at the delay. width: m; at one width from its
+    middle, 2 % of the amplitude are left. period: s, after which another pulse follows, without end: each is
+    exp(kappa (cos phi - 1)), with the phase phi and kappa such that its top is the same; None: a single pulse. Arguments
+    may be (k,), for k muscles, or (n, k), as in `wave`.
 
     >>> import magshell as ms
     >>> ms.control.pulse(0.5, [0.0, 0.01], speed=0.02, width=5e-3).round(decimals=6)  # it is at 1 cm

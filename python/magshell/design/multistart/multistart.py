@@ -41,17 +41,17 @@ def multistart(
     """Call run(start) for every start, several at a time, and order the results, the best one first.
 
     run: returns an ms.MinimizeResult (or anything with an `objective`), a number, or a tuple that begins with one of these
-        and holds whatever else is to be kept, such as (minimum, equilibrium.positions). It gets a copy of its start.
-        Make the scene inside, or hand it in with functools.partial: meshes, shells, fields and scenes pickle.
-    starts: arrays, tensors or anything else that pickles; `ms.random_starts` makes some. A run that draws random
+        and holds further results, such as (minimum, equilibrium.positions). It gets a copy of its start. Make the scene
+        inside, or pass it with functools.partial: meshes, shells, fields and scenes can be pickled.
+    starts: arrays, tensors or anything else that can be pickled; `ms.random_starts` makes some. A run that draws random
         numbers should take its seed from its start, because nothing else distinguishes one worker from another.
     executor: any concurrent.futures.Executor, such as dask.distributed's Client.get_executor(); it is left open. By
         default processes are made here, and ended: `workers` of them, one for each processor.
-    attempts: how often a start is begun whose process, made here, dies; then it counts as failed. Other executors
-        have rules of their own.
-    feasibility: how far a MinimizeResult may break its constraints and still come before all that break theirs by more.
-    checkpoint: a folder that gets a file for every start that has finished. The files hold data only: run must return
-        numbers, arrays, tensors, ms.MinimizeResult, or containers of these, and reading them runs nothing.
+    attempts: how often a start is run if its process, made here, dies; then it counts as failed. Other executors have
+        their own rules.
+    feasibility: the largest violation with which a MinimizeResult counts as feasible; feasible results come first.
+    checkpoint: a folder that gets a file for every finished start. The files hold data only: run must return numbers,
+        arrays, tensors, ms.MinimizeResult, or containers of these, and reading a file runs no code.
     resume: take the results that are there, and run the other starts and those that failed. The bar, the result and its
         `resumed` say which were taken. A file is refused if its start differs, or if its run differs in name, code, bound
         arguments, closure, or in what it looks up in its module and in others that are not installed. (Results of another

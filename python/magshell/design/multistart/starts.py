@@ -88,7 +88,7 @@ class MultistartResult(Sequence[Any]):
 
     def __repr__(self) -> str:
         total = len(self.finished) + len(self.failed) + len(self.unfinished)
-        head = f"Multistart: {len(self.finished)} of {total} starts finished in {self.seconds:.3g} s"
+        head = f"MultistartResult: {len(self.finished)} of {total} starts finished in {self.seconds:.3g} s"
         head += f", {len(self.resumed)} of them earlier (from the checkpoint)" if self.resumed else ""
         head += f", {len(self.failed)} failed" if self.failed else ""
         lines = [f"  start {found.number}: {_in_words(found)}" for found in self.finished[:_MOST_SHOWN]]
