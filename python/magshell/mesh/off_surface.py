@@ -1,4 +1,4 @@
-"""Warnings about midside nodes that could not be moved onto the curved surface that they belong to, or were not."""
+"""Warnings about midside nodes that are not on the curved surface that they belong to."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from .mesh_base import MeshBase
     from .triangles.triangle_mesh import TriangleMesh
 
-# [rad] Turn between neighbouring faces above which their edge is a crease; see test_folded_and_flat_meshes_get_no_warning.
+# [rad] Angle between the normals of adjacent faces above which their edge is a crease; fixed by
+# test_folded_and_flat_meshes_get_no_warning.
 CREASE = np.radians(40.0)
 # [-] Distance of a node over the length of its edge; straight edges of 1/12 rad of a sphere are this far off it. Fixed by
 # test_nodes_that_stay_off_a_thin_sphere_are_warned_of_with_their_count_and_distance.
@@ -49,39 +50,40 @@ def warn_of_nodes_off(mesh: MeshBase, edges: np.ndarray, middles: np.ndarray, su
 
 
 def warn_of_straight_edges(mesh: TriangleMesh, middles: np.ndarray) -> None:
-    """Warn where more than a few of the middles (n_e, 3) m lie on straight edges of a mesh of a smoothly curved surface.
+    """Warn if more than a few midside nodes (n_e, 3) m lie on straight edges although the mesh is smoothly curved.
 
-    A smooth surface turns by about the same angle at both ends of an edge, and bulges by length * angle / 8 in its middle,
-    with the angle between the normals of the ends. A fold turns on one line alone, a zigzag to the other side at the next.
+    Along an edge on a smooth surface, the normal rotates by about the same angle in both halves. The middle of the surface
+    is then length * angle / 8 away from the edge, with the angle between the normals at its ends. At folds the normal
+    changes on one line only, and in a zigzag alternately in both directions: there is no warning for these.
     """
     bulges = _bulges(mesh)
     off = bulges > _OFF * mesh.edge_lengths
     off &= np.linalg.norm(middles - mesh.edge_midpoints, axis=1) < _STRAIGHT * bulges
     if off.sum() <= _FEW * mesh.n_edges:
         return
-    shares = np.where(off, bulges / mesh.edge_lengths, 0.0)
-    worst = int(np.argmax(shares))
+    relative = np.where(off, bulges / mesh.edge_lengths, 0.0)
+    worst = int(np.argmax(relative))
     warnings.warn(
         f"{off.sum()} of {mesh.n_edges} nodes between corners lie on straight edges of a mesh that is curved as a smooth "
-        f"surface is: they stay off it by up to about {bulges[worst]:.3g} m, {shares[worst]:.2g} of an edge, and six-node "
-        "elements are no better than flat ones there. Give project= of QuadraticTriangleMesh.from_triangles the surface, fit "
-        "the nodes to a finer mesh (QuadraticTriangleMesh.fitted), or make the mesh by ms.meshes with order=2",
+        f"surface is: they stay off it by up to about {bulges[worst]:.3g} m, {relative[worst]:.2g} of an edge, and six-node "
+        "elements are no better than flat ones there. Give project= of QuadraticTriangleMesh.from_triangles the surface, "
+        "fit the nodes to a finer mesh (QuadraticTriangleMesh.fitted), or make the mesh by ms.meshes with order=2",
         MeshQualityWarning,
         stacklevel=callers_level(),
     )
 
 
 def _bulges(mesh: TriangleMesh) -> np.ndarray:
-    """Return how far a smooth surface through the vertices is from the middle of each edge, (n_e,) m; 0 at folds."""
+    """Estimate the distance of a smooth surface through the vertices from the middle of each edge, (n_e,) m; 0 at folds."""
     edges, sides = mesh.edges, mesh.edge_faces
     ends = mesh.rest_positions[edges[:, 1]] - mesh.rest_positions[edges[:, 0]]
     normals = mesh.face_normals
-    beside = np.where(sides[:, :1] < 0, normals[sides[:, 1]], normals[sides[:, 0]])
-    beside = beside + np.where(sides[:, 1:] < 0, beside, normals[sides[:, 1]])
-    beside /= np.linalg.norm(beside, axis=1, keepdims=True)
+    normal = np.where(sides[:, :1] < 0, normals[sides[:, 1]], normals[sides[:, 0]])
+    normal = normal + np.where(sides[:, 1:] < 0, normal, normals[sides[:, 1]])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     at_ends = mesh.vertex_normals[edges]
-    before = np.einsum("ei,ei->e", beside - at_ends[:, 0], ends)
-    after = np.einsum("ei,ei->e", at_ends[:, 1] - beside, ends)
+    before = np.einsum("ei,ei->e", normal - at_ends[:, 0], ends)
+    after = np.einsum("ei,ei->e", at_ends[:, 1] - normal, ends)
     bulges = np.where(before * after > 0.0, 0.25 * np.minimum(np.abs(before), np.abs(after)), 0.0)
     inside = mesh.interior_edges
     cosines = np.einsum("ei,ei->e", normals[sides[inside, 0]], normals[sides[inside, 1]])

@@ -1,4 +1,4 @@
-"""A gmsh session that leaves no trace: none in a session that the user has open, none after its end."""
+"""A temporary gmsh session that leaves a session of the user, if there is one, unchanged."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-# Everything that decides what the mesh looks like: the user's own settings must not reach in.
+# All options that affect the mesh; they replace the user's settings during the session.
 _OPTIONS = {
     "General.Terminal": 0,
     "General.NumThreads": 1,
@@ -30,15 +30,15 @@ _OPTIONS = {
 
 @contextmanager
 def gmsh_session(mesh_size: float) -> Iterator[Any]:
-    """Yields the gmsh module with an empty model of its own, quiet, on one thread."""
+    """Yield the gmsh module with a new empty model, without output, on one thread."""
     try:
         import gmsh
-    except (ImportError, OSError) as error:  # OSError: gmsh is there, a system library that it needs is not
+    except (ImportError, OSError) as error:  # OSError: a system library that gmsh needs is missing
         raise ImportError(f'this is meshed by gmsh: pip install "magshell[gmsh]" ({error})') from error
 
     started_here = not gmsh.isInitialized()
     if started_here:
-        # not interruptible: gmsh would take over Ctrl-C, and can only do so in the main thread
+        # not interruptible: otherwise gmsh handles Ctrl-C itself, which works in the main thread only
         gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
     users_model = gmsh.model.getCurrent()
     users_options = {name: gmsh.option.getNumber(name) for name in _OPTIONS}

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 _MOST_SAMPLES = 300_000
 _LOST = 0.15  # [-] lost fraction of the volume that is reported; coarse meshes lose less by blunted edges
-_SURE = 4.0  # [-] standard deviations of the sampled volume that are added to it
+_SURE = 4.0  # [-] standard deviations of the sampled volume that are added to that limit
 _MISSED = 0.2  # [-] relative error of the number of tetrahedra that is reported
 
 

@@ -11,10 +11,11 @@ from .msh_numbers import MshNumbers
 _INT, _DOUBLE = 4, 8  # bytes
 # [-] Node tags are accepted up to this number or ten times the file's bytes: the reader allocates 8 bytes per tag.
 _LEAST_TAG_LIMIT = 10**7
+# number of nodes by gmsh's number of the kind of element
 _ELEMENT_NODES = {
     **{1: 2, 2: 3, 3: 4, 4: 4, 5: 8, 6: 6, 7: 5, 8: 3, 9: 6, 10: 9, 11: 10},
     **{12: 27, 13: 18, 14: 14, 15: 1, 16: 8, 17: 20, 18: 15, 19: 13, 21: 10, 23: 15, 25: 21, 26: 4, 29: 20},
-}  # gmsh's number of a kind of element: its nodes
+}
 
 
 def check_counts(path: Path) -> None:
@@ -26,7 +27,7 @@ def check_counts(path: Path) -> None:
 
 def _check_stl(data: bytes) -> None:
     if data[:512].lstrip().lower().startswith(b"solid") and b"\0" not in data[:512]:
-        return  # text, which has no count
+        return  # a text file has no count
     if len(data) < 84:
         raise ValueError(
             f"a binary file has 84 bytes before its triangles, but this one has {len(data)} bytes in all"
@@ -42,7 +43,7 @@ def _check_msh(data: bytes) -> None:
     begin, end = data.find(b"$MeshFormat"), data.find(b"$EndMeshFormat")
     words = data[begin:end].split()[1:4]
     if not 0 <= begin < end or len(words) < 3 or words[2] not in (b"4", b"8"):
-        return  # the reader says that it is no such file
+        return  # the reader reports that it is not an MSH file
     version = "4.0" if words[0] == b"4.0" else words[0][:1].decode("latin-1")
     at = end + len(b"$EndMeshFormat")
     while (found := _SECTION.match(data, at)) is not None:
@@ -84,7 +85,7 @@ def _elements_4_1(numbers: MshNumbers) -> None:
     for _ in range(numbers.sizes(4)[0]):
         _, _, kind = numbers.ints(3)
         if kind not in _ELEMENT_NODES:
-            return  # the reader says that it does not know it
+            return  # the reader reports an unknown kind of element
         (count,) = numbers.sizes(1)
         numbers.largest_size(count * (1 + _ELEMENT_NODES[kind]))
 

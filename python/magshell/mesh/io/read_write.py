@@ -200,7 +200,7 @@ def _read(
         found = reader(path)
     except ImportError:
         raise
-    except Exception as error:  # a reader fed garbage may raise anything
+    except Exception as error:  # readers may raise any error for an invalid file
         raise ValueError(f"cannot read {str(path)!r} as {ending[1:].upper()}: {_reason(error)}") from error
     if isinstance(found, TetContent):
         return _solid(path, found, drop_unused)

@@ -10,13 +10,8 @@ import numpy as np
 from ..._input.arrays import integer_array
 from ..tetrahedra.tet_mesh import TetMesh
 
-LOWER_CELLS = (
-    "vertex",
-    "line",
-    "line3",
-    "triangle",
-    "triangle6",
-)  # gmsh writes them in addition to the solid
+# gmsh writes them in addition to the solid
+LOWER_CELLS = ("vertex", "line", "line3", "triangle", "triangle6")
 _KINDS = ("tetra", "tetra10")
 _PART = "part"  # the cell field that write_mesh writes
 _PART_FIELDS = (_PART, "gmsh:physical")

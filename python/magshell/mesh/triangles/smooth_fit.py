@@ -10,9 +10,7 @@ from .triangle_mesh import TriangleMesh
 
 # [rad] A larger angle between the normals of adjacent faces is a crease; between boundary edges, a corner.
 _SMOOTH = CREASE
-_NEAR = (
-    0.25  # [-] largest distance between the middle of an edge and the surface, relative to the edge's length
-)
+_NEAR = 0.25  # [-] largest distance of the surface from the middle of an edge, relative to its length
 _SAME_PLACE = 1e-6  # [-] largest distance between equal vertices, relative to the edge's length
 _ENOUGH = 28  # vertices to which a polynomial of fourth degree, with 15 coefficients, is fitted
 _CANDIDATES = 12  # nearest vertices among which one on a face of the same orientation is sought

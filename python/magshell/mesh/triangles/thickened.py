@@ -7,8 +7,7 @@ import scipy
 
 from .triangle_mesh import TriangleMesh
 
-# [-] Largest offset at a vertex over half the thickness; 2 is that of two faces at a dihedral angle of 120 degrees from
-# flat.
+# [-] Largest offset at a vertex over half the thickness; 2 is exact for two faces whose normals differ by 120 degrees.
 _LONGEST_MITER = 2.0
 
 

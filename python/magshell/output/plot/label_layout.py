@@ -13,14 +13,8 @@ if TYPE_CHECKING:
 
 GAP = 0.02  # [inch] smallest gap between texts
 NEAR = 0.055  # [inch] distance between a point and its text
-FARTHER = (
-    0.055,
-    0.16,
-    0.3,
-    0.5,
-    0.8,
-    1.2,
-)  # [inch] distances between a point and its text that are tried in turn
+# [inch] distances between a point and its text that are tried in turn
+FARTHER = (0.055, 0.16, 0.3, 0.5, 0.8, 1.2)
 DIRECTIONS = 16  # directions from a point that are tried at each distance
 
 

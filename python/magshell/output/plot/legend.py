@@ -24,15 +24,10 @@ EDGE = 0.05  # [inch] margin at the picture's sides
 SPACE = 0.35  # [inch] gap between the parts
 TRIAD = np.array([0.36, 0.32])  # [inch] origin of the coordinate axes
 SCALE_BAR = 0.85  # [inch] left end of the scale bar
-KEY, KEY_ROW = (
-    0.38,
-    0.2,
-)  # [inch] width of an arrow with the gap before its text; distance between rows of keys
-NARROWEST, WIDEST, OVERHANG = (
-    0.8,
-    2.4,
-    0.25,
-)  # [inch] widths of a colour bar; how far tick labels may reach beyond it
+# [inch] width of an arrow with the gap before its text; distance between rows of keys
+KEY, KEY_ROW = (0.38, 0.2)
+# [inch] widths of a colour bar; how far tick labels may reach beyond it
+NARROWEST, WIDEST, OVERHANG = (0.8, 2.4, 0.25)
 LINE = 0.15  # [inch] height of an additional line of the colour bar's text
 
 

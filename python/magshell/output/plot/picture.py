@@ -28,23 +28,14 @@ if TYPE_CHECKING:
 
 DPI = 200
 MARGIN = 0.08  # [inch] margin of the picture
-TITLE, TITLE_GAP = (
-    0.26,
-    0.055,
-)  # [inch] height of a line of a title, and the gap below it, which is part of the height
+# [inch] height of a line of a title, and the gap below it, which is part of the height
+TITLE, TITLE_GAP = (0.26, 0.055)
 TITLE_LINES = 3  # largest number of lines of a title
 FLATTEST, TALLEST = 0.16, 1.1  # [-] smallest and largest ratio of a panel's height to its width
 # [inch] distance of the points that represent what texts should not cover, and their largest number along a side of a face
 SPREAD, MOST_SPREAD = 0.08, 12
-_WITHOUT_WINDOWS = {
-    "agg",
-    "cairo",
-    "pdf",
-    "pgf",
-    "ps",
-    "svg",
-    "template",
-}  # matplotlib backends that open no window
+# matplotlib backends that open no window
+_WITHOUT_WINDOWS = {"agg", "cairo", "pdf", "pgf", "ps", "svg", "template"}
 
 
 class Picture(Frozen):
