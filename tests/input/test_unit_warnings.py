@@ -148,7 +148,7 @@ def varied(usual: float, some: float) -> np.ndarray:
     ],
 )
 def test_some_faces_beyond_the_limits_are_not_warned_of_and_all_of_them_are(name, usual, some):
-    """A modulus fitted face by face goes that far on its way; a unit would be mistaken in every face."""
+    """Compare one extreme face, as a fit face by face passes through, with all faces, as a mistaken unit gives."""
     assert not warned(lambda: scene(**{name: varied(usual, some)}))
     assert len(warned(lambda: scene(**{name: varied(1.5 * some, some)}))) == 1
     if name != "mass_density":  # which has no part in a solve without gravity

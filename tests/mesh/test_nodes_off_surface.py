@@ -122,7 +122,7 @@ def test_elements_from_arrays_are_warned_of_and_copies_of_them_are_not():
 
 
 def folded(angle: float, zigzag: bool) -> ms.TriangleMesh:
-    """A strip with folds by an angle [rad] every 1 m, four edges apart, all to one side or to both in turn."""
+    """Return a strip with folds by an angle [rad] every 1 m, four edges apart, to one side or alternately to both."""
     mesh = ms.meshes.rectangle(4.0, 1.0, cells=(16, 4))
     s, turns = mesh.rest_positions[:, 0], np.arange(4)
     slopes = angle * (turns % 2 if zigzag else turns)
