@@ -8,7 +8,10 @@ from pathlib import Path
 def run(
     compute: Callable[[], dict], summary: Callable[[dict], str], write: Callable[[dict, Path], None]
 ) -> None:
-    """write: puts pictures of what was computed into a folder, which is there."""
+    """Run an example as a script.
+
+    write: function that writes pictures of the outcome into an existing folder.
+    """
     began = time.perf_counter()
     outcome = compute()
     print(summary(outcome))

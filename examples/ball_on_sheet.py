@@ -73,7 +73,7 @@ def thrown(
     """Simulate and measure one throw. The time is the processor's, of all threads."""
     scene = scenery(throw, cells, ball_cells, stretch)
     began = time.process_time()
-    with warnings.catch_warnings():  # told in the summary
+    with warnings.catch_warnings():  # the summary states the strains
         warnings.simplefilter("ignore", ms.LargeStrainWarning)
         motion = scene.thrown(throw, steps)
     processor_time = time.process_time() - began

@@ -1,5 +1,6 @@
-"""What every test runs under: one BLAS thread, two of ours (one where tests run in several processes), no display, the
-same random numbers every time."""
+"""Common conditions of all tests: one BLAS thread, two threads of magshell (one where tests run in several
+processes), no display, the same random numbers every time.
+"""
 
 import os
 import signal
@@ -32,12 +33,12 @@ from parallel import (  # noqa: E402, F401 - pytest finds hooks by their names
 
 @pytest.fixture
 def rng() -> np.random.Generator:
-    """A generator with a fixed seed, new for each test, so that no test depends on another's draws."""
+    """Return a generator with a fixed seed, new for each test, so that no test depends on another's draws."""
     return np.random.default_rng(20220701)
 
 
 @pytest.fixture
 def here() -> Iterator[ThreadPoolExecutor]:
-    """An executor in this process that runs one call after another."""
+    """Yield an executor in this process that runs one call after another."""
     with ThreadPoolExecutor(1) as executor:
         yield executor

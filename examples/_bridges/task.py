@@ -60,7 +60,7 @@ class Task:
     def motion(self, unknowns, **options) -> ms.Trajectory:
         """Simulate the fall from rest, and count the simulation."""
         self.simulations += 1
-        with warnings.catch_warnings():  # it is to sag that far
+        with warnings.catch_warnings():  # large strains are intended
             warnings.simplefilter("ignore", ms.LargeStrainWarning)
             return ms.simulate(
                 self.scene,

@@ -1,4 +1,4 @@
-"""Volumes of the cells and the ways of drone and ball; what the gripper is looked at from."""
+"""The figure of the cells' volumes and of the paths of drone and ball, and the view of the gripper."""
 
 from __future__ import annotations
 

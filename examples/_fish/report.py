@@ -1,4 +1,4 @@
-"""The torques found; what the fish is looked at from."""
+"""The figure of the torques that were found, and the view of the fish."""
 
 from __future__ import annotations
 

@@ -88,7 +88,7 @@ class Figure:
             both = [self.limits(start, steps)] * 2 if limits is None else limits
             shoulders = zip(self.joints[:2], both, strict=True)
             values = {joint: {"torque_limit": each} for joint, each in shoulders}
-        with warnings.catch_warnings():  # of 0.8 kPa, it is to be squeezed far
+        with warnings.catch_warnings():  # large strains are intended at 0.8 kPa
             warnings.simplefilter("ignore", ms.LargeStrainWarning)
             return ms.simulate(
                 self.scene,

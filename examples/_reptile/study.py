@@ -14,7 +14,10 @@ from .model import FREQUENCY, TIME_STEP, Crawler, crawler, flat
 
 @dataclass(frozen=True)
 class Row:
-    """advance: m along x in the last cycle, None without ground; cpu: s of processor time a step."""
+    """One line of the study.
+
+    advance: along x in the last cycle, m, None without ground; cpu: processor time of a step, s.
+    """
 
     what: str
     time_step: float

@@ -12,8 +12,8 @@ import magshell as ms
 class Outcome:
     """One line of the table.
 
-    what: a few words. solid: what was solved. miss: the distance from the target, or any other number of merit.
-    iterations, seconds_per_iteration: of the search; None where a design found elsewhere was only looked at.
+    what: a few words. solid: the solid of the solve. error: the distance from the target, or any other figure of merit.
+    iterations, seconds_per_iteration: of the search; None where a design was only evaluated.
     """
 
     what: str

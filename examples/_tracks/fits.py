@@ -19,7 +19,11 @@ CONTROL_POINTS = 20
 
 @dataclass(frozen=True)
 class Method:
-    """unknowns: "steps", a field a step, or "spline", control points. optimizer: makes one from a list of tensors."""
+    """A method to find the field.
+
+    unknowns: "steps", one field a step, or "spline", control points. optimizer: function that makes one from a list
+    of tensors.
+    """
 
     label: str
     unknowns: str

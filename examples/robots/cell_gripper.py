@@ -28,7 +28,7 @@ LOW, RADIUS = 0.0, 0.37  # m: arms end as high as the middle of the ball, so tha
 BALL_CELLS = 3
 YOUNG_MODULUS, POISSON_RATIO, MASS, BALL_MASS = 2e5, 0.4, 10.0, 1.0  # Pa, 1, kg, kg
 STIFFNESS, INFLATED = 5e5, 1.6  # Pa, of a cell; its volume over that at rest, at most
-RESPONSE = 0.2  # of what is asked for and what a cell has, made up for in a step: air takes its time
+RESPONSE = 0.2  # fraction of the difference between requested and present volume that a step makes up: air flows slowly
 FRICTION = 0.8
 SPEED = 1.5  # m/s, of the drone along an axis, at most
 STEPS, TIME_STEP = 50, 1e-2  # s
@@ -36,14 +36,17 @@ TARGET = (0.0, 0.3, 0.0)  # m, of the ball
 
 
 class CellGripper(Robot):
-    """levels: of an arm, with a cell in each; the ball needs 5. ball_cells: of its mesh, from its center to its surface.
+    """Four arms of pneumatic cells under a drone, and a ball on a table.
+
+    levels: of an arm, with a cell in each; the ball needs 5. ball_cells: of its mesh, from its center to its surface.
 
     scene: arms and ball, gravity, and a table that the ball lies on. arms, ball: the Solids. cells: 56, from the lowest
     of an arm to the highest, arm by arm. drone: the Pin that holds the arms' upper end, and moves.
     ends: (4, n), the vertices at the end of each arm.
 
-    59 numbers a step: volumes asked of the cells, from 1 to INFLATED, which they come nearer to by RESPONSE in a step, and
-    the speed of the drone along three axes, up to SPEED.
+    A step has 59 numbers: the requested volumes of the cells, from 1 to INFLATED, whose difference from the present
+    ones
+    decreases by the fraction RESPONSE in a step, and the speed of the drone along three axes, up to SPEED.
     """
 
     arms: Solid

@@ -56,8 +56,11 @@ def body_shape() -> shapes.Shape:
 
 
 class Fish(Robot):
-    """scene: in water, without gravity. flesh: the Solid. joints: head to front, front to rear, rear to tail, right fin,
-    left fin."""
+    """A soft fish with a skeleton, in water.
+
+    scene: in water, without gravity. flesh: the Solid. joints: head to front, front to rear, rear to tail, right fin,
+    left fin.
+    """
 
     flesh: Solid
     traveller: Solid

@@ -30,21 +30,24 @@ STEPS, TIME_STEP = 400, 5e-3  # s
 TARGET = (-0.4, 0.8, -0.4)  # m, of the center of mass
 FREQUENCY = 2.0  # Hz, of the waves
 DELAY = 0.25  # of a period, at most
-WAVES = (0.25, 0.75)  # that a leg has on it at once, least and most
+WAVES = (0.25, 0.75)  # least and largest number of wavelengths on a leg
 REACH = 0.05  # m, of the fibres around their middle line
 NUMBERS = 4  # of a muscle: strength, depth, delay, waves
 
 
 class MuscleOctopus(Robot):
-    """scene: in water, without gravity. flesh: the Solid. muscles: upper and lower one of each leg, one after another.
+    """A soft octopus in water, with two muscles in each of eight legs.
+
+    scene: in water, without gravity. flesh: the Solid. muscles: upper and lower one of each leg, one after another.
     tips: (8,), the vertex at the end of each leg.
 
-    Activation of a muscle, along the share s of its leg, from four numbers a step:
+    The activation of a muscle at the fraction s of its leg depends on four numbers a step:
 
         a(s, t) = strength/2 (1 + depth sin(2 pi (FREQUENCY (t - delay) - waves s)) ),
 
-    the strength from 0 to 1, depth from -1 to 1, delay up to DELAY periods, waves on a leg between WAVES; the lower muscles
-    half a period later.
+    the strength from 0 to 1, depth from -1 to 1, delay up to DELAY periods, waves on a leg between WAVES; the lower
+    muscles
+    are half a period later.
     """
 
     flesh: Solid

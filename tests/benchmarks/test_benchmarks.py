@@ -1,4 +1,4 @@
-"""python -m benchmarks: parts, a quick accuracy run, results as JSON, and what it refuses."""
+"""Tests of python -m benchmarks: its parts, a quick accuracy run, results as JSON, and refusals."""
 
 import json
 import subprocess
@@ -38,7 +38,7 @@ def test_module_runs_and_lists_its_parts() -> None:
     assert all(part in run.stdout for part in PARTS)
 
 
-def test_unknown_part(capsys) -> None:
+def test_unknown_part_is_refused(capsys) -> None:
     assert main(["speed"]) == 2
     complaint = capsys.readouterr().err
     assert "there is no part 'speed'" in complaint and "accuracy" in complaint
@@ -113,7 +113,7 @@ def test_unwritable_path_is_refused_at_once(tmp_path, capsys, option: str) -> No
     assert "cannot write" in capsys.readouterr().err
 
 
-def test_unknown_case(capsys) -> None:
+def test_unknown_case_is_refused(capsys) -> None:
     with pytest.raises(SystemExit):
         main(["accuracy", "--only", "Z9"])
     assert "invalid choice: 'Z9'" in capsys.readouterr().err
@@ -127,7 +127,7 @@ def test_ngsolve_is_missed_before_any_work(monkeypatch, capsys) -> None:
 
 
 def test_rows_beside_ngsolve(monkeypatch, capsys) -> None:
-    """The table, with numbers in place of NGSolve's: errors that fall as the fourth power, a second a cell."""
+    """Check the table with numbers in place of NGSolve's: errors of fourth order, a second a cell."""
     case = compare_ngsolve.CASES[0]
     theirs = lambda order: lambda mesh: compare_ngsolve.Tried(mesh, (mesh[0] ** -order,), (float(mesh[0]),))  # noqa: E731
     monkeypatch.setattr(
@@ -160,7 +160,7 @@ def test_without_matplotlib_the_numbers_are_there(monkeypatch, tmp_path, capsys,
     assert 'pip install "magshell[plot]"' in printed.err and "numbers are above" in printed.err
 
 
-def test_without_torch(monkeypatch, capsys) -> None:
+def test_missing_torch_names_the_extra(monkeypatch, capsys) -> None:
     monkeypatch.setitem(sys.modules, "torch", None)
     assert main(["gradients", "--quick"]) == 3
     assert 'pip install "magshell[torch]"' in capsys.readouterr().err

@@ -1,4 +1,6 @@
-"""python -m benchmarks check: what is worse than in the last release is said loudly. The run itself is no test."""
+"""Tests of python -m benchmarks check: results worse than those of the last release are reported. The run itself is
+no test.
+"""
 
 import json
 
@@ -29,7 +31,9 @@ NOW = {
 
 @pytest.fixture
 def release(tmp_path):
-    """The file of a release whose numbers are these; `doctor(part, name, value)` changes one."""
+    """Return a function that writes the file of a release with these numbers; `doctor(part, name, value)` changes
+    one.
+    """
     path = tmp_path / "release.json"
     content = {"ratios": {part: {name: r.value for name, r in of.items()} for part, of in NOW.items()}}
 
@@ -83,7 +87,7 @@ def test_tolerances_of_each_kind(kind, old, tolerated, worse):
     assert Ratio(kind, "a", float("nan")).worse_than(old)
 
 
-def test_more_is_better_where_something_is_to_be_reached():
+def test_larger_ratio_is_better_for_a_lower_target():
     gain = Ratio("share", "gain", 1.0, 1.7, at_least=True)
     assert gain.worse_than(1.8) and not gain.worse_than(1.5) and gain.better_than(0.5)
 
@@ -117,7 +121,7 @@ def test_a_file_that_was_better_is_loud(release, capsys, part, name, value):
     assert f"{value:.4g}" in row and f"{NOW[part][name].value:.4g}" in row
 
 
-def test_what_is_no_longer_measured_is_loud(release, capsys):
+def test_missing_measurement_fails_the_check(release, capsys):
     assert run_check(release("statics", "an old target", 3.0)) == 1
     printed = capsys.readouterr().out
     assert "GONE: no longer measured" in printed and "an old target" in printed and "1 gone" in printed
@@ -132,7 +136,7 @@ def test_better_and_new_numbers_are_shown(release, capsys):
 
 
 def test_a_missed_target_stays_in_sight(release, capsys):
-    """Missed before and no worse now: seen, and no failure."""
+    """Check that a target missed before and no worse now is reported, without a failure."""
     now = {**NOW, "statics": {**NOW["statics"], **ratios(Ratio("share", "worth", 14.0, 12.0))}}
     assert run_check(release("statics", "worth", 14.0), now=now) == 0
     printed = capsys.readouterr().out
@@ -193,7 +197,7 @@ def test_no_file_of_a_release(tmp_path, content, complaint):
         run_check(path)
 
 
-# What it runs on
+# The machine
 
 
 def test_a_part_is_measured_with_its_times_over_the_loops(monkeypatch, capsys):
@@ -212,7 +216,7 @@ def test_the_loop_takes_time():
 
 
 def test_quickest_form_runs_every_part_and_nothing_is_worse_than_in_the_last_release(capsys):
-    """Under half a minute of one idle core: counts and errors only, which other people's work does not disturb."""
+    """Limit the run to counts and errors, which do not depend on other load: half a minute of one idle core."""
     pytest.importorskip("torch")
     assert check(["--quickest"]) == 0, capsys.readouterr().out
 
@@ -249,7 +253,7 @@ def test_quickest_form_is_written_beside_the_numbers_of_the_whole_one(tmp_path, 
 
 
 def test_orders_of_convergence_have_a_name_for_each_element(capsys):
-    """Two notes of one name are refused by `check`, which then does not end."""
+    """Check that notes have different names; `check` refuses two of the same name."""
     cells, errors = np.array([10, 20]), np.array([[1e-2, 2.5e-3]])
     study = Convergence(cells, 4 * cells, errors, errors)
     with collected() as notes:

@@ -1,4 +1,4 @@
-"""python -m benchmarks experiments: counting, methods beside each other, a library that is not there."""
+"""Tests of python -m benchmarks experiments: counting, comparison of methods, a missing library."""
 
 import json
 import sys
@@ -127,7 +127,7 @@ def test_a_robots_miss_and_its_failures() -> None:
 
 
 def test_a_robots_episode_loses_its_miss() -> None:
-    """What a learner sees of an episode is the objective of the same actions."""
+    """Compare the reward that a learner gets in an episode with the objective of the same actions."""
     from robots.cell_gripper import CellGripper
     from robots.environments import cell_gripper
 
@@ -182,7 +182,7 @@ def test_quick_run_draws_a_figure(tmp_path, capsys) -> None:
 
 
 def test_runs_are_kept_and_gone_on_with(tmp_path, capsys, monkeypatch) -> None:
-    """Stopped in the second run, the first is printed; later only what is missing is run, with the same numbers."""
+    """Stop in the second run: the first is printed; later only the missing ones are run, with the same numbers."""
     chosen = ["experiments", "--budget", "4", "--only", "suspension", "--methods", "L-BFGS", "--seeds", "2"]
     path, ran, run = tmp_path / "runs.json", [], methods.run
 
@@ -248,7 +248,7 @@ def test_a_library_that_is_not_there_is_a_row(monkeypatch, capsys) -> None:
     assert "not installed: pip install cma" in printed and "MMA" in printed
 
 
-def test_impossible_budgets() -> None:
+def test_impossible_budgets_are_refused() -> None:
     with pytest.raises(SystemExit, match="--budget must be at least 1, got 0"):
         main(["experiments", "--budget", "0"])
     with pytest.raises(SystemExit, match="--quick or --full, not both"):

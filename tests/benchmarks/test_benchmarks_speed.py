@@ -1,4 +1,4 @@
-"""The parts of the bench that measure speed: what they print and write on tiny sheets. Never how fast."""
+"""Tests of the benchmark parts that measure speed: their output and files for tiny sheets, never their times."""
 
 import json
 import time
@@ -26,7 +26,7 @@ def same_threads_afterwards():
 
 
 def run(part: str, folder: Path, *options: str, rounds: bool = True, figure: bool = True) -> dict:
-    """The numbers of a part as its JSON holds them; the figure must be one."""
+    """Run a part and return the numbers of its JSON; check its figure."""
     path, picture = folder / f"{part}.json", folder / f"{part}.png"
     if figure:
         pytest.importorskip("matplotlib")
@@ -38,7 +38,7 @@ def run(part: str, folder: Path, *options: str, rounds: bool = True, figure: boo
     return written["results"]
 
 
-def test_kernels(tmp_path, capsys) -> None:
+def test_kernels_part_prints_and_writes(tmp_path, capsys) -> None:
     results = run("kernels", tmp_path, "--faces", "8", "32")
     printed = capsys.readouterr().out
     assert "midedge, magnetic" in printed and "times that at 32" in printed and "Two threads" in printed
@@ -47,7 +47,7 @@ def test_kernels(tmp_path, capsys) -> None:
     assert results["two threads"] > 0
 
 
-def test_statics(tmp_path, capsys) -> None:
+def test_statics_part_prints_and_writes(tmp_path, capsys) -> None:
     results = run("statics", tmp_path, "--faces", "32")
     assert "the same to the last bit" in capsys.readouterr().out
     assert results["threads"]["same bits"] is True
@@ -56,7 +56,7 @@ def test_statics(tmp_path, capsys) -> None:
     assert "supernodal" in results["backends"]
 
 
-def test_gradients(tmp_path, capsys) -> None:
+def test_gradients_part_prints_and_writes(tmp_path, capsys) -> None:
     pytest.importorskip("torch")
     results = run("gradients", tmp_path, "--faces", "32", "--quick")
     assert "The gradient by all inputs at once" in capsys.readouterr().out
@@ -64,7 +64,7 @@ def test_gradients(tmp_path, capsys) -> None:
     assert all(cost["share"] == cost["gradient"] / cost["equilibrium"] for cost in results.values())
 
 
-def test_dynamics(tmp_path, capsys) -> None:
+def test_dynamics_part_prints_and_writes(tmp_path, capsys) -> None:
     pytest.importorskip("torch")
     results = run("dynamics", tmp_path, "--quick", "--long", "200")
     printed = capsys.readouterr().out
@@ -86,7 +86,7 @@ def test_dynamics(tmp_path, capsys) -> None:
     assert surroundings["contact"]["way"] != surroundings["contact, friction"]["way"]
 
 
-def test_scaling(tmp_path, capsys) -> None:
+def test_scaling_part_prints_and_writes(tmp_path, capsys) -> None:
     results = run("scaling", tmp_path, "--faces", "512", "128", "--bending", "hinge", "--quick")
     printed = capsys.readouterr().out
     assert "a Newton iteration grows with the faces to the" in printed and "Two threads" in printed
@@ -106,7 +106,7 @@ def test_scaling(tmp_path, capsys) -> None:
 
 
 def test_scaling_without_the_memory_for_it(monkeypatch, tmp_path, capsys) -> None:
-    """What was measured before the process was ended is there."""
+    """Check that earlier measurements are kept when the process is killed."""
     size = {
         "faces": 8,
         "unknowns": 9,
@@ -133,7 +133,7 @@ def test_scaling_without_the_memory_for_it(monkeypatch, tmp_path, capsys) -> Non
         main(["scaling", "--faces", "32"])
 
 
-def test_exponents() -> None:
+def test_exponents_of_power_laws() -> None:
     assert fitted_exponent([10, 100, 1000], [3.0, 30.0 * 10**0.5, 3000.0]) == pytest.approx(1.5)
     assert fitted_exponent([10, 10], [1.0, 2.0]) is None and fitted_exponent([1, 2], [1.0, None]) is None
 
@@ -168,7 +168,7 @@ def test_solves_measure_the_processor_if_told_to():
         assert time.perf_counter is walls
 
 
-def test_terms(tmp_path, capsys) -> None:
+def test_terms_part_prints_and_writes(tmp_path, capsys) -> None:
     results = run("terms", tmp_path, "--faces", "32")
     assert "+ field of a dipole" in capsys.readouterr().out
     parts = {part["part"]: part for part in results["parts"]}
@@ -194,7 +194,7 @@ def test_parts_of_a_scene_add_up() -> None:
 PAPER = ["bending_twisting", "hexagram", "kirigami_reaching", "kirigami_tower", "letters"]
 
 
-def test_paper(tmp_path, capsys) -> None:
+def test_paper_part_prints_and_writes(tmp_path, capsys) -> None:
     pytest.importorskip("torch")
     results = run("paper", tmp_path, "--iterations", "2", "--only", *PAPER, rounds=False)
     printed = capsys.readouterr().out
@@ -216,7 +216,7 @@ def test_every_row_of_the_paper_has_its_example() -> None:
 
 
 def test_paper_without_an_example(monkeypatch, tmp_path, capsys) -> None:
-    """Other rows go on."""
+    """Check that other rows are still run."""
     pytest.importorskip("torch")
     pending = ROWS[0]._replace(name="Squid", example="squid", seconds=10.0, iterations=5)
     monkeypatch.setattr("benchmarks.paper.ROWS", (pending, *ROWS[1:]))

@@ -100,7 +100,7 @@ def test_curves_by_hand():
         (lambda b: control.low_frequency_penalty(FIELD, TIMES, OMEGA, ALPHA[:, 0], b), BETA[:, 0].clone()),
     ],
 )
-def test_derivatives(function, at):
+def test_derivatives_equal_differences(function, at):
     assert gradcheck(function, (at.clone().requires_grad_(),))
 
 
@@ -236,6 +236,6 @@ def test_dmp_finds_the_frequencies_of_a_field():
         ),
     ],
 )
-def test_bad_input(call, message):
+def test_bad_input_is_refused(call, message):
     with pytest.raises(ValueError, match=message):
         call()

@@ -18,7 +18,7 @@ SCENE = ms.Scene(SHEET, supports=[ms.Clamp(MESH.edges_at(x=0.0))], field=ms.Unif
 
 
 def field(in_plane):
-    """A spline in the x-z plane. in_plane: (k, 2) T."""
+    """Return a spline in the x-z plane. in_plane: (k, 2) T."""
     control_points = in_plane @ torch.tensor([[1.0, 0, 0], [0, 0, 1.0]], dtype=torch.float64)
     return control.spline(control.step_times(STEPS, TIME_STEP), control_points, STEPS * TIME_STEP)
 

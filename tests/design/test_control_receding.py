@@ -1,5 +1,4 @@
-"""ms.control.receding_horizon: unstable motions that one search loses, the same bits again, what is tried, and
-what goes wrong."""
+"""Tests of ms.control.receding_horizon: unstable motions that a single search loses, equal bits, trials, failures."""
 
 import numpy as np
 import pytest
@@ -15,7 +14,7 @@ def zeros(*shape):
 
 
 class Stick:
-    """That balances: angle and rate under a push a step. Noise grows by a factor of 1.1 in each."""
+    """An inverted pendulum: angle and rate under a push in each step. Noise grows by a factor of 1.1 a step."""
 
     def moved(self, pushes, state):
         angles, (angle, rate) = [], state
@@ -37,8 +36,10 @@ def upright(noise):
     return torch.tensor([noise, 0.0], dtype=torch.float64)
 
 
-def test_what_noise_overthrows_stays_upright() -> None:
-    """Over 160 steps noise grows 4e6-fold; one search of the whole, with as many steps in all, lets the stick fall."""
+def test_unstable_stick_stays_upright() -> None:
+    """Check 160 steps, over which noise grows 4e6-fold; one search of all steps, with as many iterations, lets the
+    stick fall.
+    """
     stick, start = Stick(), upright(1e-3)
     limits = {"lower": -1.0, "upper": 1.0, "start": start, **QUIET}
     found = ms.control.receding_horizon(
@@ -84,7 +85,7 @@ def test_parts_begin_where_the_one_before_led() -> None:
 
 
 def compass():
-    """A free magnet in water that points against the field, the most unstable of its places."""
+    """Build a free magnet in water that points against the field, its most unstable orientation."""
     mesh = ms.meshes.rectangle(0.02, 0.01, cells=(2, 1))
     sheet = ms.Shell(
         mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3, remanent_magnetization=(4e4, 0, 0)
@@ -141,7 +142,7 @@ def detached(values):
 
 
 def squared_swim(rows, part=None, state=None):
-    """Nothing to first order: the way is the square of the control's rate."""
+    """Return an objective without a first-order term: the displacement is the square of the control's rate."""
     return -(rows[:, 0].diff() ** 2).sum() + 1e-2 * (rows**2).sum()
 
 
@@ -188,7 +189,7 @@ def test_without_iterations_the_best_trial_is_done_and_no_gradient_asked_for() -
     assert not found.searches and not found.evaluations and found.reached == 40
 
 
-def test_what_is_tried_is_as_planned_then_swings_or_repeats_within_bounds() -> None:
+def test_trials_are_the_plan_then_swings_or_repeats_within_bounds() -> None:
     seen = []
 
     def objective(rows, part, state):
@@ -223,7 +224,7 @@ def test_what_is_tried_is_as_planned_then_swings_or_repeats_within_bounds() -> N
     assert repeated >= 2 and len(others) == 6
 
 
-def test_it_ends_where_it_is_told_and_the_rest_stays_as_given() -> None:
+def test_search_ends_at_until_and_leaves_later_controls() -> None:
     found = ms.control.receding_horizon(
         lambda rows, part, state: ((rows - 2) ** 2).sum(),
         lambda rows, part, state: part.settled,
@@ -341,7 +342,7 @@ def test_errors_and_interrupts_hand_back_what_was_settled(where) -> None:
         ({"progress": 1}, "progress must be True or False"),
     ],
 )
-def test_bad_input(changes, complaint) -> None:
+def test_bad_input_is_refused(changes, complaint) -> None:
     def unasked(*_):
         raise AssertionError("work began")
 

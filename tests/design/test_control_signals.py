@@ -1,4 +1,4 @@
-"""Fields in time: values by hand and against scipy, derivatives, bounds, fits, and what a simulation makes of them."""
+"""Fields in time: values by hand and against scipy, derivatives, bounds, fits, and their use in a simulation."""
 
 import numpy as np
 import pytest
@@ -85,7 +85,7 @@ def test_fourier_and_rotating_by_hand():
         lambda t: control.rotating(t, 0.01, (1, 2, 3), 5.0, (1, 0, 0)),
     ],
 )
-def test_one_time_gives_one_vector(field):
+def test_single_time_gives_a_single_vector(field):
     np.testing.assert_allclose(field(float(TIMES[7])), field(TIMES)[7], rtol=1e-14)
     assert field(TIMES[7]).shape == (3,)
 
@@ -110,7 +110,7 @@ def test_one_time_gives_one_vector(field):
         (lambda s: control.rotating(TIMES, 0.2, (1, 2, 3), 40.0, s), BETA[0]),
     ],
 )
-def test_derivatives(function, at):
+def test_derivatives_equal_differences(function, at):
     assert gradcheck(function, (at.double().clone().requires_grad_(),))
 
 
@@ -215,6 +215,6 @@ def test_gradients_reach_the_frequencies_through_a_simulation(strip):
         ),
     ],
 )
-def test_bad_input(call, message):
+def test_bad_input_is_refused(call, message):
     with pytest.raises(ValueError, match=message):
         call()

@@ -1,4 +1,6 @@
-"""ms.control.time_windows: what each window changes, a walker that a direct search leaves behind, and what goes wrong."""
+"""Tests of ms.control.time_windows: the changes of each window, a walker for which a direct search fails, and
+failures.
+"""
 
 import functools
 
@@ -16,7 +18,7 @@ def zeros(*shape):
 
 
 def sum_to_one(seen=None):
-    """The sum of the rows is to be 1 in every window."""
+    """Return an objective by which the sum of the rows should be 1 in every window."""
 
     def objective(controls, window):
         if seen is not None:
@@ -70,7 +72,7 @@ STEPS, LENGTH = 80, 0.04
 
 @functools.cache
 def walker() -> ms.Scene:
-    """A strip on rough ground, magnetised to its middle from both ends, to one side stronger."""
+    """Build a strip on rough ground, magnetised to its middle from both ends, to one side stronger."""
     mesh = ms.meshes.rectangle(LENGTH, 0.01, cells=(8, 1))
     front = mesh.rest_positions[mesh.faces].mean(axis=1)[:, 0] >= LENGTH / 2
     magnetization = np.zeros((mesh.n_faces, 3))
@@ -99,7 +101,7 @@ def walker() -> ms.Scene:
 
 
 def walked(controls, window):
-    """Minus the way of the mean vertex in lengths, as if all steps went like those of the window."""
+    """Return minus the displacement of the mean vertex in lengths, as if all steps were like those of the window."""
     scene = walker()
     [ground] = scene.contacts
     field = 1e-2 * torch.stack([controls[:, 0], torch.zeros_like(controls[:, 0]), controls[:, 1]], dim=1)
@@ -198,7 +200,7 @@ def test_errors_and_interrupts_come_through_with_what_was_found() -> None:
         ({"objective": 3}, "must be a function"),
     ],
 )
-def test_bad_input(changes, complaint) -> None:
+def test_bad_input_is_refused(changes, complaint) -> None:
     given = {"objective": sum_to_one(), "controls": zeros(4, 1), "lengths": (2, 4), **QUIET}
     with pytest.raises(ValueError, match=complaint):
         ms.control.time_windows(**{**given, **changes})

@@ -1,4 +1,4 @@
-"""L-BFGS in a box, against scipy's, and the pieces it is made of."""
+"""Tests of bound-constrained L-BFGS against scipy's, and of its parts."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from magshell.design.optim.line_search import Probe, strong_wolfe
 
 
 def scipys(given):
-    """The minimizer, minimum and number of evaluations of scipy's L-BFGS-B, in variables of their sizes."""
+    """Return minimizer, minimum and number of evaluations of scipy's L-BFGS-B, in scaled variables."""
     scale = 1.0 if given.scale is None else given.scale
 
     def flat(u):
@@ -108,7 +108,7 @@ def test_diagonal_is_that_of_bfgs(rng):
 
 
 def test_sizes_guessed_badly_are_learned():
-    """The box of the logarithms is ten times as wide for some variables as for others, and they are alike."""
+    """Test logarithms whose bounds are ten times as wide for some variables as for others, though all are alike."""
     given = next(given for given in BOUNDED if given.name == "logarithms")
     minimum = scipys(given)[1]
     x = given.parameter()
@@ -162,7 +162,7 @@ def test_line_search_stops_at_the_end_of_the_interval():
 
 @pytest.mark.parametrize("most", [1, 3, 20])
 def test_a_line_search_asks_no_more_often_than_it_may(most):
-    """A kink has no length that meets the curvature condition: the search would go on."""
+    """Test a kink, where no step length meets the curvature condition, so that the search would continue."""
     x = torch.tensor([3.0, -2.0], dtype=torch.float64, requires_grad=True)
     optimizer = ms.optim.LBFGS([x], scale=1.0, max_evaluations=most)
     asked = []
@@ -183,7 +183,7 @@ def test_a_line_search_asks_no_more_often_than_it_may(most):
 
 
 def test_a_line_search_that_was_cut_short_is_not_called_a_minimum():
-    """The first step is far too long, and there may be no second."""
+    """Test a first step that is far too long, without a second one allowed."""
 
     def end(**options) -> str:
         x = torch.tensor([1.0], dtype=torch.float64, requires_grad=True)

@@ -1,4 +1,4 @@
-"""A minimization goes on only with the problem that its checkpoint is of, and says what is another one."""
+"""Resumed minimizations: a checkpoint is accepted for its own problem only, and messages name the difference."""
 
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ def torchs(kind, **options):
         (torchs("Adam"), torchs("Adam", betas=(0.5, 0.999)), r"betas of group 0.* was 0.9 and is 0.5"),
     ],
 )
-def test_other_options_are_refused(before, after, words, tmp_path):
+def test_resuming_with_other_options_is_refused(before, after, words, tmp_path):
     path = tmp_path / "run.pt"
     started(path, before)
     with pytest.raises(ValueError, match=f"the checkpoint is of a run with other options: {words}"):
@@ -65,7 +65,7 @@ def test_the_same_bounds_in_another_form_are_the_same(tmp_path):
     assert found.objective == 0.75
 
 
-def test_other_feasibility_and_another_dtype_are_refused(tmp_path):
+def test_resuming_with_other_feasibility_or_dtype_is_refused(tmp_path):
     path = tmp_path / "run.pt"
     started(path, lbfgs())
     with pytest.raises(ValueError, match=r"feasibility was 1e-06 and is 0\.1"):
@@ -80,7 +80,7 @@ def test_other_feasibility_and_another_dtype_are_refused(tmp_path):
 @pytest.mark.parametrize(
     "other", [lambda x: 2 * bowl(x), lambda x: bowl(x) + 1e-4, lambda x: (bowl(x), (x[:1] + 1))]
 )
-def test_another_objective_is_refused(other, tmp_path):
+def test_resuming_with_another_objective_is_refused(other, tmp_path):
     path = tmp_path / "run.pt"
     started(path, mma())
     with pytest.raises(
@@ -102,7 +102,7 @@ def test_an_objective_that_fails_there_is_refused(tmp_path):
         started(tmp_path / "run.pt", mma(), failing, resume=True)
 
 
-def test_other_constraints_are_refused(tmp_path):
+def test_resuming_with_other_constraints_is_refused(tmp_path):
     def run(limit, **options):
         return started(tmp_path / "run.pt", mma(), lambda x: (bowl(x), limit - x.sum()[None]), **options)[0]
 

@@ -1,4 +1,6 @@
-"""MMA and GCMMA: Svanberg's examples, NLopt's MMA as an oracle, and the promises of every optimizer of the library."""
+"""Tests of MMA and GCMMA: Svanberg's examples, NLopt's MMA as an oracle, and the properties common to all
+optimizers.
+"""
 
 import copy
 
@@ -17,7 +19,7 @@ TWO_BALLS = ([4.0, 3.0, 2.0], 0.0, 5.0, two_balls, 8.770245902791997)
 
 
 def run(method, start, lower, upper, function, steps, **options):
-    """(x, objectives and constraints after each step)."""
+    """Return x and the objectives and constraints after each step."""
     x = torch.tensor(start, dtype=torch.float64, requires_grad=True)
     optimizer = method([x], lower=lower, upper=upper, **options)
     rows = []
@@ -39,7 +41,7 @@ def test_first_iterates_are_the_published_ones():
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("case", [CANTILEVER, TWO_BALLS], ids=["E1", "E2"])
-def test_svanbergs_examples(method, case):
+def test_svanbergs_examples_reach_their_optimum(method, case):
     _, rows = run(method, *case[:4], 30)
     assert rows[-1, 0] == pytest.approx(case[4], rel=1e-6)
     assert rows[-1, 1:].max() < 1e-7
@@ -254,7 +256,7 @@ def test_bad_closures_are_refused(method, closure, error, message):
     assert (x == 0.5).all()
 
 
-def test_other_bad_input_is_refused():
+def test_missing_scale_and_gradient_are_refused():
     x = torch.full((2,), 0.5, requires_grad=True)
     with pytest.raises(ValueError, match="give `scale`"):
         ms.optim.MMA([x], lower=0.0)

@@ -1,4 +1,4 @@
-"""Many starts: the order of their results, failures, what runs may return, resuming, and bad input."""
+"""Tests of many starts: the order of their results, failures, admissible return values, resuming, and bad input."""
 
 import sys
 import threading
@@ -42,7 +42,7 @@ def test_feasible_designs_come_before_all_others(here):
 
 
 @pytest.mark.parametrize("value", [2, 2.0, np.float32(2), np.array(2.0), torch.tensor(2.0), (2.0, "more")])
-def test_what_a_run_may_return(value, here):
+def test_admissible_returns_of_a_run(value, here):
     found = quiet(lambda start: value, [None], here)
     assert found.best.objective == 2.0 and found.best.result is value
 
@@ -51,7 +51,7 @@ def test_what_a_run_may_return(value, here):
     ("value", "error"),
     [(None, "must return"), ("one", "must return"), ([1, 2], "must return"), (np.nan, "is NaN")],
 )
-def test_what_a_run_may_not_return(value, error, here):
+def test_bad_returns_of_a_run_count_as_failures(value, error, here):
     found = quiet(lambda start: value if start else 0.0, [0, 1], here)
     assert len(found) == 1 and error in found.failed[0].error
 
@@ -105,7 +105,7 @@ def test_threads_are_given_back(here):
 # Bad input
 
 
-def test_what_does_not_pickle_is_refused_before_any_work():
+def test_objects_without_pickle_are_refused_before_any_work():
     for run in (lambda x: x, partial(lambda a, x: x, 1)):
         with pytest.raises(ValueError, match=r"run cannot be sent to a worker process.*top of a module"):
             quiet(run, [1, 2])

@@ -1,4 +1,4 @@
-"""Where starts run: processes made here, pools of the caller, dask. Deaths, interruptions, the same bits."""
+"""Tests of the execution of starts: own processes, pools of the caller, dask; deaths, interruptions, time limits."""
 
 import os
 import signal
@@ -100,7 +100,7 @@ def test_a_script_without_a_guard_gets_an_error_and_no_swarm(tmp_path):
     assert error.count("was called while a worker process imports this script") == 1
 
 
-def test_what_a_prompt_or_a_notebook_defines_goes_along(tmp_path):
+def test_functions_of_a_prompt_are_sent_to_workers(tmp_path):
     pytest.importorskip("cloudpickle")
     lines = ["import magshell as ms", "def run(x): return x * scale", "scale = 2.0"]
     program = "\n".join([*lines, "print(ms.multistart(run, [2.0, 1.0], workers=1).objectives)"])

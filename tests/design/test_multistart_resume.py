@@ -1,4 +1,4 @@
-"""The folder of a multistart: what a second call takes from it, what it refuses, and that no file of it runs code."""
+"""Tests of a multistart's folder: the results that a second call reuses, its refusals, and its files."""
 
 import os
 import pickle
@@ -18,7 +18,7 @@ from magshell.design.minimum import Record
 
 
 def logged(folder, start):
-    """The sum of a start, after word of it; start 2 fails until there are four words."""
+    """Return the sum of a start, after writing a file; start 2 fails until there are four files."""
     (folder / f"{start['seed']}-{len(os.listdir(folder))}").touch()
     if start["seed"] == 2 and len(os.listdir(folder)) < 4:
         raise RuntimeError("not yet")
@@ -42,7 +42,7 @@ def test_a_second_call_does_only_the_rest(here, tmp_path):
     assert sorted(path.name for path in kept.iterdir()) == [f"start-000{number}.npz" for number in range(4)]
 
 
-def test_what_came_from_the_folder_is_said(here, tmp_path, capsys):
+def test_resumed_starts_are_reported(here, tmp_path, capsys):
     quiet(runs.square, [1.0, 2.0], here, checkpoint=tmp_path)
     found = ms.multistart(runs.square, [1.0, 2.0, 3.0], here, checkpoint=tmp_path, resume=True)
     assert "3 of 3 starts finished" in repr(found) and "2 of them earlier (from the checkpoint)" in repr(
@@ -138,7 +138,7 @@ def test_a_result_that_is_not_data_is_refused_at_the_first(result, here, tmp_pat
         (Mine(1.0), Mine(2.0)),
     ],
 )
-def test_another_start_under_the_same_number_is_refused(before, after, here, tmp_path):
+def test_resuming_with_another_start_is_refused(before, after, here, tmp_path):
     quiet(lambda start: 1.0, [0, before], here, checkpoint=tmp_path)
     with pytest.raises(ValueError, match=r"start-0001\.npz was begun at another start than number 1"):
         quiet(lambda start: 1.0, [0, after], here, checkpoint=tmp_path, resume=True)
@@ -213,21 +213,21 @@ def first_of(scene, start):
         ),
     ],
 )
-def test_another_run_is_refused_in_words(before, after, words, here, tmp_path):
+def test_resuming_with_another_run_is_refused(before, after, words, here, tmp_path):
     quiet(before, [1.0], here, checkpoint=tmp_path)
     with pytest.raises(ValueError, match=rf"start-0000\.npz is the result of another run: .*{words}"):
         quiet(after, [1.0], here, checkpoint=tmp_path, resume=True)
     assert quiet(before, [1.0], here, checkpoint=tmp_path, resume=True).resumed == (0,)
 
 
-def test_what_a_run_looks_up_counts(here, tmp_path, monkeypatch):
+def test_globals_of_a_run_are_part_of_its_digest(here, tmp_path, monkeypatch):
     quiet(module_run, [1.0], here, checkpoint=tmp_path)
     monkeypatch.setitem(globals(), "THICKNESS", 4e-4)
     with pytest.raises(ValueError, match="the module's helped was a function with digest"):
         quiet(module_run, [1.0], here, checkpoint=tmp_path, resume=True)
 
 
-def test_what_cannot_be_told_apart_is_refused_before_any_work(here, tmp_path):
+def test_runs_without_a_digest_are_refused_before_any_work(here, tmp_path):
     lock = threading.Lock()
     with pytest.raises(ValueError, match="cannot for lock around it: a lock has no digest"):
         quiet(lambda start: start if lock else 0, [1.0], here, checkpoint=tmp_path)

@@ -51,7 +51,7 @@ TWO_LEVELS = ms.PrintableSet(2.0, INK.directions, levels=(0.5, 1.0))
         (lambda v: parametrize.clip_to_limit(v, 1.3), VECTORS),
     ],
 )
-def test_derivatives(function, at):
+def test_derivatives_equal_differences(function, at):
     assert gradcheck(function, (at.clone().requires_grad_(),))
 
 
@@ -156,7 +156,7 @@ def test_cap_and_its_aggregate():
     assert (parametrize.softly_limited(1e3 * m, 4e5).norm(dim=1) <= 4e5).all()
 
 
-def test_parametrisations():
+def test_parametrisations_have_known_values():
     assert parametrize.from_regions(torch.tensor([1.0, 5.0]), [1, 0, 1]).tolist() == [5, 1, 5]
     unsigned = np.array([1, 0, 1], dtype=np.uint64)
     assert parametrize.from_regions(torch.tensor([1.0, 5.0]), unsigned).tolist() == [5, 1, 5]

@@ -1,4 +1,4 @@
-"""Magnetizations that can be printed: what an ink says of them, axes of faces, and the search that rounds."""
+"""Printable magnetizations: properties of the printable set, axes of faces, and the search that rounds."""
 
 import itertools
 import pickle
@@ -24,8 +24,8 @@ def test_distances_are_to_rays_that_end_at_the_strength():
 
 
 @pytest.mark.parametrize("levels", [None, (1,), (0, 1), (0.25, 0.5, 1)])
-def test_what_is_nearest_is_nearest_of_all(levels):
-    """Against every candidate, one by one; in frames that are turned on every face."""
+def test_nearest_magnetization_is_the_nearest_candidate(levels):
+    """Compare with every candidate, one by one, in frames that are rotated on every face."""
     frames = np.linalg.qr(rng.normal(size=(7, 3, 3)))[0]
     ink = ms.PrintableSet(3e4, [(1, 1, 0), (0, -1, 2), (0, 0, -1)], levels=levels, frames=frames)
     m = 4e4 * rng.normal(size=(7, 3))
@@ -45,7 +45,7 @@ def test_what_is_nearest_is_nearest_of_all(levels):
 
 
 def test_the_pull_has_no_unit():
-    """The same number for another strength, in other units, on a finer mesh."""
+    """Check that the number is the same for another strength, in other units, on a finer mesh."""
     m = rng.normal(size=(5, 3))
     at_first = objectives.printable(m, ms.PrintableSet(1.0, SIX)).item()
     assert objectives.printable(5e4 * m, ms.PrintableSet(5e4, SIX)).item() == pytest.approx(at_first)
@@ -144,7 +144,9 @@ WANTED = torch.from_numpy(mixing.normal(size=(6, 3)))
 
 
 def mixed(m):
-    """Six sums of what 24 faces do, far fewer than there are choices: the rounding can be made up for."""
+    """Return an objective of six sums over 24 faces, far fewer than there are choices: rounding errors can be
+    compensated.
+    """
     return ((MIX @ m - WANTED) ** 2).sum()
 
 
@@ -164,7 +166,7 @@ def test_rounding_makes_up_for_itself(levels, share):
 
 
 def test_the_best_of_few_faces_is_found():
-    """Of 4^5 designs, all of which are evaluated."""
+    """Compare with all 4^5 designs."""
     ink = ms.PrintableSet(1.0, [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)], levels=(1,))
 
     def objective(m):
@@ -178,7 +180,9 @@ def test_the_best_of_few_faces_is_found():
 
 
 def test_the_weight_pulls():
-    """A stage with a large weight ends nearer to what can be printed than the free one, and none does not move."""
+    """Check that a large weight leads nearer to printable magnetizations than none, and that without one nothing
+    moves.
+    """
     ink = ms.PrintableSet(1.0, SIX, levels=(1,))
     stages = {"blocks": 1, "exchanges": 0, "stage_iterations": 40, "progress": False}
     pulled = ms.minimize_printable(mixed, np.full((24, 3), 0.1), ink, weights=(0.01, 0.1, 1.0), **stages)
@@ -199,11 +203,11 @@ def test_radial_ink_prints_in_and_out_only():
 
 
 def test_blocks_that_jump_are_halved():
-    """An objective that refuses designs more than a little away from the last one, as a WarmStart does."""
+    """Test an objective that refuses designs too far from the last one, as a WarmStart does."""
     last = [torch.full((24, 3), 0.1, dtype=torch.float64)]
     refused = []
 
-    def cautious(m):
+    def refusing(m):
         if (m.detach() - last[0]).norm() > 1.6:
             refused.append(1)
             raise ms.EquilibriumJumped("too far")
@@ -211,7 +215,7 @@ def test_blocks_that_jump_are_halved():
         return mixed(m)
 
     ink = ms.PrintableSet(1.0, SIX, levels=(1,))
-    found = ms.minimize_printable(cautious, np.full((24, 3), 0.1), ink, exchanges=5, progress=False)
+    found = ms.minimize_printable(refusing, np.full((24, 3), 0.1), ink, exchanges=5, progress=False)
     assert refused and found.not_printable == 0 and found.rounded_at_once is None
     assert "cannot be evaluated" in repr(found)
 
@@ -219,7 +223,7 @@ def test_blocks_that_jump_are_halved():
 @pytest.mark.parametrize(
     ("error", "raised"), [(KeyboardInterrupt, ms.Interrupted), (ZeroDivisionError, ms.ObjectiveFailed)]
 )
-def test_what_was_found_is_handed_back(error, raised):
+def test_interrupted_search_returns_its_best_design(error, raised):
     calls = []
 
     def failing(m):
@@ -239,8 +243,10 @@ def test_what_was_found_is_handed_back(error, raised):
 
 
 def test_the_way_back_may_jump():
-    """An objective with a memory: once the first face points back, designs on the way there are refused; only its state
-    leads back. What it says at the end is said from where it is."""
+    """Test an objective with a state, which refuses designs on the path back once the first face points backwards.
+
+    Only its stored state leads back; the final value is evaluated there.
+    """
 
     class Memory:
         def __init__(self):

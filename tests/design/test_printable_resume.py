@@ -1,4 +1,4 @@
-"""ms.minimize_printable is stopped and goes on with the same bits; a callback sees its stages."""
+"""Tests of ms.minimize_printable: an interrupted search continues with the same bits; a callback sees its stages."""
 
 import numpy as np
 import pytest
@@ -45,8 +45,8 @@ def searched(objective, ink=INK, **options):
 
 
 @pytest.mark.parametrize("levels", [(1,), None])
-def test_it_goes_on_with_the_same_bits(levels, tmp_path):
-    """Stopped at evaluations all over the search: in stages, between them, among the exchanges."""
+def test_resumed_search_gives_the_same_bits(levels, tmp_path):
+    """Stop at evaluations throughout the search: in stages, between them, among the exchanges."""
     ink = ms.PrintableSet(1.0, SIX, levels=levels)
     whole = searched(counted := StoppedAt(), ink)
     total = counted.calls
@@ -75,8 +75,8 @@ def test_a_finished_search_is_only_checked(tmp_path):
     assert counted.calls == calls
 
 
-def test_what_is_handed_back_is_what_it_says(tmp_path):
-    """Among the exchanges too, where the design was the best one and the objective that before them."""
+def test_last_good_design_has_the_stated_objective(tmp_path):
+    """Check also during the exchanges, where the design was the best one but the objective that before them."""
     searched(counted := StoppedAt())
     lower = []
     for stop in range(3, counted.calls + 1, 5):
@@ -117,7 +117,7 @@ def test_a_callback_sees_each_stage_and_stops(tmp_path):
     assert len(told.value.last_good.history) == 1
 
 
-def test_other_searches_are_refused(tmp_path):
+def test_resuming_with_another_search_is_refused(tmp_path):
     file = tmp_path / "run.pt"
     with pytest.raises(ms.Interrupted):
         searched(StoppedAt(40), checkpoint=file)

@@ -1,4 +1,4 @@
-"""Designs that cannot be evaluated: every optimizer goes less far; jumps are crossed where that is allowed."""
+"""Designs that cannot be evaluated: every optimizer shortens its step; jumps are crossed where that is allowed."""
 
 import numpy as np
 import pytest

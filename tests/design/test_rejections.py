@@ -1,4 +1,4 @@
-"""What a minimization says of the designs that could not be evaluated: in its bar, its records and its result."""
+"""Reports of a minimization about designs that could not be evaluated: in its bar, its records and its errors."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from magshell.design.minimum import Record, conflict, in_words, reason_of
 
 
 def walled(kind=ms.EquilibriumJumped, wall=1.0, load_case=1):
-    """A bowl whose minimum lies behind a wall."""
+    """Return a bowl-shaped objective whose minimum lies behind a barrier."""
 
     def objective(x):
         if x.item() > wall:
@@ -26,7 +26,7 @@ def run(objective, iterations=20, **options):
 
 
 def now_and_then(objective, period=3):
-    """Every third design is rejected, wherever it is."""
+    """Return an objective that rejects every third design, wherever it is."""
     count = []
 
     def rejecting(x):
@@ -59,7 +59,9 @@ def test_a_jump_in_the_way_is_named():
 
 
 def records(*rejections, falling=0.0):
-    """One with each of these reasons, after a first without; the objective falls by a share an iteration."""
+    """Return one record for each of these reasons, after a first without; the objective falls by a fraction an
+    iteration.
+    """
     listed = [Record(0, 1.0, {}, 0.0, 1.0, 0.0, 1)]
     for k, reasons in enumerate(rejections, start=1):
         counted = dict.fromkeys(reasons, 2)
@@ -91,12 +93,12 @@ def test_the_same_jump_again_and_again_is_called_a_conflict():
         (records([]), {"no equilibrium found": 7}, False),
     ],
 )
-def test_nothing_else_is_called_a_conflict(history, lost, stuck):
+def test_conflict_is_empty_for_other_histories(history, lost, stuck):
     assert conflict(history, lost, stuck) == ""
 
 
 @pytest.mark.parametrize("kind", [ms.NotConverged, ms.DesignRejected])
-def test_what_was_rejected_before_an_error_is_told(kind):
+def test_rejections_before_an_error_are_reported(kind):
     with pytest.raises(ms.ObjectiveFailed, match="with 7 designs rejected: at") as caught:
         run(walled(kind), progress=False)
     best = caught.value.last_good
@@ -125,7 +127,7 @@ def test_the_bar_says_why_while_an_iteration_goes_on(monkeypatch):
         (ms.DesignRejected(""), "DesignRejected"),
     ],
 )
-def test_reasons(error, reason):
+def test_reasons_of_errors(error, reason):
     assert reason_of(error) == reason
 
 

@@ -1,4 +1,4 @@
-"""The extra `docs` brings what the reference is made of: `make docs` on a bare machine has nothing else."""
+"""The extra `docs` installs all that the reference needs: `make docs` on a bare machine has nothing else."""
 
 import re
 import subprocess
@@ -26,7 +26,7 @@ for name in sys.argv[2].split(","):
 
 
 def brought(extra: str) -> set[str]:
-    """The libraries of an extra, by the names that pip has for them."""
+    """Return the libraries of an extra, by their pip names."""
     libraries = set()
     for requirement in EXTRAS[extra]:
         if own := re.match(r"magshell\[(.+)\]", requirement):
@@ -36,7 +36,7 @@ def brought(extra: str) -> set[str]:
     return libraries
 
 
-def look(hidden: set[str]) -> subprocess.CompletedProcess:
+def import_with_hidden(hidden: set[str]) -> subprocess.CompletedProcess:
     pages = "".join(page.read_text() for page in (ROOT / "docs" / "api").glob("*.md"))
     names = re.findall(r"auto(?:class|function|data|exception):: (magshell\.[\w.]+)", pages)
     modules = ",".join(sorted(each.replace("-", "_") for each in hidden))
@@ -46,10 +46,10 @@ def look(hidden: set[str]) -> subprocess.CompletedProcess:
 
 
 def test_the_reference_needs_no_more() -> None:
-    run = look(brought("all") - brought("docs"))
+    run = import_with_hidden(brought("all") - brought("docs"))
     assert run.returncode == 0, run.stderr
 
 
 def test_a_library_too_few_is_noticed() -> None:
-    run = look((brought("all") - brought("docs")) | {"gymnasium"})
+    run = import_with_hidden((brought("all") - brought("docs")) | {"gymnasium"})
     assert run.returncode != 0 and "needs gymnasium" in run.stderr

@@ -1,4 +1,6 @@
-"""What the docstrings promise: every public name has one, names its parameters, says units, and has a line that runs."""
+"""Tests of the public docstrings: every public name has one, names its parameters, gives units, and its example
+runs.
+"""
 
 import doctest
 import importlib
@@ -45,18 +47,18 @@ def parameters(each) -> list[str]:
     return [one.name for one in found if one.kind not in several and not one.name.startswith("_")]
 
 
-def told(name: str, seen: frozenset = frozenset()) -> str:
-    """A docstring with those that it leans on: "as in `equilibrium`"."""
+def docstring_with_references(name: str, seen: frozenset = frozenset()) -> str:
+    """Return a docstring with those that it refers to: "as in `equilibrium`"."""
     text = own_docstring(named(name))
     for other in set(re.findall(r"\b[as]s (?:in|of|an?) `?(?:ms\.)?([\w.]+)`?", text)) - seen - {name}:
         other = other.rstrip(".")
         if other in public_names():
-            text += told(other, seen | {name})
+            text += docstring_with_references(other, seen | {name})
     return text
 
 
 def members(each):
-    """(name, function) of the methods and properties that a user sees."""
+    """Yield (name, function) of the methods and properties that a user sees."""
     for name, value in vars(each).items():
         function = (
             getattr(value, "fget", None) or getattr(value, "__func__", None) or getattr(value, "func", value)
@@ -66,13 +68,17 @@ def members(each):
 
 
 @pytest.mark.parametrize("name", sorted(public_names()))
-def test_there_is_one(name):
+def test_public_name_has_a_docstring(name):
     assert own_docstring(named(name)).strip()
 
 
 @pytest.mark.parametrize("name", MADE)
 def test_parameters_are_named(name):
-    missing = [each for each in parameters(named(name)) if not re.search(rf"\b{each}\b", told(name))]
+    missing = [
+        each
+        for each in parameters(named(name))
+        if not re.search(rf"\b{each}\b", docstring_with_references(name))
+    ]
     assert missing == []
 
 
@@ -82,7 +88,7 @@ def test_a_line_runs(name):
 
 
 def test_members_have_one():
-    """But those that override what has one, and those that other parts of magshell call."""
+    """Check all but those that override a documented one, and those that only magshell itself calls."""
     inner = {
         "add_numbers",
         "gradients",
@@ -120,7 +126,7 @@ def examples():
 
 
 @pytest.mark.parametrize("test", list(examples()))
-def test_it_runs(test, tmp_path, monkeypatch):
+def test_docstring_examples_run(test, tmp_path, monkeypatch):
     for library in LIBRARIES:
         if library in test.docstring:
             pytest.importorskip(library)
@@ -134,7 +140,7 @@ def test_it_runs(test, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("name", ["LBFGS", "MMA", "GCMMA"])
 def test_help_of_an_optimizer_is_ours(name):
-    """What torch says of its own methods stands under its own heading, after everything of ours."""
+    """Check that the help of torch's own methods stands under its own heading, after everything of ours."""
     told = pydoc.plain(pydoc.render_doc(getattr(ms.optim, name))).split("inherited from torch")[0]
     assert "load_state_dict" in told and "add_param_group" in told and "step(self, closure" in told
     assert not re.search(r"lr_scheduler|Args:|:class:|fine tuning|Helper for pickle", told)

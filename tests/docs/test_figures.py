@@ -19,7 +19,7 @@ ENTRIES = figures.read()
 
 @pytest.mark.parametrize("page", figures.pages(), ids=figures.name_of)
 def test_every_figure_of_a_page_has_an_origin(page):
-    """With a unit, a percent sign, or a count; what has none is added to docs/figures.json or leaves the text."""
+    """Check numbers with a unit, a percent sign, or a count; one without an origin belongs into docs/figures.json."""
     assert figures.uncovered(page, ENTRIES) == []
 
 

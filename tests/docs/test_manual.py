@@ -15,7 +15,7 @@ import magshell as ms
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = sorted(path for path in DOCS.rglob("*.md") if not {"_build", "_gallery", "_tools"} & set(path.parts))
 FENCE = re.compile(r"^```(\S*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
-# What a page may show besides Python: nothing that looks like Python and is not run.
+# Languages that a page may show besides Python; all Python code is run.
 OTHERS = {"sh", "text", "cpp", "toml"}
 
 
@@ -28,7 +28,7 @@ def blocks(page: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page)], ids=name_of)
-def test_code_runs(page, tmp_path, monkeypatch) -> None:
+def test_code_of_a_page_runs(page, tmp_path, monkeypatch) -> None:
     for library in (
         "torch",
         "gmsh",
@@ -50,8 +50,8 @@ def test_code_runs(page, tmp_path, monkeypatch) -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
-def test_fences(page) -> None:
-    """Code is Python that runs, or says what else it is."""
+def test_code_blocks_name_their_language(page) -> None:
+    """Check that a code block is Python that runs, or names its language."""
     kinds = {kind for kind, _ in FENCE.findall(page.read_text())}
     assert {kind for kind in kinds if not kind.startswith("{")} <= {"python", *OTHERS}
 
@@ -111,7 +111,7 @@ def test_every_public_name_is_in_the_reference() -> None:
 
 
 def test_sphinx_has_no_warning(tmp_path) -> None:
-    """All but the gallery's pictures, which take a minute."""
+    """Build all pages except for the gallery's pictures, which take a minute."""
     for library in ("sphinx", "myst_parser", "furo"):
         pytest.importorskip(library)
     command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "dummy"]

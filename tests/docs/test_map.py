@@ -13,7 +13,7 @@ PATH = re.compile(r"`((?:cpp|python|tests|docs|benchmarks|examples|scripts)/[\w.
 
 
 def constant(name: str):
-    """What a table of test_architecture.py holds."""
+    """Return a table of test_architecture.py."""
     tree = ast.parse((ROOT / "tests" / "house" / "test_architecture.py").read_text())
     for node in tree.body:
         if isinstance(node, ast.Assign) and node.targets[0].id == name:
@@ -22,7 +22,7 @@ def constant(name: str):
 
 
 def rows(title: str) -> list[list[str]]:
-    """Cells of the table under a title, without its head."""
+    """Return the cells of the table under a title, without its head."""
     part = MAP.read_text().split(f"\n## {title}\n")[1].split("\n## ")[0]
     lines = [line for line in part.splitlines() if line.startswith("| ")]
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[1:]]
@@ -43,7 +43,7 @@ def test_rooms_of_the_package_are_on_the_map_in_their_order():
     assert listed == [room for room in constant("ROOMS") if room not in packages]
 
 
-def test_what_a_reader_begins_with_is_in_its_room():
+def test_first_files_for_a_reader_are_in_their_room():
     missing = []
     for cells in rows("The C++ core"):
         folder = ROOT / cells[1].strip("`")

@@ -31,7 +31,7 @@ def machine_time() -> float:
 
 
 @pytest.mark.skipif("CI" not in os.environ, reason="whoever works on it may use it where it lies")
-def test_what_is_tested_came_as_a_wheel():
+def test_tested_package_was_installed_from_a_wheel():
     told = json.loads(distribution("magshell").read_text("direct_url.json") or "{}")
     assert told["url"].endswith(".whl") and "archive_info" in told
     assert ROOT not in Path(ms.__file__).parents or ROOT / ".venv" in Path(ms.__file__).parents
@@ -49,7 +49,7 @@ def test_the_first_picture_takes_less_than_a_minute_of_machine_time(tmp_path):
 
 
 def test_ten_minutes_of_reading_lead_to_a_design():
-    """README to the end of its quick start, and the first hour to the end of its design."""
+    """Count the words of README to the end of its quick start, and of the first hour to the end of its design."""
     readme = (ROOT / "README.md").read_text().split("\n## The manual")[0]
     hour = (ROOT / "docs" / "first-hour.md").read_text()
     sections = re.split(r"(?m)^(?=## )", hour)

@@ -1,4 +1,4 @@
-"""What the README promises: its quick start runs, and gives the number that stands beside it."""
+"""Tests of the README: its quick start runs, and gives the number that it states."""
 
 import re
 from pathlib import Path
@@ -8,7 +8,7 @@ import pytest
 README = Path(__file__).parents[2] / "README.md"
 
 
-def test_quick_start(tmp_path, monkeypatch) -> None:
+def test_quick_start_gives_its_number(tmp_path, monkeypatch) -> None:
     section = README.read_text().split("## Quick start")[1].split("\n## ")[0]
     monkeypatch.chdir(tmp_path)
     names: dict = {}
@@ -28,6 +28,6 @@ def test_links_lead_somewhere() -> None:
     assert len(targets) > 15 and missing == []
 
 
-def test_two_screens() -> None:
-    """What is longer belongs into the manual."""
+def test_readme_fits_two_screens() -> None:
+    """Limit the length; further text belongs into the manual."""
     assert len(README.read_text().splitlines()) < 170

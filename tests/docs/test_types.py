@@ -1,4 +1,4 @@
-"""What a type checker says of a user's program: nothing, for every block of README and manual."""
+"""Type checking of user code: every block of README and manual passes, and wrong code is reported."""
 
 import json
 import os
@@ -16,8 +16,8 @@ PAGES = [
     *sorted((ROOT / "docs" / "how-to").glob("*.md")),
 ]
 
-# What a program has not at hand, such as an optional package, is not the question; nor are the types of other packages, nor
-# None, which only a look at the value would rule out: `shape, speed = None, None` before a loop.
+# Not checked: missing optional packages, the types of other packages, and None where only the value at run time rules it
+# out, as in `shape, speed = None, None` before a loop.
 OPTIONS = {
     "typeCheckingMode": "basic",
     **dict.fromkeys(("reportMissingImports", "reportMissingModuleSource"), False),
@@ -26,7 +26,7 @@ OPTIONS = {
 
 
 def run_checker(folder: Path, *asked: str) -> dict:
-    """What basedpyright tells."""
+    """Run basedpyright and return its report."""
     environment = {
         **os.environ,
         "PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]),
@@ -39,7 +39,7 @@ def run_checker(folder: Path, *asked: str) -> dict:
 
 
 def complaints(folder: Path) -> list[str]:
-    """Of basedpyright, of the programs in a folder."""
+    """Return the errors that basedpyright reports for the programs in a folder."""
     (folder / "pyrightconfig.json").write_text(json.dumps(OPTIONS))
     told = run_checker(folder)
     return [
@@ -62,8 +62,8 @@ def test_no_block_of_the_manual_is_complained_of(tmp_path):
     assert complaints(tmp_path) == []
 
 
-def test_what_is_wrong_is_complained_of(tmp_path):
-    """Types are there: a checker that found none of the package would say nothing above either."""
+def test_wrong_code_gives_complaints(tmp_path):
+    """Check that the checker sees the types: without any it would report nothing in the tests above either."""
     (tmp_path / "wrong.py").write_text(
         "import magshell as ms\n"
         "mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))\n"
@@ -76,8 +76,8 @@ def test_what_is_wrong_is_complained_of(tmp_path):
     ), told
 
 
-def test_share_of_what_has_its_types(tmp_path):
-    """Of all public names and what they hold; what is not typed completely says so to a strict checker."""
+def test_all_public_names_are_typed(tmp_path):
+    """Check all public names and their members with a strict checker."""
     told = run_checker(tmp_path, "--ignoreexternal", "--verifytypes", "magshell")["typeCompleteness"]
     assert (
         sum(told["exportedSymbolCounts"].values()) > 3400

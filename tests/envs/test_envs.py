@@ -1,4 +1,4 @@
-"""Scenes as environments of gymnasium: the interface, the same bits, processes, frames, and what is refused."""
+"""Tests of scenes as gymnasium environments: interface, reproducibility, processes, frames, refusals."""
 
 import builtins
 import importlib
@@ -59,7 +59,7 @@ def test_registered_robots_pass_gymnasiums_own_check(name):
 
 
 def test_actions_are_one_motion():
-    """The numbers of a motion in one piece with the same torques, to the bit."""
+    """Compare with one motion under the same torques, to the bit."""
     scene, hinge = pendulum()
     one = environment()
     actions = np.linspace(-1.0, 1.0, 5)[:, None]
@@ -140,7 +140,7 @@ def test_processes_give_the_same_bits(context):
 
 
 def test_robots_have_the_same_bits_with_the_same_seed():
-    """Made twice; the small ones of the robots that go to a target."""
+    """Build small robots that go to a target twice."""
     for make in (
         partial(environments.muscle_octopus, cells=4),
         partial(environments.cell_gripper, levels=7, ball_cells=2),
@@ -282,7 +282,7 @@ def test_bad_actions_are_refused(action, complaint):
         one.step(action)
 
 
-def test_two_actuators_of_one_value_are_refused():
+def test_actuators_of_the_same_value_are_refused():
     scene, hinge = pendulum()
     twice = [ms.envs.Action(hinge, "torque", lower=-1, upper=1) for _ in range(2)]
     with pytest.raises(ValueError, match="two actuators set one value: Action"):

@@ -1,4 +1,4 @@
-"""Whole episodes: here, in the processes of an executor, on dask, with the same bits; what is refused."""
+"""Whole episodes in this process, in those of an executor, and on dask, with the same bits; refusals."""
 
 import multiprocessing
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
@@ -31,7 +31,7 @@ def same(found, expected) -> None:
         assert one.seed == other.seed and one.failure is None
 
 
-def test_whole_episodes(alone):
+def test_episodes_equal_single_steps(alone):
     actions, found = alone
     assert [len(each.rewards) for each in found] == [3, 3, 50]  # as many as there are; as an episode lasts
     np.testing.assert_array_equal(found[2].actions[4], squeezed(found[2].observations[4]))

@@ -21,7 +21,7 @@ def test_meshes_are_the_papers(example, result) -> None:
     assert [(mesh.n_vertices, mesh.n_faces) for mesh in sizes] == [(289, 512), (1089, 2048)]
 
 
-def test_nothing_passes(result) -> None:
+def test_no_face_passes_through_another_body(result) -> None:
     for row in [*result["rows"], result["soft"]]:
         assert row["penetrations"] == 0
         assert row["gaps"].min() > row["least_gap"]

@@ -31,7 +31,7 @@ def test_the_mesh_of_the_papers_size(parts) -> None:
 
 
 def test_the_chamber_holds_what_its_shape_leaves_out(parts) -> None:
-    """Beside the shape's own volume, from points in a box."""
+    """Compare the chamber's volume with that of its shape, from random points in a box."""
     shape = parts["shape"]
     heart = shape.Heart.of(6000)
     points = shape.UNIT * np.random.default_rng(0).uniform((-40, -40, -50), (40, 40, shape.TOP), (200_000, 3))
@@ -52,7 +52,7 @@ def test_the_field_contracts_the_heart(heart) -> None:
 
 
 def test_linear_elements_promise_too_little(heart) -> None:
-    """The chamber shrinks further on a better mesh than where the design was found."""
+    """Check that the chamber shrinks further on a better mesh than on the one where the design was found."""
     where_found, converged = heart["hearts"]["lower_half"]["volumes"][:2]
     assert converged < where_found - 0.01
 
@@ -63,8 +63,10 @@ def test_a_design_is_what_the_heart_does_when_the_field_is_turned_on(heart) -> N
     np.testing.assert_allclose(again.positions, np.array(design.rest.positions), atol=1e-8)
 
 
-def test_it_beats(heart) -> None:
-    """Contracts and expands, and moves with the field: slowly enough to be near its rest at the ends."""
+def test_heart_contracts_and_expands_with_the_field(heart) -> None:
+    """Check that the heart contracts and expands with the field, slowly enough to be near its equilibria at the
+    ends.
+    """
     found = heart["hearts"]["lower_half"]
     beats, contracted = found["beating"], found["volumes"][4]
     assert beats.volumes[0] == pytest.approx(beats.at_rest)

@@ -32,7 +32,9 @@ def test_alignment_grows_with_the_field(result) -> None:
 
 
 def test_magnet_turns_as_far_as_a_beam_says(result) -> None:
-    """The field's torque M V B sin(angle left) bends the strip evenly up to the magnet, and a third of the magnet."""
+    """Compare with beam theory: the torque M V B sin(angle left) bends the strip evenly up to the magnet, and a
+    third of that.
+    """
     state = result["bent"][2]
     volume = model.MAGNETIZED * model.LENGTH * model.WIDTH * model.THICKNESS
     stiffness = model.YOUNG_MODULUS * model.WIDTH * model.THICKNESS**3 / 12  # free to bend sideways
@@ -42,7 +44,7 @@ def test_magnet_turns_as_far_as_a_beam_says(result) -> None:
     assert left + turned == pytest.approx(np.radians(135), rel=0.05)
 
 
-def test_energy_balances(result) -> None:
+def test_energy_balance_is_closed(result) -> None:
     for state in result["bent"]:
         assert state["balance"].error < 2e-3
     twisted = result["twisted"]["balance"]

@@ -1,4 +1,4 @@
-"""The bistable beam in time on 192 faces, beside what was measured."""
+"""The bistable beam in time on 192 faces, compared with the measurements."""
 
 import numpy as np
 import pytest
@@ -38,7 +38,7 @@ def test_snap_on_a_finer_mesh_comes_closer_to_the_measured_one(result) -> None:
     assert 0.9625 < finer.snap < result["ramp"]["snap"]
 
 
-def test_plateau(result) -> None:
+def test_plateau_and_overshoot_are_the_measured_ones(result) -> None:
     assert result["plateau"]["computed"] == pytest.approx(result["plateau"]["measured"], rel=0.05)
     assert result["ramp"]["peak"] == pytest.approx(result["measured_ramp"]["peak"], rel=0.1)
     assert result["ramp"]["dip"] == pytest.approx(result["measured_ramp"]["dip"], rel=0.1)
@@ -55,14 +55,16 @@ def test_step_does_not_snap_and_comes_to_the_equilibrium(result) -> None:
 
 
 def test_step_and_ramp_of_the_experiment_contradict_each_other(result) -> None:
-    """At 5 mT in the ramp the measured beam has moved twice as far as after the step, and as far as computed."""
+    """Check that in the ramp at 5 mT the measured beam has moved twice as far as after the step, and as far as
+    computed.
+    """
     ramp = result["measured"]["ramp"]
     at_rest = np.interp(model.NO_SNAP, ramp["fields"], ramp["displacements"])
     assert at_rest == pytest.approx(result["step"]["last_third"], rel=0.05)
     assert at_rest > 1.9 * result["measured_step"]["last_third"]
 
 
-def test_one_other_shortening_explains_the_step(result) -> None:
+def test_larger_shortening_reproduces_the_measured_step(result) -> None:
     other, measured = result["other_mounting"], result["measured_step"]
     assert 1.3 < other["shortening"] / model.SHORTENING < 1.45
     assert other["last_third"] == pytest.approx(measured["last_third"], rel=0.02)
@@ -83,10 +85,13 @@ def test_ringing_about_the_buckled_state(result) -> None:
     assert viscous.decay == pytest.approx(maxwell_oscillator(elastic.frequency, share)[1], rel=0.05)
 
 
-def maxwell_oscillator(frequency, share) -> tuple[float, float]:
-    """Hz and 1/s of a mass on a spring with a branch beside it: w0^2 (1 + share s t / (1 + s t)) + s^2 = 0."""
+def maxwell_oscillator(frequency, ratio) -> tuple[float, float]:
+    """Return frequency [Hz] and decay [1/s] of a mass on a spring with a Maxwell branch of `ratio` times its stiffness.
+
+    They are a root of w0^2 (1 + ratio s t / (1 + s t)) + s^2 = 0.
+    """
     w, t = 2 * np.pi * frequency, motion.MAXWELL_TIME
-    roots = np.roots([t, 1.0, w**2 * t * (1 + share), w**2])
+    roots = np.roots([t, 1.0, w**2 * t * (1 + ratio), w**2])
     root = roots[np.argmax(roots.imag)]
     return root.imag / (2 * np.pi), -root.real
 
@@ -98,7 +103,7 @@ def test_ringing_of_a_known_curve() -> None:
     assert found.misfit < 1e-6
 
 
-def test_variations(result) -> None:
+def test_variations_shift_the_snap(result) -> None:
     given, elastic, longer, shifted, air, thick = (snap for _, snap in result["variations"])
     assert given == pytest.approx(result["ramp"]["snap"], abs=1e-9)
     assert elastic < given - 0.01

@@ -1,4 +1,4 @@
-"""The bridges: what is found for the suspension bridge, and what data know."""
+"""Tests of the bridges: the moduli found for the suspension bridge, and their identifiability."""
 
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ def test_the_slope_is_that_of_differences_over_all_steps(bridges, task) -> None:
     assert load("bridges").slope_error(task["arch"]) < 1e-4
 
 
-def test_one_number_knows_one_combination(bridges) -> None:
+def test_single_measurement_determines_one_combination_of_moduli(bridges) -> None:
     sag, surface, turned, precise = bridges["known"]
     assert (sag.numbers, sag.directions) == (1, 1)
     assert sag.of("young_modulus").mean() > 0.999 and sag.identified("young_modulus") == 0
@@ -62,8 +62,8 @@ def test_one_number_knows_one_combination(bridges) -> None:
         assert each.of("poisson_ratio").mean() > each.of("young_modulus").mean()
 
 
-def test_what_is_left_is_what_bayes_says(bridges, task) -> None:
-    """Beside the posterior covariance from normal equations."""
+def test_posterior_deviation_is_that_of_the_normal_equations(bridges, task) -> None:
+    """Compare with the posterior covariance from the normal equations."""
     load("bridges")
     from _bridges.identified import PRIOR_LOG, PRIOR_POISSON, _known
 

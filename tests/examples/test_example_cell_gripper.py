@@ -11,7 +11,7 @@ TARGET = (0.0, 0.05, 0.0)
 
 
 @pytest.fixture(scope="module")
-def carried() -> dict:
+def lifted() -> dict:
     return load("cell_gripper").main(
         levels=7,
         ball_cells=2,
@@ -43,27 +43,27 @@ def test_cells_are_the_outer_half_of_each_arm() -> None:
         assert (np.diff(heights) > 0.08).all()
 
 
-def test_ball_is_carried_to_the_target(carried) -> None:
-    for found in carried["found"]:
+def test_ball_is_carried_to_the_target(lifted) -> None:
+    for found in lifted["found"]:
         assert found.distances[0] > 0.4 and found.episodes is not None
-    way = carried["found"][0].robot.displacement(carried["motion"])
+    way = lifted["found"][0].robot.displacement(lifted["motion"])
     np.testing.assert_allclose(way, TARGET, atol=0.01 * 0.05)
 
 
-def test_friction_holds_it(carried) -> None:
-    """With the same controls and no friction it stays on the table, and no arm passes into the ball."""
-    assert carried["slips"][1] < 0.2 * TARGET[1]
-    gripper, motion = carried["found"][0].robot, carried["motion"]
+def test_ball_is_not_lifted_without_friction(lifted) -> None:
+    """Check that without friction the same controls leave the ball on the table, and that no arm passes into it."""
+    assert lifted["slips"][1] < 0.2 * TARGET[1]
+    gripper, motion = lifted["found"][0].robot, lifted["motion"]
     touching = motion.contact_state(gripper.grip, len(motion) - 1)
     assert touching.smallest_distance > 0 and touching.normal_force > 5.0
 
 
-def test_the_slope_is_that_of_differences(carried) -> None:
-    assert carried["slope"] < 1e-4 and carried["slope_found"] < 1e-4
+def test_the_slope_is_that_of_differences(lifted) -> None:
+    assert lifted["slope"] < 1e-4 and lifted["slope_found"] < 1e-4
 
 
 def test_cells_fill_step_by_step() -> None:
-    """The volumes of a motion are those that the environment comes to, one after another."""
+    """Compare the volumes of a motion with those that the environment computes one step after another."""
     gripper = CellGripper(levels=9, ball_cells=2)
     controls = np.random.default_rng(4).uniform(-1, 1, (6, gripper.numbers))
     whole = gripper.values(controls)
@@ -75,23 +75,23 @@ def test_cells_fill_step_by_step() -> None:
     np.testing.assert_allclose(np.diff(ways, axis=0), 0.015 * controls[:, -3:], atol=1e-14)
 
 
-def test_the_environment_moves_as_the_motion_does(carried) -> None:
+def test_the_environment_moves_as_the_motion_does(lifted) -> None:
     pytest.importorskip("gymnasium")
     from robots.environments import cell_gripper as environment
 
-    gripper, controls = carried["found"][0].robot, carried["found"][0].controls[:4]
+    gripper, controls = lifted["found"][0].robot, lifted["found"][0].controls[:4]
     one = environment(levels=7, ball_cells=2, disturbed=False)
     one.reset(seed=0)
     seen = [one.step(action)[0] for action in controls]
     np.testing.assert_allclose(seen[-1][:3], gripper.displacement(gripper.motion(controls)), atol=1e-12)
 
 
-def test_pictures_of_the_gripper(carried, tmp_path, monkeypatch) -> None:
+def test_pictures_of_the_gripper(lifted, tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("MAGSHELL_PLOT", "matplotlib")
     example = load("cell_gripper")
-    figure = example.plot(carried)
+    figure = example.plot(lifted)
     assert len(figure.axes) == 3 and ms.Picture(figure)._repr_png_().startswith(b"\x89PNG")
-    assert example.picture(carried)._repr_png_().startswith(b"\x89PNG")
-    path = example.movie(carried, tmp_path / "a.gif", fps=10.0, width=400, speed=0.5, progress=False)
+    assert example.picture(lifted)._repr_png_().startswith(b"\x89PNG")
+    path = example.movie(lifted, tmp_path / "a.gif", fps=10.0, width=400, speed=0.5, progress=False)
     assert path.stat().st_size > 3_000
-    assert "without friction" in example.summary(carried)
+    assert "without friction" in example.summary(lifted)

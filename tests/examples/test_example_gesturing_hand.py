@@ -1,4 +1,4 @@
-"""The hand, with few iterations: shape, gestures, designs, and what carries them from mesh to mesh."""
+"""The hand, with few iterations: shape, gestures, designs, and the transfer of designs between meshes."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def design(parts, body):
 
 
 def test_the_hand_has_the_papers_counts(parts, body) -> None:
-    """Tetrahedra for work; for its faces more of them."""
+    """Check the number of tetrahedra, and the finer mesh that has the paper's number of faces."""
     mesh = body.solid.mesh
     assert mesh.n_tetrahedra == pytest.approx(4975, rel=0.03)
     assert mesh.n_components == 1
@@ -68,7 +68,9 @@ def test_the_design_reaches_its_anchors(parts, body, design) -> None:
 
 
 def test_gradient_against_differences(parts, body) -> None:
-    """Of the anchors' distances by the skin's magnetization, along a random direction."""
+    """Compare the gradient of the anchors' distances by the skin's magnetization with differences along a random
+    direction.
+    """
     anchors, skin = body.anchors(GESTURE), body.solid.skin
     generator = torch.Generator().manual_seed(1)
     shape = (len(skin.faces), 3)
@@ -109,7 +111,7 @@ def test_a_magnetization_carried_to_another_mesh(parts, body) -> None:
 
 
 def test_the_report_and_its_pictures(parts, design, monkeypatch) -> None:
-    """With states that were looked at on the same mesh, as a converged solve takes long."""
+    """Use states on the same mesh in place of a converged one, whose solve takes long."""
     example = load("gesturing_hand")
     state = parts[0].on(design.body, design)
     assert state.rms_distance == pytest.approx(

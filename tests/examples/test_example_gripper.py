@@ -22,7 +22,7 @@ def test_the_search_closes_the_arms(result, example) -> None:
 
 
 def test_six_printable_directions_meet_the_target(example, result) -> None:
-    """Rounded, to 0.3 mm: every face fully magnetized along an axis."""
+    """Check that the rounded design, every face fully magnetized along an axis, is within 0.3 mm of the target."""
     printed = result["printed"]
     assert printed.objective**0.5 < 0.3  # mm rms
     assert printed.not_printable == 0
@@ -42,15 +42,15 @@ def test_ball_is_lifted_by_what_was_found_only(result) -> None:
     assert raised["without"] < 1e-3
 
 
-def test_nothing_passes(result) -> None:
+def test_no_face_crosses_another(result) -> None:
     for name in ("lift", "lift_printed", "without"):
         assert result[name]["crossings"] == 0
         assert result[name]["gaps"].min() > result[name]["least_gap"]
     assert result["lift"]["forces"].max() > 4.3e-3  # N: more than the ball's weight
 
 
-def test_longer_arms_meet_and_do_not_pass(example, monkeypatch) -> None:
-    """Of 18 mm, with ends that curl under the ball; without contact of the sheet with itself hundreds of faces cross."""
+def test_arms_of_18_mm_touch_without_crossing(example, monkeypatch) -> None:
+    """Use arms of 18 mm, whose ends curl under the ball; without self-contact of the sheet hundreds of faces cross."""
     import sys
 
     model, lift = (sys.modules[f"_gripper.{name}"] for name in ("model", "lift"))

@@ -1,4 +1,4 @@
-"""The example of the hexagram, on a mesh of 486 faces: its numbers, what they rest on, and its pictures."""
+"""The example of the hexagram, on a mesh of 486 faces: its numbers, their assumptions, and its pictures."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def test_mesh_that_cannot_be_had_is_refused() -> None:
 
 @pytest.mark.parametrize("degrees", [-90.0, 0.0, 90.0, 200.0])
 def test_rolling_is_an_isometry(degrees) -> None:
-    """The metric of the rolled sheet, from differences of the formula off the roots, is the flat one."""
+    """Compare the metric of the rolled sheet, from differences of the formula off the roots, with the flat one."""
     mesh, step = sheet.hexagram(6, 280), 1e-7
     centers = mesh.face_barycenters
     columns = [
@@ -68,7 +68,7 @@ def test_rolled_arms_are_arcs() -> None:
     np.testing.assert_allclose(np.hypot(tips[:, 0], tips[:, 1]), sheet.ROOT_DISTANCE + radius, rtol=1e-12)
 
 
-def test_objective_falls(result) -> None:
+def test_objective_falls_from_both_starts(result) -> None:
     beam, none = result["runs"]["from beam theory"], result["runs"]["from none"]
     assert beam["history"][0].objective == pytest.approx(2.22e-2, rel=0.05)
     assert beam["objective"] < 5e-4
@@ -102,7 +102,7 @@ def test_reversed_field_mirrors_the_shape(result) -> None:
 
 
 def test_a_normal_component_breaks_the_mirror(result) -> None:
-    """So the mirrored shapes are the magnetization's doing."""
+    """Check that the mirrored shapes are due to the in-plane magnetization."""
     tilted = result["magnetization"] + np.array([0.0, 0.0, 0.05 * design.CAP])
     rest = ms.equilibrium(
         result["design"].scene, remanent_magnetization=tilted, applied_flux_density=design.FIELDS
@@ -134,7 +134,7 @@ def test_arms_shake_as_the_field_goes_round(result) -> None:
     assert np.abs(np.roll(heights, (4, 0), axis=(0, 1)) - heights).max() > 0.5 * sheet.ARM_LENGTH
 
 
-def test_pictures(result, tmp_path, monkeypatch) -> None:
+def test_pictures_and_summary_are_written(result, tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("MAGSHELL_PLOT", "matplotlib")  # what runs everywhere, and the quicker
     example.plot(result).savefig(tmp_path / "plot.png")
     for name, picture in example.pictures(result).items():

@@ -27,7 +27,7 @@ def test_bones_keep_their_length_where_there_are_any(figure) -> None:
     assert figure["falls"]["no skeleton"][0].bone_error > 0.01
 
 
-def test_only_the_driven_one_reaches_the_y_pose(figure) -> None:
+def test_driven_skeleton_alone_reaches_the_y_pose(figure) -> None:
     errors = {kind: falls[0].joint_error for kind, falls in figure["falls"].items()}
     assert errors["driven"] < 0.2
     assert min(errors[kind] for kind in ("no skeleton", "rigid", "passive")) > 1.0
@@ -44,7 +44,7 @@ def test_angles_of_vertices_are_those_of_joints(figure) -> None:
     assert told[0] > 0.1
 
 
-def test_it_lands(figure) -> None:
+def test_figure_lands_on_its_soles(figure) -> None:
     [fall] = figure["falls"]["driven"]
     soles = fall.motion.positions[:, figure["body"].soles, 2].min(axis=1)
     assert soles[0] > 0.1 and -0.05 < soles[-1] < 0.02

@@ -1,4 +1,4 @@
-"""Identification on a coarser mesh, with fewer nodes: its errors, what it cannot tell, and its picture."""
+"""Identification on a coarser mesh, with fewer nodes: its errors, its limits, and its picture."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def test_modulus_and_magnetization_are_found(identified) -> None:
     assert first["misfits"][0] > 100 and first["magnetization"] > 0.5
 
 
-def test_it_stops_at_the_noise(identified) -> None:
+def test_search_stops_at_the_noise(identified) -> None:
     assert 0.93 < last(identified, "noisy")["misfits"][-1] <= 1.0
     earlier = [stage["misfits"][-1] for stage in identified["noisy"]["stages"][:-1]]
     assert min(earlier) > 1.0

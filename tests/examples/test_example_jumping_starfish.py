@@ -23,7 +23,9 @@ def parts(example):
 
 @pytest.fixture(scope="module")
 def result(example, parts) -> dict:
-    """Asked to be 6 mm further and 10 mm high after 40 ms; two steps of the search, and the field on quadratic elements."""
+    """Run two iterations of a search for a jump 6 mm ahead and 10 mm high after 40 ms, and its field on quadratic
+    elements.
+    """
     _, jump = parts
     places = {"OVER_TIME": 0.03, "OVER": (4e-3, 0.0, 8e-3), "DOWN_TIME": 0.04, "DOWN": (6e-3, 0.0, 10e-3)}
     with pytest.MonkeyPatch.context() as patched:
@@ -61,8 +63,8 @@ def test_arms_are_magnets_along_themselves(parts) -> None:
     assert not vectors[5].any()
 
 
-def test_it_pushes_itself_off_the_ground(result) -> None:
-    """Its own weight lets it rise nowhere: the arms' stroke does, and friction pushes it ahead."""
+def test_starfish_takes_off_by_the_stroke_of_its_arms(result) -> None:
+    """Check that the starfish takes off: its arms' stroke lifts it, and friction pushes it ahead."""
     found = result["found"]
     assert found["lowest"][0] < 1e-5 and found["lowest"][-1] > 1e-3
     assert found["center"][-1, 0] > found["center"][0, 0] + 0.3e-3
@@ -79,14 +81,14 @@ def test_the_search_lowers_the_objective_within_the_field_s_limit(result, parts)
 
 
 def test_linear_elements_are_too_stiff(result) -> None:
-    """The field that was found with them does more where the elements bend as the material does."""
+    """Check that the field found with linear elements lifts the starfish higher with quadratic ones."""
     assert result["converged"]["center"][-1, 2] > result["found"]["center"][-1, 2] + 0.5e-3
     assert result["again"]["rms_distance"] < result["converged"]["rms_distance"]
 
 
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
 def test_the_gradient_of_the_whole_motion_is_that_of_differences(parts, element) -> None:
-    """Along one direction of the unknowns: through contact, friction and the leaving of the ground."""
+    """Compare along one direction of the unknowns, through contact, friction and take-off."""
     body, jump = parts
     import magshell as ms
 

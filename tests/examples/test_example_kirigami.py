@@ -7,18 +7,18 @@ from example_modules import load
 
 @pytest.fixture(scope="module")
 def tower() -> dict:
-    """L-BFGS from no magnetization, and a few iterations of MMA."""
+    """Run L-BFGS from no magnetization, and a few iterations of MMA."""
     example = load("kirigami_tower")
     searches = [search for search in example.SEARCHES if search.name in ("L-BFGS", "MMA, all faces free")]
     return example.main(searches, iterations=20, trials=6)
 
 
-def test_as_many_faces_as_in_the_paper(tower) -> None:
+def test_numbers_of_faces_and_variables_are_about_the_papers(tower) -> None:
     assert (tower["faces"], tower["vertices"]) == (234, 199)  # [Chen22] Table 1: 244, 205
     assert [found["variables"] for found in tower["searches"]] == [234, 702]  # and 0.7 k
 
 
-def test_it_hangs_without_magnetization_and_stands_with_it(tower) -> None:
+def test_sheet_hangs_without_magnetization_and_stands_with_it(tower) -> None:
     assert tower["hanging"] == pytest.approx(-11.91e-3, rel=0.01)
     height, check = tower["tower"]["height"], tower["checks"]
     assert height == pytest.approx(33.4e-3, rel=0.02)
@@ -40,8 +40,10 @@ def test_the_field_pays_for_it(tower) -> None:
     assert check["largest_magnetization"] <= 80e3
 
 
-def test_it_rises_by_itself_from_the_floor_and_stands_on_it(tower) -> None:
-    """With contact of floor and rings: never under the floor by more than what its springs give, and nothing crosses."""
+def test_tower_rises_from_the_floor_as_the_field_grows(tower) -> None:
+    """Include contact with the floor and between rings: penetration stays within the penalty's compliance, no face
+    crosses.
+    """
     found = tower["checks"]["switched_on"]
     assert found["height"] == pytest.approx(31.9e-3, rel=0.02) and found["stable"]
     assert (np.diff(found["heights"]) > 0).all()
@@ -52,7 +54,7 @@ def test_it_rises_by_itself_from_the_floor_and_stands_on_it(tower) -> None:
     )  # less than the weight, as the ring is glued
 
 
-def test_it_bears_disturbances(tower) -> None:
+def test_tower_height_is_robust_to_disturbances(tower) -> None:
     check = tower["checks"]
     assert -0.5e-3 < check["disturbed"].min() and check["disturbed"].max() < 0.1e-3
 

@@ -7,11 +7,11 @@ from example_modules import load
 
 @pytest.fixture(scope="module")
 def reaching() -> dict:
-    """Two targets, each active for 0.6 s and counting after 0.4 s."""
+    """Run the example with two targets, each active for 0.6 s and counting after 0.4 s."""
     return load("kirigami_reaching").main(targets=2, each=0.6, delay=0.4, iterations=6)
 
 
-def test_it_comes_near_each_target(reaching) -> None:
+def test_center_comes_within_1_mm_of_each_target(reaching) -> None:
     start, found = reaching["start"], reaching["found"]
     assert start["rms"] > 1e-3
     assert found["rms"] < 0.25 * start["rms"]
@@ -25,12 +25,12 @@ def test_the_field_stays_within_its_limit(reaching) -> None:
 
 
 def test_distances_are_those_of_the_objective(reaching) -> None:
-    """Measured again from positions, without the search."""
+    """Compute the distances again from positions, without the search."""
     best = min(record.terms["distance"] for record in reaching["history"])
     assert reaching["found"]["rms"] ** 2 == pytest.approx(best, rel=1e-6)
 
 
-def test_shorter_steps_lead_as_near(reaching) -> None:
+def test_rms_stays_below_1_mm_with_smaller_steps(reaching) -> None:
     assert reaching["finer"]["rms"] < 1e-3
 
 

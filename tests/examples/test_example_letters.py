@@ -62,7 +62,7 @@ def test_a_design_is_what_a_sheet_does_when_its_field_is_turned_on(letter) -> No
 
 
 def test_gradient_against_differences(designs) -> None:
-    """Along the gradient itself and along a random direction, for all variables at once."""
+    """Compare along the gradient itself and along a random direction, for all variables at once."""
     from _letters.task import Task
 
     search = designs.Search(Task("S", 8), "M, Y, c")

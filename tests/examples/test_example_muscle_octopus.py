@@ -26,8 +26,8 @@ def test_the_octopus_has_the_papers_size() -> None:
     assert octopus.scene.water.is_smooth
 
 
-def test_its_legs_are_alike() -> None:
-    """Turned by an eighth, every leg lies on the next one, and its muscles are as large."""
+def test_all_legs_have_the_same_shape() -> None:
+    """Check that rotation by an eighth maps every leg onto the next one, with muscles of equal volume."""
     octopus = MuscleOctopus(cells=4)
     tips = octopus.flesh.mesh.rest_positions[octopus.tips]
     turn = np.pi / 4

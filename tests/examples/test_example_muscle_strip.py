@@ -15,13 +15,13 @@ def strip(example) -> dict:
     return example.main(cells=(12, 2, 2), steps=60, time_step=2e-2)
 
 
-def test_it_bends_as_timoshenkos_bilayer(strip) -> None:
+def test_strip_bends_as_timoshenkos_bilayer(strip) -> None:
     bent = strip["bent"]
     assert bent["curvature"] == pytest.approx(bent["theory"], rel=0.02)
     assert bent["rest"].stable
 
 
-def test_it_swims_against_its_wave(strip) -> None:
+def test_strip_swims_against_its_wave(strip) -> None:
     swims, backwards = strip["swims"], strip["backwards"]
     assert swims["advance"] > 0.05
     assert backwards["advance"] < -0.05
@@ -29,7 +29,7 @@ def test_it_swims_against_its_wave(strip) -> None:
     assert np.abs(swims["center"][:, 1]).max() < 1e-3
 
 
-def test_its_picture(example, strip, tmp_path) -> None:
+def test_picture_is_written(example, strip, tmp_path) -> None:
     figure = example.plot(strip)
     figure.savefig(tmp_path / "strip.png", dpi=40)
     assert (tmp_path / "strip.png").stat().st_size > 5000

@@ -15,7 +15,7 @@ def example():
 
 @pytest.fixture(scope="module")
 def swim(example) -> dict:
-    """The first 0.25 s in the narrow pipe, asked to be 4 mm further by then, from a start with noise."""
+    """Run the first 0.25 s in the narrow pipe, with a goal 4 mm ahead, from a start with noise."""
     return example.main(channels=("pipe I",), steps=250, goal=1.5e-3, noise=1e-12)["pipe I"]
 
 
@@ -28,14 +28,14 @@ def test_the_mesh_is_as_large_as_the_papers(swim) -> None:
     assert np.ptp(strengths[body.tentacle >= 0]) < 1e-9 * strengths.max()
 
 
-def test_it_swims_to_where_it_is_asked_to_be_from_no_field(swim) -> None:
+def test_octopus_reaches_its_goal_from_zero_field(swim) -> None:
     center = swim["found"]["center"]
     assert swim["search"].reached == 250 and not swim["search"].failures
     assert center[-1, 0] > swim["path"][-1] - 1e-3
     assert np.abs(center[:, 1:]).max() < 1e-4  # straight on
 
 
-def test_one_motion_does_what_the_search_did(swim) -> None:
+def test_single_motion_reproduces_that_of_the_search(swim) -> None:
     assert np.array_equal(swim["found"]["positions"][-1], swim["search"].state.positions[-1])
 
 
@@ -48,13 +48,13 @@ def test_without_gradients_plans_are_only_tried(example) -> None:
     assert found.reached == 40 and found.evaluations == 0 and found.controls[:, 0].any()
 
 
-def test_it_stays_in_the_pipe_and_the_field_in_its_limit(swim) -> None:
+def test_octopus_stays_in_the_pipe_and_the_field_in_its_limit(swim) -> None:
     assert swim["found"]["deepest"] < 1e-4
     assert np.abs(swim["found"]["field"]).max() <= 50e-3
 
 
 def test_the_gradient_is_that_of_differences(example) -> None:
-    """By values of the field in time that push the octopus aside too."""
+    """Compare for values of a field in time that also pushes the octopus aside."""
     swim = example.Swim.of(example.CHANNELS["pipe I"], 40)
     swim.goal, swim.precision = 5e-3, 1e-11
     random = np.random.default_rng(1).standard_normal((40, 3))

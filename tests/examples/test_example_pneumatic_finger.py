@@ -15,7 +15,7 @@ def result(example) -> dict:
     return example.main()
 
 
-def test_it_bends_away_from_its_channel_faster_and_faster(result, example) -> None:
+def test_finger_bends_away_from_its_channel_progressively(result, example) -> None:
     angles, pressures = result["angles"], result["pressures"]
     assert pressures[0] == 0.0 and pressures[-1] == pytest.approx(example.PRESSURE)
     assert (np.diff(angles) > 0).all() and (np.diff(result["volumes"]) > 0).all()

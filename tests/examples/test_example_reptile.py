@@ -38,24 +38,24 @@ def test_the_paper_s_mesh_and_a_magnetization_that_adds_up_to_nothing(parts) -> 
     assert np.abs(total).max() < 1e-12 * (mesh.face_areas[:, None] * np.abs(magnetization)).sum()
 
 
-def test_it_walks_ahead_and_uphill(parts, result) -> None:
+def test_crawler_walks_ahead_and_uphill(parts, result) -> None:
     flat, slope = (advance(parts, result["walks"][name])[0] for name in ("flat", "slope"))
     assert flat == pytest.approx(3.2e-3, rel=0.05)
     assert 0.3 * flat < slope < flat
 
 
-def test_it_keeps_to_its_line(parts, result) -> None:
+def test_crawler_keeps_to_its_line(parts, result) -> None:
     for walk in result["walks"].values():
         assert abs(advance(parts, walk)[1]) < 0.01e-3
 
 
 def test_a_field_that_turns_the_other_way_drives_it_back(parts, result) -> None:
-    """The mirror image: back to front, the pairs' magnets and the field's rotation change sign."""
+    """Use the symmetry: mirrored back to front, the pairs' magnets and the field's rotation change sign."""
     ahead, back = (advance(parts, walk)[0] for walk in (result["walks"]["flat"], result["back"]))
     assert back == pytest.approx(-ahead, rel=1e-3)
 
 
-def test_nothing_goes_far_into_the_ground(result) -> None:
+def test_penetration_into_the_ground_stays_below_0_1_mm(result) -> None:
     for who, motion in result["walks"].values():
         depth = who.ground.obstacle.signed_distance(motion.positions).min()
         assert -0.1e-3 < depth < 0

@@ -1,4 +1,4 @@
-"""Figure 12 of [Chen22], small: a shell's magnetic energy beside that of layers of tetrahedra (validation M2)."""
+"""Figure 12 of [Chen22], small: the magnetic energy of a shell and of layers of tetrahedra (validation M2)."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def test_in_the_plane_they_are_the_same(result, deformation, magnetization) -> N
 
 
 def test_against_the_reference_numbers(result) -> None:
-    """M2: bend and twist by pi, 32 cells along."""
+    """Compare with case M2: bend and twist by pi, 32 cells along."""
     for row in rows(result, "bent", "along"):
         assert row["shell"] == pytest.approx(-0.002546479089, rel=1e-9)
     for row in rows(result, "bent", "normal"):
@@ -44,7 +44,10 @@ def test_against_the_reference_numbers(result) -> None:
 
 
 def test_along_the_normal_the_difference_is_the_cells(result) -> None:
-    """Not the layers'; a helicoid with the normals of its surface is close, with its old directors it is not."""
+    """Check that the difference depends on the cells and not on the layers.
+
+    A helicoid with the normals of its surface is close; with its old directors it is not.
+    """
     fine = load("shell_against_volume").main(cells=(64, 8), layers=(2,), angles=(np.pi,))
     for deformation in ("bent", "twisted"):
         two, six = (row["accumulated"] for row in rows(result, deformation, "normal"))
@@ -60,12 +63,12 @@ def test_along_the_normal_the_difference_is_the_cells(result) -> None:
 
 
 def test_energies_of_cells_sum_to_the_librarys(result) -> None:
-    """Plain formulas beside the core."""
+    """Compare the sums of plain formulas with the energies of the library."""
     for row in result["rows"]:
         np.testing.assert_allclose(row["summed"], [row["volume"], row["shell"]], rtol=1e-11)
 
 
-def test_pictures(result, monkeypatch) -> None:
+def test_pictures_and_summary_are_drawn(result, monkeypatch) -> None:
     example = load("shell_against_volume")
     assert len(example.plot(result).axes) == 3
     monkeypatch.setenv("MAGSHELL_PLOT", "matplotlib")

@@ -15,7 +15,7 @@ def result(example) -> dict:
     return example.main()
 
 
-def test_one_tendon_bends_it_as_beam_theory_says(result) -> None:
+def test_single_tendon_bends_the_arm_as_beam_theory(result) -> None:
     assert np.allclose(result["angles"], result["theory"], rtol=0.03, atol=1e-9)
     assert result["angles"][-1] > np.radians(3)
 

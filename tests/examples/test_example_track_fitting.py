@@ -25,7 +25,7 @@ def every_fit(tracks):
 
 
 def test_the_paper_s_mesh(model) -> None:
-    """The numbers of the table, and as many unknowns: three a step."""
+    """Check the numbers of the paper's table, and its number of unknowns: three a step."""
     strip = model.strip()
     mesh = strip.scene.mesh
     assert (mesh.n_faces, mesh.n_vertices) == (768, 417)

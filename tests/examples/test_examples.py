@@ -24,7 +24,7 @@ def test_bistable_beam_critical_field(bistable) -> None:
 
 
 def test_bistable_beam_bifurcation_next_to_the_limit_point(bistable) -> None:
-    """Both are found, though 0.0001 mT apart on the middle mesh, and the finer mesh exchanges them."""
+    """Check that both are found, though 0.0001 mT apart on the middle mesh; the finer mesh exchanges them."""
     rows = bistable["convergence"]["rows"]
     assert [row["first"] for row in rows] == ["bifurcation", "bifurcation", "limit"]
     for row in rows:
@@ -80,7 +80,7 @@ def test_bistable_beam_pictures(bistable, tmp_path) -> None:
     assert "limit point" in example.summary(bistable)
 
 
-def test_as_a_script_it_tells_its_numbers_and_leaves_pictures(tmp_path, monkeypatch, capsys) -> None:
+def test_script_prints_its_numbers_and_writes_pictures(tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
     load("_run").run(
         lambda: {"height": 3}, "{height} mm high".format_map, lambda found, out: (out / "a.png").touch()

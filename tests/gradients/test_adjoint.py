@@ -45,7 +45,7 @@ def loss_of(found):
 
 
 def check(solve, at, directions=3, step=1e-4):
-    """The gradient along random directions and along itself against differences of sixth order."""
+    """Compare the gradient along random directions and along itself with differences of sixth order."""
     at = np.array(at, dtype=np.float64)
     start = solve(at)
     leaf = tensor(at)
@@ -66,7 +66,7 @@ def check(solve, at, directions=3, step=1e-4):
 
 @pytest.mark.parametrize("bending", BENDINGS)
 @pytest.mark.parametrize("name", SOLVE_INPUTS)
-def test_an_input(name, bending):
+def test_gradient_by_an_input(name, bending):
     scene = everything(bending)
 
     def solve(value, start=None):
@@ -105,7 +105,7 @@ def test_gravity_and_vertex_loads():
 @pytest.mark.parametrize(
     "name", ["thickness", "young_modulus", "poisson_ratio", "curvature_scale", "mass_density"]
 )
-def test_one_number_for_the_whole_sheet(name):
+def test_gradient_by_a_uniform_value_of_the_sheet(name):
     scene = everything()
     at = float(np.mean(SOLVE_INPUTS[name]))
     check(lambda v, start=None: ms.equilibrium(scene, **DEFAULTS, **{name: v}, start=start, solver=EXACT), at)
@@ -113,7 +113,7 @@ def test_one_number_for_the_whole_sheet(name):
 
 @pytest.mark.parametrize("bending", BENDINGS)
 def test_an_oblique_symmetry_plane(bending):
-    """Its vertices have frames of their own, and one of them moves within the plane."""
+    """Check vertices in rotated frames, one of which moves within the plane."""
     angle = 0.4
     turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
     mesh = ms.TriangleMesh(MESH.rest_positions @ turn.T, MESH.faces)
@@ -128,11 +128,11 @@ def test_an_oblique_symmetry_plane(bending):
     def stiff(value, start=None):
         return ms.equilibrium(scene, **given, young_modulus=value, start=start, solver=EXACT)
 
-    def pushed(value, start=None):
+    def moved(value, start=None):
         return ms.equilibrium(scene, **given, support_factor=value, start=start, solver=EXACT)
 
     check(stiff, YOUNG)
-    check(pushed, 0.8)
+    check(moved, 0.8)
 
 
 def test_a_field_in_python_passes_gradients_to_the_rest():
@@ -146,17 +146,17 @@ def test_a_field_in_python_passes_gradients_to_the_rest():
 
 
 def test_several_inputs_at_once():
-    """torch's own gradcheck, entry by entry."""
+    """Run torch's gradcheck, entry by entry."""
     scene = everything()
     start = ms.equilibrium(scene, **DEFAULTS, young_modulus=YOUNG, solver=EXACT)
 
-    def positions(magnetization, field, young, force, turn):
+    def positions(magnetization, field, young, force, rotation):
         found = ms.equilibrium(
             scene,
             remanent_magnetization=1e4 * magnetization,
             applied_flux_density=1e-3 * field,
             young_modulus=1e6 * young,
-            values={POINT: {"force": 1e-3 * force}, CLAMP: {"rotation": turn}},
+            values={POINT: {"force": 1e-3 * force}, CLAMP: {"rotation": rotation}},
             start=start,
             solver=EXACT,
         )
@@ -180,7 +180,7 @@ def test_repeated_backward_and_inputs_without_gradient():
     )
     loss = loss_of(found)
     (first,) = torch.autograd.grad(loss, young, retain_graph=True)
-    # What another solve leaves in the core does not matter.
+    # The state that another solve leaves in the core has no effect.
     ms.equilibrium(scene, **DEFAULTS, young_modulus=2 * YOUNG, load_factor=0.3)
     (second,) = torch.autograd.grad(loss, young)
     assert torch.equal(first, second) and field.grad is None and "stable" in repr(found)
@@ -195,7 +195,7 @@ def test_a_loss_that_ignores_the_result():
     assert torch.isfinite(only).all() and only.abs().max() > 0
 
 
-def test_other_dtypes_come_back_as_they_were():
+def test_gradients_have_the_dtypes_of_their_inputs():
     young, field = tensor(YOUNG).detach().float().requires_grad_(), tensor((1e-3, -2e-3, 3e-3))
     found = ms.equilibrium(
         everything(), remanent_magnetization=MAGNETIZATION, applied_flux_density=field, young_modulus=young
@@ -205,7 +205,7 @@ def test_other_dtypes_come_back_as_they_were():
     assert young.grad.dtype == torch.float32 and field.grad.dtype == torch.float64
 
 
-def test_nothing_is_kept_without_a_gradient_and_nothing_afterwards():
+def test_adjoint_data_are_freed_without_a_gradient_and_afterwards():
     scene, young = everything(), tensor(YOUNG)
     with torch.no_grad():
         assert not ms.equilibrium(scene, **DEFAULTS, young_modulus=young).positions.requires_grad

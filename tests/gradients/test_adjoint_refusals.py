@@ -1,4 +1,4 @@
-"""What has no gradient says so, and values that a solve cannot replace are refused by name."""
+"""Refusals of gradients: results without one say so, and values that a solve cannot replace are refused by name."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def compressed():
 
 
 def test_an_unstable_equilibrium_has_no_gradient():
-    """Straight, far beyond where it buckles."""
+    """Use a straight strip, far beyond its buckling load."""
     found = solve(compressed(), young_modulus=young(), require_stable=False)
     assert not found.stable
     with pytest.raises(ms.NoGradient, match=r"not stable \(\d+ directions lower"):

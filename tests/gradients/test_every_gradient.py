@@ -26,7 +26,7 @@ def weights_of(name, shape):
 
 
 def loss_of(found):
-    """Linear and quadratic in everything that has a gradient."""
+    """Return a loss that is linear and quadratic in every differentiable result."""
     total = 0.0
     for name, size in OUTPUTS.items():
         if not hasattr(found, name):
@@ -42,7 +42,7 @@ def loss_of(found):
 
 @cache
 def at(name):
-    """Where searches of equilibria begin, so that differences stay on one branch."""
+    """Return the equilibrium at which searches start, so that differences stay on one branch."""
     found = kind(name).found({})
     return found if isinstance(found, ms.Equilibrium | ms.EquilibriumSet) else None
 
@@ -58,7 +58,7 @@ def gradients(name, given):
 
 
 def slopes(name, given, direction):
-    """Central differences along a direction, with two steps."""
+    """Return central differences along a direction, with two steps."""
     step = kind(name).step
     found = []
     for size in (step, 0.5 * step):
@@ -71,7 +71,9 @@ def slopes(name, given, direction):
 
 
 def check(name, given, key, by, along, steepest):
-    """The gradient by one of the given inputs along a unit direction of it, which is as large as its value."""
+    """Compare the gradient by one input along a direction with differences; the direction is scaled to the input's
+    size.
+    """
     direction = size_of(name, key, given[key]) * along
     exact = float((by * direction).sum())
     long, short = slopes(name, given, {key: direction})
@@ -90,7 +92,7 @@ def unit(vector):
 
 @cache
 def rounding(name) -> float:
-    """What differences cannot see: equilibria are found to a relative 1e-13."""
+    """Return the error of differences due to round-off: equilibria are found to a relative 1e-13."""
     return 1e-12 * max(abs(loss(name, {})), 1.0) / kind(name).step
 
 
@@ -132,7 +134,7 @@ WITHOUT_EFFECT = {(ms.obstacles.Sphere, "rotation"), (ms.Prismatic, "origin"), (
 
 
 def test_no_input_is_forgotten_and_each_matters_somewhere():
-    """A new value of an object, or a new keyword of a solve, belongs into a kind of scene where it does something."""
+    """Check that each value of an object and each keyword of a solve has an effect in some kind of scene."""
     seen = set(WITHOUT_EFFECT)
     for name in MAKERS:
         given, by = differentiated(name)

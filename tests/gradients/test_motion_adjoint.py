@@ -65,7 +65,7 @@ def differentiated(request):
 
 
 @pytest.mark.parametrize("name", INPUTS)
-def test_gradient(differentiated, name):
+def test_gradient_equals_central_differences(differentiated, name):
     scene, integrator, gradients = differentiated
     rng = np.random.default_rng(11)
     value = INPUTS[name]
@@ -105,8 +105,10 @@ def a_strip():
     return ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
 
 
-def driven(steps, **options):
-    """The strip's tip after so many steps in a turning field, and the gradient by the field of every step."""
+def motion_and_gradient(steps, **options):
+    """Return a motion of the strip's tip in a rotating field, its positions, and the gradient by the field of every
+    step.
+    """
     scene = a_strip()
     time = np.arange(steps + 1) * 1e-3
     field = 5e-3 * np.stack([np.cos(40 * time), 0 * time, np.sin(40 * time)], axis=1)
@@ -126,7 +128,7 @@ def driven(steps, **options):
 
 
 def test_over_200_steps_against_differences():
-    _, field, gradient = driven(200)
+    _, field, gradient = motion_and_gradient(200)
     rng = np.random.default_rng(2)
     direction = rng.standard_normal(field.shape) * 1e-3
 
@@ -151,16 +153,18 @@ def test_over_200_steps_against_differences():
     "extra", [{}, {"maxwell_modulus": 0.5, "maxwell_time": 4e-3, "stiffness_damping": 1e-4}]
 )
 @pytest.mark.parametrize("record_every", [1, 4])
-def test_what_is_kept_does_not_matter(record_every, extra):
+def test_adjoint_storage_does_not_change_the_gradient(record_every, extra):
     budgets = {"stages": 1.2e6, "checkpoints": 2e4}
     found = {}
     for keep, budget in budgets.items():
-        move, _, found[keep] = driven(
+        move, _, found[keep] = motion_and_gradient(
             60, adjoint_storage=ms.AdjointStorage(memory_budget=budget), record_every=record_every, **extra
         )
         assert move.adjoint_storage == keep
         assert move.bytes <= budget
-    move, _, found["factors"] = driven(60, adjoint_storage="factors", record_every=record_every, **extra)
+    move, _, found["factors"] = motion_and_gradient(
+        60, adjoint_storage="factors", record_every=record_every, **extra
+    )
     assert move.adjoint_storage == "factors"
     np.testing.assert_array_equal(found["stages"], found["checkpoints"])
     np.testing.assert_allclose(found["factors"], found["stages"], rtol=1e-9)
@@ -168,7 +172,9 @@ def test_what_is_kept_does_not_matter(record_every, extra):
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_kept_factors_serve_all_the_way_back(monkeypatch, integrator):
-    """One factorization serves several iterations on the way there, so those that are kept are of earlier ones."""
+    """Check that stored factors serve the adjoint: one factorization serves several iterations, so they are of
+    earlier ones.
+    """
     pull_back, counts = _core.pull_back_motion, []
 
     def counted(*given):
@@ -178,9 +184,9 @@ def test_kept_factors_serve_all_the_way_back(monkeypatch, integrator):
 
     monkeypatch.setattr(_core, "pull_back_motion", counted)
     options = {"integrator": INTEGRATORS[integrator]}
-    move, _, _ = driven(30, adjoint_storage="factors", **options)
+    move, _, _ = motion_and_gradient(30, adjoint_storage="factors", **options)
     assert move.iterations > 1.5 * move.factorizations
-    driven(30, adjoint_storage="stages", **options)
+    motion_and_gradient(30, adjoint_storage="stages", **options)
     stages = 30 * {"euler": 1, "tr_bdf2": 2, "sdirk2": 2, "sdirk3": 3}[integrator]
     assert counts == [0, stages]
 
@@ -207,7 +213,7 @@ def test_kept_factors_share_their_work_space():
 
 
 def test_a_step_in_parts_has_its_gradient():
-    """A jump of the field that one step cannot take."""
+    """Use a jump of the field that one step cannot take."""
     scene = a_strip()
     solver = ms.Newton(max_iterations=4)
     field = np.zeros((6, 3))

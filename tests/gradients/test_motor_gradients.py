@@ -1,4 +1,4 @@
-"""Gradients of what motors in joints do, at rest and in motions, against differences."""
+"""Gradients of motor forces in joints, in equilibria and in motions, against differences."""
 
 from __future__ import annotations
 
@@ -14,8 +14,7 @@ WEIGHTS = np.array([0.7, -1.3, 0.4])
 
 
 def robot():
-    """A motor that slides a base along, a ball joint with a motor on it, and on that a hinge with a spring and one with a
-    motor."""
+    """Build a robot: a motor slides the base, a ball joint has a motor, and two hinges have a spring and a motor."""
     base = ms.Link(mass=1.0, inertia=0.2, center=(0, 0, 0))
     arm = ms.Link(mass=2.0, inertia=(0.2, 0.3, 0.25), center=(0.5, 0.1, 0))
     hand = ms.Link(mass=0.5, inertia=(0.02, 0.05, 0.04), center=(1.2, 0.1, 0.1))
@@ -30,11 +29,11 @@ def robot():
     return ms.Scene(skeleton, gravity=(0, 0, -G)), slide, hinge, wrist, ball
 
 
-def told(result, slide, hinge, ball):
-    """A number that all motors have their part in; of a motion, at some of its states."""
+def motor_output(result, prismatic, hinge, ball):
+    """Return a number to which all motors contribute; for a motion, at some of its states."""
     weights = WEIGHTS if isinstance(result[hinge].motor_torque, np.ndarray) else torch.tensor(WEIGHTS)
     sums = (
-        0.3 * result[slide].motor_force
+        0.3 * result[prismatic].motor_force
         + result[hinge].motor_torque ** 2
         + (result[ball].motor_torque * weights).sum(-1) * (1.0 + result[hinge].motor_torque)
     )
@@ -56,7 +55,7 @@ VALUES = {
 
 
 def varied(solve, given, step=1e-5):
-    """The gradient of `solve`, and by differences; of unit vectors what is across them."""
+    """Return the gradient of `solve`, and the one by differences; for unit vectors the part perpendicular to them."""
     value = torch.tensor(given, dtype=torch.float64, requires_grad=True)
     solve(value).backward()
     by_hand = differences(lambda each: float(solve(each)), np.asarray(given, dtype=np.float64), step)
@@ -64,13 +63,13 @@ def varied(solve, given, step=1e-5):
 
 
 @pytest.mark.parametrize("which", VALUES)
-def test_what_motors_do_at_rest(which):
+def test_motor_outputs_of_an_equilibrium(which):
     scene, slide, hinge, wrist, ball = robot()
     owner = {"slide": slide, "hinge": hinge, "wrist": wrist, "ball": ball}[VALUES[which][0]]
 
     def solve(value):
         values = {owner: {VALUES[which][1]: value}}
-        return told(
+        return motor_output(
             ms.equilibrium(scene, values=values, solver=ms.MixedNewton(tolerance=1e-13)), slide, hinge, ball
         )
 
@@ -78,12 +77,12 @@ def test_what_motors_do_at_rest(which):
     np.testing.assert_allclose(found, by_hand, rtol=1e-7, atol=1e-6 * np.abs(by_hand).max() + 1e-8)
 
 
-def test_what_a_motor_does_at_rest_by_gravity_and_with_other_outputs():
+def test_motor_outputs_by_gravity_together_with_other_outputs():
     scene, slide, hinge, wrist, ball = robot()
 
     def solve(gravity):
         rest = ms.equilibrium(scene, values={scene: {"gravity": gravity}})
-        return told(rest, slide, hinge, ball) + rest[wrist].angle + rest[ball].place[2]
+        return motor_output(rest, slide, hinge, ball) + rest[wrist].angle + rest[ball].place[2]
 
     found, by_hand = varied(solve, np.array([0.3, 0.2, -G]), 1e-4)
     np.testing.assert_allclose(found, by_hand, rtol=1e-7)
@@ -110,13 +109,15 @@ def motion(scene, hinge, ball, integrator, values, **law):
 
 @pytest.mark.parametrize("keep", ["factors", "checkpoints"])
 @pytest.mark.parametrize("integrator", [ms.TRBDF2(), ms.ImplicitEuler()])
-def test_what_motors_do_in_time_by_their_signals(integrator, keep):
+def test_motor_outputs_of_a_motion_by_their_signals(integrator, keep):
     scene, slide, hinge, _, ball = robot()
     given = 0.3 + 0.5 * np.sin(np.linspace(0, 2.0, 9))
 
     def solve(angles):
         values = {hinge: {"motor_angle": angles}}
-        return told(motion(scene, hinge, ball, integrator, values, adjoint_storage=keep), slide, hinge, ball)
+        return motor_output(
+            motion(scene, hinge, ball, integrator, values, adjoint_storage=keep), slide, hinge, ball
+        )
 
     found, by_hand = varied(solve, given, 1e-5)
     np.testing.assert_allclose(found, by_hand, rtol=1e-6, atol=1e-7 * np.abs(by_hand).max())
@@ -132,7 +133,7 @@ def test_what_motors_do_in_time_by_their_signals(integrator, keep):
         ("ball origin", 1e-5),
     ],
 )
-def test_what_motors_do_in_time(which, step):
+def test_motor_outputs_of_a_motion(which, step):
     scene, slide, hinge, wrist, ball = robot()
     owner = {"hinge": hinge, "wrist": wrist, "ball": ball}[VALUES[which][0]]
 
@@ -143,13 +144,13 @@ def test_what_motors_do_in_time(which, step):
             moved[hinge]["motor_angle"] = signal
         if owner is ball:
             moved[ball]["motor_rotation"] = np.outer(1 + np.linspace(0, 1, 9) ** 2, [0.2, -0.4, 0.3])
-        return told(motion(scene, hinge, ball, ms.TRBDF2(), moved), slide, hinge, ball)
+        return motor_output(motion(scene, hinge, ball, ms.TRBDF2(), moved), slide, hinge, ball)
 
     found, by_hand = varied(solve, VALUES[which][2], step)
     np.testing.assert_allclose(found, by_hand, rtol=1e-6, atol=1e-6 * np.abs(by_hand).max())
 
 
-def test_what_motors_do_by_the_time_step():
+def test_motor_outputs_by_the_time_step():
     scene, slide, hinge, _, ball = robot()
 
     def solve(time_step):
@@ -161,7 +162,7 @@ def test_what_motors_do_by_the_time_step():
 
 
 def fleshy():
-    """A soft bar around two bones; a motor turns the upper one."""
+    """Build a soft bar around two bones; a motor rotates the upper one."""
     mesh = ms.meshes.box((0.04, 0.04, 0.3), cells=(1, 1, 6))
     bar = ms.Solid(
         mesh,
@@ -189,8 +190,8 @@ def fleshy():
         ("elbow", 1e-3, 1e-5),
     ],
 )
-def test_what_a_motor_does_in_soft_flesh(name, given, step):
-    """The history of what damps is felt beside the end of a step as well."""
+def test_motor_outputs_in_a_soft_body(name, given, step):
+    """Check that the history of damping contributes as well as the end of a step."""
     scene, shoulder, elbow = fleshy()
     laws = {"stiffness_damping": 5e-3, "damping": 0.05, "maxwell_modulus": 0.5, "maxwell_time": 0.1}
     angles = 0.4 * np.sin(np.linspace(0, 2, 7))
@@ -215,7 +216,9 @@ def test_what_a_motor_does_in_soft_flesh(name, given, step):
 
 @pytest.mark.parametrize("budget", [1e9, 1.0])
 def test_power_of_a_motor(budget):
-    """What a search for a frugal motion would want: the sum of squares of the torque, along a path given by few numbers."""
+    """Differentiate the sum of squares of the torque along a path with few parameters, as for a motion of low
+    effort.
+    """
     scene, _, hinge, _, ball = robot()
     shape = torch.linspace(0, 1, 9, dtype=torch.float64)
 

@@ -187,7 +187,7 @@ REACH = {
 
 
 def check(loss, name, value, gradient, size=1e-6):
-    """Central differences along the gradient and a random direction together, each as long as the value is large."""
+    """Compare central differences along the gradient plus a random direction, each scaled to the size of the value."""
     direction = np.random.default_rng(3).standard_normal(value.shape)
     if gradient.any():
         direction = direction + gradient / np.abs(gradient).max()
@@ -206,7 +206,7 @@ ROWS = [
 
 
 @pytest.mark.parametrize("name, entry", ROWS)
-def test_gradient(name, entry):
+def test_gradient_equals_central_differences(name, entry):
     problem, gradients = differentiated(name)
     key = next(key for key in problem.inputs if key[1] == entry)
     check(
@@ -215,7 +215,7 @@ def test_gradient(name, entry):
 
 
 @pytest.mark.parametrize("name", [name for name, case in CASES.items() if case.obstacle])
-def test_what_is_differentiated_strikes_sticks_and_slips(name):
+def test_differentiated_motion_strikes_sticks_and_slips(name):
     problem = Problem(CASES[name])
     motion = problem.move(problem.inputs)
     pressed = motion.energies["contact"]
@@ -258,9 +258,9 @@ def against_differences(scene, owner, name, value, **options) -> ms.Trajectory:
     return move(value)
 
 
-def driven_into_ground(turn=None):
-    """A strip whose clamp presses its other end onto the ground and draws it along, and the clamp."""
-    turn = np.eye(3) if turn is None else turn
+def dragged_over_ground(rotation=None):
+    """Build a strip whose clamp presses its other end onto the ground and drags it along; return it with the clamp."""
+    turn = np.eye(3) if rotation is None else rotation
     mesh = ms.TriangleMesh(MESH.rest_positions @ turn.T, MESH.faces)
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
     clamp = ms.Clamp(
@@ -276,7 +276,7 @@ def driven_into_ground(turn=None):
 @pytest.mark.parametrize("integrator", [ms.ImplicitEuler(), ms.TRBDF2()], ids=repr)
 @pytest.mark.parametrize("name", ["displacement", "rotation"])
 def test_by_a_support_that_presses_the_sheet_onto_the_ground(integrator, name):
-    scene, clamp, _ = driven_into_ground()
+    scene, clamp, _ = dragged_over_ground()
     value = {"displacement": clamp._move.displacement, "rotation": clamp._move.rotation}[name]
     found = against_differences(
         scene,
@@ -291,7 +291,7 @@ def test_by_a_support_that_presses_the_sheet_onto_the_ground(integrator, name):
 
 
 def sliding_into_a_corner():
-    """Held by an oblique symmetry plane, in nodes with frames of their own, on an oblique slope and in water."""
+    """Build a strip held by an oblique symmetry plane, with rotated nodal frames, on an oblique slope and in water."""
     turn = rotation_matrix(np.array([0.5, -0.4, 0.8]))
     mesh = ms.TriangleMesh(MESH.rest_positions @ turn.T, MESH.faces)
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
@@ -325,7 +325,10 @@ def test_with_nodes_that_have_frames_of_their_own(integrator, what):
 
 @pytest.mark.parametrize("name", ["friction_coefficient", "velocities"])
 def test_through_steps_that_are_taken_in_parts(name):
-    """In a whole step the sheet would come out behind the wall; wherever the number of parts stays, it has a gradient."""
+    """Check steps that are subdivided because in one step the sheet would pass the wall.
+
+    The gradient exists wherever the number of substeps stays the same.
+    """
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
     wall = ms.obstacles.Box((0.06, 0.04, 1.5e-3), rounding=5e-4, center=(0.01, 0.005, -2.5e-3))
     contact = ms.Contact(wall, friction_coefficient=0.4, contact_stiffness=2e3)

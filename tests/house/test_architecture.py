@@ -113,7 +113,7 @@ def python_files(root: Path, *folders: str) -> list[Path]:
 
 
 def includes(path: Path) -> list[tuple[str, str]]:
-    """(delimiter, name) of each include: '"' or '<', and what stands after it."""
+    """Return (delimiter, name) of each include, with the delimiter '"' or '<'."""
     return re.findall(r'^\s*#\s*include\s*(["<])([^">]+)[">]', path.read_text(), re.MULTILINE)
 
 
@@ -139,7 +139,7 @@ def include_violations(root: Path) -> Iterator[str]:
 
 
 def imported_names(path: Path) -> Iterator[str]:
-    """Dotted names a file imports, or reaches through a module (`torch.autograd.Function`)."""
+    """Yield the dotted names that a file imports, or reaches through a module (`torch.autograd.Function`)."""
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -160,7 +160,7 @@ def import_violations(root: Path) -> Iterator[str]:
 
 
 def run_nodes(node: ast.AST) -> Iterator[ast.AST]:
-    """What of a file is ever run: names that only a type checker reads say what comes, and need nothing to be there."""
+    """Yield the nodes of a file that are executed, without the imports for type checkers only."""
     yield node
     for child in ast.iter_child_nodes(node):
         if isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING":
@@ -171,7 +171,9 @@ def run_nodes(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def own_imports(path: Path, package: Path) -> Iterator[str]:
-    """What a file imports of the package, anywhere in it: "mesh.io" or "errors"; "__init__" is the whole package."""
+    """Yield the modules of the package that a file imports anywhere: "mesh.io" or "errors"; "__init__" is the whole
+    package.
+    """
     here = path.relative_to(package).parent.parts
     for node in run_nodes(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
@@ -188,13 +190,13 @@ def own_imports(path: Path, package: Path) -> Iterator[str]:
 
 
 def room_of(parts: list[str]) -> str:
-    """The room in which a dotted name stands: model.shells, or mesh."""
+    """Return the room of a dotted name: model.shells, or mesh."""
     inner = ".".join(parts[:2])
     return inner if inner in ROOMS else parts[0]
 
 
 def module_of(parts: list[str], package: Path) -> str:
-    """The file or folder that a dotted name stands in or is, as far as there is one; its room at least."""
+    """Return the file or folder of a dotted name, as deep as one exists; at least its room."""
     if not parts or parts[0] not in {room.split(".")[0] for room in ROOMS}:
         return "__init__"
     places = [package.joinpath(*parts[:n]) for n in range(len(parts), 0, -1)]
@@ -218,7 +220,7 @@ def room_violations(root: Path) -> Iterator[str]:
 
 
 def circle_violations(root: Path) -> Iterator[str]:
-    """Files that need each other, in whatever order they are loaded."""
+    """Yield the files that import each other, in whatever order they are loaded."""
     package = root / "python" / "magshell"
     needed = {}
     for path in python_files(root, "python/magshell"):
@@ -233,7 +235,7 @@ def circle_violations(root: Path) -> Iterator[str]:
 
 
 def hidden_violations(root: Path) -> Iterator[str]:
-    """A function that a package offers under the name of a module of its own hides that module."""
+    """Yield the functions that a package exports under the name of one of its modules, which hides that module."""
     package = root / "python" / "magshell"
     for path in package.rglob("__init__.py"):
         for node in ast.walk(ast.parse(path.read_text())):
@@ -276,7 +278,7 @@ RULES = [
 
 
 @pytest.mark.parametrize("rule", RULES)
-def test_rule_holds(rule) -> None:
+def test_rule_holds_in_the_tree(rule) -> None:
     assert list(rule(ROOT)) == []
 
 

@@ -1,4 +1,4 @@
-"""`make` says how far the build is (scripts/build_progress.py)."""
+"""The progress of the build that `make` prints (scripts/build_progress.py)."""
 
 import re
 import subprocess

@@ -1,4 +1,4 @@
-"""What the build says of itself, and thread counts."""
+"""Tests of the build's own description, and of thread counts."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""What is written down beside the code agrees with it: the stub of the extension, and the version."""
+"""Consistency of files with the code: the stub of the extension, and the versions."""
 
 import ast
 import re

@@ -27,7 +27,7 @@ def test_sleeps(k):
 
 @pytest.fixture
 def folder(tmp_path):
-    """A folder of tests with the same hooks."""
+    """Build a folder of tests with the same hooks."""
     (tmp_path / "support").mkdir()
     for name in ("conftest.py", "support/parallel.py"):
         shutil.copy(HERE / name, tmp_path / name)
@@ -45,7 +45,7 @@ def run(folder, *options):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs flock")
 @pytest.mark.skipif(importlib.util.find_spec("xdist") is None, reason="needs pytest-xdist")
-def test_other_processes_wait_while_a_test_runs_alone(folder):
+def test_processes_wait_while_a_marked_test_runs_alone(folder):
     for number in range(3):
         (folder / f"test_busy_{number}.py").write_text(BUSY.format(mark=""))
     (folder / "test_alone.py").write_text(BUSY.format(mark="@pytest.mark.alone"))

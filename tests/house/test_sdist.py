@@ -1,4 +1,4 @@
-"""The sdist: all that is under version control, so that whoever has it builds, tests and documents as we do. No more."""
+"""The sdist has all files under version control and no others, so that its users can build, test and document."""
 
 import shutil
 import subprocess
@@ -15,7 +15,7 @@ ADDED = {"PKG-INFO"}
 
 @pytest.fixture(scope="module")
 def tracked() -> set[str]:
-    """Files that are, or could be, under version control: none that something generated."""
+    """Return the files that are, or could be, under version control: none that is generated."""
     git = shutil.which("git")
     command = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
     found = subprocess.run(command, cwd=ROOT, capture_output=True, text=True) if git else None
@@ -26,7 +26,7 @@ def tracked() -> set[str]:
 
 @pytest.fixture(scope="module")
 def held(tmp_path_factory) -> set[str]:
-    """Names in an sdist made here."""
+    """Return the names in an sdist built here."""
     pytest.importorskip("scikit_build_core", reason="the build's backend is not installed")
     folder = tmp_path_factory.mktemp("sdist")
     program = f"from scikit_build_core.build import build_sdist; build_sdist({str(folder)!r})"
@@ -36,12 +36,12 @@ def held(tmp_path_factory) -> set[str]:
         return {each.name.split("/", 1)[1] for each in opened if not each.isdir()}
 
 
-def test_it_holds_what_git_does(tracked, held) -> None:
+def test_sdist_holds_the_files_under_version_control(tracked, held) -> None:
     assert held - ADDED == tracked - LEFT_OUT
 
 
-def test_what_making_needs_is_there(held) -> None:
-    """Seen without git too: the build, the tests, the manual with its gallery, the notebooks."""
+def test_sdist_has_all_that_make_needs(held) -> None:
+    """Check, also without git: the build, the tests, the manual with its gallery, the notebooks."""
     needed = [
         "Makefile",
         "CMakeLists.txt",

@@ -1,4 +1,4 @@
-"""Bad meshes, shells, scenes, supports and loads: what each mistake says, DESIGN.md 5."""
+"""Messages for bad meshes, shells, scenes, supports and loads, DESIGN.md 5."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Bad input to a solve: what each mistake says, DESIGN.md 5."""
+"""Messages for bad input to a solve, DESIGN.md 5."""
 
 import numpy as np
 import pytest
@@ -145,7 +145,7 @@ GRADIENTS = {
 
 @pytest.mark.parametrize("name", GRADIENTS)
 def test_gradients_that_nothing_passes_back_are_refused(name):
-    """A silent zero is the worst defect this library can have."""
+    """Check that an input without a gradient raises instead of giving a silent zero."""
     torch = pytest.importorskip("torch")
     with pytest.raises(ValueError, match=rf"{name}.* requires a gradient.*detach it first"):
         GRADIENTS[name](lambda shape: torch.ones(shape, requires_grad=True))
@@ -159,7 +159,7 @@ def test_a_list_of_tensors_is_refused_by_name():
 
 
 def test_a_scene_cannot_be_solved_from_within_its_own_solve():
-    """It would overwrite what the solve outside is working with."""
+    """Check the refusal of a nested solve, which would overwrite the state of the outer one."""
     itself = scene(loads=[ms.AreaLoad((0, 0, 1.0))])
     with pytest.raises(RuntimeError, match="the scene is being solved"):
         ms.equilibrium(itself, progress=lambda *_: ms.equilibrium(itself))

@@ -79,7 +79,7 @@ def test_all_of_them(tmp_path):
 
 
 def refusal(call, name, bad) -> str | None:
-    """None where it was refused as it should be."""
+    """Return None where a call was refused by the argument's name, or the fault as text."""
     with warnings.catch_warnings():
         warnings.simplefilter("error", np.exceptions.ComplexWarning)
         try:
@@ -108,7 +108,7 @@ def nothing(parameters):
 
 
 @pytest.mark.parametrize("value", [1j, np.complex128(1j), "1", True, -1.0])
-def test_feasibility(value):
+def test_feasibility_must_be_a_real_number(value):
     torch = pytest.importorskip("torch")
     parameter = torch.ones(2, dtype=torch.float64, requires_grad=True)
     optimizer = lambda given: ms.optim.LBFGS(given, lower=0.0, upper=2.0)  # noqa: E731

@@ -1,4 +1,4 @@
-"""Copies, and what arrives in another process: made from the same arguments, they give the same bits."""
+"""Tests of copies and of pickles in another process: built from the same arguments, they give the same bits."""
 
 import copy
 import pickle
@@ -34,7 +34,7 @@ FIELDS = {
 
 @pytest.mark.parametrize("duplicate", COPIES)
 @pytest.mark.parametrize("make", FIELDS.values(), ids=FIELDS)
-def test_fields(make, duplicate, rng):
+def test_copied_fields_give_the_same_bits(make, duplicate, rng):
     field = make()
     twin = duplicate(field)
     points = 0.02 * rng.standard_normal((5, 3))
@@ -44,7 +44,7 @@ def test_fields(make, duplicate, rng):
 
 
 @pytest.mark.parametrize("duplicate", COPIES)
-def test_scenes(duplicate):
+def test_copied_scenes_give_the_same_bits(duplicate):
     mesh = ms.meshes.rectangle(0.1, 0.02, cells=(8, 2), irregular=0.2)
     edge = mesh.edges_at(x=0.1)
     sheet = ms.Shell(
@@ -75,7 +75,7 @@ def test_a_scene_that_may_move_stays_one():
     assert pickle.loads(pickle.dumps(free)).n_dofs == free.n_dofs
 
 
-def test_what_goes_together_stays_together():
+def test_objects_pickled_together_stay_shared():
     mesh = ms.meshes.rectangle(0.1, 0.02, cells=(2, 1))
     sheet, clamp = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6), ms.Clamp(mesh.edges_at(x=0.0))
     scene, same_clamp = pickle.loads(pickle.dumps((ms.Scene(sheet, supports=[clamp]), clamp)))

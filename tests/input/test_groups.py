@@ -1,4 +1,4 @@
-"""Parameters in groups: made once, handed to many calls; a keyword that went into one is told where."""
+"""Parameters in groups: built once and passed to many calls; the message for a moved keyword names its group."""
 
 import numpy as np
 import pytest
@@ -87,7 +87,7 @@ def test_pictures_with_one_frame_have_one_window():
 
 @pytest.mark.parametrize("name, right, up", [("top", 0, 1), ("front", 0, 2), ("side", 1, 2)])
 def test_usual_views_have_names(name, right, up):
-    """The axes of the world that go to the right and upwards."""
+    """Check the axes of the world that point to the right and upwards."""
     axes = view_of([], name).axes
     np.testing.assert_allclose(axes[:2], np.eye(3)[[right, up]], atol=1e-12)
     with pytest.raises(ValueError, match="'top', 'front', 'side', got 'above'"):
@@ -118,7 +118,7 @@ def test_a_keyword_that_is_misspelt_is_told_the_nearest(call, words):
 
 
 def test_a_frame_shows_a_part(tmp_path):
-    """As large as it is asked for, whatever else there is; what is said about places that are not seen is left out."""
+    """Check the requested size, whatever else is in the scene; labels of places outside the frame are omitted."""
     view = ms.View(90, -90, frame=[(0.08, 0, 0), (0.1, 0.02, 0.0)])
     field = {"applied_flux_density": (0, 1e-3, 0)}
     picture = ms.plot(MESH, view=view, width=500, style=PLAIN, **field)
@@ -170,7 +170,7 @@ def test_a_page_takes_what_a_style_says(tmp_path):
         ms.write_page(MESH, tmp_path / "b.html", style=ms.Style(contacts=True))
 
 
-def test_what_is_kept_may_be_a_word_or_a_group():
+def test_adjoint_storage_may_be_a_word_or_a_group():
     torch = pytest.importorskip("torch")
     young = torch.tensor(1e6, dtype=torch.float64, requires_grad=True)
     for keep, word in (

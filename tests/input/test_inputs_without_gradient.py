@@ -1,4 +1,6 @@
-"""Inputs that have no gradient, or have one in some cases only: whoever asks is told, and nobody gets a part of it."""
+"""Inputs that have no gradient, or only in some cases: a request raises an error, and no partial gradient is
+returned.
+"""
 
 import math
 
@@ -77,7 +79,7 @@ def test_obstacles_that_move_leave_the_time_step_without_a_gradient():
 
 
 def from_rest(thickness, **given):
-    """A motion from an equilibrium, both of this thickness."""
+    """Return a motion from an equilibrium, both of this thickness."""
     rest = ms.equilibrium(SCENE, **MAGNETIC, thickness=thickness)
     return moved(thickness=thickness, start=rest, applied_flux_density=(0, 0, 1e-3), **given)
 

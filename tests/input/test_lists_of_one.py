@@ -13,7 +13,7 @@ SLIT = [(0.1, 0.7), (0.5, 0.8)]
 
 
 @pytest.mark.parametrize("one", [HOLE, tuple(HOLE), np.array(HOLE)], ids=["list", "tuple", "array"])
-def test_one_hole_and_one_slit(one) -> None:
+def test_single_hole_and_slit_need_no_list(one) -> None:
     pytest.importorskip("gmsh")
     alone = ms.meshes.outline(SQUARE, holes=one, slits=SLIT, size=0.2)
     listed = ms.meshes.outline(SQUARE, holes=[one], slits=[SLIT], size=0.2)
@@ -33,7 +33,7 @@ def test_one_hole_and_one_slit(one) -> None:
         ({"holes": HOLE[0]}, r"hole 0 \[m\] must have shape \(n, 2\)"),
     ],
 )
-def test_what_is_no_list_of_polygons(given, message) -> None:
+def test_bad_lists_of_polygons_are_refused(given, message) -> None:
     with pytest.raises(ValueError, match=message):
         ms.meshes.outline(SQUARE, size=0.2, **given)
 
@@ -43,7 +43,7 @@ SHEET = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6)
 CLAMP = ms.Clamp(MESH.edges_at(x=0.0))
 
 
-def test_one_support_load_contact_field_and_case() -> None:
+def test_single_support_load_contact_field_and_case_need_no_list() -> None:
     load, floor = ms.EdgeLoad(MESH.edges_at(x=0.1), (0, 0, 0.01)), ms.obstacles.Plane(center=(0, 0, -0.05))
     field = ms.Dipoles([(0, 0, 1)], [(0, 0, 1)])
     scene = ms.Scene(SHEET, supports=CLAMP, loads=load, contacts=ms.Contact(floor), field=field)
@@ -52,7 +52,7 @@ def test_one_support_load_contact_field_and_case() -> None:
     assert len(ms.EquilibriumSet(rest)) == 1 and ms.EquilibriumSet(rest)[0] is rest
 
 
-def test_one_tensor_one_state_one_direction() -> None:
+def test_single_tensor_state_and_direction_need_no_list() -> None:
     torch = pytest.importorskip("torch")
     x = torch.zeros(3, dtype=torch.float64, requires_grad=True)
     state = ms.WarmStart(ms.Scene(SHEET, supports=CLAMP))
@@ -144,7 +144,9 @@ def test_a_wrong_keyword_of_an_optimizer() -> None:
     ],
 )
 def test_vertices_are_not_taken_for_edges(make, message) -> None:
-    """Their numbers are edges too, of other places: it held and loaded those, without a word."""
+    """Check the refusal of vertex numbers where edges are expected; they used to select unrelated edges without a
+    warning.
+    """
     with pytest.raises(ValueError, match=message):
         make()
 

@@ -1,4 +1,4 @@
-"""What messages call things: bodies by what they are, shapes that may be given, the names to use instead of others."""
+"""Tests of the wording of messages: bodies by their kind, admissible shapes, suggested names."""
 
 import os
 import re
@@ -61,7 +61,7 @@ def test_messages_name_the_body_that_is_inside_an_obstacle_by_its_number_where_t
 
 
 def test_no_message_about_a_solid_says_sheet():
-    """Every refusal that a scene of a solid alone meets here."""
+    """Check every refusal that a scene of a solid alone raises here."""
     body = solid()
     clamped = ms.Scene(body, supports=[ms.Pin(BOX.vertices_at(x=0.0))])
     for call in (
@@ -172,7 +172,7 @@ def test_names_in_messages_come_in_the_same_order_in_every_process():
 
 
 def test_a_point_mass_on_a_slide_needs_no_joint_away_from_its_center():
-    """x(t) = g/w^2 (1 - cos wt) of a mass on a spring, wherever it is."""
+    """Compare with x(t) = g/w^2 (1 - cos wt) of a mass on a spring, wherever it is."""
     for place in ((0.0, 0.0, 0.0), (0.3, 0.2, 0.0)):
         mass = ms.Link(mass=1.0, center=place)
         slide = ms.Prismatic(mass, origin=place, axis=(1, 0, 0), spring_stiffness=10.0, rest_displacement=0.0)

@@ -49,7 +49,7 @@ def test_results_have_the_dtype_of_the_design(scene, solve, dtype):
 
 @SOLVES
 def test_integers_are_no_dtype_for_results(scene, solve):
-    """They were: positions came back as integers, all zero."""
+    """Check that integer tensors give float64 results; positions used to come back as integers, all zero."""
     found = solve(scene, STRENGTH.long())
     assert found.dtype == torch.float64 and found.abs().max() > 0
     assert torch.equal(found, solve(scene, STRENGTH))
@@ -195,7 +195,7 @@ def test_files_take_bfloat16(tmp_path):
 
 @WITH_GRADIENT
 def test_compiled_code_runs_solves_as_they_are(scene, solve):
-    """It ended in an AssertionError deep inside torch."""
+    """Check torch.compile, which used to end in an AssertionError inside torch."""
 
     def tip(magnetization):
         return 2 * solve(scene, magnetization * 1.5)[..., -1, :].pow(2).sum()

@@ -1,4 +1,4 @@
-"""One way to hand over values: what the keywords of solves are short for, and what `values` refuse."""
+"""Overrides by `values`: the keywords of solves that are short for them, and refusals."""
 
 import warnings
 
@@ -84,7 +84,7 @@ def test_load_cases_and_gradients_come_through_values():
 
 
 def test_linear_theory_and_vibrations_take_values_of_objects():
-    """As a scene that was made with them."""
+    """Compare with a scene that was built with these values."""
     thick = ms.Shell(MESH, thickness=2e-3, young_modulus=1e6, poisson_ratio=0.3, mass_density=1e3)
     load = ms.EdgeLoad(MESH.edges_at(x=0.05), (-0.01, 0, 0.002))
     made = ms.Scene(thick, supports=[ms.Clamp(MESH.edges_at(x=0.0))], loads=[load])
@@ -201,7 +201,7 @@ def at_rest(values, **given):
         ),
     ],
 )
-def test_what_has_no_place_is_refused(call, message):
+def test_values_without_an_owner_are_refused(call, message):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         with pytest.raises(ValueError, match=message):

@@ -17,7 +17,7 @@ TIME_STEP = 1e-3
 
 
 def straight(value: np.ndarray) -> np.ndarray:
-    """A value over time that goes from the first to the last row on a straight line."""
+    """Return a value over time, interpolated linearly between its first and its last row."""
     share = np.linspace(0.0, 1.0, len(value)).reshape(-1, *(1 for _ in value.shape[1:]))
     return (1.0 - share) * value[0] + share * value[-1]
 
@@ -102,7 +102,7 @@ def test_growth_of_every_shape_changes_in_time_whatever_the_number_of_knots(shap
 
 @pytest.mark.parametrize("integrator", INTEGRATORS, ids=lambda each: type(each).__name__)
 def test_a_tensor_in_time_that_shrinks_one_face_to_nothing_is_refused_at_any_knot(integrator):
-    """Faces lie in the plane of x and y, so only the third row is bad, in every face: not a row for each face."""
+    """Check a row that is inadmissible in every face; faces lie in the plane of x and y, so only the third row is."""
     rows = np.stack([np.eye(3), np.eye(3), np.diag([1.0, -1.0, 1.0]), np.eye(3)])
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e5, mass_density=1e3, growth=np.eye(3))
     scene = ms.Scene(sheet, supports=[ms.Clamp(MESH.edges_at(x=0.0))])
@@ -115,7 +115,7 @@ def test_a_tensor_in_time_that_shrinks_one_face_to_nothing_is_refused_at_any_kno
 
 
 def test_a_tensor_in_time_is_refused_for_a_face_that_has_no_row_of_its_own():
-    """Two knots and two faces that lie across each other: each row holds for both."""
+    """Check two rows in time and two perpendicular faces: each row applies to both."""
     points = [(0, 0, 0), (0.01, 0, 0), (0.01, 0.01, 0), (0, 0, 0.01)]
     mesh = ms.TriangleMesh(points, [(0, 1, 2), (0, 3, 1)])
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e5, mass_density=1e3, growth=np.eye(3))

@@ -1,4 +1,4 @@
-"""Files: every format read, the two written ones read back with their fields, and what is refused."""
+"""Mesh files: every format read, the two written ones read back with their fields, and refusals."""
 
 import struct
 import sys
@@ -114,7 +114,7 @@ def test_obj_numbers_that_count_backwards(tmp_path):
         ("v 1 2", "line 5, 'v 1 2': not enough values"),
     ],
 )
-def test_bad_obj(tmp_path, line, message):
+def test_bad_obj_files_are_refused(tmp_path, line, message):
     path = tmp_path / "bad.obj"
     path.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n" + line + "\n")
     with pytest.raises(ValueError, match=message):
@@ -235,7 +235,7 @@ def test_missing_files_and_unknown_endings(tmp_path):
     [b"", b"hello\nworld\n", b"\x00\x01garbage \xff not a mesh\n" * 20],
     ids=["empty", "text", "noise"],
 )
-def test_garbage(tmp_path, ending, content):
+def test_files_without_a_mesh_are_refused(tmp_path, ending, content):
     path = tmp_path / f"garbage.{ending}"
     path.write_bytes(content)
     with pytest.raises(ValueError, match=r"garbage\..*( as |holds no triangles)"):
@@ -313,7 +313,7 @@ PLY_POINTS = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
         ("ply\nformat ascii 1.0\n", "it has no PLY header"),
     ],
 )
-def test_bad_ply(tmp_path, content, message):
+def test_bad_ply_files_are_refused(tmp_path, content, message):
     path = tmp_path / "bad.ply"
     path.write_text(content)
     with pytest.raises(ValueError, match=f"cannot read .*bad.ply' as PLY: .*{message}"):

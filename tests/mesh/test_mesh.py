@@ -23,7 +23,7 @@ def rectangle(nx=4, ny=3, **options):
 # Connectivity
 
 
-def test_two_faces_by_hand():
+def test_connectivity_of_two_faces_by_hand():
     mesh = ms.TriangleMesh(SQUARE, HALVES)
     assert mesh.edges.tolist() == [[0, 1], [0, 2], [0, 3], [1, 2], [2, 3]]
     # edge (0, 2) runs forward in face 1 (0 -> 2 -> 3) and backward in face 0 (2 -> 0)
@@ -113,7 +113,7 @@ def test_arrays_outlive_the_mesh():
 
 
 @pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda mesh: pickle.loads(pickle.dumps(mesh))])
-def test_copies(duplicate):
+def test_copies_have_the_same_arrays(duplicate):
     mesh = rectangle(irregular=0.2)
     twin = duplicate(mesh)
     assert np.array_equal(twin.rest_positions, mesh.rest_positions)
@@ -124,7 +124,7 @@ def test_copies(duplicate):
 
 
 def moebius():
-    """Seven triangles in a band, each sharing an edge with the next, closed with a half twist."""
+    """Build seven triangles in a band, each sharing an edge with the next, closed with a half twist."""
     angle = 2 * np.pi * np.arange(7) / 7
     side = np.where(np.arange(7) % 2 == 0, 1.0, -1.0)
     ring = np.stack([np.cos(angle), np.sin(angle)], axis=1) * (1 + 0.3 * side * np.cos(angle / 2))[:, None]
@@ -237,7 +237,7 @@ def test_repr_answers_what_a_person_asks():
 
 
 def test_quality_of_two_triangles_by_hand():
-    """One of 90, 60 and 30 degrees, and a cap of height 0.1 on its longest side."""
+    """Check a triangle of 90, 60 and 30 degrees, and a cap triangle of height 0.1 on its longest side."""
     along = np.array([np.sqrt(3), 1.0, 0.0]) / 2
     apex = 1.0 * along + 0.1 * np.array([-0.5, np.sqrt(3) / 2, 0.0])
     mesh = ms.TriangleMesh([[0, 0, 0], [np.sqrt(3), 0, 0], 2 * along, apex], [[0, 1, 2], [0, 2, 3]])
@@ -339,7 +339,7 @@ def test_a_closed_mesh_has_no_boundary_to_select():
 # Moving
 
 
-def test_flipped():
+def test_flipped_mesh_has_opposite_normals():
     mesh = ms.meshes.spherical_cap(1.0, cells=(12, 5))
     flipped = mesh.flipped()
     assert flipped.face_normals == pytest.approx(-mesh.face_normals)
@@ -359,7 +359,7 @@ def test_rigid_motions_keep_lengths_and_carry_normals(seed):
         assert moved.face_normals == pytest.approx(mesh.face_normals @ rotation.as_matrix().T, abs=1e-12)
 
 
-def test_scaled():
+def test_scaled_mesh_has_scaled_areas():
     assert rectangle().scaled(1e-3).face_areas.sum() == pytest.approx(2e-6)
 
 
@@ -373,6 +373,6 @@ def test_scaled():
         (lambda m: m.transformed(translation=(1.0, np.nan, 0)), "translation .* must be finite"),
     ],
 )
-def test_bad_moves(move, message):
+def test_bad_transformations_are_refused(move, message):
     with pytest.raises(ValueError, match=message):
         move(rectangle())

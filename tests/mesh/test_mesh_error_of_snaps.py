@@ -1,4 +1,6 @@
-"""A pinched cylinder (A6: Sze, Liu, Lo 2004) on coarse meshes: its error is told, and after it has snapped it is refused."""
+"""A pinched cylinder (A6: Sze, Liu, Lo 2004) on coarse meshes: its error is estimated before, and refused after the
+snap.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,9 @@ RADIUS, HALF_LENGTH, THICKNESS, YOUNG_MODULUS = 100.0, 100.0, 1.0, 30e3
 
 
 def sunk(mesh, force: float) -> float:
-    """How far two opposite forces at mid-length sink into the cylinder on rigid diaphragms; an eighth of it."""
+    """Return the deflection of one eighth of the cylinder on rigid diaphragms under two opposite forces at
+    mid-length.
+    """
     bending = "midedge2" if isinstance(mesh, ms.QuadraticTriangleMesh) else "midedge"
     sheet = ms.Shell(
         mesh, thickness=THICKNESS, young_modulus=YOUNG_MODULUS, poisson_ratio=0.3, bending=bending
@@ -32,7 +36,7 @@ def meshes(coarsest: int, order: int) -> list:
     ]
 
 
-def test_before_it_snaps_the_error_is_told():
+def test_error_before_the_snap_is_estimated():
     found = {
         order: ms.richardson_extrapolation(lambda mesh: sunk(mesh, 150.0), meshes(8 // order, order))
         for order in (1, 2)
@@ -43,7 +47,7 @@ def test_before_it_snaps_the_error_is_told():
 
 
 @pytest.mark.parametrize(("coarsest", "order"), [(8, 1), (4, 2)])
-def test_after_that_three_meshes_refuse_to_answer(coarsest, order):
+def test_extrapolation_beyond_the_snap_is_refused(coarsest, order):
     with pytest.raises(ms.NotConverged, match="does not converge with the mesh") as caught:
         ms.richardson_extrapolation(lambda mesh: sunk(mesh, 600.0), meshes(coarsest, order))
     seen = caught.value.last_good

@@ -1,4 +1,4 @@
-"""Generators: topology, area, orientation, where the boundary lies; and what they refuse."""
+"""Mesh generators: topology, area, orientation, position of the boundary; and refusals."""
 
 import math
 import subprocess
@@ -69,7 +69,7 @@ def test_rectangle_lies_where_it_says():
     assert mesh.face_areas == pytest.approx(np.full(1200, 2e-6))
 
 
-def test_diagonals():
+def test_diagonals_have_their_directions():
     def directions(diagonals):
         mesh = ms.meshes.rectangle(4.0, 4.0, cells=(4, 4), diagonals=diagonals)
         ends = mesh.rest_positions[mesh.edges]
@@ -106,7 +106,7 @@ def test_irregular_moves_the_inside_only_and_by_no_more_than_it_says(nx, ny, dia
     assert mesh.face_normals[:, 2].min() > 0.99
 
 
-def test_seeds():
+def test_seed_determines_an_irregular_mesh():
     def make(seed):
         return ms.meshes.rectangle(1.0, 1.0, (5, 5), irregular=0.2, seed=seed).rest_positions
 
@@ -114,7 +114,7 @@ def test_seeds():
     assert not np.array_equal(make(3), make(4))
 
 
-def test_disk():
+def test_disk_has_its_faces_and_area():
     for cells in (1, 2, 5):
         mesh = ms.meshes.disk(0.5, cells)
         assert mesh.n_faces == 6 * cells**2
@@ -190,7 +190,7 @@ def test_spherical_cap_lies_where_it_says():
         ),
     ],
 )
-def test_refusals(make, message):
+def test_bad_arguments_are_refused(make, message):
     with pytest.raises(ValueError, match=message):
         make(ms.meshes)
 
@@ -211,7 +211,7 @@ def midline(low, high):
     [(1.0, 3.0, 3, 2, 1), (2.0, 4.0, 4, 1, 1), (0.0, 4.0, 9, 2, 2)],
     ids=["inside", "to the rim", "right through"],
 )
-def test_cuts(low, high, added, loops, parts):
+def test_cuts_add_vertices_loops_and_parts(low, high, added, loops, parts):
     whole = sheet()
     mesh = ms.meshes.cut(whole, midline(low, high))
     assert mesh.n_vertices == whole.n_vertices + added
@@ -220,7 +220,7 @@ def test_cuts(low, high, added, loops, parts):
     assert np.array_equal(mesh.rest_positions[mesh.faces], whole.rest_positions[whole.faces])
 
 
-def test_two_cuts_that_cross():
+def test_crossing_cuts_share_their_vertex():
     upright = sheet().edges_where(lambda p: (p[:, 0] == 2.0) & (p[:, 1] > 0.5) & (p[:, 1] < 1.5))
     mesh = ms.meshes.cut(sheet(), np.concatenate([midline(1.0, 3.0), upright]))
     assert (
@@ -278,7 +278,7 @@ def test_outline_with_a_hole(outline, scale, direction):
     ],
     ids=["straight", "bent", "to the rim", "through", "crossing", "two"],
 )
-def test_slits(outline, slits, loops, parts):
+def test_slits_open_boundary_loops(outline, slits, loops, parts):
     mesh = outline(SQUARE, slits=slits, size=0.08)
     assert (len(mesh.boundary_loops), mesh.n_components) == (loops, parts)
     assert mesh.face_areas.sum() == pytest.approx(1.0)

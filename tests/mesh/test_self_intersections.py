@@ -1,4 +1,4 @@
-"""Faces that pass through each other are found, each pair once; what only touches is not."""
+"""Faces that cross each other are found, each pair once; faces that only touch are not."""
 
 import time
 
@@ -20,7 +20,7 @@ def pairs(positions, faces=None):
 
 
 def parts(*meshes):
-    """One mesh of several, none of their vertices shared."""
+    """Build one mesh of several that share no vertices."""
     offsets = np.cumsum([0, *(mesh.n_vertices for mesh in meshes)])
     return ms.TriangleMesh(
         np.concatenate([mesh.rest_positions for mesh in meshes]),
@@ -29,7 +29,7 @@ def parts(*meshes):
 
 
 def upright(mesh, shift=(0.0, 0.0, 0.0)):
-    """(x, y, 0) put to (x, 0, y), moved by `shift`."""
+    """Return the mesh with (x, y, 0) mapped to (x, 0, y) and moved by `shift`."""
     return ms.TriangleMesh(mesh.rest_positions[:, [0, 2, 1]] + shift, mesh.faces)
 
 
@@ -38,13 +38,13 @@ def square(cells=4, **options):
 
 
 def curved(mesh, curve):
-    """The sheet with (x, y) put to (curve(x), y): a strip along a plane curve."""
+    """Return positions with (x, y) mapped to (curve(x), y): a strip along a plane curve."""
     along = np.array([curve(x) for x in mesh.rest_positions[:, 0]])
     return np.column_stack([along[:, 0], mesh.rest_positions[:, 1], along[:, 1]])
 
 
 def through(p, q, triangle):
-    """Whether the segment goes through the triangle: three unknowns, one linear system."""
+    """Return whether the segment intersects the triangle, by one linear system of three unknowns."""
     a, b, c = triangle
     matrix = np.column_stack([b - a, c - a, p - q])
     if abs(np.linalg.det(matrix)) < 1e-14:
@@ -54,7 +54,10 @@ def through(p, q, triangle):
 
 
 def by_trying_all(positions, faces):
-    """Edges that end in a common vertex meet the other face there, and nowhere else."""
+    """Find the intersections by testing all pairs.
+
+    Edges that end in a common vertex meet the other face there, and nowhere else.
+    """
     found = []
     for f, one in enumerate(faces.tolist()):
         for g, other in enumerate(faces[f + 1 :].tolist(), f + 1):
@@ -84,7 +87,7 @@ def test_loose_triangles_are_those_that_trying_all_finds(rng, offset):
 
 
 def test_a_crumpled_sheet_is_what_trying_all_finds(rng):
-    """Neighbours that share a vertex and cross beyond it are among them."""
+    """Include neighbours that share a vertex and cross beyond it."""
     mesh = square(7)
     crumpled = mesh.rest_positions + 0.15 * rng.standard_normal(mesh.rest_positions.shape)
     found = [tuple(pair) for pair in mesh.self_intersections(crumpled).tolist()]
@@ -93,7 +96,7 @@ def test_a_crumpled_sheet_is_what_trying_all_finds(rng):
     assert len(neighbours) > 10 and len(found) > len(neighbours) + 10
 
 
-def test_two_parts_that_cross():
+def test_crossing_parts_are_found():
     crossing = parts(square(), upright(square(), (0.013, 0.52, -0.46)))
     found = np.array(pairs(crossing))
     assert len(found) >= 8 and (found[:, 0] < 32).all() and (found[:, 1] >= 32).all()
@@ -103,7 +106,9 @@ def test_two_parts_that_cross():
 @pytest.mark.parametrize("turn", [np.eye(3), OBLIQUE], ids=["along the axes", "oblique"])
 @pytest.mark.parametrize("shift", [(0, 0.5, -0.5), (0.125, 0.5, -0.5), (0, 0.375, -0.5), (0.06, 0.5, -0.3)])
 def test_parts_that_cross_along_their_edges_and_vertices(turn, shift):
-    """No face goes through another's inside with more than a line: seen all the same, all along the line."""
+    """Check that the crossing is found all along its line, although no face crosses another's interior in more than
+    a line.
+    """
     grid = square()
     crossing = parts(grid, upright(grid, shift)).transformed(rotation=turn)
     found = pairs(crossing)
@@ -114,7 +119,7 @@ def test_parts_that_cross_along_their_edges_and_vertices(turn, shift):
 
 
 def loop(x):
-    """A curve that crosses itself once, as a strip does that is bent beyond a circle."""
+    """Return a point of a curve that crosses itself once, like a strip bent beyond a circle."""
     angle = 1.5 * np.pi * (2 * x - 1)
     return np.array([np.sin(angle) + 0.2 * angle, np.cos(angle)])
 
@@ -131,7 +136,7 @@ def test_a_sheet_folded_through_itself(cells):
 
 
 def test_neighbours_that_pass_through_each_other():
-    """Two faces of one vertex, beyond it; a fan that is twisted until its faces cross."""
+    """Check two faces that cross beyond their common vertex, and a fan that is twisted until its faces cross."""
     positions = [[0, 0, 0], [1, -0.5, 0], [1, 0.5, 0], [1, 0, -0.5], [1, 0.1, 0.5]]
     assert pairs([*positions[:3], [1.2, 0, -0.5], [1.2, 0.1, 0.5]], [[0, 1, 2], [0, 3, 4]]) == [(0, 1)]
     assert pairs([*positions[:3], [1.2, 0.7, -0.5], [1.2, 0.7, 0.5]], [[0, 1, 2], [0, 3, 4]]) == []
@@ -141,7 +146,7 @@ def test_neighbours_that_pass_through_each_other():
 
 
 def folded(mesh, gap=0.0):
-    """The right half laid on the left one."""
+    """Return positions with the right half laid on the left one."""
     positions = mesh.rest_positions.copy()
     right = positions[:, 0] > 0.5
     positions[right, 0] = 1.0 - positions[right, 0]
@@ -166,7 +171,7 @@ TOUCHING = {
 
 @pytest.mark.parametrize("turn", [np.eye(3), OBLIQUE], ids=["along the axes", "oblique"])
 @pytest.mark.parametrize("name", TOUCHING)
-def test_what_only_touches_is_not_passing_through(name, turn):
+def test_touching_faces_are_not_reported(name, turn):
     assert pairs(TOUCHING[name]().transformed(rotation=turn)) == []
 
 
@@ -178,7 +183,7 @@ def test_a_sheet_folded_flat_on_itself_only_touches(gap, turn):
 
 
 def test_a_sheet_folded_to_the_other_side_and_through():
-    """Folded over and down again through the half below, by more than round-off."""
+    """Check a sheet folded over, and then down through the half below, by more than round-off."""
     mesh = square(8)
     positions = folded(mesh, 1e-3)
     positions[mesh.rest_positions[:, 0] > 0.8, 2] = -1e-3
@@ -200,7 +205,7 @@ def test_an_ordinary_sheet_does_not(shape, irregular):
 
 
 def test_a_large_sheet_takes_little_time():
-    """Some 1 us a face is measured; 20 is a machine that does much else, and far below what all pairs take."""
+    """Limit the time to 20 us a face: about 1 is measured, and testing all pairs takes far longer."""
     mesh = square(256)
     mesh.edges  # noqa: B018 - found when the mesh is made
     began = time.process_time()
@@ -244,7 +249,7 @@ def test_a_motion_tells_and_prints():
     assert len(flat.self_intersections()) == 0 and "does not pass through itself in any state" in repr(flat)
 
 
-def test_what_costs_much_is_not_done_unasked(monkeypatch):
+def test_expensive_checks_need_a_request(monkeypatch):
     mesh = square()
     states = np.stack([mesh.rest_positions] * 3)
     assert crossings.describe_self_intersections(mesh, states) == "does not pass through itself in any state"

@@ -37,7 +37,9 @@ def gradient(shape, points, step=1e-6):
 
 @pytest.mark.parametrize("name", [*PRIMITIVES, *MOVED])
 def test_distance_is_exact(name):
-    """A function whose gradient has length one, and which is zero on its surface only, is the distance to it."""
+    """Check by the eikonal property: a function with a unit gradient that is zero only on its surface is the
+    distance to it.
+    """
     shape = {**PRIMITIVES, **MOVED}[name]
     distance, slope = shape(POINTS), gradient(shape, POINTS)
     feet = POINTS - distance[:, None] * slope
@@ -147,7 +149,7 @@ def test_points_of_any_leading_shape():
         (lambda: S.ball(1)([1, 2]), r"points \[m\] must have shape"),
     ],
 )
-def test_what_is_refused(make, message):
+def test_bad_shapes_are_refused(make, message):
     with pytest.raises(ValueError, match=message):
         make()
 

@@ -1,4 +1,6 @@
-"""QuadraticTriangleMesh.fitted: middle nodes on a smooth surface through a finer mesh's vertices, and what is refused."""
+"""Tests of QuadraticTriangleMesh.fitted: middle nodes on a smooth surface through a finer mesh's vertices, and
+refusals.
+"""
 
 import numpy as np
 import pytest
@@ -17,7 +19,7 @@ def strip(n: int) -> ms.TriangleMesh:
 
 @pytest.mark.parametrize("fine, error", [(4, 1e-3), (8, 1e-5), (32, 1e-8)])
 def test_the_finer_the_nearer(fine, error):
-    """Border and inside; straight elements are 8e-3 off."""
+    """Measure border and interior; straight elements are 8e-3 off."""
     assert on_cylinder(ms.QuadraticTriangleMesh.from_triangles(strip(4))) > 7e-3
     fitted = ms.QuadraticTriangleMesh.fitted(strip(4), to=strip(fine))
     assert on_cylinder(fitted) < error
@@ -47,7 +49,7 @@ def test_a_rim_is_bent_in_its_plane():
     assert np.abs(rim - 1.0).max() < 1e-5 and np.abs(disk.rest_positions[:, 2]).max() == 0.0
 
 
-def test_two_sheets_close_together_are_told_apart():
+def test_close_parallel_sheets_are_distinguished():
     outer = strip(16)
     inner = outer.flipped()
     inner = ms.TriangleMesh(inner.rest_positions * [0.99, 1, 0.99], inner.faces)
@@ -59,7 +61,7 @@ def test_two_sheets_close_together_are_told_apart():
 
 
 def test_the_roof_on_a_fitted_mesh():
-    """B1: as good as on the cylinder itself, where straight elements are far off."""
+    """Compare case B1 with the mesh on the cylinder itself; straight elements are far off."""
     size = linear_cylinders.ROOF_RADIUS, linear_cylinders.ROOF_LENGTH / 2
     span = (0.0, linear_cylinders.ROOF_HALF_ANGLE)
     flat, fine = (ms.meshes.cylinder(*size, span, cells=(n, n)) for n in (8, 32))
@@ -74,7 +76,7 @@ def test_the_roof_on_a_fitted_mesh():
     assert abs(sinks(ms.QuadraticTriangleMesh.from_triangles(flat)) / exact - 1.0) > 1e-3
 
 
-def test_what_is_refused():
+def test_unsuitable_meshes_are_refused():
     with pytest.raises(ValueError, match="to folds by 45 degrees at its edge"):
         ms.QuadraticTriangleMesh.fitted(strip(4), to=ms.meshes.cylinder(1.0, 1.0, cells=(8, 2)))
     with pytest.raises(ValueError, match="border of to has no vertex at"):

@@ -1,4 +1,4 @@
-"""Meshes of six-node triangles: what they are made of, how they are made, and what is refused."""
+"""Tests of second-order triangle meshes: topology, construction, refusals."""
 
 import pickle
 
@@ -41,7 +41,7 @@ def test_rims_are_arcs_and_the_inside_is_straight(name, make, area):
     assert np.abs(mesh.rest_positions[mesh.edge_nodes] - middles)[inside].max() < 1e-15
 
 
-def test_what_it_is_made_of():
+def test_second_order_mesh_has_its_elements_and_faces():
     mesh = ms.meshes.rectangle(2.0, 1.0, cells=(2, 1), order=2)
     assert mesh.order == 2 and mesh.elements.shape == (4, 6) and mesh.faces.shape == (16, 3)
     assert mesh.face_areas.sum() == pytest.approx(2.0) and mesh.element_areas == pytest.approx(0.5)
@@ -163,7 +163,7 @@ BAD = [
 
 
 @pytest.mark.parametrize("message, make", BAD, ids=[message for message, _ in BAD])
-def test_is_refused(message, make):
+def test_bad_arrays_are_refused(message, make):
     with pytest.raises(ValueError, match=message):
         ms.QuadraticTriangleMesh(*make())
 
@@ -192,7 +192,7 @@ def test_files_keep_the_curved_elements(tmp_path):
 
 
 def test_gmsh_meshes_of_second_order(tmp_path):
-    """A disk by gmsh's own geometry, whose nodes between corners lie on the circle."""
+    """Read a disk of gmsh's own geometry, whose mid-edge nodes lie on the circle."""
     pytest.importorskip("meshio")
     gmsh = pytest.importorskip("gmsh")
     gmsh.initialize(interruptible=False)

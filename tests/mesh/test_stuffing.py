@@ -1,4 +1,4 @@
-"""Solids from signed distances: the angles that are promised, the surface, the volume; and what is refused."""
+"""Solids from signed distances: the guaranteed angles, the surface, the volume; and refusals."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def assert_within_bounds(quality):
 
 
 class Corners:
-    """What TetQuality looks at."""
+    """A minimal mesh for TetQuality: points and corners."""
 
     def __init__(self, points, tetrahedra):
         self.rest_positions, self.corners = points, tetrahedra
@@ -44,7 +44,7 @@ class Corners:
 
 @pytest.mark.parametrize("seed", range(30))
 def test_angles_in_a_lattice_of_random_signs_and_cuts(seed):
-    """No shape is as wild: every combination of signs, with cuts at, before and behind where they move a point."""
+    """Test all combinations of signs, with cuts at, before and behind the place where they move a point."""
     rng = np.random.default_rng(seed)
     share = rng.uniform(0.1, 0.9)
     lattice = lattice_inside(
@@ -113,7 +113,9 @@ def test_random_shapes_keep_the_angles_and_have_a_manifold_surface(seed):
 
 
 def test_surface_where_shapes_meet_in_a_point_or_an_edge():
-    """Lattice points move onto the place where two solids touch, and would hold both by a thread."""
+    """Test lattice points that move onto the contact of two solids, which would then be connected by a vertex or an
+    edge.
+    """
     for spacing in (0.2, 0.23, 0.25, 0.31):
         touching = (
             S.box((1.0, 1.0, 1.0))
@@ -130,7 +132,7 @@ def test_surface_where_shapes_meet_in_a_point_or_an_edge():
 
 
 def test_the_repair_is_needed_and_works():
-    """This spacing makes an edge of the hand's surface meet itself at first."""
+    """Use a spacing at which an edge of the hand's surface first has more than two faces."""
     low, high = HAND.bounds
     counts = np.ceil((high - low) / 0.0055).astype(int) + 2
     lattice = lattice_inside(HAND, 0.5 * (low + high) - 0.5 * 0.0055 * counts, counts, 0.0055)
@@ -251,7 +253,7 @@ def test_any_function_and_obstacles():
         ({"shape": S.half_space((0, 0, 1)), "bounds": None}, "is unbounded: give bounds"),
     ],
 )
-def test_what_is_refused(arguments, message):
+def test_bad_arguments_are_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
         ms.meshes.from_distance(
             **{
@@ -280,7 +282,7 @@ BALLS = shapes.ball(1.0) | shapes.ball(1.0, center=(3, 0, 0))
         (shapes.box((1, 1, 0.2)), 300, "440 tetrahedra are the nearest to the 300 asked for"),
     ],
 )
-def test_what_is_lost_is_told(shape, given, said):
+def test_lost_features_give_a_warning(shape, given, said):
     how = {"n_tetrahedra": given} if isinstance(given, int) else {"spacing": given}
     with pytest.warns(ms.MeshQualityWarning, match=said):
         ms.meshes.from_distance(shape, **how)
@@ -296,6 +298,6 @@ def test_what_is_lost_is_told(shape, given, said):
         (BALLS, 0.35),
     ],
 )
-def test_what_is_whole_is_not_warned_of(shape, spacing, recwarn):
+def test_complete_shapes_give_no_warning(shape, spacing, recwarn):
     ms.meshes.from_distance(shape, spacing)
     assert not recwarn.list

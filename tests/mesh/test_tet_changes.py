@@ -1,4 +1,4 @@
-"""Meshes of tetrahedra from others: repaired, of another order, divided, moved, welded."""
+"""Tests of tetrahedral meshes derived from others: repaired, of another order, refined, moved, welded."""
 
 import numpy as np
 import pytest
@@ -48,7 +48,7 @@ def test_mended_ten_nodes_and_parts():
     assert repaired.mesh.part_names == {"last": 159}
 
 
-def test_nothing_to_mend():
+def test_repair_of_a_good_mesh_changes_nothing():
     repaired = ms.TetMesh.repaired(BLOCK.rest_positions, BLOCK.tetrahedra)
     assert str(repaired.report) == "nothing to repair"
     assert np.array_equal(repaired.mesh.tetrahedra, BLOCK.tetrahedra)
@@ -72,7 +72,7 @@ def test_merging_drops_what_collapses():
         ({"parts": [1, 2]}, r"parts must have shape"),
     ],
 )
-def test_what_cannot_be_mended(arguments, message):
+def test_irreparable_meshes_are_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
         ms.TetMesh.repaired(**{"rest_positions": CORNERS, "tetrahedra": [[0, 1, 2, 3]], **arguments})
 
@@ -182,13 +182,13 @@ CUBE = ms.meshes.box((1.0, 1.0, 1.0), cells=(2, 2, 2))
         ([CUBE.with_parts(None, names={"a": 1})], "part 'a' is number 0 in one mesh and 1 in mesh 1"),
     ],
 )
-def test_what_does_not_weld(others, message):
+def test_bad_welds_are_refused(others, message):
     with pytest.raises(ValueError, match=message):
         ms.weld(CUBE.with_parts(None, names={"a": 0}), *others)
 
 
 def test_a_hanging_vertex_does_not_weld():
-    """The solids share the face (0, 1, 2); beside it, a vertex of the second lies on a face of the first."""
+    """Test solids that share the face (0, 1, 2), where a vertex of the second lies on another face of the first."""
     square = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
     above = np.concatenate([square, [[0.5, 0.5, 1]]])
     below = np.concatenate([square[:3], [[0.6, 0.7, 0]], [[0.5, 0.5, -1]]])

@@ -1,4 +1,4 @@
-"""Generators of solids: topology, volumes, orientation, curved elements; and what they refuse."""
+"""Generators of solids: topology, volumes, orientation, curved elements; and refusals."""
 
 import math
 import sys
@@ -114,7 +114,7 @@ def test_a_box_is_its_own_mirror_image(diagonals):
     ],
 )
 def test_no_corner_is_cut_off_by_one_tetrahedron(mesh):
-    """It would have all its faces but one on the surface, and lock where that is held."""
+    """Check that no tetrahedron has three faces on the surface; it would lock where they are held."""
     outside = np.bincount(mesh.face_tetrahedra, minlength=mesh.n_tetrahedra)
     assert outside.max() <= 2
 
@@ -175,7 +175,7 @@ def test_quarter_tube_lies_between_its_planes():
         ),
     ],
 )
-def test_what_is_refused(make, message):
+def test_bad_arguments_are_refused(make, message):
     with pytest.raises(ValueError, match=message):
         make()
 
@@ -229,7 +229,7 @@ def test_tetrahedralized_pieces_and_chambers():
         ms.meshes.tetrahedralize(several(outer, inner))
 
 
-def test_without_gmsh(monkeypatch):
+def test_missing_gmsh_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "gmsh", None)
     with pytest.raises(ImportError, match=r'pip install "magshell\[gmsh\]"'):
         ms.meshes.tetrahedralize(ms.meshes.ball(1.0, 2).surface)

@@ -1,4 +1,4 @@
-"""Files of tetrahedra: read as others write them, written and read back with fields and parts, and what is refused."""
+"""Files of tetrahedra: read as others write them, written and read back with fields and parts, and refusals."""
 
 import numpy as np
 import pytest
@@ -56,7 +56,7 @@ def test_written_and_read_back(tmp_path, mesh):
             assert np.array_equal(found[name], values)
 
 
-def test_one_part_writes_no_field(tmp_path):
+def test_single_part_writes_no_field(tmp_path):
     ms.write_mesh(tmp_path / "solid.vtu", LINEAR)
     assert ms.read_fields(tmp_path / "solid.vtu") == ({}, {})
     assert not ms.read_mesh(tmp_path / "solid.vtu").parts.any()
@@ -65,7 +65,7 @@ def test_one_part_writes_no_field(tmp_path):
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("version", [2.2, 4.1])
 def test_gmsh_with_physical_groups(tmp_path, order, version):
-    """As gmsh itself writes it: in its own order of nodes, with the surface, lines and points beside the solid."""
+    """Read a file by gmsh itself: its order of nodes, with the surface, lines and points as well as the solid."""
     gmsh = pytest.importorskip("gmsh", exc_type=ImportError)
     path = tmp_path / "two.msh"
     gmsh.initialize(interruptible=False)
@@ -95,7 +95,7 @@ def test_gmsh_with_physical_groups(tmp_path, order, version):
         )
 
 
-def test_unused_points(tmp_path):
+def test_unused_points_are_dropped_with_their_fields(tmp_path):
     path = tmp_path / "solid.vtu"
     points = np.concatenate([LINEAR.rest_positions, [[1.0, 1, 1]]])
     values = np.arange(len(points))
@@ -162,7 +162,7 @@ def test_files_of_something_else(tmp_path, cells, data, message):
         ("a.vtu", LINEAR, {"positions": np.zeros((3, 3))}, r"positions \[m\] must have shape"),
     ],
 )
-def test_what_cannot_be_written(tmp_path, name, mesh, arguments, message):
+def test_impossible_files_are_refused(tmp_path, name, mesh, arguments, message):
     with pytest.raises(ValueError, match=message):
         ms.write_mesh(tmp_path / name, mesh, **arguments)
     assert not (tmp_path / name).exists()

@@ -1,4 +1,4 @@
-"""Meshes of tetrahedra: what they know of themselves, what they refuse, and selection."""
+"""Tests of tetrahedral meshes: topology and measures, refusals, selection."""
 
 import copy
 import pickle
@@ -14,7 +14,7 @@ import magshell as ms
 
 
 def ten(move=(), order=range(10)):
-    """One tetrahedron of ten nodes, some of them moved: {node: by}."""
+    """Build one tetrahedron of ten nodes, some of them displaced: {node: displacement}."""
     mesh = one().second_order()
     positions = np.array(mesh.rest_positions)
     for node, by in dict(move).items():
@@ -23,7 +23,7 @@ def ten(move=(), order=range(10)):
 
 
 def sharing(*others):
-    """Tetrahedra that have the given corners in common, alone."""
+    """Build tetrahedra that have only the given corners in common."""
     points, tetrahedra = list(CORNERS), [[0, 1, 2, 3]]
     for shared, away in others:
         new = []
@@ -164,7 +164,7 @@ def shared_middle():
 
 
 @pytest.mark.parametrize(("make", "message"), [row[1:] for row in REFUSED], ids=[row[0] for row in REFUSED])
-def test_what_is_no_mesh_is_refused(make, message):
+def test_bad_arrays_are_refused(make, message):
     with pytest.raises(ValueError, match=message):
         make()
 
@@ -202,7 +202,7 @@ def test_edges_and_boundary():
 
 
 def test_volume_of_curved_tetrahedra_is_exact():
-    """Of a map x + a quadratic whose Jacobian is known."""
+    """Use a map x + a quadratic whose Jacobian is known."""
     mesh = ms.meshes.box((1.0, 1.0, 1.0), cells=(1, 1, 1), order=2)
     x, y, z = mesh.rest_positions.T
     bent = ms.TetMesh(np.stack([x + 0.3 * x**2, y + 0.2 * x * z, z + 0.1 * z * z], axis=1), mesh.tetrahedra)
@@ -212,7 +212,7 @@ def test_volume_of_curved_tetrahedra_is_exact():
 @settings(max_examples=60, deadline=None)
 @given(st.integers(0, 10**6), st.floats(0.0, 0.5))
 def test_no_inverted_point_goes_unnoticed(seed, amount):
-    """Whatever the middle nodes do: a mesh that is taken has a positive Jacobian everywhere."""
+    """Check that a mesh that is accepted has a positive Jacobian everywhere, wherever its mid-edge nodes are."""
     from magshell.mesh.tetrahedra.jacobian import _gradients
 
     rng = np.random.default_rng(seed)
@@ -242,7 +242,7 @@ def test_immutable_copies_and_pickles():
         assert other.part_names == mesh.part_names
 
 
-def test_printed():
+def test_repr_describes_the_mesh():
     assert re.match(
         r"TetMesh: 36 vertices, 72 tetrahedra of four nodes, 64 faces on the surface\n"
         r"  size: 3 x 2 x 1 m, volume 6 m3, surface 22 m2\n  shape: 1 piece, 1 part\n  tetrahedra: edges 0.5 to 1.5 m",

@@ -1,4 +1,4 @@
-"""Welding: what joins, what is refused, and where everything went."""
+"""Tests of welding: joints, refusals, and the maps of vertices and faces."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def test_slits_stay_open():
 
 
 def crooked():
-    """The unit square, one vertex of its left side moved along that side."""
+    """Build the unit square, one vertex of its left side moved along that side."""
     positions = UNIT.rest_positions.copy()
     positions[2, 1] += 0.05
     return ms.TriangleMesh(positions, UNIT.faces)
@@ -79,6 +79,6 @@ TO_THE_RIM = ms.meshes.cut(UNIT, UNIT.edges_where(lambda p: (p[:, 1] == 0.5) & (
         ),
     ],
 )
-def test_refusals(parts, options, message):
+def test_bad_welds_are_refused(parts, options, message):
     with pytest.raises(ValueError, match=message):
         ms.weld(*parts, **options)

@@ -28,7 +28,7 @@ MOTION = ms.simulate(SCENE, steps=3, time_step=1e-2, progress=False)
     ],
     ids=lambda what: type(what).__name__,
 )
-def test_plot(what) -> None:
+def test_plot_method_equals_the_function(what) -> None:
     found, wanted = (each._repr_png_(60) for each in (what.plot(style=PLAIN), ms.plot(what, style=PLAIN)))
     assert found == wanted and len(found) > 2000
 

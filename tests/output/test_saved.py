@@ -1,4 +1,4 @@
-"""Results that were saved, pickled or copied are the same: numbers, what follows from them, what goes on from them."""
+"""Equality of results after saving, pickling or copying: their numbers and all derived values."""
 
 import copy
 import json
@@ -23,7 +23,7 @@ def strip(**options):
 
 
 def same(one, other):
-    """Whether two values are the same to the bit, NaN too."""
+    """Return whether two values are equal to the bit, including NaN."""
     if isinstance(one, dict):
         return one.keys() == other.keys() and all(same(one[key], other[key]) for key in one)
     if isinstance(one, list | tuple):
@@ -32,7 +32,7 @@ def same(one, other):
 
 
 def facts(result):
-    """What a result says, apart from its arrays."""
+    """Return the properties of a result, apart from its arrays."""
     found = [repr(result), result.positions, result.edge_rotations]
     if isinstance(result, ms.EquilibriumSet):
         return [*found, *(facts(case) for case in result)]
@@ -130,7 +130,7 @@ def test_numpy_reads_the_file(tmp_path):
         assert same(file["energies.bending"], move.energies["bending"])
 
 
-def test_another_process_makes_the_scene_and_loads(tmp_path):
+def test_results_load_in_another_process(tmp_path):
     script = tmp_path / "scene.py"
     script.write_text(
         "import sys, numpy as np, magshell as ms\n"
@@ -168,7 +168,7 @@ def test_a_file_of_another_scene_is_refused(tmp_path):
 
 
 def changed(path, change):
-    """The file with its text or its arrays changed."""
+    """Write the file with its text or its arrays changed."""
     with np.load(path) as file:
         arrays = dict(file)
     known = json.loads(arrays["contents"].tobytes())
@@ -200,7 +200,7 @@ def test_a_broken_file_is_refused(change, message, tmp_path):
         ms.load(path, scene)
 
 
-def test_what_is_no_file_of_results(tmp_path):
+def test_load_refuses_other_files(tmp_path):
     scene = strip()
     (tmp_path / "text.npz").write_text("hello")
     np.savez(tmp_path / "arrays.npz", positions=np.zeros(3))
@@ -216,7 +216,7 @@ def test_what_is_no_file_of_results(tmp_path):
         ms.save(tmp_path / "list.npz", [1, 2])
 
 
-def test_what_has_no_digest_is_refused_before_a_file_is_there(tmp_path):
+def test_scene_without_a_digest_is_refused_before_writing(tmp_path):
     import threading
 
     class Locked:

@@ -1,4 +1,4 @@
-"""A series holds every state with its time and its fields; what stops the writing leaves whole files and their list."""
+"""Series of files: every state with its time and fields; an interrupted write leaves complete files and their list."""
 
 import errno
 import xml.etree.ElementTree as ET
@@ -87,7 +87,7 @@ def test_a_shorter_series_replaces_a_longer_one(move, tmp_path) -> None:
 
 
 @pytest.mark.parametrize("reason", [OSError(errno.ENOSPC, "No space left on device"), KeyboardInterrupt()])
-def test_what_was_written_before_an_error_is_listed(move, tmp_path, monkeypatch, reason) -> None:
+def test_states_written_before_an_error_are_listed(move, tmp_path, monkeypatch, reason) -> None:
     write, written = meshio.vtu.write, []
 
     def until_the_fourth(path, content) -> None:

@@ -25,7 +25,7 @@ def results():
 @pytest.mark.parametrize(
     "name, along", [("rest", ()), ("cases", ("case",)), ("path", ("parameter",)), ("move", ("time",))]
 )
-def test_xarray(name, along, results):
+def test_xarray_has_labels_and_units(name, along, results):
     pytest.importorskip("xarray")
     result = results[name]
     table = ms.to_xarray(result)
@@ -43,7 +43,7 @@ def test_xarray(name, along, results):
         assert table.membrane_energy.values.tolist() == [case.energies["membrane"] for case in result]
 
 
-def test_pandas(results):
+def test_pandas_has_times_and_vertices(results):
     pytest.importorskip("pandas")
     move = results["move"]
     states, vertices = ms.to_pandas(move), ms.to_pandas(move, per="vertex")
@@ -55,7 +55,7 @@ def test_pandas(results):
     assert ms.to_pandas(results["path"]).index.name == "parameter"
 
 
-def test_tensors(results):
+def test_tensors_become_arrays_in_tables(results):
     torch = pytest.importorskip("torch")
     pytest.importorskip("xarray")
     strength = torch.tensor([4e4, 0, 0], dtype=torch.float64, requires_grad=True)
@@ -63,7 +63,7 @@ def test_tensors(results):
     np.testing.assert_array_equal(ms.to_xarray(rest).positions, results["rest"].positions)
 
 
-def test_bad_input(results, monkeypatch):
+def test_bad_input_is_refused(results, monkeypatch):
     with pytest.raises(
         ValueError,
         match=r"result must be an Equilibrium, EquilibriumSet, an EquilibriumPath or a Trajectory, got Scene",

@@ -21,7 +21,7 @@ def area(points, faces):
 
 
 def volume(mesh):
-    """Of a closed surface, m3; positive where its normals look out of it."""
+    """Return the volume of a closed surface, m3; positive where its normals point outwards."""
     x0, x1, x2 = np.moveaxis(mesh.rest_positions[mesh.faces], 1, 0)
     return float((x0 * np.cross(x1, x2)).sum() / 6.0)
 
@@ -116,7 +116,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("change, message", BAD.values(), ids=BAD)
-def test_bad_input(change, message, tmp_path):
+def test_bad_input_is_refused(change, message, tmp_path):
     arguments = {"path": "a.stl", "what": MESH, **change}
     with pytest.raises(ValueError, match=message):
         ms.write_surface(tmp_path / arguments.pop("path"), **arguments)

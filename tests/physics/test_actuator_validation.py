@@ -10,7 +10,9 @@ import magshell as ms
 def tube_as_cavity(
     material: str, inside: dict, cells=(4, 16, 1), **moduli
 ) -> tuple[ms.Equilibrium, np.ndarray, ms.Cavity]:
-    """All of a ring in plane strain with lids over its two rims: (rest, inner and outer radius, cavity)."""
+    """Solve a ring in plane strain with lids over its two rims; return (equilibrium, inner and outer radius,
+    cavity).
+    """
     mesh = ms.meshes.tube(1.0, 2.0, 0.5, cells=cells, order=2)
     density = ms.StableNeoHookean if material == "stable" else lambda **own: ms.NeoHookean(material, **own)
     solid = ms.Solid(mesh, material=density(**moduli))
@@ -43,7 +45,7 @@ def test_t9a_tube_as_a_cavity(case):
 
 @pytest.mark.parametrize("case", [*INCOMPRESSIBLE, LARGEST], ids=lambda case: f"{case[1]}")
 def test_t9a_incompressible_tube_filled_with_liquid(case):
-    """The volume is prescribed, all of it in one call, and the pressure is the result, also where it hardly rises."""
+    """Prescribe the volume, all of it in one call; the pressure is the result, also where it hardly rises."""
     pressure, inner, outer, _ = case
     rest, radii, cavity = tube_as_cavity(
         "isochoric",
@@ -66,9 +68,11 @@ BILAYERS = [
 
 
 def bilayer_of_cells(ratio: float, moduli: float, mismatch: float) -> float:
-    """Its curvature times its thickness. The volumetric energies of isochoric material and of cells add up to one about a
-    volume of (1 + mismatch)^3, with a Poisson's ratio of 0: the layer wants to be so much longer each way, free of stress.
-    Half the strip's length, and half its width."""
+    """Return curvature times thickness of half the length and half the width of the strip.
+
+    The volumetric energies of isochoric material and of cells add up to one about a volume of (1 + mismatch)^3, with a
+    Poisson's ratio of 0: the stress-free length of the layer is larger by that factor in each direction.
+    """
     layers = {1.0: 4, 0.5: 3, 0.2: 6}[ratio]
     half = ms.meshes.box(
         (10.0, 0.25, 1.0), cells=(20, 1, layers), diagonals="crossed" if layers % 2 == 0 else "alternating"
@@ -112,8 +116,11 @@ def bilayer_of_cells(ratio: float, moduli: float, mismatch: float) -> float:
 
 @pytest.mark.parametrize("case", BILAYERS, ids=str)
 def test_p3_bilayer_with_a_layer_of_cells_that_swells(case):
-    """Timoshenko's curvature is that of small strains: what is off, up to 1.34 % of it at a mismatch of 1 % on any mesh, is
-    in proportion to the mismatch, and without it less than 0.4 %."""
+    """Extrapolate to small strains, for which Timoshenko's curvature is exact.
+
+    The error, up to 1.34 % at a mismatch of 1 % on any mesh, is proportional to the mismatch; without it, it is
+    below 0.4 %.
+    """
     ratio, moduli, curvature = case
     full, half = (bilayer_of_cells(ratio, moduli, mismatch) for mismatch in (0.01, 0.005))
     assert full == pytest.approx(curvature, rel=0.014 if moduli == 4.0 else 0.01)
@@ -121,7 +128,7 @@ def test_p3_bilayer_with_a_layer_of_cells_that_swells(case):
 
 
 def test_a_free_block_of_cells_rests_at_their_volume():
-    """P3's note: free of stress, its edges the cube root of the target."""
+    """Check case P3: free of stress, its edges are the cube root of the target."""
     block = ms.meshes.box((1, 1, 1), cells=(1, 1, 1))
     solid = ms.Solid(block, material=ms.NeoHookean("isochoric", young_modulus=1.0, poisson_ratio=-0.9))
     bulk = 1.0 / (3 * (1 + 1.8))

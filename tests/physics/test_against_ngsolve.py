@@ -1,7 +1,4 @@
-"""Second-order shells beside NGSolve's of order 2 with Regge's elements of order 1: the same to round-off.
-
-An extra: NGSolve is not among what the tests need (pip install "magshell[ngsolve]", and run this file).
-"""
+"""Second-order shells compared with NGSolve's of order 2 with Regge's elements of order 1: the same to round-off."""
 
 import numpy as np
 import pytest
@@ -17,7 +14,7 @@ from benchmarks.baselines.ngsolve_mesh import netgen_mesh  # noqa: E402
 @pytest.mark.parametrize("support", ["supported", "clamped"])
 @pytest.mark.parametrize("cells", [2, 4, 8])
 def test_plate_under_pressure(cells, support):
-    """B5, to first order: a quarter of it, irregular, graded."""
+    """Compare case B5, to first order: a quarter of it, irregular, graded."""
     flat = plates.graded_quarter((cells, cells), irregular=0.25)
     mesh = ms.QuadraticTriangleMesh.from_triangles(flat)
     nu = plates.POISSON_RATIO
@@ -37,8 +34,10 @@ def test_plate_under_pressure(cells, support):
 
 
 @pytest.mark.parametrize("cells", [4, 6, 8])
-def test_curved_roof(cells):
-    """B1, to first order: all displacements of an irregular quarter of it, on curved elements of one shape."""
+def test_curved_roof_equals_ngsolve(cells):
+    """Compare case B1, to first order: all displacements of an irregular quarter of it, on curved elements of the
+    same shape.
+    """
     span = (0.0, linear_cylinders.ROOF_HALF_ANGLE)
     mesh = ms.meshes.cylinder(
         linear_cylinders.ROOF_RADIUS,
@@ -54,8 +53,8 @@ def test_curved_roof(cells):
 
 
 @pytest.mark.parametrize("cells", [(5, 1), (6, 2), (8, 2)])
-def test_sheared_strip(cells):
-    """A1 at its full load, through large rotations; NGSolve integrates by the same points."""
+def test_sheared_strip_equals_ngsolve(cells):
+    """Compare case A1 at its full load, through large rotations; NGSolve integrates by the same points."""
     length, force = shear_strip.LENGTH, shear_strip.FULL_LOAD
     flat = shear_strip.strip(cells, "midedge")
     mesh = ms.QuadraticTriangleMesh.from_triangles(flat)
@@ -65,8 +64,8 @@ def test_sheared_strip(cells):
     other = netgen_mesh(flat, names)
     material = ngsolve_linear.Material(shear_strip.THICKNESS, shear_strip.YOUNG_MODULUS, 0.0)
 
-    def pull(share, u, _):
-        return -share * force * u[2] * ng.ds(definedon=other.BBoundaries("right"))
+    def pull(factor, u, _):
+        return -factor * force * u[2] * ng.ds(definedon=other.BBoundaries("right"))
 
     theirs = ngsolve_strips.strip(other, 2, material, pull, loads=10, tolerance=1e-22).displacements
     assert found == pytest.approx(theirs, abs=1e-8)

@@ -15,7 +15,7 @@ def everywhere(body) -> np.ndarray:
 
 
 def flat(side, at=(0.0, 0.0, 0.0), cells=1, **given) -> ms.Shell:
-    """A square around `at`, to be held: a floor."""
+    """Build a square around `at`, to be held: a floor."""
     mesh = ms.meshes.rectangle(side, side, cells=(cells, cells))
     return ms.Shell(
         mesh.transformed(translation=np.asarray(at) - (side / 2, side / 2, 0.0)), **{**RIGID, **given}
@@ -32,7 +32,7 @@ SQUEEZED = {0.05: 0.02058275337, 0.1: 0.06157763805, 0.3: 0.4067555698}
 
 
 def octant(cells: int) -> ms.TetMesh:
-    """An eighth of the unit ball, of ten nodes, out of a cube: cells are smaller towards the z axis."""
+    """Build an eighth of the unit ball, of ten nodes, from a cube; cells are smaller towards the z axis."""
     cube = ms.meshes.box((1, 1, 1), cells=(cells, cells, cells), diagonals="aligned")
     x = cube.rest_positions.copy()
     x[:, :2] **= 2.2
@@ -44,7 +44,7 @@ def octant(cells: int) -> ms.TetMesh:
 
 
 def squeeze_force(cells: int, advance: float, reach=1e-3) -> float:
-    """On a ball of radius 1 and modulus 1. What is left between ball and plate counts as ball."""
+    """Return the force on a ball of radius 1 and modulus 1; the gap between ball and plate counts as ball."""
     mesh = octant(cells)
     ball = ms.Solid(mesh, material=ms.NeoHookean("isochoric", young_modulus=1.0, poisson_ratio=0.45))
     plate = flat(3.0, (0.1, 0.2, 1 + reach))
@@ -57,7 +57,7 @@ def squeeze_force(cells: int, advance: float, reach=1e-3) -> float:
 
 @pytest.mark.parametrize("advance, cells", [(0.05, 6), (0.1, 6), (0.3, 6)])
 def test_ball_between_plates(advance, cells):
-    """F1a asks for 2 % on a surface of R / 20, which the mesh of six cells has at the pole."""
+    """Check case F1a: 2 % on a surface of size R / 20, which the mesh of six cells has at the pole."""
     assert squeeze_force(cells, advance) == pytest.approx(SQUEEZED[advance], rel=0.02)
 
 
@@ -68,7 +68,7 @@ UPRIGHT = np.array([[0, 0, 1.0], [0, 1.0, 0], [-1.0, 0, 0]])  # turns z to x
 
 
 def bar_and_wall(cells, gap, reach):
-    """The bar along x, a gap behind a wall at x = 0."""
+    """Build the bar along x, a gap behind a wall at x = 0."""
     mesh = ms.meshes.box((LENGTH, SIDE, SIDE), cells=(cells, 1, 1))
     mesh = mesh.transformed(translation=(gap, -SIDE / 2, -SIDE / 2))
     bar = ms.Solid(mesh, material=ms.NeoHookean(**BAR), mass_density=1e3, element="linear")
@@ -82,7 +82,7 @@ def bar_and_wall(cells, gap, reach):
 
 @pytest.mark.parametrize("cells, restitution", [(25, 0.94), (100, 0.98)])
 def test_bar_against_a_wall(cells, restitution):
-    """In touch for 2 L / c under the stress rho c v, whatever the time step; waves shorter than that are damped away."""
+    """Check contact for 2 L / c under the stress rho c v, whatever the time step; shorter waves are damped."""
     speed, reach = 0.1, 1e-4
     scene, bar, touch, forwards = bar_and_wall(cells, 2 * reach, reach)
     time_step = LENGTH / SOUND / cells
@@ -108,7 +108,7 @@ def test_bar_against_a_wall(cells, restitution):
 
 
 def center_after_impact(cells, speed, gap, reach):
-    """Of the bar, m, 0.4 s after it was thrown at the wall."""
+    """Return the center of the bar 0.4 s after it was thrown at the wall, m."""
     scene, bar, _, forwards = bar_and_wall(cells, 0.1, reach)
     forwards, mass = torch.tensor(forwards), torch.tensor(bar.vertex_masses)
     steps = round(0.4 * SOUND * cells / LENGTH)
@@ -125,14 +125,16 @@ def center_after_impact(cells, speed, gap, reach):
 
 
 def gradient_through_impact(cells, reach) -> list[float]:
-    """By the speed [s] and the gap [1]."""
+    """Return the gradient by the speed [s] and by the gap [1]."""
     given = [torch.tensor(value, dtype=torch.float64, requires_grad=True) for value in (0.5, 0.1)]
     center_after_impact(cells, *given, reach).backward()
     return [float(each.grad) for each in given]
 
 
 def test_gradient_through_an_impact():
-    """I3: T - 2 L / c by the speed, and -1 by the gap: what is nearer by a gap comes back by it."""
+    """Check case I3: T - 2 L / c by the speed, and -1 by the gap: a change of the gap changes the end by its
+    negative.
+    """
     by_speed, by_gap = gradient_through_impact(40, 1e-2)
     assert by_speed == pytest.approx(0.4 - 2 * LENGTH / SOUND, rel=0.03)
     assert by_gap == pytest.approx(-1.0, rel=0.03)
@@ -149,9 +151,9 @@ def test_gradient_through_an_impact_is_that_of_the_motion():
 
 
 def ball_on_a_slope(slope: float, friction: float):
-    """A rigid ball of 40 facets around, askew, let go; several of them touch at once.
+    """Simulate a rigid ball of 40 facets around, askew, released on a slope; several facets touch at once.
 
-    In time: speed, radius times turning [m/s], and the time [s].
+    Returns over time: speed, radius times angular velocity [m/s], and the time [s].
     """
     radius, distance = 0.05, 1e-3
     askew = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))[0]
@@ -187,7 +189,7 @@ def ball_on_a_slope(slope: float, friction: float):
     [(20, 0.2, 2.396584004, 2.396584004), (45, 0.2, 5.549374019, 3.468358762)],
 )
 def test_ball_on_a_slope_rolls_or_slides(slope, friction, acceleration, turning):
-    """F3a. It rattles over its facets, at each of which a touch of short reach takes energy as a polygon's would."""
+    """Compare the accelerations with case F3a; each impact of a facet dissipates energy as that of a polygon would."""
     speed, turned, time = ball_on_a_slope(np.radians(slope), friction)
     assert np.polyfit(time, speed, 1)[0] == pytest.approx(acceleration, rel=0.02)
     assert np.polyfit(time, turned, 1)[0] == pytest.approx(turning, rel=0.02)
@@ -203,7 +205,7 @@ WEIGHT = 1e3 * 0.05**3 * GRAVITY  # N, of a cube
 
 
 def test_stack_of_blocks():
-    """F4: what lies over each touch is what it bears, to the round-off of the solver."""
+    """Check case F4: each contact carries the weight above it, to the round-off of the solver."""
     ground = flat(0.2, (0.001, 0.002, -6e-4))
     blocks = [cube((1e-3 * (k % 2), 2e-3 * (k % 3), k * 0.0503)) for k in range(4)]
     below = [ground, *blocks]
@@ -228,7 +230,7 @@ STICKING = 5e-6  # m/s
 
 
 def slid(ground, slope, friction, lagged=False, speed=0.0, time=0.2) -> tuple[float, float]:
-    """A cube at rest on a plate or a larger cube, which gravity then pulls aside: speed at last [m/s] and acceleration."""
+    """Return the final speed [m/s] and acceleration of a cube on a plate or a larger cube, pulled aside by gravity."""
     base = flat(0.4, (0, 0, -5e-4)) if ground == "plate" else cube((-0.05, -0.05, -0.1), 1e9, side=0.1)
     block = cube((-0.024, -0.023, 2e-4))
     law = {"activation_distance": 2.5e-4, "contact_stiffness": 1e6}
@@ -267,8 +269,8 @@ LAGGED = pytest.mark.parametrize("lagged", [False, True], ids=["exact", "lagged"
 @GROUNDS
 @LAGGED
 @pytest.mark.parametrize("slope, friction, acceleration", [(20, 0.3, 0.5897022231), (30, 0.5, 0.6571453944)])
-def test_block_slides(ground, lagged, slope, friction, acceleration):
-    """F4, at 10 mm/s and faster."""
+def test_block_slides_above_the_friction_angle(ground, lagged, slope, friction, acceleration):
+    """Check case F4, at 10 mm/s and faster."""
     _, found = slid(ground, np.radians(slope), friction, lagged, speed=0.01)
     assert found == pytest.approx(acceleration, rel=5e-3)
 
@@ -276,8 +278,8 @@ def test_block_slides(ground, lagged, slope, friction, acceleration):
 @GROUNDS
 @LAGGED
 @pytest.mark.parametrize("slope, friction", [(20, 0.37), (30, 0.6)])
-def test_block_sticks(ground, lagged, slope, friction):
-    """F4: it creeps as slowly as documented, and by less than 1e-4 of its size a second."""
+def test_block_sticks_below_the_friction_angle(ground, lagged, slope, friction):
+    """Check case F4: it creeps as slowly as documented, and by less than 1e-4 of its size a second."""
     speed, _ = slid(ground, np.radians(slope), friction, lagged)
     share = np.tan(np.radians(slope)) / friction
     assert speed == pytest.approx(STICKING * (1 - np.sqrt(1 - share)), rel=0.01)

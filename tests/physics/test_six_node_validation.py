@@ -1,4 +1,4 @@
-"""Second-order shells against references: closed forms, series, and what other codes find in the limit."""
+"""Second-order shells against references: closed forms, series, and results of other codes."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,9 @@ def order(cells, errors) -> float:
 
 @pytest.mark.parametrize("study", STUDIES)
 def test_order_of_convergence_of_strips(study):
-    """A1 at full load and C1-90 at beta = 20, three irregular meshes of each fineness; the elastica stretches."""
+    """Check A1 at full load and C1-90 at beta = 20 on three irregular meshes of each fineness; the elastica
+    stretches.
+    """
     found = converge(study, "midedge2")
     assert found.order >= REQUIRED_ORDER["midedge2"]
     assert found.mean_errors[-1] < 1e-6
@@ -31,7 +33,7 @@ def test_order_of_convergence_of_strips(study):
 
 @pytest.fixture(scope="module")
 def square_plates():
-    """B5, errors of the four deflections on irregular meshes of 4, 8, 16 cells."""
+    """Return the errors of case B5's four deflections on irregular meshes of 4, 8, 16 cells."""
     runs = [plates.square_plate((n, n), "midedge2", irregular=IRREGULAR) for n in (4, 8, 16)]
     return {c.quantity: [run.comparisons[k].error for run in runs] for k, c in enumerate(runs[0].comparisons)}
 
@@ -42,8 +44,8 @@ def test_order_of_the_plate_under_pressure(square_plates, support):
     assert order((4, 8, 16), errors) >= 3.7 and errors[-1] < 1e-5
 
 
-def test_plates(square_plates):
-    """B5: Navier's series and Ritz's; closed forms of the disk."""
+def test_plates_have_the_deflections_of_the_series(square_plates):
+    """Compare B5 with the series of Navier and Ritz, and the disk with closed forms."""
     assert max(errors[-1] for errors in square_plates.values()) < 2e-4
     disk = plates.circular_plate(8, "midedge2")
     errors = {c.quantity: c.error for c in disk.comparisons}
@@ -51,49 +53,52 @@ def test_plates(square_plates):
     assert max(errors.values()) < 6e-3  # under the force, where the mesh is even
 
 
-def test_scordelis_lo():
-    """B1: 0.3006 in Kirchhoff-Love theory, isogeometric (PENGoLINS)."""
+def test_scordelis_lo_roof_has_the_reference_deflection():
+    """Compare case B1 with 0.3006 of Kirchhoff-Love theory, isogeometric (PENGoLINS)."""
     assert scordelis_lo((16, 16), "midedge2", irregular=IRREGULAR).comparisons[0].error < 2e-4
 
 
-def test_pinched_cylinder():
-    """B2: the limit of Kirchhoff-Love theory 1.82842e-5, as the project's issue 18 states it."""
+def test_pinched_cylinder_has_the_reference_deflection():
+    """Compare case B2 with the limit of Kirchhoff-Love theory, 1.82842e-5."""
     assert pinched_cylinder((32, 32), "midedge2").comparisons[0].computed[0] == pytest.approx(
         1.82842e-5, rel=1e-4
     )
 
 
 def test_hemisphere_pulled_and_pushed():
-    """A4: the limit of Kirchhoff-Love theory 4.0742 and 8.1495, as the project's issue 18 states it."""
+    """Compare case A4 with the limit of Kirchhoff-Love theory, 4.0742 and 8.1495."""
     pulled, pushed = last(hemisphere.large_deflection((64, 16), "midedge2"))
     assert (pulled, pushed) == (pytest.approx(4.0742, rel=2e-3), pytest.approx(8.1495, rel=2e-3))
 
 
 def test_a_field_is_a_force_at_the_end():
-    """C4: by the divergence theorem, to round-off of the solves."""
+    """Compare case C4 by the divergence theorem, to round-off of the solves."""
     field = magnetic_strip.magnetic_end_shear((5, 1), "midedge2")
     assert max(comparison.error for comparison in field.comparisons) < 1e-9
 
 
 def test_rolled_by_a_couple():
-    """A2: an arc of 180 degrees."""
+    """Compare case A2: an arc of 180 degrees."""
     rolled = end_moment((12, 1), "midedge2", loads=(0.5,))
     assert max(comparison.error for comparison in rolled.comparisons) < 3e-4
 
 
-def test_columns_buckle():
-    """B7: Euler."""
+def test_columns_buckle_at_eulers_loads():
+    """Compare case B7 with Euler's loads."""
     assert columns((20, 2), "midedge2").comparisons[0].error < 1e-4
 
 
 def test_snap_through_is_followed():
-    """A7a: both limit points; Sze, Liu, Lo 2004, whose shells shear under the force (2.6 % of the full load at the end)."""
+    """Compare both limit points of case A7a with Sze, Liu, Lo 2004.
+
+    Their shells shear under the force (2.6 % of the full load at the end).
+    """
     snap = cylinder_roof.snap_through((4, 4), "midedge2", max_step=0.02)
     assert snap.comparisons[0].error < 0.03
 
 
 def test_sphere_under_pressure():
-    """An eighth, to first order: the radius grows by p R^2 (1 - nu) / (2 E h), membrane forces are p R / 2."""
+    """Check an eighth, to first order: the radius grows by p R^2 (1 - nu) / (2 E h), membrane forces are p R / 2."""
     radius, thickness, modulus, nu, pressure = 1.0, 0.01, 1e6, 0.3, 1.0
     mesh = ms.meshes.spherical_cap(radius, 0.0, np.pi / 2, np.pi / 2, cells=(4, 4), order=2)
     sheet = ms.Shell(mesh, thickness=thickness, young_modulus=modulus, poisson_ratio=nu)

@@ -18,7 +18,7 @@ def magnetic_energy(scene, positions):
 
 
 def bent(points, curvature):
-    """With straight unit normals, from one end on."""
+    """Return the points bent from one end on, with straight unit normals."""
     x, y, z = points.T
     angle = curvature * x
     return np.stack(
@@ -27,7 +27,7 @@ def bent(points, curvature):
 
 
 def twisted(points, twist):
-    """About its axis; lines across the plate stay across it."""
+    """Return the points twisted about the axis; lines across the plate stay perpendicular to it."""
     x, y, z = points.T
     cosine, sine = np.cos(twist * x), np.sin(twist * x)
     return np.stack([x, y * cosine - z * sine, y * sine + z * cosine], axis=1)
@@ -78,7 +78,7 @@ def test_energy_of_a_deformed_plate_in_layers_and_as_a_shell(case):
     ("g", "x", "y"), [(0.5, 0.9665630825, 0.2213158696), (2.0, 0.8323702576, 0.4709996116)]
 )
 def test_beam_with_opposite_skins(g, x, y):
-    """M3a: constant curvature; the beam's tip at the axis, within 2 % of its length."""
+    """Check case M3a: constant curvature; the tip of the beam's axis, within 2 % of its length."""
     length, side, modulus, thickness, flux = 0.1, 0.01, 1e5, 1e-4, 0.02
     mesh = ms.meshes.box((length, side, side), cells=(20, 2, 2))
     low, high = mesh.rest_positions.min(axis=0), mesh.rest_positions.max(axis=0)
@@ -99,7 +99,7 @@ def test_beam_with_opposite_skins(g, x, y):
 
 
 def test_a_stiff_skin_is_a_shell_tied_to_the_surface():
-    """Two stiff layers on a soft core: the deflection of a sandwich beam with EI + 2 E_s b t (H/2)^2."""
+    """Compare two stiff layers on a soft core with the deflection of a sandwich beam, EI + 2 E_s b t (H/2)^2."""
     length, side, thickness, stiff = 0.2, 0.01, 1e-4, 2e6
     mesh = ms.meshes.box((length, side, side), cells=(20, 1, 2))
     core = ms.Solid(mesh, material=ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.0))
@@ -126,7 +126,7 @@ def test_a_stiff_skin_is_a_shell_tied_to_the_surface():
 
 
 def test_water_on_a_solid_is_that_on_a_shell_around_it():
-    """A block in a stream: its surface feels what a closed sheet of the same faces feels."""
+    """Compare a block in a stream with a closed sheet of the same faces."""
     mesh = ms.meshes.box((0.02, 0.02, 0.02), cells=(1, 1, 1))
     solid = ms.Solid(mesh, material=SOFT, element="linear", mass_density=1e3)
     water = ms.Water(1000.0, (0.3, 0.1, -0.2))
@@ -147,7 +147,9 @@ def test_water_on_a_solid_is_that_on_a_shell_around_it():
 
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
 def test_a_solid_on_a_floor_is_carried_by_it(element):
-    """Its weight, by the springs of the vertices on its underside; what is inside it touches nothing."""
+    """Check that the contact springs of the vertices on its underside carry its weight; inner vertices have no
+    contact.
+    """
     mesh = ms.meshes.box((0.02, 0.02, 0.02), cells=(2, 2, 2))
     stiff = ms.NeoHookean(young_modulus=1e9, poisson_ratio=0.3)
     solid = ms.Solid(mesh, material=stiff, mass_density=1e3, element=element)
@@ -211,12 +213,12 @@ ALONG = (1e4, 0.0, 0.0)
         (lambda: ms.Solid(skinned().mesh, material=SOFT, skin=1e-3), "skin must be a Skin"),
     ],
 )
-def test_bad_input(act, words):
+def test_bad_input_is_refused(act, words):
     with pytest.raises(ValueError, match=words):
         act()
 
 
-def test_one_magnetization_for_all_faces_and_by_the_skin_are_the_same():
+def test_magnetization_of_all_faces_equals_that_of_the_skin():
     solid = skinned(faces=[3, 5])
     by_skin = solved(solid, lambda s: {s.skin: {"remanent_magnetization": ALONG}})
     of_faces = np.zeros((solid.mesh.n_faces, 3))

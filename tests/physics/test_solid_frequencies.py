@@ -25,7 +25,7 @@ def frequencies(cells: int, poisson_ratio: float, element: str, mass: str = "lum
 
 @pytest.mark.parametrize("poisson_ratio", CUBE)
 def test_t11a_frequencies_of_a_free_cube(poisson_ratio):
-    """Lumped masses leave errors of second order, 3 % with 6 cells: two meshes tell the numbers without them."""
+    """Extrapolate from two meshes: lumped masses leave errors of second order, 3 % with 6 cells."""
     coarse, fine = (frequencies(cells, poisson_ratio, "quadratic") for cells in (3, 6))
     assert np.allclose(fine, CUBE[poisson_ratio], rtol=0.035)
     assert np.allclose(np.sort((4 * fine - coarse) / 3), CUBE[poisson_ratio], rtol=0.01)
@@ -47,9 +47,9 @@ def test_linear_tetrahedra_with_consistent_masses_vibrate_too_fast():
     assert (consistent > lumped).all() and (consistent > CUBE[0.3]).all()
 
 
-def bar_of(bodies, turn, **more) -> np.ndarray:
-    """Squares of a bar between an oblique symmetry plane and nothing, with consistent masses."""
-    plane = ms.SymmetryPlane(turn[:, 0], body=bodies[0])
+def bar_of(bodies, rotation, **more) -> np.ndarray:
+    """Return the squared frequencies of a bar with an oblique symmetry plane and a free end, with consistent masses."""
+    plane = ms.SymmetryPlane(rotation[:, 0], body=bodies[0])
     scene = ms.Scene(bodies, supports=[plane], allow_rigid_motions=True, **more)
     return ms.vibration_modes(scene, count=8, mass="consistent").squares
 
@@ -84,7 +84,7 @@ def test_consistent_masses_of_turned_welded_and_curved_bodies():
 
 
 def test_consistent_masses_of_a_shell_are_as_good_as_lumped_ones():
-    """3.516 sqrt(E h^2 / 12 rho) / (2 pi L^2), from both sides."""
+    """Compare with 3.516 sqrt(E h^2 / 12 rho) / (2 pi L^2), which both approach from opposite sides."""
     mesh = ms.meshes.rectangle(0.1, 0.01, cells=(20, 2))
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0, mass_density=1e3)
     scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))])

@@ -15,12 +15,14 @@ def dead(forces: np.ndarray) -> ms.PointLoad:
 
 
 def faces_where(body, condition) -> np.ndarray:
-    """Those of its faces whose corners all are where condition, of x (..., 3), says."""
+    """Return the faces whose corners x (..., 3) all meet a condition."""
     return np.flatnonzero(condition(body.mesh.rest_positions[body.mesh.faces]).all(axis=1))
 
 
 def cook(cells, poisson_ratio: float, volume: str = "isochoric", element: str = "quadratic"):
-    """Cook's membrane in plane strain: (rest, corner's displacement, displacement unknowns)."""
+    """Solve Cook's membrane in plane strain; return (equilibrium, displacement of the corner, number of displacement
+    dofs).
+    """
     unit = ms.meshes.box((1, 1, 1), cells=(*cells, 1))
     x, y, z = unit.rest_positions.T
     mesh = ms.TetMesh(np.stack([48 * x, 44 * x + y * (44 - 28 * x), z], axis=1), unit.tetrahedra)
@@ -62,7 +64,10 @@ def test_t5_linear_tetrahedra_are_much_too_stiff_on_cook():
 
 
 def bent_beam(cells, poisson_ratio: float, element: str = "quadratic"):
-    """10 x 1 x 1 with P L^2 / EI = 2 across its end: (rest, displacement of the end's center, unknowns)."""
+    """Solve a beam of 10 x 1 x 1 with P L^2 / EI = 2 across its end.
+
+    Returns (equilibrium, displacement of the end's center, number of dofs).
+    """
     mesh = ms.meshes.box((10, 1, 1), cells=cells, diagonals="crossed")
     material = ms.NeoHookean("isochoric", young_modulus=1e5, poisson_ratio=poisson_ratio)
     solid = ms.Solid(mesh, material=material, element=element)
@@ -87,7 +92,10 @@ def test_t5_t6_beam_to_half_a_percent_with_3060_unknowns(poisson_ratio):
 
 @pytest.mark.parametrize("poisson_ratio", BEAM)
 def test_t6_deflection_and_shortening_to_half_a_percent(poisson_ratio):
-    """Four cells across: 0.07 and 0.19 %. With (12, 4, 4) 0.2 and 0.43 %: one mean volume an element is soft."""
+    """Use four cells across: errors are 0.07 and 0.19 %.
+
+    With (12, 4, 4) they are 0.2 and 0.43 %, because one mean volume an element is soft.
+    """
     rest, end, _ = bent_beam((10, 4, 4), poisson_ratio)
     assert rest.load_steps == 1 and rest.iterations <= 10
     assert np.allclose((end[2], -end[0]), BEAM[poisson_ratio], rtol=0.005)
@@ -95,7 +103,7 @@ def test_t6_deflection_and_shortening_to_half_a_percent(poisson_ratio):
 
 @pytest.mark.parametrize("cells", [(8, 2, 2), (9, 3, 3), (15, 1, 1)], ids=str)
 def test_t6_takes_one_load_step_and_as_many_iterations_on_any_mesh(cells):
-    """20 are allowed, and as many with nu = 0.499 as with 0.45."""
+    """Allow 20 iterations, and the same number with nu = 0.499 as with 0.45."""
     counts = []
     for poisson_ratio in BEAM:
         rest, _, _ = bent_beam(cells, poisson_ratio)
@@ -107,7 +115,10 @@ def test_t6_takes_one_load_step_and_as_many_iterations_on_any_mesh(cells):
 def quarter_tube(
     material: str, load, cells=(4, 8, 1), height=0.25, **moduli
 ) -> tuple[ms.Equilibrium, np.ndarray]:
-    """By default four cells through the wall: the equilibrium, and both radii. load: inner faces -> a load."""
+    """Solve a quarter of a tube, by default with four cells through the wall; return the equilibrium and both radii.
+
+    load: function from the inner faces to a load.
+    """
     kind = ms.StableNeoHookean(**moduli) if material == "stable" else ms.NeoHookean(material, **moduli)
     mesh = ms.meshes.tube(1.0, 2.0, height, np.pi / 2, cells=cells, order=2)
     solid = ms.Solid(mesh, material=kind)
@@ -122,7 +133,7 @@ def quarter_tube(
 
 @pytest.mark.parametrize("case", TUBES, ids=lambda case: "{} {} {}".format(*case))
 def test_t9a_tube_under_live_pressure(case):
-    """At the most 0.042 % off, where 0.2 % are allowed; 4 to 7 iterations."""
+    """Check the radii to 0.2 %; the largest error is 0.042 %, in 4 to 7 iterations."""
     material, poisson_ratio, pressure = case
     rest, radii = quarter_tube(
         material,
@@ -152,8 +163,11 @@ def test_t9a_incompressible_tube_and_its_axial_force(case):
 
 @pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 def test_t9a_incompressible_tube_at_three_times_its_radius():
-    """There the pressure is within 5 % of the largest that there is, and rises by 0.036 a unit: on four cells the radius is
-    0.62 % off, of which 0.13 % are the bulk modulus of a ratio of 0.4999; on eight, with 0.49999, 0.11 % (allowed: 0.2)."""
+    """Check near the largest possible pressure, within 5 % of it, where it rises by 0.036 a unit.
+
+    On four cells the radius is 0.62 % off, of which 0.13 % are due to the bulk modulus of a ratio of 0.4999; on eight,
+    with 0.49999, 0.11 % (allowed: 0.2).
+    """
     pressure, inner, outer, force = LARGEST
     rest, radii = quarter_tube(
         "isochoric",
@@ -179,7 +193,9 @@ def test_t9a_dead_pressure_blows_up_less():
 
 
 def test_t10a_land_beam_of_guccione():
-    """Land et al. 2015, problem 1, in mm and kPa: the end at 4.17, converged submissions from 4.151 to 4.185."""
+    """Compare with Land et al. 2015, problem 1, in mm and kPa: the end at 4.17, converged submissions from 4.151 to
+    4.185.
+    """
     material = ms.Guccione(
         stiffness=2.0,
         fibre_exponent=8.0,
@@ -196,7 +212,9 @@ def test_t10a_land_beam_of_guccione():
 
 
 def test_i1_moduli_of_two_blocks():
-    """P = 1e4 N on 1 m2, Poisson's ratio 0: each block is stretched to l with P = E (l^2 - 1)/(2 l)."""
+    """Identify the moduli under P = 1e4 N on 1 m2, Poisson's ratio 0: each block is stretched to l with P = E (l^2 -
+    1)/(2 l).
+    """
     mesh = ms.meshes.box((1, 1, 1), cells=(2, 1, 1))
     solid = ms.Solid(mesh, material=ms.NeoHookean(young_modulus=1e4, poisson_ratio=0.0), element="linear")
     end = Faces(solid.mesh, lambda x: x[:, 0] > 1 - TINY).forces(mesh.rest_positions, traction=(1e4, 0, 0))

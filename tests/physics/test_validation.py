@@ -14,7 +14,7 @@ from benchmarks.cases.hemisphere import large_deflection
 from benchmarks.cases.plates import SQUARE, even_plate
 from benchmarks.convergence import REQUIRED_ORDER, STUDIES, converge
 
-# What the project set out to reach: relative errors, of each case's comparisons in turn.
+# Required accuracy: relative errors, of each case's comparisons in turn.
 PLATE = {", ".join(key): 0.005 for key in SQUARE}
 BOUNDS = {
     "A1": {"W": 0.002, "U": 0.003},
@@ -49,7 +49,7 @@ def rows():
 
 
 @pytest.mark.parametrize(("name", "k", "bound"), list(rows()))
-def test_error(name: str, k: int, bound: float) -> None:
+def test_error_is_below_its_bound(name: str, k: int, bound: float) -> None:
     comparison = outcome(name).comparisons[k]
     worst = comparison.worst
     assert comparison.error <= bound, (

@@ -1,4 +1,4 @@
-"""Files whose numbers say more than the file holds: refused with what was found, before memory is asked for."""
+"""Files whose header claims more data than the file holds: refused with both numbers, before memory is allocated."""
 
 import io
 import re
@@ -16,7 +16,7 @@ GIANT = 10**11
 
 
 def saved(tmp_path, kind="result"):
-    """(path, how to read it) of each kind of .npz that magshell reads."""
+    """Return (path, function that reads it) of each kind of .npz that magshell reads."""
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
     scene = ms.Scene(sheet, supports=[ms.Clamp(MESH.edges_at(x=0.0))])
     path = tmp_path / f"{kind}.npz"
@@ -28,14 +28,14 @@ def saved(tmp_path, kind="result"):
 
 
 def claimed(array: np.ndarray, shape: tuple[int, ...]) -> bytes:
-    """An array as numpy writes it, with another shape in its header."""
+    """Return an array as numpy writes it, with another shape in its header."""
     file = io.BytesIO()
     np.lib.format.write_array_header_1_0(file, {"descr": "<f8", "fortran_order": False, "shape": shape})
     return file.getvalue() + array.tobytes()
 
 
 def rewritten(path, changes: dict[str, bytes]):
-    """The archive with other contents of some of its members."""
+    """Write the archive with other contents of some of its members."""
     with zipfile.ZipFile(path) as archive:
         members = {name: archive.read(name) for name in archive.namelist()} | changes
     with zipfile.ZipFile(path, "w") as archive:
@@ -70,7 +70,7 @@ def test_archives_of_anything_else_are_refused(tmp_path):
 
 @pytest.mark.parametrize("seed", range(60))
 def test_spoiled_archives_are_refused_or_read(tmp_path, seed):
-    """A few bytes of the file are others: a ValueError or a result, nothing else."""
+    """Change a few bytes of the file: it gives a ValueError or a result, nothing else."""
     path, read = saved(tmp_path, "state")
     rng, data = np.random.default_rng(seed), bytearray(path.read_bytes())
     for at in rng.integers(len(data), size=3):
@@ -137,7 +137,7 @@ def written(request, tmp_path):
 
 
 def peak_of(read) -> float:
-    """Bytes that numpy and Python had at once while something was read."""
+    """Return the peak memory of numpy and Python while something is read, bytes."""
     tracemalloc.start()
     try:
         read()
@@ -149,7 +149,9 @@ def peak_of(read) -> float:
 
 
 def spoiled(data: bytes, rng: np.random.Generator) -> bytes:
-    """With other bytes, another number in the text at its beginning, a large integer somewhere, or cut off."""
+    """Return data with other bytes, another number in the text at its beginning, a large integer somewhere, or cut
+    off.
+    """
     found = bytearray(data)
     kind = rng.integers(4)
     if kind == 0:

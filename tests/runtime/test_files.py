@@ -1,4 +1,4 @@
-"""A file is the old one or the new one: whatever stops the writing, nothing half-written and nothing stray is left."""
+"""Atomicity of files: a file is the old one or the new one; whatever stops the writing, no partial file is left."""
 
 import errno
 import json
@@ -63,7 +63,7 @@ WRITERS = {
 
 @contextmanager
 def disk_of(n_bytes):
-    """No file can grow beyond this: as on a full disk, the write that would fails half way."""
+    """Limit the size of files: like on a full disk, the write that exceeds it fails half way."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (n_bytes, hard))
     try:
@@ -156,7 +156,7 @@ def test_devices_are_written_to_as_they_are():
 
 @contextmanager
 def nobody():
-    """Root may write anywhere: for a while someone else."""
+    """Change to an unprivileged user for a while, because root may write anywhere."""
     user = os.geteuid()
     if user == 0:
         os.seteuid(65534)
@@ -167,7 +167,7 @@ def nobody():
 
 
 @pytest.mark.parametrize("check", [new, check_replaceable])
-def test_what_may_not_be_written_is_refused_in_words(check, tmp_path):
+def test_unwritable_paths_are_refused(check, tmp_path):
     with pytest.raises(IsADirectoryError, match="cannot write"):
         check(tmp_path)
     with pytest.raises(FileNotFoundError, match=r"cannot write .*there is no folder .*none'"):

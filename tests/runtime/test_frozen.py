@@ -1,4 +1,4 @@
-"""What is made stays as it was made: every public object, with every array in it, in copies and other processes too."""
+"""Immutability of every public object and of every array in it, also in copies."""
 
 import copy
 import pickle
@@ -30,13 +30,15 @@ def thing(request):
 
 
 def attributes(thing) -> list[str]:
-    """What of it is no method."""
+    """Return the names of attributes that are no methods."""
     names = [name for name in dir(thing) if not name.startswith("_")]
     return [name for name in names if not callable(getattr(type(thing), name, None))]
 
 
-def kept_values(thing) -> Iterator[tuple[str, object]]:
-    """(name, value) of what it has, in tuples and dicts too, but what is made anew whenever it is asked for."""
+def stored_values(thing) -> Iterator[tuple[str, object]]:
+    """Yield (name, value) of an object's attributes, also inside tuples and dicts, except those computed at each
+    access.
+    """
     for name in attributes(thing):
         if name in getattr(thing, "_as_given", ()):
             continue
@@ -96,7 +98,7 @@ def test_no_attribute_can_be_assigned(thing) -> None:
 
 
 def test_no_array_list_or_dict_of_it_can_be_edited(thing) -> None:
-    for name, value in kept_values(thing):
+    for name, value in stored_values(thing):
         assert not (isinstance(value, np.ndarray) and value.flags.writeable), name
         assert type(value) not in (list, dict, set, bytearray), name
 
@@ -112,7 +114,7 @@ def test_copies_are_as_immutable(thing, duplicate) -> None:
     test_no_array_list_or_dict_of_it_can_be_edited(twin)
 
 
-def test_what_is_said_names_the_way_to_another_value() -> None:
+def test_message_names_the_way_to_another_value() -> None:
     for thing, name, way in (
         (
             MADE["shell"],
@@ -175,7 +177,7 @@ def test_a_solve_leaves_the_arrays_of_its_caller_writable() -> None:
 
 
 def one_more(name: str, thing, **others) -> ms.Scene:
-    """A scene with the thing twice in one of its lists."""
+    """Build a scene with the object twice in one of its lists."""
     bodies = others.pop("bodies", MADE["shell"])
     return ms.Scene(bodies, **{"allow_rigid_motions": True, **others, name: [thing, thing]})
 
@@ -197,7 +199,7 @@ TWICE = {
 
 
 @pytest.mark.parametrize("name", TWICE)
-def test_what_a_scene_holds_twice_is_refused(name) -> None:
+def test_duplicates_in_a_scene_are_refused(name) -> None:
     argument, thing = TWICE[name][0], MADE[TWICE[name][1]]
     message = (
         rf"{argument} must differ, but {argument}\[0\] and {argument}\[1\] are one {type(thing).__name__}"
@@ -218,7 +220,7 @@ def test_what_a_scene_holds_twice_is_refused(name) -> None:
         (lambda: ms.Cavity([MADE["balloon"]] * 2, pressure=1.0), "names each body once"),
     ],
 )
-def test_what_another_list_holds_twice_is_refused(make, message) -> None:
+def test_duplicates_in_other_lists_are_refused(make, message) -> None:
     with pytest.raises(ValueError, match=message):
         make()
 
@@ -282,7 +284,7 @@ PRIVATE = {
 
 
 def test_names_of_the_inside_are_not_offered(thing) -> None:
-    """help() and tab completion show what a user may call."""
+    """Check that help() and tab completion show the public names only."""
     assert PRIVATE & {name for name in dir(thing) if not name.startswith("_")} == set()
 
 
@@ -296,7 +298,7 @@ def test_a_module_offers_its_public_names_alone(module) -> None:
 
 
 def test_replaced_makes_another_with_every_value_that_the_message_names() -> None:
-    """Of objects that a solve gives other values: the message sends users there."""
+    """Check the objects whose values a solve may override; the message refers users to `replaced`."""
     for name, each in MADE.items():
         replaceable = [value for value in getattr(each, "_replaceable", ()) if hasattr(each, value)]
         values = {value: getattr(each, value) for value in replaceable if not callable(getattr(each, value))}

@@ -1,9 +1,9 @@
-"""`import magshell` is quick: what takes long to load comes with its first use. Modules are looked at, not times."""
+"""Speed of `import magshell`: slow modules are loaded at their first use. The tests check modules, not times."""
 
 import subprocess
 import sys
 
-# Of the standard library and of what magshell requires.
+# Modules of the standard library and of magshell's requirements.
 LATE = {
     *(
         "scipy.sparse",

@@ -1,4 +1,4 @@
-"""Ctrl-C in each of a caller's functions, at every call of it, in every solve: Interrupted, with what there is."""
+"""Ctrl-C in each of a caller's functions, at every call of it, in every solve: Interrupted, with the results so far."""
 
 import numpy as np
 import pytest
@@ -66,7 +66,7 @@ SOLVES = {
 
 
 @pytest.mark.parametrize("name", SOLVES)
-def test_every_call(name):
+def test_interrupt_at_every_call(name):
     kind, make = SOLVES[name]
     caller = Caller()
     solve, scene = make(caller), scene_of(caller)

@@ -1,4 +1,4 @@
-"""What a user sees while it goes on: bars, and what is logged."""
+"""Feedback during long calls: progress bars and log messages."""
 
 import logging
 import time
@@ -49,7 +49,7 @@ def test_quick_solves_show_nothing(capsys):
     assert capsys.readouterr().err == ""
 
 
-def test_nothing_is_shown_where_it_is_not_wanted(at_once, capsys):
+def test_unwanted_progress_is_not_shown(at_once, capsys):
     ms.equilibrium(SCENE, **MAGNETIZED, applied_flux_density=FIELDS, progress=False)
     with bars.no_bars():
         ms.equilibrium(SCENE, **MAGNETIZED, applied_flux_density=FIELDS)
@@ -133,15 +133,15 @@ def test_searches_are_logged(caplog, here):
     assert "minimize: design 2 rejected: too far" in lines(caplog, logging.DEBUG)
 
 
-def test_nobody_who_listens_is_told_nothing(capsys):
-    """No handler of our own: what a program logs is its own affair."""
+def test_solve_without_log_handlers_prints_nothing(capsys):
+    """Check that magshell adds no log handler of its own; logging is configured by the program."""
     ms.equilibrium(SCENE, **MAGNETIZED, applied_flux_density=(0, 0, 1e-3))
     assert capsys.readouterr() == ("", "") and not logging.getLogger("magshell").handlers
 
 
 @pytest.mark.alone
 def test_progress_of_one_solve_costs_nothing_to_speak_of(monkeypatch):
-    """The bar is not even made before its time."""
+    """Check that the bar is not even created before its delay."""
     monkeypatch.setattr(bars, "progress_bar", lambda *_, **__: pytest.fail("a bar was made"))
     began = time.perf_counter()
     ms.equilibrium(SCENE, **MAGNETIZED, applied_flux_density=(0, 0, 1e-3))

@@ -77,7 +77,7 @@ while True:
     solve()
 """
 
-# What the process catches, as the system sees it, many times during a solve.
+# A program that reads from the system, many times during a solve, which signals the process catches.
 CAUGHT = """
 def caught():
     with open("/proc/self/status") as status:

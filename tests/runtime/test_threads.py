@@ -15,7 +15,7 @@ VARIABLES = ("MAGSHELL_NUM_THREADS", "OMP_NUM_THREADS")
 
 
 def printed_by(program: str, *, timeout: float = 300, environment=(), **options) -> str:
-    """Of a process whose environment says no more of our threads than this."""
+    """Return the output of a process whose environment sets no thread counts except for the given ones."""
     others = {name: value for name, value in os.environ.items() if name not in VARIABLES}
     done = subprocess.run(
         [sys.executable, "-c", program],
@@ -29,7 +29,7 @@ def printed_by(program: str, *, timeout: float = 300, environment=(), **options)
     return done.stdout.strip()
 
 
-# What the environment says
+# Limits by the environment
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,7 @@ def test_a_process_begins_with_what_its_environment_says():
     assert printed_by(COUNT, environment={"OMP_NUM_THREADS": "1", "MAGSHELL_NUM_THREADS": "3"}) == "3"
 
 
-# What the system allows
+# Limits by the system
 
 
 @LINUX
@@ -77,7 +77,7 @@ def test_a_process_begins_with_the_processors_it_may_use():
 
 
 def system(root: Path, groups: str, mounts: str, files: dict[str, str]) -> Path:
-    """A folder with the files of proc and sys that tell the quotas."""
+    """Write a folder with the files of proc and sys that state the quotas."""
     for name, text in {"proc/self/cgroup": groups, "proc/self/mountinfo": mounts, **files}.items():
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         (root / name).write_text(text)
@@ -250,8 +250,8 @@ def test_a_forked_process_has_helpers_of_its_own():
 
 
 @LINUX
-def test_more_threads_than_processors_give_the_same_bits():
-    """All on one processor, so that most of them wait for it at any time, in the middle of parts as well."""
+def test_results_have_the_same_bits_with_more_threads_than_processors():
+    """Run all threads on one processor, so that most of them wait for it at any time, also within a loop."""
     one = min(os.sched_getaffinity(0))
     printed_by(SHEET + CROWDED, preexec_fn=lambda: os.sched_setaffinity(0, {one}))
 

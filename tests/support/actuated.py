@@ -12,14 +12,14 @@ SOFT = {"young_modulus": 1e5, "poisson_ratio": 0.3}
 
 
 def box_sheet(size=0.1, cells=(2, 2, 1), thickness=5e-3, modulus=1e6, density=1e3) -> ms.Shell:
-    """A closed box of a sheet."""
+    """Build a closed box of a sheet."""
     box = ms.meshes.box((size, size, size), cells=cells)
     mesh = ms.TriangleMesh(box.rest_positions, box.faces)
     return ms.Shell(mesh, thickness=thickness, young_modulus=modulus, poisson_ratio=0.4, mass_density=density)
 
 
 def hollow_block(element="linear", cells=3, **options) -> ms.Solid:
-    """A cube of three cells a side without the one in the middle."""
+    """Build a cube of three cells a side without the one in the middle."""
     box = ms.meshes.box((0.03, 0.03, 0.03), cells=(cells, cells, cells))
     middle = np.abs(box.tetrahedron_barycenters - 0.015).max(axis=1) < 0.005
     kept, numbered = np.unique(box.tetrahedra[~middle], return_inverse=True)
@@ -33,7 +33,7 @@ def held(body, **options) -> ms.Scene:
 
 
 def gauge_pressure_of(cavity: ms.Cavity, volume, rest: float):
-    """- dE/dV by hand."""
+    """Return - dE/dV, computed by hand."""
     if cavity.law == "pressure":
         return float(cavity.pressure)
     if cavity.law == "gas":
@@ -42,7 +42,7 @@ def gauge_pressure_of(cavity: ms.Cavity, volume, rest: float):
 
 
 def energy_by_torch(scene: ms.Scene, x: torch.Tensor, factor: float = 1.0) -> torch.Tensor:
-    """Of all actuators, at positions (n_v, 3), under a load factor."""
+    """Return the energy of all actuators at positions (n_v, 3), under a load factor."""
     total = torch.zeros((), dtype=torch.float64)
     for each in scene.actuators:
         if isinstance(each, ms.Cavity):

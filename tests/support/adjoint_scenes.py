@@ -41,7 +41,7 @@ PLANE_GRID = ms.SampledField.from_function(
 
 
 def everything(bending="midedge"):
-    """A clamp that moves, all loads, gravity, and a uniform field over dipoles and a grid."""
+    """Build a scene with a clamp that moves, all loads, gravity, and a uniform field plus dipoles and a grid."""
     return ms.Scene(
         shell(bending),
         supports=[CLAMP],

@@ -1,4 +1,4 @@
-"""For tests of bad input: a small scene to spoil, and tables of what each mistake must say."""
+"""Cases of bad input: a small scene to modify, and tables of the message that each mistake must give."""
 
 import numpy as np
 import pytest
@@ -39,12 +39,12 @@ def held_by(*supports):
 
 
 def loaded_by(make):
-    """The load may be refused at once, or where it meets its mesh."""
+    """Return a call that makes a load and its scene; the load may be refused at once, or where it meets its mesh."""
     return lambda: scene(loads=[make()])
 
 
 def refused(cases, errors=ValueError):
-    """The cases (name, what to do, what it must say), run as one test each."""
+    """Return a test of the cases (name, call, expected message), one case each."""
 
     def test(act, message):
         with pytest.raises(errors, match=message):

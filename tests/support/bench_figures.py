@@ -4,7 +4,7 @@ from pathlib import Path
 
 
 def is_a_picture(path: Path) -> bool:
-    """A PNG of some size, of which neither nothing nor everything is painted."""
+    """Return whether a file is a PNG of some size that is neither blank nor completely painted."""
     from matplotlib.image import imread
 
     if not path.read_bytes().startswith(b"\x89PNG"):

@@ -1,4 +1,4 @@
-"""Stiff free sheets that rest and slide on obstacles: what the tests of contact, friction and water push around."""
+"""Stiff free sheets that rest and slide on obstacles, for the tests of contact, friction and water."""
 
 import numpy as np
 
@@ -15,24 +15,24 @@ def block_sheet(cells=(2, 2), side=0.02, young_modulus=1e9) -> ms.Shell:
 
 
 def smoothing_of(sheet: ms.Shell) -> float:
-    """The one a Contact takes by itself, m."""
+    """Return the default smoothing of a Contact, m."""
     return 1e-2 * float(sheet.thickness.mean())
 
 
 def depth_under(force, smoothing: float, stiffness: float = STIFFNESS):
-    """How deep a point sinks under a force [N], m: the inverse of the documented law."""
+    """Return the penetration depth of a point under a force [N], m: the inverse of the documented law."""
     soft = np.asarray(force) / stiffness
     return np.where(soft < 0.5 * smoothing, np.sqrt(2.0 * smoothing * soft), soft + 0.5 * smoothing)
 
 
 def force_at(depth, smoothing: float, stiffness: float = STIFFNESS):
-    """The normal force [N] at a depth [m], zero where it is negative: d^2 / (2 s), from d = s on d - s / 2."""
+    """Return the normal force [N] at a depth [m], zero where that is negative: d^2 / (2 s), from d = s on d - s / 2."""
     deep = np.maximum(depth, 0.0)
     return stiffness * np.where(deep < smoothing, deep**2 / (2.0 * smoothing), deep - 0.5 * smoothing)
 
 
 def resting_on_plane(sheet: ms.Shell, normal_gravity: float = GRAVITY) -> np.ndarray:
-    """Positions of a sheet at rest on the plane z = 0: long steps of a method that damps lead there."""
+    """Return the equilibrium positions of a sheet on the plane z = 0, found by long steps of a dissipative method."""
     level = block_on(ms.obstacles.Plane(), sheet=sheet, gravity=(0, 0, -normal_gravity))
     start = np.array(sheet.mesh.rest_positions)
     start[:, 2] -= depth_under(sheet.vertex_masses.mean() * normal_gravity, smoothing_of(sheet))
@@ -40,7 +40,7 @@ def resting_on_plane(sheet: ms.Shell, normal_gravity: float = GRAVITY) -> np.nda
 
 
 def block_on(obstacle, friction=None, *, gravity=(0, 0, -GRAVITY), sheet=None, **contact) -> ms.Scene:
-    """A free block and one obstacle."""
+    """Build a scene of a free block and one obstacle."""
     touching = ms.Contact(
         obstacle,
         **{
@@ -63,5 +63,5 @@ def simulated(scene: ms.Scene, steps: int, time_step: float, **options) -> ms.Tr
 
 
 def weight_of(sheet: ms.Shell) -> float:
-    """N."""
+    """Return the weight of a sheet, N."""
     return float(sheet.vertex_masses.sum() * GRAVITY)

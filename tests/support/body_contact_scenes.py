@@ -8,12 +8,12 @@ DOWN = (0, 0, -9.81)
 
 
 def above(height, mesh=PLATE, **changes) -> ms.Shell:
-    """A sheet at a height, a little aside, so that no vertex is over another."""
+    """Build a sheet at a height, shifted sideways, so that no vertex is over another."""
     return ms.Shell(mesh.transformed(translation=(1e-3, 5e-4, height)), **{**SOFT, **changes})
 
 
 def two_sheets(height=1.15e-3, rubbing=None, **contact):
-    """The lower one clamped at a side, the upper one pinned there, and heavy."""
+    """Build two sheets: the lower one clamped at a side, the upper one pinned there, and heavy."""
     lower, upper = ms.Shell(PLATE, **SOFT), above(height)
     supports = [
         ms.Clamp(PLATE.edges_at(x=0.0), body=lower),

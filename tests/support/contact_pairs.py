@@ -7,7 +7,7 @@ LAW = {"stiffness": 2.0e3, "reach": 0.4, "thickness": 0.0, "smoothing": 0.1, "pe
 
 
 def random_pairs(kind, count, seed=0, gap=None):
-    """(count, 4, 3) [m], of size 1; with `gap` the parts are pulled together or apart to about that distance."""
+    """Return random pairs (count, 4, 3) [m], of size 1; with `gap` the parts are moved to about that distance."""
     from magshell import _core
 
     rng = np.random.default_rng(seed)
@@ -22,7 +22,9 @@ def random_pairs(kind, count, seed=0, gap=None):
 
 
 def hard_pairs(kind, gap=1e-3):
-    """Parallel and nearly parallel edges, touching and lined up corners, needles: (n, 4, 3) and what each is."""
+    """Return difficult pairs (n, 4, 3) and their names: nearly parallel edges, touching and aligned corners,
+    needles.
+    """
     up = np.array([0.0, 0.0, gap])
     o, x, y = np.zeros(3), np.eye(3)[0], np.eye(3)[1]
     if kind == "point_triangle":
@@ -54,7 +56,7 @@ def hard_pairs(kind, gap=1e-3):
 
 
 def differences(function, x, step=1e-6):
-    """Of a function of (n, 4, 3) with values (n, ...): its derivatives (n, ..., 12), by central differences."""
+    """Return the derivatives (n, ..., 12) of a function of (n, 4, 3) with values (n, ...), by central differences."""
     columns = []
     for k in range(12):
         shift = np.zeros((4, 3))
@@ -64,7 +66,7 @@ def differences(function, x, step=1e-6):
 
 
 def relative(got, expected):
-    """The largest difference of a row, over the largest number of that row."""
+    """Return the largest difference of a row, over the largest number of that row."""
     n = len(expected)
     size = np.abs(expected).reshape(n, -1).max(1)
     return (np.abs(got - expected).reshape(n, -1).max(1) / np.where(size > 0.0, size, 1.0)).max()

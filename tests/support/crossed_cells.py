@@ -8,7 +8,8 @@ import magshell as ms
 
 
 def crossed(length, width, cells, row_heights, across=False) -> ms.TriangleMesh:
-    """Cells cut into four from a point at this height over one of their sides, (n,), from row to row of cells.
+    """Build a strip whose cells are cut into four from a point at a height over one of their sides, (n,), a row of
+    cells each.
 
     That side runs along the strip; or across it.
     """

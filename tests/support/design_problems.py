@@ -48,18 +48,18 @@ def rosenbrock(x):
 
 
 def cantilever(x):
-    """Case E1: five hollow beams, Svanberg 1987."""
+    """Return objective and constraint of case E1: five hollow beams, Svanberg 1987."""
     return 0.0624 * x.sum(), (vector(61, 37, 19, 7, 1) / x**3).sum()[None] - 1
 
 
 def two_balls(x):
-    """Case E2."""
+    """Return objective and constraints of case E2: the nearest point to the origin in two balls."""
     first, second = ((x - vector(*center)) ** 2 for center in ((5, 2, 1), (3, 4, 3)))
     return (x**2).sum(), torch.stack([first.sum() - 9, second.sum() - 9])
 
 
 def two_bar_truss(x):
-    """Svanberg 1987, 5.1: weight of two bars of area x0 and half distance x1, under two stress limits."""
+    """Return the weight of two bars of area x0 and half distance x1 and two stress limits, Svanberg 1987, 5.1."""
     length = torch.sqrt(1 + x[1] ** 2)
     stresses = [0.124 * length * (8 / x[0] + sign / (x[0] * x[1])) - 1 for sign in (1, -1)]
     return x[0] * length, torch.stack(stresses)
@@ -128,19 +128,21 @@ def hs100(x):
 
 
 def bad_scales(x):
-    """Variables of sizes 1e8, 1 and 1e-4, an objective of size 1e-9 and a constraint of size 1e6."""
+    """Return a problem with variables of sizes 1e8, 1 and 1e-4, an objective of size 1e-9 and a constraint of size
+    1e6.
+    """
     u = x / vector(1e8, 1.0, 1e-4)
     return 1e-9 * ((u - vector(0.7, 0.9, 0.2)) ** 2).sum(), 1e6 * (u.sum() - 1.2)[None]
 
 
 def resource(x):
-    """Many variables share one budget."""
+    """Return a problem in which many variables share one budget."""
     weights = torch.linspace(1, 3, len(x), dtype=x.dtype)
     return (weights / x).sum() / len(x), (x.mean() - 1)[None]
 
 
 def many_quadratics(x):
-    """10^4 variables, a third of them at a bound, coupled to their neighbours."""
+    """Return an objective of 10^4 variables, a third of them at a bound, coupled to their neighbours."""
     target = 1.5 * torch.sin(torch.arange(len(x), dtype=x.dtype))
     return ((x - target) ** 2).sum() + 0.5 * ((x[1:] - x[:-1]) ** 2).sum()
 
@@ -199,7 +201,7 @@ BOUNDED = [
 
 
 def value_and_rows(given: Problem, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Values (1 + m,) and gradients (1 + m, n), by autograd itself and none of the library's code."""
+    """Return values (1 + m,) and gradients (1 + m, n), by autograd alone and without the library's code."""
     tensor = torch.tensor(x, requires_grad=True)
     result = given.function(tensor)
     values = torch.cat([result[0][None], result[1]]) if isinstance(result, tuple) else result[None]
@@ -209,7 +211,7 @@ def value_and_rows(given: Problem, x: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 @cache
 def nlopt_mma(given: Problem) -> tuple[np.ndarray, float]:
-    """The minimizer and the minimum that NLopt's MMA finds, with variables scaled to their bounds."""
+    """Return the minimizer and the minimum that NLopt's MMA finds, with variables scaled to their bounds."""
     width = given.upper - given.lower
     optimizer = nlopt.opt(nlopt.LD_MMA, len(given.start))
     optimizer.set_lower_bounds(np.zeros_like(width))
@@ -244,7 +246,7 @@ def nlopt_mma(given: Problem) -> tuple[np.ndarray, float]:
 
 
 class AcceptsJumps:
-    """What offers to cross a jump of the equilibrium, as ms.WarmStart does."""
+    """A checkpointed object that can accept a jump of the equilibrium, like ms.WarmStart."""
 
     accepting = False
 

@@ -1,4 +1,4 @@
-"""Imports examples."""
+"""A helper that imports examples."""
 
 import importlib
 import sys
@@ -8,7 +8,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 def load(name: str):
-    """An example as a module; what it imports lies beside it."""
+    """Import an example as a module; its own imports are in the same folder."""
     if str(EXAMPLES) not in sys.path:
         sys.path.insert(0, str(EXAMPLES))
     return importlib.import_module(name)

@@ -24,8 +24,8 @@ from gradient_kinds_muscles import muscles_at_rest, muscles_in_motion
 from gradient_kinds_pressure import pressed_sheet, pressed_solid
 from gradient_kinds_six_nodes import six_nodes_at_rest, six_nodes_in_motion
 from gradient_kinds_skeletons import (
-    driven_skeleton_at_rest,
-    driven_skeleton_in_motion,
+    motorized_skeleton_at_rest,
+    motorized_skeleton_in_motion,
     skeleton_at_rest,
     skeleton_in_motion,
     thrown_skeleton,
@@ -52,7 +52,7 @@ from magshell.model.supports.supports import rotation_matrix
 
 
 def resting_on(shape, bending="midedge", step=1e-5, **contact) -> Kind:
-    """A clamped sheet whose weight lies on an obstacle in part, with what a Contact does by default."""
+    """Build a clamped sheet whose weight lies on an obstacle in part, with the default Contact."""
     sheet = ms.Shell(
         MESH, thickness=1e-3, young_modulus=1e7, poisson_ratio=0.4, mass_density=300.0, bending=bending
     )
@@ -63,7 +63,7 @@ def resting_on(shape, bending="midedge", step=1e-5, **contact) -> Kind:
 
 
 def pinned() -> Kind:
-    """Pins that move and turn, and a couple given as a vector."""
+    """Build a sheet with pins that move and rotate, and a moment given as a vector."""
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.3)
     left = ms.Pin(MESH.vertices_at(x=0.0), displacement=(1e-3, 0, 2e-4), rotation=(0.0, 0.2, 0.1))
     right = ms.Pin(MESH.vertices_at(x=0.1), "yz", rotation=(0.0, -0.1, 0.0), center=(0.1, 0.03, 0.001))
@@ -73,7 +73,9 @@ def pinned() -> Kind:
 
 
 def among_magnets() -> Kind:
-    """Next to magnets, far from small ones, and inside large weak ones: each way to their field."""
+    """Build a sheet next to magnets, far from small ones, and inside large weak ones: each branch of their field
+    formula.
+    """
     fields = []
     for size, far, strength in ((0.03, 0.07, 3e4), (0.006, 0.2, 6e6), (0.4, 0.02, 120.0)):
         place = {
@@ -93,20 +95,20 @@ def swirl(x):
     return 0.01 * np.stack([np.sin(10 * x[:, 1]), 30 * x[:, 2] * x[:, 0], np.cos(10 * x[:, 0])], axis=1)
 
 
-def placed_grid():
+def positioned_grid():
     grid = ms.SampledField.from_function(swirl, (-0.2,) * 3, (0.2,) * 3, (5, 5, 5))
     return ms.PlacedField(grid, center=(1e-3, 2e-3, -1e-3), rotation=(0.1, 0.2, -0.1))
 
 
-def in_a_placed_grid() -> Kind:
+def in_a_positioned_grid() -> Kind:
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4)
-    scene = ms.Scene(sheet, supports=[ms.Clamp(MESH.edges_at(x=0.0))], field=placed_grid())
+    scene = ms.Scene(sheet, supports=[ms.Clamp(MESH.edges_at(x=0.0))], field=positioned_grid())
     controls = {"remanent_magnetization": MAGNETIZATION, "field_factor": 0.1}
     return Kind(scene, controls, fixed=EXACT, reach=REACH)
 
 
 def among_fields_that_move() -> Kind:
-    """Magnets, dipoles, and fields that were put somewhere."""
+    """Build a sheet among magnets, dipoles, and positioned fields."""
     place = {"center": 1e-3 * np.array([1.0, 2.0, -1.0]), "rotation": (0.1, 0.2, -0.1)}
     strong = {"remanent_magnetization": 3e4 * np.array([0.3, -0.5, 0.9]), "rotation": (0.3, -0.2, 0.5)}
     up = np.array([0.0, 0.0, 0.07])
@@ -114,7 +116,7 @@ def among_fields_that_move() -> Kind:
         ms.CuboidMagnet((0.03, 0.02, 0.02), center=MIDDLE - up, **strong),
         ms.CylinderMagnet(0.01, 0.02, center=MIDDLE + up, **strong),
         DIPOLES,
-        placed_grid(),
+        positioned_grid(),
         ms.PlacedField(ms.CustomField(swirl, length_scale=0.05), **place),
     ]
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
@@ -133,7 +135,7 @@ def load_cases() -> Kind:
 
 
 def warm(scene, values, start=None, solver=None, **design):
-    """The second equilibrium of a WarmStart, near the first."""
+    """Return the second equilibrium of a WarmStart, near the first."""
     last = ms.WarmStart(scene, start=start, solver=solver)
     numbers = {name: value.detach() if torch.is_tensor(value) else value for name, value in design.items()}
     last(**{**numbers, "applied_flux_density": 0.98 * np.asarray(numbers["applied_flux_density"])})
@@ -164,7 +166,7 @@ def thrown(
     in_time=0,
     **contact,
 ):
-    """A sheet that is thrown onto an obstacle, or through water, or both. extra: controls, options: other keywords."""
+    """Build a sheet thrown onto an obstacle, optionally in water."""
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
     contacts = []
     if shape is not None:
@@ -199,7 +201,7 @@ def thrown(
 
 
 def in_a_corner() -> Kind:
-    """Nodes with frames of their own: an oblique symmetry plane, on an oblique slope and in water."""
+    """Build a sheet with rotated nodal frames: an oblique symmetry plane, on an oblique slope and in water."""
     turn = rotation_matrix(np.array([0.5, -0.4, 0.8]))
     mesh = ms.TriangleMesh(MESH.rest_positions @ turn.T, MESH.faces)
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
@@ -222,7 +224,7 @@ def swaying(t):
 
 
 def from_an_equilibrium(scene, values, **controls):
-    """A motion that starts where the sheet is at rest under other controls."""
+    """Return a motion that starts from an equilibrium under other load parameters."""
     of_sheet = {name: controls[name] for name in ("remanent_magnetization",)}
     shared = {owner: named for owner, named in values.items()}
     rest = ms.equilibrium(scene, **of_sheet, applied_flux_density=(0, 0, 2e-3), values=shared, **EXACT)
@@ -290,9 +292,9 @@ MAKERS = {
         ms.TRBDF2(), adjoint_storage=ms.AdjointStorage("checkpoints", memory_budget=2e4)
     ),
     "a thrown skeleton": thrown_skeleton,
-    "at rest, with a driven skeleton": driven_skeleton_at_rest,
-    "in motion, with a driven skeleton, euler": lambda: driven_skeleton_in_motion(ms.ImplicitEuler()),
-    "in motion, with a driven skeleton": lambda: driven_skeleton_in_motion(
+    "at rest, with a driven skeleton": motorized_skeleton_at_rest,
+    "in motion, with a driven skeleton, euler": lambda: motorized_skeleton_in_motion(ms.ImplicitEuler()),
+    "in motion, with a driven skeleton": lambda: motorized_skeleton_in_motion(
         ms.TRBDF2(), adjoint_storage="stages"
     ),
     "in motion, with a skeleton, euler": lambda: skeleton_in_motion(ms.ImplicitEuler()),
@@ -305,7 +307,7 @@ MAKERS = {
     "onto a Box that sways": lambda: thrown(
         ob.Box, motion=swaying, options={"adjoint_storage": "factors"}, **RUBS
     ),
-    "at rest in a placed grid": in_a_placed_grid,
+    "at rest in a placed grid": in_a_positioned_grid,
     "among fields that move": among_fields_that_move,
     "in motion, everything moves": lambda: moving(ms.TRBDF2(), in_time=STEPS),
     "in motion, everything moves, euler": lambda: moving(ms.ImplicitEuler(), "hinge", in_time=STEPS),

@@ -11,7 +11,9 @@ PATH = [(0.001, 0.004, 0.028), (0.012, 0.012, 0.022), (0.022, 0.009, 0.012), (0.
 
 
 def _actuated() -> tuple[list, list, list]:
-    """A hollow block with all that there is in it, and a box of a sheet full of liquid: bodies, supports, actuators."""
+    """Return bodies, supports and actuators: a hollow block with all kinds of actuators, and a box of a sheet with
+    liquid.
+    """
     block, box = hollow_block(), box_sheet(size=0.03, thickness=1e-3)
     tetrahedra = np.arange(block.mesh.n_tetrahedra)
     pins = [ms.Pin(body.mesh.vertices_at(z=0.0), body=body) for body in (block, box)]
@@ -38,7 +40,7 @@ def actuated_at_rest() -> Kind:
 
 
 def actuated_in_motion(integrator, **options) -> Kind:
-    """All of their numbers change in time, those of groups of cells each their own way."""
+    """Build a motion in which all of their numbers change, those of groups of cells independently."""
     bodies, pins, actuators = _actuated()
     scene = ms.Scene(bodies, supports=pins, actuators=actuators)
     fixed = {"steps": 3, "integrator": integrator, "progress": False, **EXACT, **options}

@@ -12,7 +12,9 @@ CORNER = np.flatnonzero(MESH.rest_positions[:, 0] > 0.05)[[1, 3, 4]]  # a triang
 
 
 def with_rigid_parts(free: bool, **own):
-    """A clamped sheet that carries a magnet, and a magnetized top beside it. own: of the magnet."""
+    """Build a clamped sheet with a rigid magnet on it, and a free magnetized top. own: keyword arguments of the
+    magnet.
+    """
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
     carried = {
         "mass": 3e-3,
@@ -54,7 +56,7 @@ def rigid_in_motion(integrator, own=None, **options) -> Kind:
 
 
 def two_sheets():
-    """Of different bending, each with its own magnetization."""
+    """Build two sheets of different bending models, each with its own magnetization."""
     mesh = MESH.transformed(translation=(0.01, 0.09, 4e-4))
     sheet = ms.Shell(
         MESH,
@@ -77,7 +79,7 @@ def two_sheets():
 
 
 def two_sheets_at_rest() -> Kind:
-    """One floor under both, and loads on each."""
+    """Build an equilibrium of two sheets with one floor under both, and loads on each."""
     sheet, other = two_sheets()
     mesh = other.mesh
     supports = [
@@ -106,7 +108,7 @@ def two_sheets_at_rest() -> Kind:
 
 
 def two_sheets_in_motion() -> Kind:
-    """In water, and one of them onto a ball on which it rubs."""
+    """Build a motion of two sheets in water, one of them onto a ball with friction."""
     sheet, other = two_sheets()
     ball = under(ob.Sphere, -1e-3)
     rubbing = ms.Contact(ball, contact_stiffness=50.0, offset=1e-4, friction_coefficient=0.4, body=sheet)
@@ -135,7 +137,7 @@ def two_sheets_in_motion() -> Kind:
 
 
 def tied(moves: bool) -> Kind:
-    """A patch on a sheet, of two bendings and magnetizations, in a field; loads and supports on both."""
+    """Build a patch on a sheet, of two bending models and magnetizations, in a field; loads and supports on both."""
     sheet = two_sheets()[0]
     patch = ms.Shell(
         sheet.mesh,
@@ -186,7 +188,7 @@ def tied(moves: bool) -> Kind:
 
 
 def solid_at_rest(material=None, element="quadratic", **more) -> Kind:
-    """Tetrahedra between pins, one of which moves, under their weight and a force."""
+    """Build a solid between pins, one of which moves, under its weight and a force."""
     mesh = ms.meshes.box((0.1, 0.04, 0.04), cells=(2, 1, 1))
     muscle = ms.Guccione(
         stiffness=1e4,
@@ -207,7 +209,7 @@ def solid_at_rest(material=None, element="quadratic", **more) -> Kind:
 
 
 def _magnetized_block(element: str):
-    """Half of its skin and its inside magnetized, held at one end."""
+    """Build a block with half of its skin and its inside magnetized, held at one end."""
     mesh = ms.meshes.box((0.1, 0.04, 0.04), cells=(2, 1, 1))
     faces = np.flatnonzero(mesh.face_barycenters[:, 0] > 0.04)
     body = ms.Solid(
@@ -250,7 +252,7 @@ def magnetized_solid_at_rest() -> Kind:
 
 
 def magnetized_solid_in_motion() -> Kind:
-    """In water, which acts on its surface."""
+    """Build a motion of a magnetized solid in water, which acts on its surface."""
     body, held = _magnetized_block("linear")
     water = ms.Water(800.0, (0.05, -0.02, 0.01), added_mass=0.6)
     scene = ms.Scene(body, supports=[held], field=[ms.UniformField(), DIPOLES], water=water)
@@ -283,7 +285,7 @@ def solid_by_projective_dynamics() -> Kind:
 
 
 def solid_with_company(moves: bool) -> Kind:
-    """A bar with a magnetized sheet welded to its top and a magnet glued into its end."""
+    """Build a bar with a magnetized sheet welded to its top and a magnet glued into its end."""
     mesh = ms.meshes.box((0.1, 0.04, 0.04), cells=(3, 1, 1))
     law = ms.StVenantKirchhoff(young_modulus=1e5, poisson_ratio=0.3)
     bar = ms.Solid(mesh, material=law, mass_density=1e3, element="linear")

@@ -19,7 +19,7 @@ def _two_sheets(modulus, **contact):
 
 
 def sheets_at_rest_on_each_other(**contact) -> Kind:
-    """Clamped at opposite sides, the upper one softer and heavier."""
+    """Build two sheets in contact, clamped at opposite sides, the upper one softer and heavier."""
     lower, upper, touch = _two_sheets(2e8, **contact)
     scene = ms.Scene(
         [lower, upper],
@@ -34,7 +34,7 @@ def sheets_at_rest_on_each_other(**contact) -> Kind:
 
 
 def sheets_rubbing(integrator, **contact) -> Kind:
-    """The upper one thrown onto the lower one, which a side holds."""
+    """Build a motion of the upper sheet thrown onto the lower one, which is held at a side."""
     lower, upper, touch = _two_sheets(5e6, **{**RUBS, **contact})
     scene = ms.Scene(
         [lower, upper],
@@ -56,7 +56,7 @@ FLAT = ms.meshes.rectangle(0.12, 0.03, cells=(8, 1))
 
 
 def _hairpin() -> ms.TriangleMesh:
-    """A strip: straight, half a turn, straight back and down."""
+    """Build a strip: straight, half a circle, straight back and down."""
     s, across = FLAT.rest_positions[:, 0], FLAT.rest_positions[:, 1]
     radius, straight = 4e-3, 0.04
     angle = np.clip((s - straight) / radius, 0.0, np.pi)
@@ -67,7 +67,7 @@ def _hairpin() -> ms.TriangleMesh:
 
 
 def onto_itself(**contact) -> tuple[ms.Scene, dict]:
-    """A strip that comes back over itself, pressed down."""
+    """Build a strip that comes back over itself, pressed down."""
     mesh = _hairpin()
     strip = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.3, mass_density=1e3)
     touch = ms.SelfContact(strip, **{"contact_stiffness": 1e5, "activation_distance": 4e-4, **contact})

@@ -12,7 +12,7 @@ _DOME = ms.TriangleMesh(MESH.rest_positions + 4.0 * MESH.rest_positions[:, :1] *
 
 
 def _tensors(n: int, middle: float, size: float) -> np.ndarray:
-    """Symmetric, of each face, about `middle` times unity."""
+    """Return random symmetric tensors of each face, about `middle` times unity."""
     some = size * RNG.uniform(-1, 1, (n, 3, 3))
     return middle * np.eye(3) + some + np.swapaxes(some, 1, 2)
 
@@ -36,14 +36,14 @@ def _sheet(mesh, bending: str, growth, rest_curvature) -> ms.Shell:
 
 
 def grown_at_rest(bending: str) -> Kind:
-    """Curved at rest, growing in its own way in each face, under a weight."""
+    """Build a curved sheet with a different growth in each face, under a weight."""
     sheet = _sheet(_DOME, bending, _tensors(N_F, 1.02, 0.01), _tensors(N_F, 3.0, 2.0))
     scene = _clamped(sheet, gravity=(0.2, 0.1, -9.81))
     return Kind(scene, {"gravity_factor": 1.0}, fixed=EXACT, reach=_REACH, step=1e-5)
 
 
 def grown_evenly() -> Kind:
-    """One number for all faces, and one tensor."""
+    """Build a sheet with one growth number for all faces, and one curvature tensor."""
     sheet = _sheet(MESH, "midedge", 0.99, np.diag([8.0, 1.0, 1.0]))
     return Kind(_clamped(sheet), {}, fixed=EXACT, reach=_REACH)
 
@@ -63,7 +63,7 @@ def grown_six_nodes() -> Kind:
 
 
 def growing(integrator, in_time: int = 0, six_nodes: bool = False, **keywords) -> Kind:
-    """In motion, with all viscosities, whose strains know where they have been."""
+    """Build a motion with growth and all kinds of viscosity, whose strains have a history."""
     if six_nodes:
         mesh = curved(own_magnetization=False).mesh
         sheet = ms.Shell(

@@ -23,7 +23,10 @@ def _body(element: str):
 
 
 def _muscles(body, moves: bool) -> list[ms.Muscle]:
-    """A target stretch in pieces along a curved line, an active stress, and Hill's; weights and directions of their own."""
+    """Build muscles with a target stretch, in segments along a curved line, an active stress, and Hill's law.
+
+    They have weights and directions of their own.
+    """
     line = [(0.0, 0.02, 0.04), (0.04, 0.015, 0.035), (0.1, 0.02, 0.04)]
     curved = ms.fibres_along(line, body, reach=0.02)
     target = ms.Muscle(body, curved, stiffness=8e4, segments=3, activation=(0.1, -0.05, 0.2))
@@ -49,7 +52,7 @@ def muscles_at_rest() -> Kind:
 
 
 def muscles_in_motion(integrator, in_time: int = 0) -> Kind:
-    """Fast enough for the force-velocity curve to matter."""
+    """Build a motion that is fast enough for the force-velocity curve to matter."""
     body = _body("linear")
     scene = ms.Scene(
         body,

@@ -1,4 +1,4 @@
-"""Kinds of scene under pressures that follow, for gradient_kinds.py."""
+"""Kinds of scene under follower pressures, for gradient_kinds.py."""
 
 import numpy as np
 from adjoint_scenes import MESH
@@ -10,7 +10,7 @@ from magshell import obstacles as ob
 
 
 def _solid(element: str) -> tuple[ms.Solid, list]:
-    """Held at one end, with a pressure all around and one a face at the other end."""
+    """Build a solid held at one end, with a pressure all around and one on each face at the other end."""
     body = ms.Solid(
         ms.meshes.box((0.1, 0.04, 0.04), cells=(2, 1, 1)),
         material=ms.NeoHookean("isochoric", young_modulus=1e5, poisson_ratio=0.45),
@@ -22,7 +22,10 @@ def _solid(element: str) -> tuple[ms.Solid, list]:
 
 
 def pressed_solid(moves: bool) -> Kind:
-    """At rest its support turns too; in motion the pressures change in time and the solid is in contact and rubs."""
+    """Build a solid under pressure.
+
+    As an equilibrium its support rotates, too; in motion the pressures change, and it is in contact with friction.
+    """
     body, loads = _solid("linear" if moves else "quadratic")
     left = np.flatnonzero(body.mesh.rest_positions[:, 0] < 1e-9)
     place = {} if moves else {"displacement": (1e-3, 0, 2e-4), "rotation": (0.0, 0.1, 0.05)}
@@ -45,7 +48,7 @@ def pressed_solid(moves: bool) -> Kind:
 
 
 def pressed_sheet(moves: bool) -> Kind:
-    """A flap, with faces that have a pressure of their own: no potential."""
+    """Build a flap with a different pressure on some faces: a load without a potential."""
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
     supports = [ms.Clamp(MESH.edges_at(x=0.0), displacement=(1e-4, 0, 2e-4), rotation=(0.0, 0.1, 0.02))]
     loads = [ms.Pressure(RNG.uniform(-0.8, -0.4, 3), faces=[1, 4, 7]), ms.Pressure(-0.3)]

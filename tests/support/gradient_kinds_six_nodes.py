@@ -33,7 +33,9 @@ def curved(own_magnetization: bool) -> ms.Shell:
 
 
 def six_nodes_at_rest() -> Kind:
-    """A clamp that moves, all loads, gravity, fields, a floor, and a sheet of three nodes beside it."""
+    """Build an equilibrium with a clamp that moves, all loads, gravity, fields, a floor, and a sheet of three-node
+    elements.
+    """
     sheet = curved(own_magnetization=True)
     mesh = sheet.mesh
     other = ms.Shell(
@@ -69,7 +71,7 @@ def six_nodes_at_rest() -> Kind:
 
 
 def six_nodes_in_motion() -> Kind:
-    """Thrown through water onto a ball on which it rubs."""
+    """Build a motion of a sheet thrown through water onto a ball with friction."""
     sheet = curved(own_magnetization=False)
     ball = under(ob.Sphere, 8e-3)
     rubbing = ms.Contact(ball, contact_stiffness=50.0, offset=1e-4, friction_coefficient=0.4)

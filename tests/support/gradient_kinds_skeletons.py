@@ -11,8 +11,10 @@ import magshell as ms
 _LIMITS = {"lower_limit": -1.0, "upper_limit": -1e-3, "limit_stiffness": 1e-2, "limit_smoothing": 5e-3}
 
 
-def _carried_skeleton(free: bool):
-    """On the free end of a sheet: a hinge, a slide, a ball joint, a link held fast, and a loop through the world."""
+def _skeleton_on_a_sheet(free: bool):
+    """Build a skeleton on the free end of a sheet: a hinge, a slide, a ball joint, a fixed link, and a loop closed
+    to the world.
+    """
     base = MESH.rest_positions[CORNER].mean(axis=0)
 
     def link(*off, **own):
@@ -87,8 +89,8 @@ def _carried_skeleton(free: bool):
     )
 
 
-def _driven_skeleton(moves: bool):
-    """On the free end of a sheet: motors that turn and slide links, and a moment in a ball joint; dampers if it moves."""
+def _motorized_skeleton(moves: bool):
+    """Build a skeleton with motors on the free end of a sheet, and a moment in a ball joint; dampers if it moves."""
     base = MESH.rest_positions[CORNER].mean(axis=0)
 
     def link(*off):
@@ -152,26 +154,26 @@ def _driven_skeleton(moves: bool):
 _REACH = {**REACH, "motor_rotation": 0.3}
 
 
-def driven_skeleton_at_rest() -> Kind:
-    return Kind(_driven_skeleton(False), {**DEFAULTS, **FACTORS}, fixed=EXACT, reach=_REACH)
+def motorized_skeleton_at_rest() -> Kind:
+    return Kind(_motorized_skeleton(False), {**DEFAULTS, **FACTORS}, fixed=EXACT, reach=_REACH)
 
 
-def driven_skeleton_in_motion(integrator, **options) -> Kind:
+def motorized_skeleton_in_motion(integrator, **options) -> Kind:
     controls = {**IN_TIME, "time_step": 5e-3}
     fixed = {**EXACT, "steps": STEPS, "integrator": integrator, "progress": False, **options}
     in_time = {"in_time": STEPS} if "adjoint_storage" in options else {}
     step = 3e-4 if in_time else 1e-5
     return Kind(
-        _driven_skeleton(True), controls, ms.simulate, fixed=fixed, step=step, reach=_REACH, **in_time
+        _motorized_skeleton(True), controls, ms.simulate, fixed=fixed, step=step, reach=_REACH, **in_time
     )
 
 
 def skeleton_at_rest() -> Kind:
-    return Kind(_carried_skeleton(False), {**DEFAULTS, **FACTORS}, fixed=EXACT, step=3e-4, reach=REACH)
+    return Kind(_skeleton_on_a_sheet(False), {**DEFAULTS, **FACTORS}, fixed=EXACT, step=3e-4, reach=REACH)
 
 
 def skeleton_in_motion(integrator, **options) -> Kind:
-    scene = _carried_skeleton(True)
+    scene = _skeleton_on_a_sheet(True)
     turning = np.cross([2.0, 5.0, -1.0], MESH.rest_positions - MIDDLE)
     moves = np.array([0.02, 0.01, -0.1]) + turning + 0.05 * RNG.standard_normal((N_V, 3))
     moves[CORNER] = (np.array([0.02, 0.01, -0.1]) + turning)[CORNER]
@@ -184,7 +186,7 @@ def skeleton_in_motion(integrator, **options) -> Kind:
 
 
 def thrown_skeleton() -> Kind:
-    """Two links on a hinge, in the air: they start as one."""
+    """Build two links on a hinge in the air, which start as one rigid body."""
     arm = ms.Link(
         mass=2e-3,
         inertia=(4e-7, 5e-7, 6e-7),

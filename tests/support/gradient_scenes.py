@@ -1,4 +1,4 @@
-"""What a kind of scene can be differentiated by: found, not listed.
+"""The inputs by which a kind of scene can be differentiated: found, not listed.
 
 A new value of an object (`_replaceable`), or a new keyword of a solve, is an input by being there.
 """
@@ -27,7 +27,7 @@ SETTINGS_OF = {
 
 @cache
 def continuous(solve) -> set[str]:
-    """The keywords of ms.equilibrium or ms.simulate that are inputs."""
+    """Return the keywords of ms.equilibrium or ms.simulate that are inputs."""
     return set(inspect.signature(solve).parameters) - SETTINGS_OF[solve]
 
 
@@ -35,10 +35,10 @@ def continuous(solve) -> set[str]:
 class Kind:
     """A kind of scene, and how it is solved.
 
-    solve: (scene, start=None, **keywords) to what has positions; function: the one of magshell behind it.
-    controls: by keyword, the inputs that belong to no object. fixed: other keywords.
-    step: of differences, over the size of a value; reach: that size, where it is not the value's own. in_time: steps of
-    the motion over which everything goes somewhere that can, or 0.
+    solve: (scene, start=None, **keywords) to what has positions; function: the one of magshell behind it. controls: by
+    keyword, the inputs that belong to no object. fixed: other keywords. step: of differences, over the size of a
+    value; reach: that size, where it is not the value's own. in_time: steps of the motion over which everything
+    varies_in_time somewhere that can, or 0.
     """
 
     scene: ms.Scene
@@ -51,7 +51,7 @@ class Kind:
     in_time: int = 0
 
     def found(self, given: dict[tuple, object], start=None):
-        """The solution with these inputs, {(object or None, name): value}, in place of those that it has."""
+        """Find the solution with these inputs, {(object or None, name): value}, in place of its own."""
         keywords, values = {**self.fixed, **self.controls}, {}
         for (owner, name), value in given.items():
             if owner is None:
@@ -64,7 +64,7 @@ class Kind:
 
     @cached_property
     def of_objects(self) -> dict[tuple, np.ndarray]:
-        """{(object, name): its value} of everything in the scene."""
+        """The values of all objects in the scene, {(object, name): value}."""
         owners = (self.scene, *self.scene.objects)
         moving = self.function is ms.simulate
         return {
@@ -73,12 +73,12 @@ class Kind:
             for name, value in _values_of(self.scene, owner, moving).items()
         }
 
-    def goes(self, owner, name: str) -> bool:
-        """Whether this value is another at each end of a step."""
+    def varies_in_time(self, owner, name: str) -> bool:
+        """Return whether this value is another at each end of a step."""
         return self.in_time > 0 and name in getattr(owner, "_in_time", ())
 
     def _over_time(self, owner, name: str, value: np.ndarray) -> np.ndarray:
-        if not self.goes(owner, name):
+        if not self.varies_in_time(owner, name):
             return value
         rng = np.random.default_rng(len(name))
         way = self.reach.get(name, 0.1 * np.abs(value).max()) * admissible(
@@ -89,7 +89,7 @@ class Kind:
 
     @cached_property
     def of_solve(self) -> dict[tuple, np.ndarray]:
-        """{(None, keyword): its value}: controls, and what a keyword too can say of the objects, as one number."""
+        """The keywords as {(None, keyword): value}: load parameters, and uniform values of the objects."""
         own = {(None, name): np.array(value, dtype=np.float64) for name, value in self.controls.items()}
         for (owner, name), value in self.of_objects.items():
             if owner is self.scene and name in continuous(self.function):
@@ -97,20 +97,20 @@ class Kind:
             inside = (
                 isinstance(owner, ms.Solid) and name == "remanent_magnetization"
             )  # the keyword is of faces
-            # Of several bodies: by values only.
+            # With several bodies only `values` can set this.
             if self.scene.bodies == (owner,) and name in continuous(self.function) and not inside:
                 own[None, name] = value.mean()
         return own
 
     @cached_property
     def together(self) -> dict[tuple, np.ndarray]:
-        """All inputs, each once and a little off what it was made with, so that nothing is left to a default."""
+        """The inputs, each once and slightly changed, so that none has a default value."""
         once = {key: value for key, value in self.entries.items() if self._once(key)}
         rng = np.random.default_rng(23)
         off = {key: admissible(key, 0.02 * rng.uniform(-1, 1, value.shape)) for key, value in once.items()}
         moved = {
             (owner, name): value + off[owner, name] * self.reach.get(name, value)
-            if self.goes(owner, name)
+            if self.varies_in_time(owner, name)
             else value * (1.0 + off[owner, name])
             for (owner, name), value in once.items()
         }
@@ -128,7 +128,7 @@ class Kind:
 
 
 def admissible(key: tuple, direction: np.ndarray) -> np.ndarray:
-    """A direction that a value may change along: its free components, and symmetric where it is."""
+    """Return the admissible part of a direction: the value's free components, and symmetric where the value is."""
     direction = free(key) * direction
     if key[1] in ("growth", "rest_curvature") and direction.shape[-2:] == (3, 3):
         return 0.5 * (direction + np.swapaxes(direction, -1, -2))
@@ -136,7 +136,7 @@ def admissible(key: tuple, direction: np.ndarray) -> np.ndarray:
 
 
 def free(key: tuple) -> np.ndarray | float:
-    """1 for the components of a value that may change at all, and 0 for the others."""
+    """Return 1 for the components of a value that may change at all, and 0 for the others."""
     owner, name = key
     if isinstance(owner, ms.Pin) and name == "displacement":
         return np.array([float(axis in owner.components) for axis in "xyz"])
@@ -144,7 +144,7 @@ def free(key: tuple) -> np.ndarray | float:
 
 
 def label(kind: Kind, key: tuple) -> str:
-    """For people: what an input is called."""
+    """Return the name of an input for messages."""
     owner, name = key
     if owner is None:
         return name
@@ -154,15 +154,15 @@ def label(kind: Kind, key: tuple) -> str:
 
 
 def subject(kind: Kind, key: tuple) -> tuple:
-    """(class or function, name) of an input: what coverage counts; one over time is told apart."""
+    """Return (class or function, name) of an input, by which coverage is counted; one over time is a different one."""
     owner, name = key
-    if owner is not None and kind.goes(owner, name):
+    if owner is not None and kind.varies_in_time(owner, name):
         name += IN_TIME
     return (kind.function if owner is None else type(owner), name)
 
 
 def subjects() -> set[tuple]:
-    """All that there are: keywords of solves, and values of every class that a scene may hold."""
+    """Return all subjects: keywords of solves, and values of every class that a scene may hold."""
     classes = [
         each for module in (ms, ms.obstacles) for each in vars(module).values() if isinstance(each, type)
     ]
@@ -179,7 +179,7 @@ def subjects() -> set[tuple]:
 
 
 def _names_of(kind: type) -> tuple[str, ...]:
-    """Of the values of a class; a solid's are its materials'."""
+    """Return the names of the values of a class; a solid's are its materials'."""
     if kind is not ms.Solid:
         return getattr(kind, "_replaceable", ())
     materials = [
@@ -191,7 +191,7 @@ def _names_of(kind: type) -> tuple[str, ...]:
 
 
 def _values_of(scene: ms.Scene, owner, moving: bool) -> dict[str, object]:
-    """The values of an object that a solve of this scene may replace, as they are. One that is new must be here."""
+    """Return the present values of an object that a solve of this scene may override; a new one must be added here."""
     names = getattr(owner, "_replaceable", ())
     if owner is scene:
         layout, key = scene._value_layout, ("loads", "forces")

@@ -1,4 +1,4 @@
-"""What the scenes of gradient_kinds.py are made of."""
+"""The parts of the scenes of gradient_kinds.py."""
 
 from functools import cache
 
@@ -15,7 +15,7 @@ RNG = np.random.default_rng(17)
 EXACT = {"solver": ms.MixedNewton(tolerance=1e-13)}
 STEPS = 4
 FACTORS = {"load_factor": 0.9, "gravity_factor": 0.8, "field_factor": 1.1, "support_factor": 0.7}
-# Of values that may be zero: m, rad, m/s.
+# Sizes of values that may be zero: m, rad, m/s.
 REACH = {
     "center": 1e-3,
     "rotation": 0.3,
@@ -65,8 +65,8 @@ UNDER = {  # every obstacle, its highest point at the middle of its own frame
 }
 
 
-def _lowered(place: dict, by: float) -> dict:
-    return {**place, "center": np.array(place["center"]) - np.array([0, 0, by])}
+def _lowered(pose: dict, by: float) -> dict:
+    return {**pose, "center": np.array(pose["center"]) - np.array([0, 0, by])}
 
 
 @cache
@@ -75,6 +75,6 @@ def _ball():
 
 
 def under(shape, height: float, **place):
-    """An obstacle of this class, its highest point so far above the sheet's rest plane."""
+    """Build an obstacle of this class, with its highest point at a height above the sheet's reference plane."""
     center = MIDDLE + np.array([0, 0, height])
     return UNDER[shape](**{"center": center, "rotation": (0.01, -0.02, 0.1), **place})

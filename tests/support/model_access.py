@@ -12,7 +12,7 @@ from magshell.model.scene.values import Values
 
 @dataclass(frozen=True)
 class Controls:
-    """What acts on a scene: T, and factors."""
+    """The load parameters of a scene: T, and factors."""
 
     applied_flux_density: tuple[float, ...] = (0.0, 0.0, 0.0)
     field_factor: float = 0.0
@@ -21,7 +21,7 @@ class Controls:
     support_factor: float = 0.0
 
     def of(self, scene: ms.Scene) -> np.ndarray:
-        """As the core takes them."""
+        """Return the load parameters as the core takes them."""
         numbers = {("scene", name): value for name, value in asdict(self).items()}
         return scene._control_layout.packed(numbers, scene._control_layout.zeros())
 
@@ -39,7 +39,7 @@ class Problem:
 
     @property
     def n_nodes(self) -> int:
-        """Vertices and directions; the rotations come after their components."""
+        """The number of vertices and directors; the rotations come after their components."""
         return (self.model.size - self.n_rotations) // 3
 
     @property
@@ -49,7 +49,7 @@ class Problem:
 
     @property
     def order(self) -> np.ndarray:
-        """(n,) where each unknown of the core stands in (positions, edge rotations); -1 for directions."""
+        """The position of each dof of the core in (positions, edge rotations), (n,); -1 for directors."""
         mesh = self.scene.mesh
         numbers = np.arange(3.0 * mesh.n_vertices).reshape(-1, 3)
         order = self.model.state(numbers, 3.0 * mesh.n_vertices + np.arange(mesh.n_edges))
@@ -63,7 +63,7 @@ class Problem:
         return np.asarray(self.model.gradient(q, self.controls))
 
     def hessian(self, q: np.ndarray, reduced: bool = False) -> np.ndarray:
-        """Dense and whole; the core hands out the lower triangle."""
+        """Return the full dense Hessian; the core gives the lower triangle."""
         size, starts, rows, values = self.model.hessian(q, self.controls, reduced=reduced)
         lower = np.zeros((size, size))
         lower[rows, np.repeat(np.arange(size), np.diff(starts))] = values

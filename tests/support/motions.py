@@ -6,7 +6,7 @@ import magshell as ms
 
 
 def lifted_strip(mesh: ms.TriangleMesh, steps: int = 8, record_every: int = 1) -> ms.Trajectory:
-    """A clamped strip, magnetized along itself, for 40 ms in a vertical field that grows to 4 mT."""
+    """Simulate a clamped strip, magnetized along itself, for 40 ms in a vertical field that grows to 4 mT."""
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
     scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
     return ms.simulate(

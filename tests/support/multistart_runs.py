@@ -1,4 +1,4 @@
-"""What the tests of multistart have run, and how they look at what comes back. Worker processes import this."""
+"""Functions that the tests of multistart run, and checks of their results. Worker processes import this."""
 
 import os
 import signal
@@ -17,14 +17,14 @@ def quiet(*arguments, **options):
 
 
 def bits(found):
-    """Everything that may not depend on where and when `valley` ran."""
+    """Return everything that must not depend on where and when `valley` ran."""
     return [
         (one.number, one.objective, [x.numpy().tobytes() for x in one.result.parameters]) for one in found
     ]
 
 
 def valley(start):
-    """A minimization in a landscape with several minima."""
+    """Run a minimization in a landscape with several minima."""
     import torch  # only where it is used: it takes a worker seconds to import
 
     x = torch.as_tensor(start, dtype=torch.float64).clone().requires_grad_()
@@ -36,7 +36,7 @@ def valley(start):
 
 
 def bend(start):
-    """A strip bent by a field, at a design of three numbers; the scene is made here."""
+    """Compute the equilibrium of a strip in a field, at a design of three numbers; the scene is built here."""
     mesh = ms.meshes.rectangle(0.1, 0.02, cells=(8, 2))
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
     scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
@@ -93,7 +93,7 @@ def killed_the_first_time(folder, start):
 
 
 def slow_bend(folder, start):
-    """`bend`, leaving word of the process it runs in, and slow enough to be caught at it."""
+    """Run `bend` slowly enough to be interrupted, and write a file that names the process."""
     (Path(folder) / f"{os.getpid()}-{time.monotonic_ns()}").touch()
     time.sleep(0.3)
     return bend(start)

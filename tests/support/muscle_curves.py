@@ -11,7 +11,7 @@ PASSIVE = np.stack([PLACES, 0.3 * np.clip(PLACES - 1.1, 0, None) ** 2], axis=1)
 
 
 def curve(table, x):
-    """By its definition: a B-spline with the core's coefficients, constant beyond."""
+    """Evaluate a curve by its definition: a B-spline with the core's coefficients, constant beyond."""
     origin, step, c = core_curve(table)
     c = torch.tensor(c, dtype=torch.float64)
     s = (x - origin) / step

@@ -1,4 +1,4 @@
-"""One obstacle of every kind, about a metre large, for tests of what all have in common."""
+"""One obstacle of every kind, about a metre large, for tests of their common properties."""
 
 from functools import cache
 
@@ -19,7 +19,7 @@ def ball(cells=64):
 
 
 def torus(ring=0.6, radius=0.25, cells=(96, 48), flip=False):
-    """A closed mesh around the z axis."""
+    """Build a closed mesh of a torus around the z axis."""
     n, m = cells
     u, v = np.meshgrid(2 * np.pi * np.arange(n) / n, 2 * np.pi * np.arange(m) / m, indexing="ij")
     rho = ring + radius * np.cos(v)
@@ -54,12 +54,12 @@ MAKERS = {
 
 @cache
 def made(name):
-    """At rest, in its own frame."""
+    """Build an obstacle at rest, in its own frame."""
     return MAKERS[name]()
 
 
-def spread_points(obstacle, count, depth, seed=0):
-    """(count, 3) m: points by the surface, up to `depth` on either side of it."""
+def points_near_surface(obstacle, count, depth, seed=0):
+    """Return points near the surface, up to `depth` on either side of it, (count, 3) m."""
     rng = np.random.default_rng(seed)
     vertices, faces = obstacle.surface(extent=2.0)
     corners = vertices[faces[rng.integers(len(faces), size=count)]]

@@ -28,7 +28,9 @@ PROCESSES = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """`-n auto`: a process for each processor that this one may use, as far as memory goes; 0 is this one alone."""
+    """Return the number of processes for `-n auto`: one for each usable processor, as far as memory suffices; 0 is
+    this one.
+    """
     if fcntl is None:  # no test could run alone
         return 0
     processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -51,7 +53,9 @@ def measured() -> dict[str, float]:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Marks what is slow. For several processes, files that take longest come first, so that all end at the same time."""
+    """Mark slow tests, and sort files for several processes: those that take longest come first, so that all end
+    together.
+    """
     seconds = measured()
     of_file: dict[Path, float] = defaultdict(float)
     seen = set()
@@ -79,8 +83,8 @@ def pytest_configure_node(node) -> None:
 
 
 @contextlib.contextmanager
-def turn(folder: Path, alone: bool) -> Iterator[None]:
-    """Holds a lock together with others, or alone. Whoever waits to hold it alone keeps others from taking it meanwhile."""
+def locked(folder: Path, alone: bool) -> Iterator[None]:
+    """Hold a lock together with others, or alone; while one waits to hold it alone, no other can take it."""
     with open(folder / "door", "w") as door, open(folder / "room", "w") as room:
         fcntl.flock(door, fcntl.LOCK_EX)
         fcntl.flock(room, fcntl.LOCK_EX if alone else fcntl.LOCK_SH)
@@ -94,13 +98,13 @@ def turn(folder: Path, alone: bool) -> Iterator[None]:
 
 
 def processor_time() -> float:
-    """Seconds of this process and of those that it has waited for."""
+    """Return the processor time of this process and of those that it has waited for, s."""
     return sum(os.times()[:4])
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> Iterator[None]:
-    """Notes when the test's first fixture is made."""
+    """Record the time at which the test's first fixture is built."""
     item.stash[BEGAN] = processor_time()
     return (yield)
 
@@ -116,9 +120,9 @@ def pytest_runtest_teardown(item: pytest.Item) -> Iterator[None]:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
-    """Fixtures of files are made within the turn of the first test that wants them."""
+    """Run a test under the lock; fixtures of a file are built under that of the first test that needs them."""
     shared = getattr(item.config, "workerinput", None)
     if shared is None:
         return (yield)
-    with turn(Path(shared["locks"]), alone=item.get_closest_marker("alone") is not None):
+    with locked(Path(shared["locks"]), alone=item.get_closest_marker("alone") is not None):
         return (yield)

@@ -40,7 +40,7 @@ def clamped(solid, axes="xyz", **motion):
 
 
 def both(scene, steps=4, time_step=5e-3, **options):
-    """Positions by Projective Dynamics and by Newton's method."""
+    """Return the positions by Projective Dynamics and by Newton's method."""
     given = {"steps": steps, "time_step": time_step, "progress": False, **options}
     mine = ms.simulate(scene, integrator=TIGHT, **given)
     newton = ms.simulate(scene, integrator=ms.ImplicitEuler(), solver=NEWTON, **given)

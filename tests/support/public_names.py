@@ -4,7 +4,7 @@ import magshell as ms
 
 
 def public_names(module=ms, prefix="") -> set[str]:
-    """What users call, modules opened."""
+    """Return the names that users call, including those in modules."""
     names = set()
     for name in module.__all__ if hasattr(module, "__all__") else _defined_in(module):
         each = getattr(module, name)

@@ -210,7 +210,7 @@ def _same(points):
 
 
 def _options(given: Arrays) -> dict[str, object]:
-    """What is handed to functions beside a scene."""
+    """Return the objects that users pass to functions together with a scene."""
     ball = ms.shapes.ball(0.1, given([0.0, 0, 0]))
     found = {
         **{
@@ -243,7 +243,7 @@ def _options(given: Arrays) -> dict[str, object]:
 
 
 def made_objects(given: Arrays) -> dict[str, object]:
-    """What users make, with a scene of much of it."""
+    """Return the objects that users make, with a scene of many of them."""
     found = _bodies(given)
     found |= _around(given, found)
     found |= _options(given)
@@ -259,21 +259,21 @@ def made_objects(given: Arrays) -> dict[str, object]:
     found["env actuator"] = ms.envs.Action(
         scene, "applied_flux_density", lower=given([-1.0, -1, -1]), upper=given([1.0, 1, 1])
     )
-    found["steered"] = ms.envs.ParametricAction(found["hinge"], "torque", 1, _steered)
+    found["steered"] = ms.envs.ParametricAction(found["hinge"], "torque", 1, _former_value)
     return found
 
 
-def _steered(share, time, before):
+def _former_value(number, time, before):
     return before
 
 
 def _from_fields(cls) -> object:
-    """A result that takes long to find, with numbers in its place."""
+    """Return a result with dummy numbers, in place of one that takes long to compute."""
     return cls(**{name: np.zeros(3) for name, each in inspect.signature(cls).parameters.items()})
 
 
 def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
-    """What functions return."""
+    """Return the results of functions."""
     mesh = made["flat"]
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
     tip = mesh.vertices_at(x=0.04)
@@ -352,7 +352,7 @@ def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
 
 
 def public_classes() -> dict[str, type]:
-    """By their public names; errors and warnings are Python's own, which write into them."""
+    """Return the public classes by their names, without errors and warnings, which Python itself modifies."""
     found = {name: _named(name) for name in public_names()}
     return {
         name: each
@@ -362,7 +362,7 @@ def public_classes() -> dict[str, type]:
 
 
 def frozen_classes() -> set[type]:
-    """All that are made immutable, once every module is loaded; those that are made within the package alone apart."""
+    """Return the immutable classes, once every module is loaded, without those that only the package itself builds."""
     for module in pkgutil.walk_packages(ms.__path__, "magshell."):
         if ".bench" not in module.name and "__main__" not in module.name:
             importlib.import_module(module.name)

@@ -8,7 +8,7 @@ import magshell as ms
 
 
 def chain(count: int, points: bool = False):
-    """Links along x, in the plane of x and z."""
+    """Build links along x, in the plane of x and z."""
     ends, spread = (1.0, None) if points else (0.5, (0.0, 1 / 12, 1 / 12))
     links = [ms.Link(mass=1.0, inertia=spread, center=(k + ends, 0, 0)) for k in range(count)]
     joints = [

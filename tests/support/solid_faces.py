@@ -12,7 +12,7 @@ MIDDLES = {(0, 1): 4, (1, 2): 5, (0, 2): 6, (0, 3): 7, (1, 3): 8, (2, 3): 9}
 
 
 class Faces:
-    """Those faces of a TetMesh whose corners all are where `where` (x (k, 3) -> (k,) bool) says."""
+    """The faces of a TetMesh whose corners all meet `where` (x (k, 3) -> (k,) bool)."""
 
     def __init__(self, mesh, where: Callable[[np.ndarray], np.ndarray]):
         self.mesh = mesh
@@ -27,13 +27,15 @@ class Faces:
         self.nodes = np.concatenate(rows)
 
     def _integrated(self, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Area vectors at points (k, p, 3), with weights, and the shapes there (p, N)."""
+        """Return area vectors at points (k, p, 3), with weights, and the shape functions there (p, N)."""
         shapes, slopes, weights = _rule(self.nodes.shape[1])
         along = np.einsum("pan,kni->apki", slopes, positions[self.nodes])
         return np.einsum("p,pki->kpi", weights, np.cross(along[0], along[1])), shapes
 
     def forces(self, positions: np.ndarray, traction=None, pressure: float = 0.0) -> np.ndarray:
-        """(n_v, 3) N: a traction (3,) Pa on the area at rest, and a pressure Pa against the faces as they are."""
+        """Return the nodal forces (n_v, 3) N of a traction (3,) Pa on the reference area and a pressure Pa on the
+        deformed faces.
+        """
         out = np.zeros_like(positions)
         if traction is not None:
             areas, shapes = self._integrated(self.mesh.rest_positions)
@@ -45,7 +47,7 @@ class Faces:
 
 
 def _rule(n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Shapes (p, n), slopes (p, 2, n) and weights (p,) of a triangle of three or six nodes."""
+    """Return shape functions (p, n), slopes (p, 2, n) and weights (p,) of a triangle of three or six nodes."""
     points, lengths = np.polynomial.legendre.leggauss(4)
     u, v = np.meshgrid((points + 1) / 2, (points + 1) / 2)
     u, v, weights = u.ravel(), v.ravel(), (np.outer(lengths, lengths) / 4).ravel()

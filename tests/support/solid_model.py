@@ -43,7 +43,7 @@ def values_of(material: str) -> dict:
 
 
 def second_order(nodes, tetrahedra):
-    """Straight ten-node tetrahedra: (nodes, (n_t, 10))."""
+    """Return straight ten-node tetrahedra: (nodes, (n_t, 10))."""
     middle: dict[tuple[int, int], int] = {}
     points, rows = list(np.asarray(nodes, dtype=float)), []
     for tet in np.asarray(tetrahedra):
@@ -134,7 +134,7 @@ class SolidModel:
         return self.core.energy(self.state(x), self.controls)
 
     def gradient(self, x) -> np.ndarray:
-        """(3 n,), in the caller's order."""
+        """Return the gradient in the caller's order, (3 n,)."""
         out = np.empty(self.nodes.size)
         out[self.order] = self.core.gradient(self.state(x), self.controls)
         return out
@@ -148,12 +148,12 @@ class SolidModel:
         return whole
 
     def vjp(self, x, adjoint) -> dict[str, np.ndarray]:
-        """adjoint . dg/dk of every value k, by name; adjoint (n, 3)."""
+        """Return adjoint . dg/dk of every value k, by name; adjoint (n, 3)."""
         found = self._vjp(x, adjoint)
         return {name: self.layout.of(found, "body 0", name) for name in self.values}
 
     def other_vjp(self, x, adjoint) -> dict[tuple[str, str], np.ndarray]:
-        """Likewise of the numbers in `others`."""
+        """Return adjoint . dg/dk of the numbers k in `others`."""
         found = self._vjp(x, adjoint)
         return {key: self.layout.of(found, *key) for key in self.others}
 
@@ -162,7 +162,7 @@ class SolidModel:
 
 
 def shape_gradients(nodes, tetrahedra):
-    """(n_t, p, N, 3) gradients at the points of integration, and (n_t, p) volumes, from the textbook's formulas."""
+    """Return gradients (n_t, p, N, 3) at the integration points and volumes (n_t, p), from textbook formulas."""
     nodes, tetrahedra = torch.tensor(np.array(nodes)), torch.tensor(np.array(tetrahedra))
     if tetrahedra.shape[1] == 4:
         points, weights = (
@@ -190,7 +190,7 @@ def shape_gradients(nodes, tetrahedra):
 
 
 def torch_energy(model: SolidModel, material: str, mean: bool, values: dict | None = None):
-    """The energy as a function of positions (n, 3), a tensor; values: {name: tensor} in place of the model's."""
+    """Return the energy as a function of positions (n, 3), a tensor; values: {name: tensor} in place of the model's."""
     gradients, volumes = shape_gradients(model.nodes, model.tetrahedra)
     tetrahedra = torch.tensor(np.array(model.tetrahedra))
     given = {name: torch.tensor(np.array(each)) for name, each in model.values.items()}
@@ -217,7 +217,7 @@ def determinant(f):
 
 
 def density(material, f, values, averaged):
-    """(n_t, p) J/m3, straight from the definitions."""
+    """Return the energy density from its definition, (n_t, p) J/m3."""
     i1, j = (f * f).sum((-1, -2)), determinant(f)
     strain = 0.5 * (f.transpose(-1, -2) @ f - torch.eye(3, dtype=torch.float64))
     if material == "Guccione":
@@ -261,8 +261,10 @@ def density(material, f, values, averaged):
 
 
 def nearest_of_product_one(s):
-    """The d with d1 d2 d3 = 1 that are nearest to s, (..., 3): by a search among positive ones, from many starts; two steps
-    of Newton on d - k/d = s with that product then carry the derivatives."""
+    """Return the d with d1 d2 d3 = 1 that is nearest to s, (..., 3), among positive ones.
+
+    It is searched from many starts; two Newton steps on d - k/d = s with that product then carry the derivatives.
+    """
     rows = []
     for row in s.detach().reshape(-1, 3).numpy():
         away = lambda p, row=row: float(((np.array([*np.exp(p), np.exp(-p.sum())]) - row) ** 2).sum())  # noqa: E731
@@ -285,7 +287,7 @@ def nearest_of_product_one(s):
 
 
 def sample_element(element: str, curved: bool = True):
-    """One tetrahedron in general position: (nodes, tetrahedra)."""
+    """Build one tetrahedron in general position: (nodes, tetrahedra)."""
     nodes = np.array([[0.1, 0.0, 0.05], [1.2, 0.1, -0.1], [0.2, 0.9, 0.1], [0.15, 0.2, 1.1]])
     tetrahedra = np.array([[0, 1, 2, 3]])
     if element == "linear":
@@ -297,7 +299,7 @@ def sample_element(element: str, curved: bool = True):
 
 
 def deformed(nodes, principal, noise=0.0, seed=1):
-    """x = R diag(principal) Q X, with noise of this size on each node."""
+    """Return x = R diag(principal) Q X, with noise of this size on each node."""
     rng = np.random.default_rng(seed)
     r, q = (np.linalg.qr(rng.standard_normal((3, 3)))[0] for _ in range(2))
     r, q = r * np.sign(np.linalg.det(r)), q * np.sign(np.linalg.det(q))

@@ -1,4 +1,4 @@
-"""Where the texts of a matplotlib figure are, and which of them cross."""
+"""The boxes of the texts of a matplotlib figure, and a check that they do not cross."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 
 def texts(figure) -> list[tuple[str, np.ndarray]]:
-    """(text, (left, bottom, right, top) in pixels) of all that one sees."""
+    """Return (text, (left, bottom, right, top) in pixels) of all visible texts."""
     from matplotlib.text import Text
 
     figure.canvas.draw()
@@ -28,7 +28,7 @@ def texts(figure) -> list[tuple[str, np.ndarray]]:
 
 
 def wrong_texts(figure, slack: float = 0.5) -> list[str]:
-    """What is wrong with them: pairs that cross, and those that leave the figure, by more than a slack in pixels."""
+    """Return the pairs of texts that cross and those that leave the figure, by more than a slack in pixels."""
     found = texts(figure)
     width, height = figure.canvas.get_width_height()
     said = [

@@ -1,4 +1,4 @@
-"""Makes strips that stand beside each other in one scene."""
+"""Strips next to each other in one scene."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ STRONG = np.array([0.0, 0.0, 2e-3])
 
 
 def strip(k=0, cells=(8, 2), **changed):
-    """Sheets that differ in mesh, bending, thickness, density and magnetization."""
+    """Build sheets that differ in mesh, bending, thickness, density and magnetization."""
     mesh = ms.meshes.rectangle(0.1, 0.02, cells=cells, irregular=0.2, seed=k)
     mesh = mesh.transformed(translation=(0.0, FAR * k, 0.0))
     properties = {

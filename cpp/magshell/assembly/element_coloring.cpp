@@ -83,7 +83,7 @@ class Neighbours {
 // Cuts an order into segments, and each segment into its colours. A segment holds enough blocks of a colour for several threads.
 std::vector<std::vector<Index>> rounds(const std::vector<Index>& order, const std::vector<Index>& colour_of) {
     constexpr std::size_t stretch =
-        32;  // blocks per segment; see test_more_threads_than_processors_give_the_same_bits
+        32;  // blocks per segment; see test_results_have_the_same_bits_with_more_threads_than_processors
     std::vector<std::vector<Index>> rounds;
     for (std::size_t first = 0; first < order.size(); first += stretch) {
         std::vector<std::vector<Index>> of_colours;

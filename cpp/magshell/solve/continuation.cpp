@@ -17,7 +17,7 @@ constexpr int max_corrector_iterations = 8, target_iterations = 3;
 // [-] Smallest cosine between successive tangents; a sharper bend halves the step. See test_buckling_is_where_the_path_branches.
 constexpr double min_tangent_cosine = 0.5;
 // [-] Least movement for which psi is scaled, of the largest step. Below it only round-off moves the bodies, and arc length is
-// that of the parameter. See test_nothing_to_buckle_under.
+// that of the parameter. See test_buckling_without_a_load_is_refused.
 constexpr double min_movement = 1e-3;
 // [rad] Largest rotation of an obstacle in one step, so that a full turn is not skipped; see test_obstacles_that_move_far.py.
 constexpr double max_obstacle_rotation = 0.5;

@@ -91,7 +91,7 @@ std::vector<Mode> modes_near_zero(Newton& newton, int count) {
 
 Mode most_unstable_mode(Newton& newton, const VectorXd& q, const LoadParameters& load_parameters,
                         Index negative_pivots) {
-    // Modes computed at most, and beyond the number of negative pivots; see test_more_unstable_directions_than_modes_asked_for.
+    // Modes computed at most, and beyond the number of negative pivots; see test_all_unstable_directions_are_counted.
     constexpr Index most = 12, spare = 6;
     const int count = std::min(negative_pivots, most) + spare;
     std::vector<Mode> modes = modes_near_zero(newton, count);

@@ -213,7 +213,7 @@ class Statics {
     }
 
     bool find_other_equilibrium() {
-        // of the usual limit of iterations; see test_its_saddles_if_asked_for
+        // of the usual limit of iterations; see test_saddles_are_found_with_include_unstable
         constexpr int iteration_factor = 3;
         load_parameters_at(1.0);
         VectorXd trial = result_.state;

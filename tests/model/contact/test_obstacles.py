@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from obstacle_shapes import MAKERS, RADII, WAVY, X, Y, made, spread_points, torus
+from obstacle_shapes import MAKERS, RADII, WAVY, X, Y, made, points_near_surface, torus
 from scipy.interpolate import CubicSpline, RectBivariateSpline
 from scipy.spatial.transform import Rotation
 
@@ -20,7 +20,7 @@ AXES = np.eye(3)
 @pytest.mark.parametrize("name", MAKERS)
 def test_normal_and_curvature_are_the_derivatives_of_the_distance(name):
     shape, step = made(name)._core, 1e-6
-    points = spread_points(made(name), 400, depth=0.05)
+    points = points_near_surface(made(name), 400, depth=0.05)
     value, normal, curvature = core.distances(shape, points)
     ahead, back = ([core.distances(shape, points + s * step * e) for e in AXES] for s in (1, -1))
     slope = np.stack([(a[0] - b[0]) / (2 * step) for a, b in zip(ahead, back, strict=True)], axis=-1)
@@ -35,7 +35,7 @@ def test_normal_and_curvature_are_the_derivatives_of_the_distance(name):
 @pytest.mark.parametrize("name", MAKERS)
 def test_distance_grows_with_unit_slope_along_the_normal(name):
     obstacle = made(name)
-    points = spread_points(obstacle, 300, depth=0.0)
+    points = points_near_surface(obstacle, 300, depth=0.0)
     np.testing.assert_allclose(obstacle.signed_distance(points), 0, atol=2e-4)
     normals = obstacle.normals(points)
     for away in (-0.04, 0.04):
@@ -182,12 +182,12 @@ def test_bump_rises_to_its_height_from_a_floor():
 def test_mesh_against_the_smooth_bodies_it_approximates(resolution, on_ball, on_torus):
     fine = ms.meshes.spherical_cap(0.7, 0.0, np.pi, cells=(512, 256))
     ball = ob.MeshObstacle(fine, resolution=resolution)
-    points = spread_points(made("sphere"), 2000, depth=0.15)
+    points = points_near_surface(made("sphere"), 2000, depth=0.15)
     wanted = np.linalg.norm(points, axis=1) - 0.7
     near = np.abs(wanted) < 0.08
     np.testing.assert_allclose(ball.signed_distance(points)[near], wanted[near], atol=on_ball)
     ring = ob.MeshObstacle(torus(cells=(768, 384)), resolution=resolution)
-    points = spread_points(made("torus mesh"), 2000, depth=0.08)
+    points = points_near_surface(made("torus mesh"), 2000, depth=0.08)
     wanted = np.hypot(np.hypot(points[:, 0], points[:, 1]) - 0.6, points[:, 2]) - 0.25
     np.testing.assert_allclose(ring.signed_distance(points), wanted, atol=on_torus)
 
@@ -230,7 +230,7 @@ def ball_mesh(radius):
 def test_distance_does_not_depend_on_where_the_body_is(name):
     center, rotation = np.array([0.3, -2.0, 1.0]), np.array([0.5, 1.1, -0.7])
     turn = Rotation.from_rotvec(rotation).as_matrix()
-    points = spread_points(made(name), 100, depth=0.05)
+    points = points_near_surface(made(name), 100, depth=0.05)
     placed = MAKERS[name](center=center, rotation=rotation)
     moved = points @ turn.T + center
     np.testing.assert_allclose(placed.signed_distance(moved), made(name).signed_distance(points), atol=1e-12)
@@ -276,7 +276,7 @@ def test_distance_in_time_changes_as_the_rates_say(name):
     time, step = 0.7, 1e-6
     body = made(name)
     turn, origin = moving._frame(time)
-    points = spread_points(body, 50, depth=0.05) @ turn.T + origin
+    points = points_near_surface(body, 50, depth=0.05) @ turn.T + origin
     velocity, spin = moving.rates(time)
     wanted = -np.sum(moving.normals(points, time) * (velocity + np.cross(spin, points - origin)), axis=1)
     found = (moving.signed_distance(points, time + step) - moving.signed_distance(points, time - step)) / (
@@ -294,7 +294,7 @@ def test_a_displacement_alone_does_not_turn():
 
 
 def test_complement_changes_the_sign():
-    points = spread_points(made("capsule"), 50, depth=0.1)
+    points = points_near_surface(made("capsule"), 50, depth=0.1)
     ends = made("capsule").ends
     inside, outside = ob.Capsule(ends, 0.3, inside=True), made("capsule")
     np.testing.assert_array_equal(inside.signed_distance(points), -outside.signed_distance(points))

@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from directors import directors, turn_about
+from directors import angle_about, directors
 from model_access import Controls, Problem
 
 import magshell as ms
@@ -112,7 +112,7 @@ def by_numpy(shell, positions, rotations):
             along = positions[mesh.edges[e, 1]] - positions[mesh.edges[e, 0]]
             along /= np.linalg.norm(along)
             theta = (
-                0.0 if min(forward, backward) < 0 else turn_about(along, normals[backward], normals[forward])
+                0.0 if min(forward, backward) < 0 else angle_about(along, normals[backward], normals[forward])
             )
             sign = 1.0 if f == forward else -1.0
             delta = 0.5 * theta + sign * rotations[e]

@@ -29,7 +29,7 @@ def rising(count: int) -> np.ndarray:
 
 
 def frames_of(gif) -> tuple[list[np.ndarray], list[float]]:
-    """The frames, and for how long each is shown, s."""
+    """Return the frames, and how long each is shown, s."""
     frames, shown = [], []
     with image.open(gif) as file:
         for k in range(file.n_frames):
@@ -125,7 +125,7 @@ class Stop(Exception):
 
 @pytest.mark.parametrize("ending", ["gif", "mp4"])
 @pytest.mark.parametrize("reason", [KeyboardInterrupt, Stop])
-def test_what_stops_a_movie_leaves_the_older_one(tmp_path, monkeypatch, ending, reason) -> None:
+def test_failed_movie_leaves_the_older_file(tmp_path, monkeypatch, ending, reason) -> None:
     path = tmp_path / f"a.{ending}"
     path.write_bytes(b"the older one")
     images = iter([np.zeros((64, 64, 3), np.uint8)] * 3)

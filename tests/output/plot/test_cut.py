@@ -1,4 +1,4 @@
-"""`ms.plot(cut=...)`: a plane that opens solids and shows what is inside, with the colours that belong there."""
+"""Tests of `ms.plot(cut=...)`: a plane that opens solids and shows their inside, with the colours of its values."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def bar(element="linear", at=0.0):
 
 @pytest.fixture(scope="module")
 def pressed():
-    """Two bars and a strip, of which one bar is pressed."""
+    """Solve two bars and a strip, of which one bar is compressed."""
     a, b = bar("linear"), bar("quadratic", 0.05)
     mesh = ms.meshes.rectangle(0.1, 0.02, cells=(6, 2)).transformed(translation=(0, 0.1, 0))
     strip = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
@@ -35,8 +35,8 @@ def pressed():
     return ms.equilibrium(ms.Scene([a, strip, b], supports=[*held, clamp, top]))
 
 
-def kept_volume(state, plane):
-    """Of solids, by the divergence theorem over what is left of their surface and the section."""
+def remaining_volume(state, plane):
+    """Return the volume of the solids by the divergence theorem over the remaining surface and the section."""
     found = section(state, plane)
     solids = [section_solid(found, plane, None, 0)]
     (surface,) = on_surfaces([state])
@@ -49,7 +49,7 @@ def kept_volume(state, plane):
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
 @pytest.mark.parametrize("at", [0.03, 0.05, 0.1 / 3])
 def test_a_section_across_a_bar_is_its_cross_section(element, at):
-    """0.05 is a plane of faces between tetrahedra."""
+    """Include 0.05, a plane of faces between tetrahedra."""
     (state,) = states_of(bar(element))
     plane = checked_cut(("x", at), [state], View(25.0, 30.0))
     found = section(state, plane)
@@ -58,7 +58,7 @@ def test_a_section_across_a_bar_is_its_cross_section(element, at):
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
     )
     assert areas.sum() == pytest.approx(SIZE[1] * SIZE[2]) and found.points[:, 0] == pytest.approx(at)
-    assert kept_volume(state, plane) == pytest.approx(at * SIZE[1] * SIZE[2])
+    assert remaining_volume(state, plane) == pytest.approx(at * SIZE[1] * SIZE[2])
     edges = cut_edges(on_surfaces([state])[0], plane)
     length = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1).sum()
     assert length == pytest.approx(2 * (SIZE[1] + SIZE[2]))
@@ -69,7 +69,7 @@ def test_a_section_across_a_bar_is_its_cross_section(element, at):
 def test_any_plane_through_the_middle_leaves_half(element, normal):
     (state,) = states_of(bar(element))
     plane = checked_cut((SIZE / 2, normal), [state], VIEW)
-    assert kept_volume(state, plane) == pytest.approx(np.prod(SIZE) / 2)
+    assert remaining_volume(state, plane) == pytest.approx(np.prod(SIZE) / 2)
     assert plane.normal @ VIEW.axes[2] > 0
 
 
@@ -82,7 +82,7 @@ def test_a_deformed_body_with_curved_edges_is_closed_by_its_section(pressed):
             view = VIEW if sign > 0 else View(-VIEW.elevation, VIEW.azimuth + 180)
             (alone,) = states_of(mesh, positions=pressed[pressed.scene.bodies[2]].positions)
             plane = checked_cut((alone.positions.mean(axis=0), normal), [alone], view)
-            volumes.append(kept_volume(alone, plane))
+            volumes.append(remaining_volume(alone, plane))
         corners = alone.positions[mesh.faces] - alone.positions[0]
         whole = np.einsum("fi,fi->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
         assert sum(volumes) == pytest.approx(whole, rel=1e-9) and min(volumes) > 0.1 * whole
@@ -90,7 +90,7 @@ def test_a_deformed_body_with_curved_edges_is_closed_by_its_section(pressed):
 
 
 def test_a_section_has_the_values_of_its_tetrahedra(pressed):
-    """Of several bodies, a strip between them; and the scale holds what is inside."""
+    """Check several bodies, with a strip between them; the colour scale includes the values inside."""
     states = states_of(pressed)
     a, strip, b = pressed.scene.bodies
     plane = checked_cut("z", states, VIEW)

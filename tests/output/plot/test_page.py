@@ -53,7 +53,7 @@ def mesh() -> ms.TriangleMesh:
 
 @pytest.fixture
 def path_(mesh) -> dict:
-    """Three states of a sheet that rises, in a growing field."""
+    """Return three states of a sheet that rises, in a growing field."""
     rise = mesh.rest_positions[:, :1] ** 2 * (0.0, 0.0, 1.0)
     return {
         "positions": mesh.rest_positions + np.arange(3)[:, None, None] * rise,
@@ -119,7 +119,7 @@ def test_varying_fields_surround_the_sheet(mesh, tmp_path) -> None:
 
 
 def decoded(packed, rows: int) -> np.ndarray:
-    """What the page's script makes of a state's numbers."""
+    """Decode the numbers of a state as the page's script does."""
     if isinstance(packed, str):
         return numbers(packed, "<f4").reshape(rows, -1)
     return (packed["low"] + packed["step"] * numbers(packed["u2"], "<u2")).reshape(rows, -1)

@@ -1,4 +1,4 @@
-"""A page draws what is around a sheet, where it is in each state: each surface held once."""
+"""Tests of the obstacles and magnets in a page: in their position in each state, each surface stored once."""
 
 import base64
 import json
@@ -22,7 +22,7 @@ def numbers(text: str, dtype: str = "<f4") -> np.ndarray:
 
 
 def shown(data: dict, state: int) -> list[np.ndarray]:
-    """Where the page's script puts each surface."""
+    """Return the positions at which the page's script draws each surface."""
     found = []
     for each in data["states"][state].get("around", []):
         points = numbers(data["around"][each["surface"]]["positions"])
@@ -48,7 +48,7 @@ def moved() -> tuple[ms.Trajectory, ms.CylinderMagnet]:
     return motion, magnet
 
 
-def test_what_moves_is_held_once_and_where_it_is(tmp_path) -> None:
+def test_moving_surfaces_are_stored_once_with_their_poses(tmp_path) -> None:
     motion, _ = moved()
     data = data_of(motion_page := ms.write_page(motion, tmp_path / "a.html"))
     assert len(data["around"]) == 3
@@ -66,7 +66,7 @@ def test_what_moves_is_held_once_and_where_it_is(tmp_path) -> None:
     assert len(data_of(bare)["around"]) == 1 and bare.stat().st_size < motion_page.stat().st_size
 
 
-def test_nothing_around_leaves_a_page_as_it_was(tmp_path) -> None:
+def test_page_without_surroundings_is_unchanged(tmp_path) -> None:
     data = data_of(ms.write_page(MESH, tmp_path / "a.html"))
     assert data["around"] == [] and data["window"] is None and "around" not in data["states"][0]
 

@@ -1,4 +1,4 @@
-"""What moves is drawn where it is: magnets and obstacles of motions and of paths, at recorded states and between them."""
+"""Tests of moving magnets and obstacles in pictures: drawn at their positions of each recorded state."""
 
 from dataclasses import replace
 
@@ -67,7 +67,7 @@ def test_between_two_states_it_is_on_the_way(motion):
     assert sides.max() < 0.01  # no smaller and no larger on its turn
 
 
-def test_what_is_coloured_and_written_has_the_field_of_then(motion, tmp_path):
+def test_colours_and_files_have_the_field_of_their_time(motion, tmp_path):
     picture = ms.plot(
         motion, color="magnetic_energy", states=[0, -1], width=500, style=ms.Style(backend="matplotlib")
     )

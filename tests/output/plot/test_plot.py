@@ -1,4 +1,4 @@
-"""Pictures hold what they should, on either backend; bad input is refused with a reason."""
+"""Contents of pictures on either backend; bad input is refused with a reason."""
 
 import io
 
@@ -31,7 +31,7 @@ def mesh() -> ms.TriangleMesh:
 
 @pytest.fixture(scope="module")
 def bent(mesh) -> np.ndarray:
-    """A quarter of a circle, without stretch."""
+    """Return the positions of a sheet bent to a quarter of a circle, without stretch."""
     x, y, _ = mesh.rest_positions.T
     radius = 0.2 / np.pi
     return np.stack([radius * np.sin(x / radius), y, radius * (1 - np.cos(x / radius))], axis=1)
@@ -45,14 +45,14 @@ def result(mesh) -> ms.Equilibrium:
 
 
 def pixels(picture: ms.Picture) -> np.ndarray:
-    """(height, width, 3), 0 to 1."""
+    """Return the pixels of a picture, (height, width, 3), 0 to 1."""
     from matplotlib.image import imread
 
     return imread(io.BytesIO(picture._repr_png_()))[:, :, :3]
 
 
-def share(image: np.ndarray, code: str, tolerance: float = 0.06) -> float:
-    """The part of the pixels whose hue and brightness are those of a colour, up to shading."""
+def color_fraction(image: np.ndarray, code: str, tolerance: float = 0.06) -> float:
+    """Return the fraction of the pixels whose hue and brightness are those of a colour, up to shading."""
     wanted = rgb(code)
     scaled = image / np.maximum(image.max(axis=2, keepdims=True), 1e-9) * wanted.max()
     near = np.abs(scaled - wanted).max(axis=2) < tolerance
@@ -63,7 +63,7 @@ def painted(image: np.ndarray) -> float:
     return float((image.min(axis=2) < 0.98).mean())
 
 
-# What a picture shows
+# Contents of a picture
 
 
 def test_a_result_is_painted(tmp_path, result, backend) -> None:
@@ -79,7 +79,7 @@ def test_a_result_is_painted(tmp_path, result, backend) -> None:
 
 def test_arrows_are_there_when_magnetized(mesh, backend) -> None:
     dark = [
-        share(
+        color_fraction(
             pixels(
                 ms.plot(
                     mesh,
@@ -102,16 +102,16 @@ def test_the_uniform_field_stands_beside_the_sheet(mesh, backend) -> None:
         pixels(ms.plot(mesh, **field, style=ms.Style(backend=backend, show_field=shown)))
         for shown in (True, False)
     )
-    green, none = (share(image[:-150], colors.FIELD) for image in (with_field, without))
+    green, none = (color_fraction(image[:-150], colors.FIELD) for image in (with_field, without))
     assert green > 1e-3 and none == 0.0
     left = with_field[:-150, : with_field.shape[1] // 4]
-    assert share(left, colors.FIELD) * left.size > 0.9 * green * with_field[:-150].size
+    assert color_fraction(left, colors.FIELD) * left.size > 0.9 * green * with_field[:-150].size
 
 
 def test_a_field_of_dipoles_surrounds_the_sheet(mesh) -> None:
     field = ms.Dipoles([[0.05, 0.01, -0.05]], [[0.0, 0.0, 1.0]])
     image = pixels(ms.plot(mesh, field=field, color=None, width=800, style=ms.Style(backend="matplotlib")))
-    quarters = [share(part, colors.FIELD) for part in np.array_split(image[:-150], 4, axis=1)]
+    quarters = [color_fraction(part, colors.FIELD) for part in np.array_split(image[:-150], 4, axis=1)]
     assert min(quarters) > 5e-4
 
 
@@ -156,7 +156,8 @@ def test_near_parts_hide_far_ones(backend) -> None:
         )
         image = pixels(picture)[:-150]
         near_is_red.append(
-            share(image, colors.SCALES["sequential"][-1]) > 10 * share(image, colors.SCALES["sequential"][0])
+            color_fraction(image, colors.SCALES["sequential"][-1])
+            > 10 * color_fraction(image, colors.SCALES["sequential"][0])
         )
     assert near_is_red == [True, True]
 
@@ -169,7 +170,7 @@ def test_several_states_side_by_side_or_overlaid(mesh, bent) -> None:
     assert [axes.get_title() for axes in side.figure.axes] == ["flat", "bent", ""]
     assert [text.get_text() for text in over.figure.axes[0].texts] == ["flat", "bent"]
     image = pixels(over)
-    assert min(share(image, code) for code in colors.SERIES[:2]) > 5e-3
+    assert min(color_fraction(image, code) for code in colors.SERIES[:2]) > 5e-3
     assert len(ms.plot([mesh, mesh, mesh], columns=3, style=ms.Style(backend="matplotlib")).figure.axes) == 4
 
 
@@ -183,12 +184,12 @@ def test_labels_carry_units(result) -> None:
     assert any(text.endswith(" mm") for text in texts) and {"x", "y", "z"} <= set(texts)
 
 
-# What it is made of
+# Its parts
 
 
 @pytest.mark.parametrize("width", [1050, 1200, 1600])
 def test_the_colour_bar_leaves_room_for_what_arrows_mean(mesh, width) -> None:
-    """Of a tall picture, where the scale bar is long."""
+    """Test a tall picture, where the scale bar is long."""
     across = mesh.rest_positions[:, [2, 1, 0]]
     picture = ms.plot(
         mesh,
@@ -224,7 +225,7 @@ def test_arrows_spread_evenly(mesh) -> None:
     assert gaps.min() > 0.4 * spacing
 
 
-def test_named_scalars(mesh, bent) -> None:
+def test_named_scalars_have_their_values_and_units(mesh, bent) -> None:
     mm = length_unit(0.1)
     halves = np.where(mesh.face_barycenters[:, :1] < 0.05, 1.0, -1.0) * MAGNETIZATION
     [state] = states_of(
@@ -282,7 +283,7 @@ def test_lines_are_the_boundary_and_the_creases(mesh) -> None:
     assert [1, 2] in outline(roof).tolist()
 
 
-def test_units() -> None:
+def test_units_have_readable_prefixes() -> None:
     assert [length_unit(size).name for size in (3e-5, 3e-3, 0.12, 4.0)] == ["µm", "mm", "mm", "m"]
     assert with_unit(0.00626, "T") == "6.26 mT" and with_unit(0.0, "T") == "0 T"
     assert prefixed(48e3, "A/m") == (1e3, "kA/m")
@@ -314,7 +315,7 @@ def test_a_path_knows_its_fields(mesh) -> None:
     assert [axes.get_title() for axes in picture.figure.axes] == ["parameter 0", last, ""]
 
 
-def test_of_many_states_some_are_drawn(mesh) -> None:
+def test_some_of_many_states_are_drawn(mesh) -> None:
     many = np.repeat(mesh.rest_positions[None], 30, axis=0)
     assert (
         len(ms.plot(mesh, positions=many, width=400, style=ms.Style(backend="matplotlib")).figure.axes)
@@ -358,7 +359,7 @@ def test_bad_input_is_refused(mesh, arguments, message) -> None:
 @pytest.mark.parametrize(
     ("what", "message"), [("sheet", "cannot draw a str"), ([], "the list is empty"), (3, "cannot draw a int")]
 )
-def test_only_sheets_are_drawn(what, message) -> None:
+def test_plot_refuses_other_objects(what, message) -> None:
     with pytest.raises(ValueError, match=message):
         ms.plot(what, style=ms.Style(backend="matplotlib"))
 

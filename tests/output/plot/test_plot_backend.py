@@ -1,4 +1,4 @@
-"""Which library paints: what is asked for, else the best that works here."""
+"""Selection of the plotting library: the requested one, or else the best that works here."""
 
 import importlib.util
 import sys
@@ -46,7 +46,7 @@ def test_a_driver_that_fails_leaves_matplotlib(monkeypatch, program, reason) -> 
 
 @pytest.mark.parametrize("backend", [None, "matplotlib", "pyvista"])
 def test_without_a_library_the_extra_is_named(mesh, monkeypatch, backend) -> None:
-    """However it is missing: not installed, or installed without what it needs itself."""
+    """Test a library that is not installed, and one whose own requirements are missing."""
     monkeypatch.setitem(sys.modules, "matplotlib.backends.backend_agg", None)
     with pytest.raises(ImportError, match=r'pip install "magshell\[plot\]"'):
         ms.plot(mesh, style=ms.Style(backend=backend))

@@ -136,7 +136,7 @@ def test_no_texts_cross(fallen, name, width):
     assert len(texts(picture.figure)) >= 4  # of the axes and the scale bar at least
 
 
-def test_what_looks_sees_them():
+def test_overlap_check_finds_crossing_texts():
     picture = ms.plot(MESH, width=800, style=ms.Style(backend="matplotlib"))
     picture.figure.text(0.5, 0.5, "one")
     picture.figure.text(0.5, 0.5, "another")
@@ -153,7 +153,7 @@ def test_every_state_that_has_room_is_named():
     assert {f"state {k}" for k in range(9)} <= set(said)
 
 
-def test_nothing_of_a_title_or_a_unit_is_lost_in_breaking():
+def test_line_breaks_keep_titles_and_units_complete():
     what, options = SCENES["long texts"](None)
     for width in (400, 900):
         said = [
@@ -166,7 +166,7 @@ def test_nothing_of_a_title_or_a_unit_is_lost_in_breaking():
 
 
 def test_no_frame_of_a_movie_has_texts_that_cross():
-    """The field grows, so that its text does; the title is a sentence."""
+    """Test a growing field, whose label grows, too, and a long title."""
     count = 6
     drawn = states_of(
         MESH, positions=states(count, 0.1, 3.0), remanent_magnetization=TURNING, field=DIPOLE["field"]
@@ -190,7 +190,7 @@ def test_no_frame_of_a_movie_has_texts_that_cross():
 
 
 def test_a_floor_and_a_field_leave_the_sheet_large():
-    """The field's arrow stood beside the floor, however large that was."""
+    """Check that the field's arrow stands next to the sheet, not next to a large floor."""
     floor = ms.obstacles.Box((5.0, 5.0, 0.02), center=(0, 0, -0.03))
     bare, floored = (
         ms.plot(MESH, obstacles=each, **FIELD, width=800, style=ms.Style(backend="matplotlib"))
@@ -201,7 +201,7 @@ def test_a_floor_and_a_field_leave_the_sheet_large():
     assert np.ptp(floored) < 1.5 * np.ptp(bare)
 
 
-# What it is made of
+# Its parts
 
 
 def test_a_place_is_free_and_clear_where_there_is_one():
@@ -233,7 +233,7 @@ def test_lines_break_between_words_and_not_within_formulas():
 )
 @pytest.mark.parametrize("width", [0.8, 2.4])
 def test_ticks_say_where_they_are(limits, wanted, width):
-    """However small the numbers, and however little they differ."""
+    """Test small numbers, and numbers that differ little."""
     found = ticks_of(Scalar("", [], limits), width, Ruler(200))
     extent = limits[1] - limits[0]
     assert len({text for _, text in found}) == len(found) >= 1

@@ -17,7 +17,7 @@ def volume(surface) -> float:
 
 
 def sided(surface):
-    """Whether each edge has a face on its other side too, places that are the same being one."""
+    """Return whether each edge has a face on its other side, too; coincident points count as one."""
     points, faces = surface
     _, numbers = np.unique(np.round(points, 9), axis=0, return_inverse=True)
     faces = numbers.ravel()[faces]
@@ -41,7 +41,7 @@ def test_own_magnets_are_where_they_are(magnet, wanted):
     )
 
 
-def test_magpylibs_magnets():
+def test_magnets_of_magpylib_are_drawn():
     magpylib = pytest.importorskip("magpylib")
     up = {"polarization": (0, 0, 1.0)}
     far = {"position": (0.0, 0.0, -0.03)}

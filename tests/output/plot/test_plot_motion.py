@@ -1,4 +1,4 @@
-"""States of a motion: what they know, and how several of them share a picture."""
+"""States of a motion: their properties, and several of them in one picture."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ MESH = ms.meshes.rectangle(0.1, 0.02, cells=(10, 4))
 
 
 def test_a_motion_fades_towards_its_beginning() -> None:
-    """Earlier states are paler, and the fields fan out from one point."""
+    """Check that earlier states are paler, and that the fields fan out from one point."""
     mesh, heights = MESH, 0.03 * np.arange(3)[:, None, None]
     lifts = mesh.rest_positions + heights * (0, 0, 1)
     fields = [(0, 0, 1e-3), (1e-3, 0, 0), (0, 0, -1e-3)]

@@ -1,4 +1,4 @@
-"""Obstacles in pictures: where they are, that one sees through them, what else may be given."""
+"""Obstacles in pictures: their positions, their transparency, and other admissible objects."""
 
 from dataclasses import replace
 
@@ -100,7 +100,7 @@ def test_things_that_are_no_obstacles_are_named():
 
 
 def test_a_floor_does_not_shrink_the_sheet():
-    """Issue: on a floor of half a metre a robot of 2 cm was a speck."""
+    """Check a floor of half a metre, on which a robot of 2 cm used to be too small to see."""
     values = np.linspace(0, 1, MESH.n_faces)
     floor = ob.Box((5.0, 5.0, 0.02), center=(0, 0, -0.03))
     bare, floored = (
@@ -122,7 +122,7 @@ def test_a_movie_frames_the_sheet_as_well():
 
 
 @pytest.mark.parametrize("width", [400, 600, 1600])
-def test_what_the_legend_says_stays_clear_of_the_colour_bar(width):
+def test_legend_stays_clear_of_the_colour_bar(width):
     turning = np.linspace(0, 2 * np.pi, MESH.n_faces)
     magnetization = 4e4 * np.stack([np.cos(turning), 0 * turning, np.sin(turning)], axis=1)
     picture = ms.plot(

@@ -1,4 +1,4 @@
-"""Pictures, movies, pages and files of solids, alone and with shells beside them."""
+"""Pictures, movies, pages and files of solids, alone and together with shells."""
 
 import json
 import re
@@ -18,7 +18,7 @@ SMALL = {"width": 400, "style": ms.Style(backend="matplotlib")}
 
 @pytest.fixture(scope="module")
 def scenes():
-    """{name: (the solid, its result, its motion)}."""
+    """Return the solid, its result and its motion, by the name of the scene."""
     solid = ms.Solid(
         ms.meshes.box((0.1, 0.02, 0.02), cells=(4, 2, 2)),
         material=ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.3),
@@ -42,8 +42,8 @@ def scenes():
 
 
 @pytest.mark.parametrize("name", ["alone", "both"])
-def test_what_is_drawn_is_the_surface(scenes, name):
-    """Ten-node tetrahedra by four flat triangles a side; vertices inside are left out."""
+def test_surface_of_a_solid_is_drawn(scenes, name):
+    """Check that each side of a ten-node tetrahedron has four flat triangles, and that inner vertices are omitted."""
     solid, rest, _ = scenes[name]
     (state,) = on_surfaces(states_of(rest))
     n = solid.mesh.surface.n_faces
@@ -89,7 +89,7 @@ def test_a_picture_has_the_solid_in_it(scenes, name, color):
 
 
 def test_lines_behind_a_closed_surface_are_not_drawn():
-    """Whichever way its faces are turned; a sheet is seen from both sides."""
+    """Check both orientations of the faces; an open sheet is visible from both sides."""
     box = ms.meshes.box((1.0, 1.0, 1.0), cells=(1, 1, 1)).surface
     inwards = ms.TriangleMesh(box.rest_positions, box.faces[:, ::-1])
     for mesh in (box, inwards):
@@ -167,7 +167,7 @@ def test_a_series_has_tetrahedra_with_their_strain_and_stress(scenes, name, tmp_
         )
 
 
-def test_what_is_written_of_a_solid_is_read_again(scenes, tmp_path):
+def test_written_solid_is_read_again(scenes, tmp_path):
     solid, rest, _ = scenes["alone"]
     strains = rest[solid].strains()
     means = {"volume_ratio": strains.mean(strains.volume_ratios)}
@@ -197,7 +197,7 @@ def test_files_that_hold_no_such_mesh_say_what_does(scenes, tmp_path):
 
 @pytest.mark.parametrize("name", ["alone", "both"])
 def test_a_series_of_solids_takes_fields_of_ones_own(scenes, name, tmp_path):
-    """Of the tetrahedra, and of the faces of all bodies, for which the solid's surface is written too."""
+    """Write fields of the tetrahedra, and of the faces of all bodies, for which the solid's surface is written too."""
     solid, _, motion = scenes[name]
     inside = np.arange(4.0 * solid.mesh.n_tetrahedra).reshape(4, -1)
     outside = np.arange(8.0 * motion.scene.mesh.n_faces).reshape(4, -1, 2)

@@ -1,4 +1,4 @@
-"""Motions: closed forms, what may vary in time, steps in parts, stopping and going on, bad input."""
+"""Tests of motions: closed forms, time-varying inputs, subdivided steps, stopping and continuing, bad input."""
 
 import os
 import signal
@@ -32,8 +32,10 @@ def simulate(scene, **options):
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
-def test_free_fall(integrator):
-    """Backward Euler falls by g dt^2 n (n + 1)/2; the others are exact for a constant acceleration."""
+def test_free_fall_has_its_closed_form(integrator):
+    """Compare with closed forms: backward Euler falls by g dt^2 n (n + 1)/2; the others are exact for a constant
+    acceleration.
+    """
     scene = ms.Scene(shell(), gravity=(0, 0, -9.81), allow_rigid_motions=True)
     move = simulate(scene, steps=50, integrator=integrator, velocities=(1.0, 0.0, 0.5))
     time = move.times[-1]
@@ -45,7 +47,7 @@ def test_free_fall(integrator):
 
 
 def test_terminal_speed_of_a_damped_fall():
-    """m g / gamma, for every vertex of its own: the sheet's mass is even here."""
+    """Compare with m g / gamma at every vertex; the vertices have equal masses here."""
     even = ms.meshes.rectangle(0.02, 0.02, cells=(2, 2))
     sheet = ms.Shell(even, thickness=1e-3, young_modulus=1e5, mass_density=1e3)
     scene = ms.Scene(sheet, gravity=(0, 0, -9.81), allow_rigid_motions=True)
@@ -56,7 +58,7 @@ def test_terminal_speed_of_a_damped_fall():
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_momenta_of_a_free_sheet(integrator):
-    """Spinning and stretched, it keeps its momentum; and, to the order of the method, its angular momentum."""
+    """Check a spinning and stretched sheet: momentum is exact, angular momentum to the order of the method."""
     scene = ms.Scene(shell(), allow_rigid_motions=True)
     masses = shell().vertex_masses[:, None]
     turning = np.array((0.1, 0.2, 0.3)) + np.cross((0.0, 3.0, 20.0), MESH.rest_positions)
@@ -106,7 +108,7 @@ def test_viscosity_does_not_slow_a_rigid_motion():
 
 
 def test_stiffness_damping_is_beta_k_for_small_motions():
-    """The logarithmic decrement of the first mode is pi beta w, to second order in it."""
+    """Compare the logarithmic decrement of the first mode with pi beta w, to second order in it."""
     mesh = ms.meshes.rectangle(0.05, 0.01, cells=(10, 2))
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0, mass_density=1e3)
     load = ms.EdgeLoad(mesh.edges_at(x=0.05), (0, 0, 1e-5))
@@ -158,7 +160,7 @@ def test_going_on_gives_the_same_bits(strip, tmp_path):
         ms.MotionState.load(tmp_path / "other")
 
 
-def test_fewer_states_are_the_same_states(strip):
+def test_recording_fewer_states_gives_the_same_states(strip):
     every, third = simulate(strip), simulate(strip, record_every=3)
     np.testing.assert_array_equal(third.positions, every.positions[::3])
     np.testing.assert_array_equal(third.times, every.times[::3])
@@ -177,7 +179,7 @@ def test_a_step_that_fails_is_taken_in_parts(strip):
 
 
 @pytest.mark.filterwarnings("ignore::magshell.UnitWarning")  # 1e4 T
-def test_what_cannot_be_done_hands_back_the_motion_until_then(strip):
+def test_failed_step_returns_the_motion_before_it(strip):
     field = np.zeros((6, 3))
     field[4:, 2] = 1e4
     with pytest.raises(ms.NotConverged, match=r"step 4 of 6, at 0.004 s") as caught:
@@ -189,8 +191,8 @@ def test_what_cannot_be_done_hands_back_the_motion_until_then(strip):
     np.testing.assert_allclose(move.times, 1e-3 * np.arange(5))
 
 
-def test_what_is_not_finite_is_named():
-    """A dipole in the very barycenter of a face."""
+def test_non_finite_field_is_named():
+    """Put a dipole at the barycenter of a face."""
     mesh = ms.TriangleMesh([(0.0, 0, 0), (3.0, 0, 0), (0, 3.0, 0), (3.0, 3.0, 0)], [(0, 1, 2), (1, 3, 2)])
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
     scene = ms.Scene(sheet, field=ms.Dipoles([(1.0, 1.0, 0.0)], [(0, 0, 1.0)]), allow_rigid_motions=True)
@@ -255,12 +257,12 @@ BAD = [
 
 
 @pytest.mark.parametrize("options, words", BAD)
-def test_bad_input(strip, options, words):
+def test_bad_options_are_refused(strip, options, words):
     with pytest.raises(ValueError, match=words):
         simulate(strip, **options)
 
 
-def test_more_bad_input(strip):
+def test_bad_scenes_are_refused(strip):
     with pytest.raises(ValueError, match="scene must be a Scene"):
         ms.simulate("scene", steps=1, time_step=1.0)
     light = ms.Scene(shell(mass_density=None), supports=[ms.Clamp(MESH.edges_at(x=0.0))])
@@ -273,7 +275,7 @@ def test_more_bad_input(strip):
         simulate(ms.Scene(shell(bending="hinge"), supports=strip.supports), start=simulate(strip).end)
 
 
-def test_what_does_not_fit_into_memory_is_refused_at_once(strip, monkeypatch):
+def test_motion_too_large_for_the_memory_is_refused_at_once(strip, monkeypatch):
     with pytest.raises(MemoryError, match=r"2,000,000,000 steps need .* GB .*record_every.*start="):
         simulate(strip, steps=2 * 10**9)
     monkeypatch.setattr("magshell._runtime.memory.physical_memory", lambda: 10**5)

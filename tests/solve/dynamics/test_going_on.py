@@ -1,4 +1,4 @@
-"""A motion in parts is that of one in one piece, bit by bit, whatever drives it: its clock goes on with it."""
+"""Tests of continued motions: the parts have the bits of one motion in one piece, for all inputs and clocks."""
 
 import dataclasses
 
@@ -50,16 +50,18 @@ def simulate(scene, steps=STEPS, **options):
     return ms.simulate(scene, steps=steps, **{**given, **options})
 
 
-def same_bits(whole, *parts):
+def same_bits(uninterrupted, *parts):
     ends = np.cumsum([0, *(part.steps_done for part in parts)])
     for begin, end, part in zip(ends[:-1], ends[1:], parts, strict=True):
         for name in ("times", "positions", "velocities", "edge_rotations", "kinetic_energy"):
-            np.testing.assert_array_equal(getattr(part, name), getattr(whole, name)[begin : end + 1], name)
-        fields = whole.applied_flux_density[
+            np.testing.assert_array_equal(
+                getattr(part, name), getattr(uninterrupted, name)[begin : end + 1], name
+            )
+        fields = uninterrupted.applied_flux_density[
             begin + 1 : end + 1
         ]  # at the start of a part: that of its first step
         np.testing.assert_array_equal(part.applied_flux_density[1:], fields)
-    assert parts[-1].end.time == whole.end.time
+    assert parts[-1].end.time == uninterrupted.end.time
 
 
 MAXWELL = {"maxwell_modulus": 0.5, "maxwell_time": 5e-3}
@@ -119,7 +121,7 @@ def test_constants_and_a_file_between(tmp_path):
     same_bits(whole, first, second)
 
 
-def test_other_steps_count_from_where_the_motion_stands():
+def test_steps_of_another_length_count_from_the_present_time():
     first = simulate(strip(), FIRST)
     asked = []
 
@@ -148,7 +150,7 @@ def test_a_time_set_by_hand_is_where_it_goes_on():
     np.testing.assert_array_equal(pushed.times, simulate(first.scene, 10).times[FIRST:])
 
 
-def test_what_is_no_clock_is_refused(tmp_path):
+def test_bad_clocks_are_refused(tmp_path):
     end = simulate(strip(), 1).end
     with pytest.raises(ValueError, match="clock must be that of a motion"):
         simulate(strip(), 1, start=dataclasses.replace(end, clock=0.0))

@@ -1,4 +1,4 @@
-"""What the integrators promise: order in time, energy of an undamped strip, long runs."""
+"""Tests of the integrators: order in time, energy of an undamped strip, long runs."""
 
 import numpy as np
 import pytest
@@ -31,14 +31,16 @@ def strip(thickness, cells, moving=False):
 
 
 def first_mode(scene):
-    """Period, s, and shape (n_v, 3)."""
+    """Return period, s, and shape (n_v, 3) of the first vibration mode."""
     modes = ms.vibration_modes(scene, count=1)
     return 1.0 / modes.frequencies[0], modes.modes[0]
 
 
 def swing(scene, law, integrator, steps):
-    """Positions at the ends of 20 parts of a period, in a field (or on a clamp) that swells and fades smoothly: the tip
-    goes 0.6 of the length to and fro."""
+    """Return positions at the ends of 20 parts of a period, in a field (or on a clamp) that rises and falls smoothly.
+
+    The tip moves by 0.6 of the length to and fro.
+    """
     thickness = scene.shell.thickness[0]
     period, _ = first_mode(scene)
     swell = lambda t: np.sin(np.pi * t / period) ** 4  # noqa: E731
@@ -72,7 +74,9 @@ def order(scene, law, name, steps, reference):
 
 @pytest.fixture(scope="module")
 def references():
-    """Of a strip so thick that its membrane is not stiff: all steps resolve all of its motion."""
+    """Return the reference motions of a strip so thick that its membrane is not stiff: all steps resolve all of its
+    motion.
+    """
     found = {}
     for law in LAWS:
         scene = strip(0.02, (3, 1), moving=law == "clamp")
@@ -90,7 +94,9 @@ def test_order_in_time(references, name, law):
 
 
 def test_on_a_thin_strip_steps_do_not_resolve_the_membrane():
-    """SDIRK2 keeps its order; SDIRK3, whose stages are as exact as SDIRK2's, falls below it."""
+    """Check that SDIRK2 keeps its order, and that SDIRK3, whose stages are as exact as SDIRK2's, falls below its
+    own.
+    """
     scene = strip(1e-3, (8, 1))
     reference = swing(scene, "elastic", ms.SDIRK3(), 5120)
     orders = {name: order(scene, "elastic", name, (40, 80, 160), reference) for name in ("sdirk2", "sdirk3")}
@@ -98,8 +104,11 @@ def test_on_a_thin_strip_steps_do_not_resolve_the_membrane():
     assert 1.3 < orders["sdirk3"] < 2.2
 
 
-def kept(scene, integrator, amplitude, steps=40, periods=20):
-    """The share of the energy, from rest shape with the first mode's velocities; amplitude of the tip over the length."""
+def remaining_energy(scene, integrator, amplitude, steps=40, periods=20):
+    """Return the fraction of the energy that remains, from the rest shape with the first mode's velocities.
+
+    amplitude: of the tip, over the length.
+    """
     period, mode = first_mode(scene)
     move = ms.simulate(
         scene,
@@ -120,18 +129,21 @@ def kept(scene, integrator, amplitude, steps=40, periods=20):
 
 @pytest.mark.parametrize("amplitude", [1e-3, 0.1, 0.3])
 def test_energy_over_20_periods(amplitude):
-    assert kept(strip(1e-3, (10, 2)), ms.TRBDF2(), amplitude) > 0.98
+    assert remaining_energy(strip(1e-3, (10, 2)), ms.TRBDF2(), amplitude) > 0.98
 
 
 def test_sdirk2_keeps_it_in_small_motions_only():
     sheet = strip(1e-3, (10, 2))
-    assert kept(sheet, ms.SDIRK2(), 0.05) > 0.98
-    assert kept(sheet, ms.SDIRK2(), 0.1) < 0.97
+    assert remaining_energy(sheet, ms.SDIRK2(), 0.05) > 0.98
+    assert remaining_energy(sheet, ms.SDIRK2(), 0.1) < 0.97
 
 
 def amplification(name, theta):
-    """Of x'' = -w^2 x over a step with theta = w dt. What is of order s in s solves, damps the fastest motions out at once
-    and divides by (1 - gamma z)^s has no choice but the terms below z^s of exp(z) (1 - gamma z)^s above that."""
+    """Return the amplification of x'' = -w^2 x over a step with theta = w dt.
+
+    A method of order s in s solves that damps the fastest motions completely and divides by (1 - gamma z)^s is unique:
+    its numerator has the terms below z^s of exp(z) (1 - gamma z)^s.
+    """
     gamma, solves = {
         "euler": (1.0, 1),
         "tr_bdf2": (1.0 - 0.5**0.5, 2),
@@ -146,13 +158,13 @@ def amplification(name, theta):
 @pytest.mark.parametrize("name", INTEGRATORS)
 @pytest.mark.parametrize("steps", [20, 40])
 def test_a_small_vibration_is_the_linear_test_equation(name, steps):
-    found = kept(strip(1e-3, (10, 1)), INTEGRATORS[name], 1e-4, steps, periods=3)
+    found = remaining_energy(strip(1e-3, (10, 1)), INTEGRATORS[name], 1e-4, steps, periods=3)
     assert found == pytest.approx(abs(amplification(name, 2 * np.pi / steps)) ** (2 * steps * 3), rel=1e-3)
 
 
 @pytest.mark.parametrize("name", ["euler", "tr_bdf2"])
 def test_a_long_run_neither_grows_nor_loses_a_step(name):
-    """24 faces in a turning field; the bench does 100,000 steps of it."""
+    """Simulate 24 faces in a rotating field; the benchmark does 100,000 steps of it."""
     scene, steps, time_step = strip(1e-3, (6, 2)), 2500, 1e-3
     turning = lambda t: 2e-3 * np.array((np.cos(40 * t), 0, np.sin(40 * t)))  # noqa: E731
     options = {

@@ -1,4 +1,6 @@
-"""Projective Dynamics with muscles, cells, cavities, tendons, and what acts in joints: Newton's solutions in few rounds."""
+"""Projective Dynamics with muscles, cells, cavities, tendons, and joint torques: Newton's solutions in few
+iterations.
+"""
 
 import numpy as np
 import pytest
@@ -104,7 +106,7 @@ JOINTS = {
 
 
 @pytest.mark.parametrize("name", JOINTS)
-def test_what_acts_in_joints(name):
+def test_joint_torques_equal_those_of_newton(name):
     solid = bar(MATERIALS["Corotated"], cells=(8, 2, 2))
     x = solid.mesh.rest_positions[:, 0] / SIZE[0]
     bones = [
@@ -120,7 +122,7 @@ def test_what_acts_in_joints(name):
 
 @pytest.mark.parametrize("law", ["stiffness", "peak_stress"])
 def test_strong_muscles_are_in_the_matrix(law):
-    """68 and 31 rounds a step, where it took 124 and 69 without their share in the matrix."""
+    """Limit the iterations to 68 and 31 a step; without the muscles' part in the matrix they were 124 and 69."""
     solid = bar(MATERIALS["Projective"])
     muscle = ms.Muscle(solid, SKEW, **{law: 50 * MODULI["young_modulus"]})
     move = ms.simulate(

@@ -1,4 +1,4 @@
-"""Bodies that touch each other, or themselves, by Projective Dynamics: steps of implicit Euler, and their gradients."""
+"""Contact and self-contact of bodies by Projective Dynamics: steps of implicit Euler, gradients."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def block(
 
 
 def stacked(apart=4e-4, cells=(2, 2, 1), **contact) -> ms.Scene:
-    """One block, whose bottom is held, under another."""
+    """Build one block, whose bottom is held, under another."""
     lower, upper = block(0.0, aside=0.0, cells=cells), block(0.5 * SIZE + apart, cells=cells)
     held = ms.Pin(lower.mesh.vertices_at(z=lower.mesh.rest_positions[:, 2].min()), body=lower)
     touch = ms.Contact(lower, upper, activation_distance=5e-4, contact_stiffness=2e3, **contact)
@@ -65,7 +65,7 @@ def test_lagged_friction_is_as_newton_has_it():
 
 
 def test_a_sheet_that_touches_itself():
-    """A strip bent to a hook, the ends of which gravity closes."""
+    """Use a strip bent to a hook, the ends of which gravity closes."""
     strip = ms.meshes.rectangle(0.06, 0.01, cells=(12, 2))
     x = strip.rest_positions.copy()
     angle = 1.7 * np.pi * x[:, 0] / 0.06
@@ -91,7 +91,7 @@ def test_a_sheet_that_touches_itself():
 
 
 def test_on_a_skeleton():
-    """A bar with two bones in it, of which one turns, and a block that falls on it: beside Schur's complement."""
+    """Drop a block on a bar with two bones in it, of which one rotates; this includes the Schur complement."""
     bar = ms.meshes.box((0.06, 0.01, 0.01), cells=(6, 1, 1))
     flesh = ms.Solid(
         bar,
@@ -122,7 +122,7 @@ def test_on_a_skeleton():
 
 
 def test_gradients_go_through_contact():
-    """200 steps, of which most touch; against differences."""
+    """Compare with differences over 200 steps, most of them in contact."""
     scene = stacked(cells=(1, 1, 1), friction_coefficient=0.2, law="penalty", smoothing=2e-4)
     weights = np.random.default_rng(0).standard_normal((scene.mesh.n_vertices, 3))
     tight = ms.ProjectiveDynamics(4000, 1e-12)

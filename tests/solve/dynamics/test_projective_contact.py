@@ -21,7 +21,7 @@ def block(poisson_ratio=0.3, young_modulus=5e4, cells=(3, 3, 2)):
 
 
 def slope(angle, friction, body=None, obstacle=None):
-    """On a floor under its rest shape, with gravity that leans by an angle towards x."""
+    """Build a body on a floor under its rest shape, with gravity inclined by an angle towards x."""
     body = block() if body is None else body
     below = body.mesh.rest_positions[:, 2].min()
     floor = ms.obstacles.Plane(center=(0, 0, below)) if obstacle is None else obstacle
@@ -38,7 +38,7 @@ def moved(scene, steps, time_step, **options):
     return move
 
 
-def test_it_sticks_below_the_angle_of_friction():
+def test_block_sticks_below_the_angle_of_friction():
     scene, below = slope(0.3, friction=1.1 * np.tan(0.3))
     move = moved(scene, 60, 5e-3)
     bottom = np.abs(scene.bodies[0].mesh.rest_positions[:, 2] - below) < 1e-9
@@ -49,8 +49,10 @@ def test_it_sticks_below_the_angle_of_friction():
     assert pressed.sum() >= 4
 
 
-def test_it_slides_above_it_with_all_of_its_friction():
-    """Of the center of mass, m (a - g) is the force of the floor: its tangential part is mu of its normal one."""
+def test_block_slides_above_the_angle_with_full_friction():
+    """Check the force of the floor, m (a - g) of the center of mass: its tangential part is mu times its normal
+    part.
+    """
     friction = 0.5 * np.tan(0.5)
     scene, below = slope(0.5, friction, block(poisson_ratio=0.0))
     time_step = 2e-3
@@ -104,7 +106,7 @@ def test_stiff_penalties_tend_to_it():
 
 
 def matrices(solid):
-    """M and L of the nodes: masses, and sum of V (2 mu + lam) g g^T."""
+    """Return M and L of the nodes: masses, and the sum of V (2 mu + lam) g g^T."""
     mesh = solid.mesh
     x, tets = mesh.rest_positions, mesh.tetrahedra
     e, nu = 5e4, 0.3
@@ -119,7 +121,10 @@ def matrices(solid):
 
 
 def rounds(masses, stiffness, diagonal, h, most=4000):
-    """Of (M + h^2 D) v <- f - h^2 (L - D) v until (M + h^2 L) v = f holds to 1e-8 of v; None where it grows without end."""
+    """Return the iterations of (M + h^2 D) v <- f - h^2 (L - D) v until (M + h^2 L) v = f holds to 1e-8 of v.
+
+    None where v grows without bound.
+    """
     f = masses * np.random.default_rng(1).standard_normal(len(masses))
     goal = np.linalg.solve(np.diag(masses) + h**2 * stiffness, f)
     v = np.zeros_like(f)
@@ -133,8 +138,11 @@ def rounds(masses, stiffness, diagonal, h, most=4000):
 
 
 def test_proposition_1_the_unsplit_scheme_diverges_beyond_a_time_step_and_the_split_one_does_not():
-    """(19) converges while h^2 times the largest eigenvalue of M^-1 L is below 1; (20), whose units do not fit, bounds that.
-    (21) converges at any h, but takes hundreds of rounds where h is long."""
+    """Check the bound of convergence of both schemes.
+
+    (19) converges while h^2 times the largest eigenvalue of M^-1 L is below 1; (20), whose units do not agree, bounds
+    that. (21) converges at any h, but takes hundreds of iterations where h is long.
+    """
     masses, stiffness = matrices(block())
     largest = np.linalg.eigvalsh(stiffness / np.sqrt(np.outer(masses, masses)))[-1]
     limit = 1 / np.sqrt(largest)
@@ -149,7 +157,7 @@ def test_proposition_1_the_unsplit_scheme_diverges_beyond_a_time_step_and_the_sp
     assert move.iterations / 5 < 0.5 * split[3]
 
 
-def test_what_it_refuses():
+def test_unsupported_scenes_are_refused():
     body = block()
     given = {"steps": 1, "time_step": 1e-3, "progress": False}
     method = ms.ProjectiveDynamics(contact="coulomb")
@@ -169,8 +177,8 @@ def test_what_it_refuses():
         ms.simulate(guided, integrator=method, **given)
 
 
-def pushed_together(friction, velocity=(0.0, 0.0, -0.5), **contact):
-    """A block flies against another; nothing else acts. Their distance is the reach of the contact."""
+def thrown_at_each_other(friction, velocity=(0.0, 0.0, -0.5), **contact):
+    """Build a block that flies against another without other forces; their distance is the activation distance."""
     lower = block(poisson_ratio=0.0, cells=(2, 2, 1))
     x = lower.mesh.rest_positions + np.array((1.3e-3, 0.7e-3, 0.5 * SIZE + 6e-4))
     upper = ms.Solid(
@@ -188,7 +196,7 @@ def of_body(body, values):
 
 
 def nearest(scene, move) -> float:
-    """J: the largest energy that the contact's own barrier would have: none where nothing is nearer than its reach."""
+    """Return the largest barrier energy of the contact [J], zero where the distance exceeds the activation distance."""
     controls, rotations = scene._control_layout.zeros(), np.zeros(scene.mesh.n_edges)
     states = [scene._model.state(x, rotations) for x in move.positions]
     return max(scene._model.energies(q, controls)["body contact"] for q in states)
@@ -196,7 +204,7 @@ def nearest(scene, move) -> float:
 
 @pytest.mark.parametrize("friction", [None, 0.3])
 def test_bodies_exchange_momentum_and_gain_no_energy(friction):
-    scene, lower, upper, start = pushed_together(friction, (0.1, 0.0, -0.5))
+    scene, lower, upper, start = thrown_at_each_other(friction, (0.1, 0.0, -0.5))
     method = ms.ProjectiveDynamics(contact="coulomb")
     move = ms.simulate(scene, velocities=start, steps=12, time_step=5e-4, integrator=method, progress=False)
     n = lower.mesh.n_vertices
@@ -211,7 +219,9 @@ def test_bodies_exchange_momentum_and_gain_no_energy(friction):
 
 @pytest.mark.parametrize("sticks", [True, False])
 def test_a_block_sticks_or_slides_on_another(sticks):
-    """Gravity leans by an angle: it stays where friction's is larger, else all of that friction brakes it."""
+    """Check a block under inclined gravity: it sticks below the friction angle; above it, full friction decelerates
+    it.
+    """
     angle = 0.4
     friction = (1.2 if sticks else 0.5) * np.tan(angle)
     lower = block(poisson_ratio=0.0, cells=(2, 2, 1))
@@ -235,14 +245,14 @@ def test_a_block_sticks_or_slides_on_another(sticks):
         assert np.abs(place[-1] - place[-10]).max() < 1e-5 * SIZE
         assert (force[:, 0] < friction * force[:, 2]).all()
     else:
-        # What lies below leans a little, and the normals with it.
+        # The lower block tilts a little, and the normals with it.
         assert np.abs(force[:, 0] + friction * force[:, 2]).max() < 1e-3 * GRAVITY
         steady = GRAVITY * (np.sin(angle) - friction * np.cos(angle))
         assert np.diff(place[5:, 0], 2).mean() / time_step**2 == pytest.approx(steady, rel=1e-2)
 
 
-def test_other_coefficients_of_what_sticks_are_refused():
-    scene, *_ = pushed_together(0.3, static_friction_coefficient=0.5)
+def test_differing_static_friction_is_refused():
+    scene, *_ = thrown_at_each_other(0.3, static_friction_coefficient=0.5)
     method = ms.ProjectiveDynamics(contact="coulomb")
     with pytest.raises(ValueError, match="static_friction_coefficient"):
         ms.simulate(scene, steps=1, time_step=1e-3, integrator=method, progress=False)

@@ -1,4 +1,6 @@
-"""Projective Dynamics takes the steps of implicit Euler: same solutions as Newton's, same gradients, refusals."""
+"""Tests of Projective Dynamics: it takes the steps of implicit Euler, with the same solutions and gradients as
+Newton.
+"""
 
 from itertools import pairwise
 
@@ -35,7 +37,7 @@ def test_rounds_as_they_are_lead_there_too():
     assert all(later < 0.7 * earlier for earlier, later in pairwise(errors))
 
 
-def test_it_comes_back_from_inverted_elements():
+def test_solver_recovers_from_inverted_elements():
     solid = bar(MATERIALS["Projective"])
     scene = ms.Scene(solid, supports=[clamped(solid)])
     start = np.array(solid.mesh.rest_positions)
@@ -61,15 +63,15 @@ SCENES = {
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_supports(name):
+def test_supports_equal_those_of_newton(name):
     solid = bar(MATERIALS["Corotated"])
     scene = ms.Scene(solid, supports=SCENES[name](solid), gravity=(0, 2.0, -9.81))
     options = {"support_factor": lambda t: t / 0.02} if name == "moving" else {}
     assert_same(*both(scene, **options))
 
 
-def bones_in_jelly(free):
-    """A bar with two bones and an elbow between them; its first bone is fixed, or falls."""
+def links_in_jelly(free):
+    """Build a bar with two bones and an elbow between them; its first bone is fixed, or falls."""
     solid = bar(MATERIALS["Corotated"], cells=(8, 2, 2))
     x = solid.mesh.rest_positions[:, 0] / SIZE[0]
     bones = [
@@ -82,14 +84,14 @@ def bones_in_jelly(free):
 
 @pytest.mark.parametrize("free", [False, True])
 def test_skeletons_turn_while_the_soft_part_stays_factorized(free):
-    scene = bones_in_jelly(free)
+    scene = links_in_jelly(free)
     assert_same(*both(scene, steps=6))
     given = {"time_step": 5e-3, "integrator": ms.ProjectiveDynamics(tolerance=1e-8), "progress": False}
     assert ms.simulate(scene, steps=6, **given).factorizations == 1
     assert ms.simulate(scene, steps=1, **given).factorizations == 1
 
 
-def test_rigid_parts():
+def test_rigid_bodies_equal_those_of_newton():
     solid = bar(MATERIALS["Corotated"])
     x = solid.mesh.rest_positions[:, 0]
     weight = ms.RigidBody(
@@ -156,7 +158,7 @@ def test_gradients_are_those_of_implicit_euler():
             assert np.abs(found - expected).max() < 1e-8 * np.abs(expected).max()
 
 
-def test_what_has_no_gradient_says_so():
+def test_missing_gradients_raise_an_error():
     solid = bar(MATERIALS["Projective"], cells=(4, 1, 1))
     scene = ms.Scene(solid, supports=[clamped(solid)], gravity=(0, 0, -9.81))
     young = torch.tensor(2e4, dtype=torch.float64, requires_grad=True)
@@ -197,7 +199,7 @@ def test_a_motion_has_the_same_bits_in_parts_and_on_any_threads():
         ({"contact": "hard"}, 'contact must be "penalty" or "coulomb"'),
     ],
 )
-def test_bad_options(bad, words):
+def test_bad_options_are_refused(bad, words):
     with pytest.raises(ValueError, match=words):
         ms.ProjectiveDynamics(**bad)
 
@@ -242,7 +244,7 @@ def test_ctrl_c_hands_back_the_motion_and_leaves_the_scene_as_it_was(contact):
 
 
 def test_rounds_without_a_tolerance_do_not_run_away():
-    """The matrix is no bound of Corotated's stiffness: steps that overshoot are cut."""
+    """Check that steps that overshoot are shortened, because the matrix is no bound of Corotated's stiffness."""
     solid = bar(MATERIALS["Corotated"])
     scene = ms.Scene(solid, supports=[clamped(solid)], gravity=(0, 2.0, -9.81))
     given = {"steps": 4, "time_step": 2e-2, "progress": False}

@@ -1,4 +1,4 @@
-"""Shells by Projective Dynamics: steps of implicit Euler, beside solids and on obstacles; gradients."""
+"""Shells by Projective Dynamics: steps of implicit Euler, together with solids and on obstacles; gradients."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def sheet(bending="hinge", cells=(6, 2), **options) -> ms.Shell:
 
 
 def both(scene, **options):
-    """By Projective Dynamics and by Newton."""
+    """Return the motion by Projective Dynamics and by Newton."""
     given = {"steps": 6, "time_step": 5e-3, "progress": False, **options}
     return (
         ms.simulate(scene, integrator=ms.ProjectiveDynamics(2000, 1e-11), **given),
@@ -40,7 +40,7 @@ def test_a_flag_falls_as_newton_has_it(thickness, bending):
 
 @pytest.mark.parametrize("bending", BENDINGS[:2])
 def test_a_curved_sheet_in_a_field(bending):
-    """A roof, magnetized along: its rest shape has folds."""
+    """Use a roof, magnetized along itself, whose rest shape has dihedral angles."""
     roof = ms.meshes.rectangle(0.06, 0.02, cells=(6, 2))
     x = roof.rest_positions.copy()
     x[:, 2] = 0.2 * x[:, 0] * (0.06 - x[:, 0]) / 0.06
@@ -61,7 +61,7 @@ def test_a_curved_sheet_in_a_field(bending):
 
 
 def test_a_sheet_that_lands_beside_a_block():
-    """A shell and a solid in one scene, on the ground."""
+    """Drop a shell and a solid in one scene onto the ground."""
     shell = sheet()
     bar = ms.meshes.box((0.03, 0.01, 0.01), cells=(3, 1, 1))
     block = ms.Solid(
@@ -78,8 +78,10 @@ def test_a_sheet_that_lands_beside_a_block():
 
 
 @pytest.mark.parametrize("bending", BENDINGS[1:])
-def test_what_bends_far_stays_soft(bending):
-    """A flag that hangs down from one end: when it has turned by a right angle, a step takes as many rounds as at first."""
+def test_strongly_bent_shells_keep_their_stiffness(bending):
+    """Check a flag that hangs down from one end: after a rotation by 90 degrees a step takes as many iterations as
+    at first.
+    """
     flag = sheet(bending, cells=(6, 1), young_modulus=1e4)
     scene = ms.Scene(flag, supports=[ms.Clamp(flag.mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
     given = {"time_step": 5e-3, "progress": False, "integrator": ms.ProjectiveDynamics(2000, 1e-10)}
@@ -90,7 +92,7 @@ def test_what_bends_far_stays_soft(bending):
 
 
 def test_on_a_slanted_support_beside_edge_rotations():
-    """Nodes that are eliminated densely and rotations in one matrix."""
+    """Combine nodes that are eliminated densely and edge rotations in one matrix."""
     turn = np.array([[0.8, 0, -0.6], [0, 1.0, 0], [0.6, 0, 0.8]])
     flat = ms.meshes.rectangle(0.06, 0.02, cells=(6, 2))
     leaning = flat.transformed(rotation=turn)
@@ -120,7 +122,7 @@ def test_gradients_are_those_of_newton(bending):
 
 
 def test_gradients_of_edge_rotations_over_200_steps():
-    """Against differences."""
+    """Compare the gradients with differences."""
     flag = sheet("midedge", cells=(4, 1))
     scene = ms.Scene(flag, supports=[ms.Clamp(flag.mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
 

@@ -15,7 +15,7 @@ def strip(**sheet) -> tuple[ms.TriangleMesh, ms.Shell]:
     return mesh, ms.Shell(mesh, **{**material, **sheet})
 
 
-def pushed(force: float, **sheet) -> ms.Scene:
+def compressed(force: float, **sheet) -> ms.Scene:
     mesh, shell = strip(**sheet)
     load = ms.EdgeLoad(mesh.edges_at(x=LENGTH), (-force, 0, 0))
     return ms.Scene(shell, supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[load])
@@ -73,7 +73,7 @@ def test_response_of_tensors_is_a_tensor() -> None:
 
 
 def test_buckling_load_and_mode() -> None:
-    found = ms.linear_buckling(pushed(EULER), modes=2)
+    found = ms.linear_buckling(compressed(EULER), modes=2)
     np.testing.assert_allclose(found.factors, [1.0, 9.0], rtol=0.02)
     mesh = found.scene.mesh
     x = mesh.rest_positions[:, 0]
@@ -84,7 +84,7 @@ def test_buckling_load_and_mode() -> None:
 
 
 def test_buckling_is_where_the_path_branches() -> None:
-    scene = pushed(2 * EULER)
+    scene = compressed(2 * EULER)
     branch = ms.follow_path(scene, progress=False).critical[0]
     assert branch.kind == "bifurcation"
     assert ms.linear_buckling(scene).factors[0] == pytest.approx(branch.parameter, rel=1e-3)
@@ -116,34 +116,34 @@ def test_buckling_in_a_field(direction) -> None:
 
 def test_a_pulled_strip_does_not_buckle() -> None:
     with pytest.raises(ValueError, match="nothing buckles under these controls"):
-        ms.linear_buckling(pushed(-EULER))
+        ms.linear_buckling(compressed(-EULER))
 
 
-def test_nothing_to_buckle_under() -> None:
+def test_buckling_without_a_load_is_refused() -> None:
     with pytest.raises(ValueError, match="neither load the scene"):
-        ms.linear_buckling(pushed(EULER), load_factor=0.0)
+        ms.linear_buckling(compressed(EULER), load_factor=0.0)
 
 
 @pytest.mark.parametrize("modes", [0, -1, 1.5, True, "two"])
 def test_modes_must_be_a_positive_integer(modes) -> None:
     with pytest.raises(ValueError, match="modes must be an integer of at least 1"):
-        ms.linear_buckling(pushed(EULER), modes=modes)
+        ms.linear_buckling(compressed(EULER), modes=modes)
 
 
 def test_not_more_modes_than_unknowns() -> None:
-    scene = pushed(EULER)
+    scene = compressed(EULER)
     with pytest.raises(ValueError, match=f"below the {scene.n_dofs} unknowns"):
         ms.linear_buckling(scene, modes=scene.n_dofs)
 
 
 @pytest.mark.parametrize("function", [ms.linear_response, ms.linear_buckling])
-def test_bad_input(function) -> None:
+def test_bad_input_is_refused(function) -> None:
     with pytest.raises(ValueError, match="scene must be a Scene"):
         function("scene")
     with pytest.raises(ValueError, match="remanent_magnetization"):
         function(magnetic(), applied_flux_density=(0, 0, 1e-3))
     with pytest.raises(ValueError, match="load_factor"):
-        function(pushed(EULER), load_factor=np.nan)
+        function(compressed(EULER), load_factor=np.nan)
 
 
 @pytest.mark.parametrize("function", [ms.linear_response, ms.linear_buckling])

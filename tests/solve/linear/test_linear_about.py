@@ -41,7 +41,7 @@ def turned_at_its_end() -> tuple[ms.Scene, dict]:
 
 
 def breathing() -> tuple[ms.Scene, dict]:
-    """Cells couple all of their nodes: a stiffness beside the sparse one."""
+    """Build a solid with cells, which couple all of their nodes: a low-rank stiffness added to the sparse one."""
     mesh = ms.meshes.box((0.02, 0.01, 0.01), cells=(4, 2, 2))
     body = ms.Solid(mesh, material=ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.3))
     mesh = body.mesh  # of ten nodes
@@ -101,7 +101,7 @@ def grown_column() -> tuple[ms.Scene, dict, dict]:
     return held(shell(growth=LONGER), (-EULER, 0, 0)), {"load_factor": 0.0}, {"load_factor": 2.0}
 
 
-def pushed_further() -> tuple[ms.Scene, dict, dict]:
+def compressed_further() -> tuple[ms.Scene, dict, dict]:
     return held(shell(), (-EULER, 0, 0)), {"load_factor": 0.5}, {"load_factor": 2.0}
 
 
@@ -111,7 +111,7 @@ def held_up_by_a_field() -> tuple[ms.Scene, dict, dict]:
     return scene, {**along, "load_factor": 0.0}, {"load_factor": 4.0, "applied_flux_density": (1e-4, 0, 0)}
 
 
-@pytest.mark.parametrize("case", [grown_column, pushed_further, held_up_by_a_field])
+@pytest.mark.parametrize("case", [grown_column, compressed_further, held_up_by_a_field])
 def test_buckling_is_where_the_path_branches(case) -> None:
     scene, at, towards = case()
     about = ms.equilibrium(scene, **at)
@@ -142,7 +142,7 @@ def test_tensors_in_tensors_out_and_no_gradient() -> None:
 
 
 @pytest.mark.parametrize("function", [ms.linear_response, ms.linear_buckling])
-def test_bad_input(function) -> None:
+def test_bad_input_is_refused(function) -> None:
     sheet = shell(growth=LONGER)
     scene = held(sheet, (-EULER, 0, 0))
     about = ms.equilibrium(scene, load_factor=0.5)
@@ -166,7 +166,7 @@ def test_bad_input(function) -> None:
         function(column, straight, load_factor=2.0)
 
 
-def test_what_buckling_cannot_tell() -> None:
+def test_buckling_with_unsuitable_loads_is_refused() -> None:
     scene, _ = breathing()
     about = ms.equilibrium(scene, load_factor=0.1)
     with pytest.raises(ValueError, match="is a spring"):

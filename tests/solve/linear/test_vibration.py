@@ -47,7 +47,7 @@ LENGTH, WIDTH, THICKNESS = 0.1, 0.01, 0.1 / 400
 
 
 def plate(width, cells, held=True, thickness=1e-3):
-    """A plate of length 1, and what makes lambda of its frequencies [Hz]."""
+    """Build a plate of length 1; return it with the factor from its frequencies [Hz] to lambda."""
     mesh = ms.meshes.rectangle(1.0, width, cells=cells, diagonals="crossed")
     sheet = ms.Shell(
         mesh, thickness=thickness, young_modulus=YOUNG_MODULUS, poisson_ratio=0.3, mass_density=DENSITY
@@ -77,7 +77,7 @@ def beam_lambda(frequencies):
 @pytest.mark.parametrize(
     ("width", "cells", "reference"), [(1.0, (32, 32), CANTILEVER_SQUARE), (0.5, (40, 20), CANTILEVER_2_TO_1)]
 )
-def test_cantilever_plates(width, cells, reference):
+def test_cantilever_plates_have_the_ritz_frequencies(width, cells, reference):
     scene, to_lambda = plate(width, cells)
     found = ms.vibration_modes(scene, count=5)
     np.testing.assert_allclose(to_lambda * found.frequencies, reference, rtol=0.005)
@@ -106,7 +106,7 @@ def test_frequencies_scale_with_the_sheet(bending, size):
 
 
 def test_the_modes_solve_the_problem():
-    """Orthogonal with respect to the masses, Rayleigh's quotients the squares, edge rotations at rest."""
+    """Check orthogonality by the masses, Rayleigh quotients equal to the squares, and edge rotations in equilibrium."""
     scene = strip(cells=(12, 2), irregular=0.2)
     rest = ms.equilibrium(scene, remanent_magnetization=(4e4, 0, 2e4), applied_flux_density=(0, 0, 3e-4))
     found = ms.vibration_modes(scene, rest, count=4)
@@ -140,7 +140,9 @@ def test_magnetised_strip_in_an_axial_field(magnetic, beta):
 
 
 def test_an_unstable_equilibrium_says_so(magnetic):
-    """Straight beyond the critical field, the square as far below zero as it is above as far before, to first order."""
+    """Check a straight beam beyond the critical field: to first order the square is as far below zero as above it
+    before.
+    """
     straight = ms.equilibrium(magnetic, **along_the_axis(-3.0), require_stable=False)
     found = ms.vibration_modes(magnetic, straight, count=2)
     assert found.unstable == straight.n_negative_eigenvalues == 1
@@ -169,7 +171,7 @@ def test_the_growth_rate_is_that_of_the_motion(magnetic):
     assert np.polyfit(move.times, np.log(grown), 1)[0] == pytest.approx(rate, rel=0.005)
 
 
-def test_more_unstable_directions_than_modes_asked_for(magnetic):
+def test_all_unstable_directions_are_counted(magnetic):
     straight = ms.equilibrium(magnetic, **along_the_axis(-30.0), require_stable=False)
     found = ms.vibration_modes(magnetic, straight, count=1)
     assert found.unstable == straight.n_negative_eigenvalues == 2 and len(found.squares) == 1
@@ -184,7 +186,9 @@ def test_values_of_the_equilibrium_are_used():
 
 
 def frequency_in_time(scene, start, mode, steps, time_step, **controls):
-    """Of the motion from `start` (n_v, 3) along a mode's displacement, by its zero crossings, Hz."""
+    """Return the frequency of the motion from `start` (n_v, 3) along a mode's displacement, by its zero crossings,
+    Hz.
+    """
     move = ms.simulate(
         scene, steps=steps, time_step=time_step, start=start + mode, progress=False, **controls
     )
@@ -218,7 +222,7 @@ def test_a_magnetised_strip_vibrates_at_its_frequency(beta):
 
 
 def test_a_buckled_strip_vibrates_at_its_frequency():
-    """Bent far, in the field against it, from the equilibrium beyond the critical one."""
+    """Use a strongly bent strip, in equilibrium in an opposing field beyond the critical one."""
     scene, field = strip(cells=(20, 1)), along_the_axis(-4.0)
     rest = ms.equilibrium(scene, **field)
     assert rest.stable and np.abs(rest.displacements[:, 2]).max() > 0.5 * LENGTH
@@ -235,7 +239,7 @@ def test_count_must_be_a_positive_integer(count):
         ms.vibration_modes(strip(cells=(4, 1)), count=count)
 
 
-def test_bad_input():
+def test_bad_input_is_refused():
     scene, other = strip(cells=(4, 1)), strip(cells=(4, 1))
     with pytest.raises(ValueError, match="scene must be a Scene"):
         ms.vibration_modes("scene")

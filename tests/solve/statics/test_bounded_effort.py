@@ -1,4 +1,4 @@
-"""A search for an equilibrium gives up after a bounded effort, and says what it saw and what is likely to be wrong."""
+"""Bounded effort of a search for an equilibrium: it gives up and reports its state and the likely cause."""
 
 import pytest
 
@@ -27,7 +27,7 @@ def test_a_search_gives_up_at_its_number_of_factorizations_and_says_what_it_saw(
 
 
 def test_a_modulus_of_the_wrong_unit_is_told_as_the_likely_cause():
-    """E = 1e-10 Pa under gravity: it took 10,842 iterations to say that more of them were to be allowed."""
+    """Use E = 1e-10 Pa under gravity, which used to take 10,842 iterations before advising more of them."""
     with pytest.raises(
         ms.NotConverged, match=r"would strain them by about \d\S*e\+1\d: is a modulus \[Pa\]"
     ) as caught:
@@ -38,7 +38,7 @@ def test_a_modulus_of_the_wrong_unit_is_told_as_the_likely_cause():
 
 @pytest.mark.parametrize(("young_modulus", "strain"), [(1e6, 1e-3), (1e3, 1.0), (1e-10, 1e13)])
 def test_the_strain_of_a_load_is_that_of_a_bar_under_its_weight_in_order_of_magnitude(young_modulus, strain):
-    """rho g L / E = 981 Pa / E; clamped at one end and flat, a sheet has a third to a tenth of that."""
+    """Compare with rho g L / E = 981 Pa / E; a flat sheet clamped at one end has a third to a tenth of that."""
     found = strain_of_loads(inputs_of(cantilever(young_modulus), {}))
     assert 0.02 * strain < found < strain
 
@@ -50,7 +50,10 @@ def test_iterations_without_a_factorization_count_too():
 
 
 def test_the_default_is_twice_what_the_dearest_hard_case_takes():
-    """A far bent strip with a face of 1e-5 times its neighbours' size takes 2,531."""
+    """Check the default against the hardest known case.
+
+    A strongly bent strip with a face of 1e-5 times its neighbours' size takes 2,531 factorizations.
+    """
     assert ms.MixedNewton().max_factorizations == ms.Newton().max_factorizations == 5000
 
 

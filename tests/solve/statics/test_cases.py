@@ -66,7 +66,7 @@ def test_gradients_of_cases(scene):
 
 
 def test_cases_share_the_analysis(scene):
-    """A second analysis of a fine sheet would cost more than its factorization."""
+    """Check the number of symbolic analyses, one of which costs more than a factorization of a fine sheet."""
     ms.equilibrium(scene, remanent_magnetization=(4e4, 0, 0), applied_flux_density=FIELDS)
     before = scene._model.analyses
     ms.equilibrium(scene, remanent_magnetization=(1e4, 0, 0), applied_flux_density=FIELDS)

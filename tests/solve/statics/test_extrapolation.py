@@ -1,4 +1,4 @@
-"""ms.richardson_extrapolation: what nested meshes say of the exact solution, and how far they are from it."""
+"""Tests of ms.richardson_extrapolation: the exact solution estimated from nested meshes, and the error estimate."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from benchmarks.cases import linear_cylinders, magnetic_strip, plates
 
 
 def roof(mesh, bending: str = "midedge") -> float:
-    """B1, the Scordelis-Lo roof: how far its free edge sinks."""
+    """Return the deflection of the free edge of case B1, the Scordelis-Lo roof."""
     half = linear_cylinders.ROOF_HALF_ANGLE
     x, z = linear_cylinders.ROOF_RADIUS * np.array([np.sin(half), np.cos(half)])
     edge = mesh.nearest_vertex((x, linear_cylinders.ROOF_LENGTH / 2, z))
@@ -26,7 +26,7 @@ ROOF_EXACT = 0.30060154  # isogeometric, PENGoLINS: the case B1 of the reference
 
 
 def strip(mesh, beta: float = 5.0) -> ms.Equilibrium:
-    """C1-90: a magnetised strip in a field across it."""
+    """Solve case C1-90: a magnetised strip in a field across it."""
     controls = magnetic_strip.controls(beta, (0.0, 0.0, 1.0))
     return ms.equilibrium(magnetic_strip.scene(mesh, "midedge"), **controls)
 
@@ -67,7 +67,7 @@ def second_order_roof(n: int) -> ms.QuadraticTriangleMesh:
 
 
 def test_six_node_elements_gain_a_digit():
-    """Two meshes assume the order 4 that three find."""
+    """Check that two meshes assume the order 4 that three find."""
     meshes = [second_order_roof(n) for n in (3, 6, 12)]
     by_two = ms.richardson_extrapolation(lambda mesh: roof(mesh, "midedge2"), meshes[1:])
     by_three = ms.richardson_extrapolation(lambda mesh: roof(mesh, "midedge2"), meshes)
@@ -79,7 +79,7 @@ def test_six_node_elements_gain_a_digit():
 
 
 def test_under_a_point_force_the_order_is_lower():
-    """B5, clamped, a force in the middle."""
+    """Use case B5, clamped, a force in the middle."""
     meshes = [ms.meshes.rectangle(0.5, 0.5, (n, n), diagonals="crossed", order=2) for n in (2, 4, 8)]
     found = ms.richardson_extrapolation(
         lambda mesh: plates.middle_deflection(mesh, "clamped", "force"), meshes
@@ -89,7 +89,7 @@ def test_under_a_point_force_the_order_is_lower():
 
 
 def test_rows_by_vertex_are_those_of_corners():
-    """Also of a cap, whose middle nodes are no corners of the generator's finer mesh."""
+    """Include a cap, whose middle nodes are no corners of the generator's finer mesh."""
     coarse = ms.meshes.spherical_cap(1.0, 0.3, np.pi / 2, cells=(8, 4), order=2)
     for fine in (coarse.refined(), ms.meshes.spherical_cap(1.0, 0.3, np.pi / 2, cells=(16, 8), order=2)):
         found = ms.richardson_extrapolation(lambda mesh: mesh.rest_positions, [coarse, fine])
@@ -110,7 +110,7 @@ def test_three_meshes_tell_the_order():
 
 
 def model(power: float, exact: float = 3.0):
-    """Of a mesh whose cells are n by n: exact + n^-power."""
+    """Return a function of a mesh of n by n cells with the value exact + n^-power."""
     return lambda mesh: exact + (mesh.n_faces / 2.0) ** (-power / 2.0)
 
 
@@ -177,7 +177,7 @@ def test_gradients_go_through():
 
 
 def slit(n: int) -> ms.TriangleMesh:
-    """A ring cut open: two rows of vertices in one place."""
+    """Build a ring cut open, with two coincident rows of vertices."""
     ring = ms.meshes.rectangle(2.0 * np.pi, 1.0, cells=(4 * n, n))
     angle, radius = ring.rest_positions[:, 0], 1.0 + ring.rest_positions[:, 1]
     points = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.0 * angle], axis=1)
@@ -201,7 +201,7 @@ def test_both_sides_of_a_slit_are_told_apart():
     np.testing.assert_array_equal(found.value, rows(coarse))
 
 
-def test_what_does_not_converge_is_said():
+def test_missing_convergence_raises_an_error():
     values = iter([1.0, 2.0, 2.9])
     with pytest.raises(
         ms.NotConverged, match=r"changes by 1 and then by 0\.9, which tells no limit"
@@ -214,7 +214,7 @@ def test_what_does_not_converge_is_said():
         ms.richardson_extrapolation(lambda mesh: next(values), [square(n) for n in (2, 4, 8)])
 
 
-def test_what_does_not_change_is_converged():
+def test_constant_values_are_converged():
     found = ms.richardson_extrapolation(lambda mesh: 2.0, [square(n) for n in (2, 4, 8)])
     assert found.value == 2.0 and found.error == 0.0 and np.isnan(found.order)
 

@@ -1,4 +1,4 @@
-"""A solve that cannot finish says why, and hands back the last good state."""
+"""Failed solves: the reason in the message, and the last good state."""
 
 import os
 import re
@@ -23,7 +23,7 @@ def cantilever(field, cells=(20, 2)):
 
 
 def short_grid(height):
-    """A field that ends `height` above and below the strip."""
+    """Build a sampled field that ends `height` above and below the strip."""
     return ms.SampledField.from_function(
         lambda x: np.tile((0.0, 0.0, 5e-3), (len(x), 1)),
         (-0.02, -0.02, -height),
@@ -44,7 +44,7 @@ def test_too_few_iterations():
     assert isinstance(good, ms.Equilibrium) and good.scene is scene
     assert 0.0 <= good.load_fraction < 1.0 and not good.stable
     assert np.isfinite(good.positions).all() and "of the way" in repr(good)
-    # What it hands back holds at its own controls, and is a start.
+    # The last good state is an equilibrium under its own load parameters, and can be a start.
     assert good.applied_flux_density[2] == pytest.approx(20e-3 * good.load_fraction)
     found = ms.equilibrium(
         scene, remanent_magnetization=(4e4, 0, 0), applied_flux_density=(0, 0, 20e-3), start=good
@@ -53,7 +53,7 @@ def test_too_few_iterations():
 
 
 def test_a_sheet_that_leaves_a_sampled_field():
-    """NaN outside the grid is neither an equilibrium nor a complaint about a matrix."""
+    """Check that NaN outside the grid gives neither an equilibrium nor a message about a matrix."""
     with pytest.raises(ms.NotConverged) as caught:
         ms.equilibrium(cantilever(short_grid(2e-3)), remanent_magnetization=(4e4, 0, 0))
     good = caught.value.last_good
@@ -72,7 +72,7 @@ def test_a_sheet_that_starts_outside_a_sampled_field():
 
 
 def test_a_neutral_equilibrium_is_no_stable_one():
-    """Nothing holds this sheet, and nothing pulls at it: its Hessian is singular."""
+    """Use a sheet without supports and loads: its Hessian is singular."""
     mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells=(6, 2))
     scene = ms.Scene(ms.Shell(mesh, thickness=THICKNESS, young_modulus=YOUNG), allow_rigid_motions=True)
     with pytest.raises(ms.NotConverged) as caught:
@@ -81,7 +81,7 @@ def test_a_neutral_equilibrium_is_no_stable_one():
 
 
 def bent_far(mesh):
-    """A thin strip in a field that makes beta = 300."""
+    """Solve a thin strip in a field that makes beta = 300."""
     shell = ms.Shell(mesh, thickness=LENGTH / 400, young_modulus=YOUNG, poisson_ratio=0.0)
     scene = ms.Scene(shell, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
     flux_density = 300.0 * YOUNG * shell.thickness[0] ** 2 / (12.0 * 1e5 * LENGTH**2)
@@ -94,7 +94,7 @@ def bent_far(mesh):
 
 
 def with_a_cap(height):
-    """A strip with a vertex at this height above a boundary edge in its middle, over that edge's length."""
+    """Build a strip with a vertex close to a boundary edge in its middle; height: over that edge's length."""
     mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells=(20, 2))
     edge = mesh.edges_at(y=0.0)[10]
     face = mesh.edge_faces[edge].max()
@@ -106,7 +106,7 @@ def with_a_cap(height):
 
 
 def test_a_nearly_degenerate_face_is_named():
-    """A clamped sheet is not told to be held by supports."""
+    """Check that the message does not suggest supports for a sheet that is clamped."""
     mesh = with_a_cap(1e-7)
     worst = mesh.quality.worst(1)[0]
     with pytest.raises(
@@ -133,7 +133,7 @@ def test_a_failure_says_where_and_what_was_tried():
 
 
 def test_a_failure_beside_flat_faces_names_them():
-    """Steps however short do not help there."""
+    """Use faces so flat that shorter load steps do not help."""
     mesh = crossed(LENGTH, WIDTH, (20, 2), [0.0003, 0.5])
     with pytest.raises(ms.NotConverged) as caught:
         bent_far(mesh)
@@ -147,7 +147,7 @@ def test_a_failure_beside_flat_faces_names_them():
     assert "The energy still falls along a motion at vertices" in text
 
 
-def test_what_a_field_raises_comes_through():
+def test_exception_of_a_field_reaches_the_caller():
     def broken(points):
         raise ZeroDivisionError("the coil is off")
 
@@ -165,7 +165,7 @@ def slow_field():
 
 
 def press_ctrl_c(after):
-    """From another thread, once; returns the timer and the list that holds when it was pressed."""
+    """Send an interrupt once from another thread; return the timer and the list that gets the time of the interrupt."""
     pressed = []
 
     def press():
@@ -178,7 +178,7 @@ def press_ctrl_c(after):
 
 
 def long_solve(progress):
-    """Plain Newton in an extreme field on a fine mesh: many seconds."""
+    """Solve by standard Newton in an extreme field on a fine mesh, which takes many seconds."""
     scene = cantilever(ms.UniformField(), cells=(400, 32))
     ms.equilibrium(
         scene,
@@ -233,14 +233,14 @@ def test_ctrl_c_hands_back_the_last_good_state(solve):
     assert 0.0 <= good.load_fraction < 1.0
 
 
-def slides_into_the_floor() -> ms.Scene:
+def sliding_onto_the_floor() -> ms.Scene:
     mesh = ms.meshes.rectangle(0.04, 0.02, cells=(40, 20), irregular=0.2)
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e5, mass_density=1e3)
     floor = ms.Contact(ms.obstacles.Plane(center=(0, 0, -1e-3)), friction_coefficient=0.6)
     return ms.Scene(sheet, contacts=[floor], gravity=(0, 0, -9.81), allow_rigid_motions=True)
 
 
-def slide(scene: ms.Scene, **options) -> np.ndarray:
+def simulate_sliding(scene: ms.Scene, **options) -> np.ndarray:
     velocities = np.tile((1.0, 0.0, -1.0), (scene.mesh.n_vertices, 1))
     integrator = ms.ImplicitEuler()
     return ms.simulate(
@@ -250,9 +250,12 @@ def slide(scene: ms.Scene, **options) -> np.ndarray:
 
 @pytest.mark.parametrize("call", [1, 2, 4, 9, 20, 40])
 def test_an_interrupted_motion_leaves_nothing_behind(monkeypatch, call):
-    """No iterations but damped ones, which hold normal forces meanwhile. The solve calls a few times a second: so that the
-    call is the same one on every machine, each takes so long that the next place where it could call does."""
-    scene = slides_into_the_floor()
+    """Stop a motion that takes damped iterations only, which freeze the normal forces meanwhile.
+
+    The solve calls back a few times a second. To make the interrupted call the same on every machine, each call takes
+    so long that the next possible one is made.
+    """
+    scene = sliding_onto_the_floor()
     calls = []
 
     def interrupt(*_):
@@ -264,9 +267,9 @@ def test_an_interrupted_motion_leaves_nothing_behind(monkeypatch, call):
     with monkeypatch.context() as patched:
         patched.setattr("magshell.solve.dynamics.simulate._advance", lambda bar: interrupt)
         with pytest.raises(ms.Interrupted) as caught:
-            slide(scene, solver=ms.Newton(max_iterations=1))
+            simulate_sliding(scene, solver=ms.Newton(max_iterations=1))
     assert caught.value.last_good.steps_done > 0 or call < 40  # not in the first step alone
-    np.testing.assert_array_equal(slide(scene), slide(slides_into_the_floor()))
+    np.testing.assert_array_equal(simulate_sliding(scene), simulate_sliding(sliding_onto_the_floor()))
 
 
 @pytest.mark.parametrize("field_factor", [-1e300, 1e300, -1e308])

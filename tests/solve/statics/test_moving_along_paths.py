@@ -11,7 +11,7 @@ CUBE = ms.CuboidMagnet((0.01, 0.012, 0.008), (0, 1e4, 2e5), center=(0.05, 0.01, 
 
 
 def test_a_path_of_equilibria_along_which_things_move():
-    """A magnet comes near and turns, a clamp lifts, a floor rises: the end is an equilibrium with them there."""
+    """Check that the end is an equilibrium after a magnet approaches and rotates, a clamp lifts and a floor rises."""
     floor = ob.Plane(center=(0, 0, -0.01))
     clamp = ms.Clamp(MESH.edges_at(x=0.0), displacement=(0, 0, 0), rotation=(0, 0, 0))
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, remanent_magnetization=(2e4, 0, 0))

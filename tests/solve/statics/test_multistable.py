@@ -9,7 +9,7 @@ LENGTH, WIDTH = 0.12, 0.02
 
 
 def beam(cells=(24, 2), shortening=0.5e-3) -> ms.Scene:
-    """A strip between clamps, pushed together: bistable."""
+    """Build a bistable strip between clamps that are pushed together."""
     mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells=cells)
     sheet = ms.Shell(mesh, thickness=2.5e-3, young_modulus=4.2e6, poisson_ratio=0.5)
     supports = [
@@ -20,7 +20,7 @@ def beam(cells=(24, 2), shortening=0.5e-3) -> ms.Scene:
 
 
 def outwards(mesh) -> np.ndarray:
-    """Magnetized outwards from the middle, A/m."""
+    """Return the magnetization that points outwards from the middle, A/m."""
     magnetization = np.zeros((mesh.n_faces, 3))
     magnetization[:, 0] = 5e4 * np.sign(mesh.face_barycenters[:, 0] - LENGTH / 2)
     return magnetization
@@ -45,8 +45,8 @@ def test_both_wells_of_a_bistable_beam():
     assert repr(found).startswith("Equilibria: 2\n")
 
 
-def test_its_saddles_if_asked_for():
-    """Straight, and in two waves, each with the unstable directions that theory says."""
+def test_saddles_are_found_with_include_unstable():
+    """Check the straight saddle and the one with two waves, each with the unstable directions of theory."""
     scene = beam()
     found = ms.find_equilibria(scene, **field(scene), include_unstable=True)
     assert (np.diff(found.energy) >= 0).all()
@@ -60,7 +60,7 @@ def test_its_saddles_if_asked_for():
 
 
 def test_a_field_takes_one_well_away():
-    """Above the field that makes it snap there is one."""
+    """Check that only one equilibrium remains above the field of the snap."""
     scene = beam()
     weak = ms.find_equilibria(scene, **field(scene, 2e-3), attempts=6)
     assert len(weak) == 2
@@ -100,7 +100,7 @@ def test_gradients_through_each():
         torch.autograd.grad(saddle, strength)
 
 
-def test_where_there_is_one_there_is_one():
+def test_single_equilibrium_is_found_once():
     mesh = ms.meshes.rectangle(0.1, 0.02, cells=(6, 1))
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
     scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
@@ -121,13 +121,13 @@ def test_starts_of_ones_own():
     assert len(ms.find_equilibria(scene, **field(scene), start=mirrored.tolist(), attempts=1)) == 1
 
 
-def test_what_counts_as_one():
+def test_distinct_tolerance_merges_equilibria():
     scene = beam()
     assert len(ms.find_equilibria(scene, **field(scene), attempts=6, distinct_tolerance=0.1)) == 1
 
 
 def test_far_beyond_its_first_instability_a_sheet_has_many():
-    """A slit ring lifted by ten times the load that it is known for: four routes ended in four equilibria."""
+    """Check a slit ring lifted by ten times its usual load: four routes ended in four equilibria."""
     strip = ms.meshes.rectangle(1.0, 1.0, cells=(16, 2))
     angle, radius = 2.0 * np.pi * strip.rest_positions[:, 0], 6.0 + 4.0 * strip.rest_positions[:, 1]
     points = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.0 * angle], axis=1)
@@ -144,9 +144,9 @@ def test_interrupted_it_hands_back_what_it_has():
     scene = beam()
     calls = []
 
-    def watch(share, residual):
-        calls.append(share)
-        if share > 0.4:
+    def watch(fraction, residual):
+        calls.append(fraction)
+        if fraction > 0.4:
             raise KeyboardInterrupt
 
     with pytest.raises(ms.Interrupted, match="after 3 equilibria were found, saddles counted") as caught:
@@ -167,14 +167,14 @@ def test_interrupted_it_hands_back_what_it_has():
         ({"applied_flux_density": np.zeros((2, 3))}, r"applied_flux_density \[T\] must have shape"),
     ],
 )
-def test_bad_input(options, message):
+def test_bad_input_is_refused(options, message):
     scene = beam((4, 1))
     with pytest.raises(ValueError, match=message):
         ms.find_equilibria(scene, **{**field(scene), **options})
 
 
 def test_a_start_that_looks_like_a_saddle_finds_it():
-    """A strip pushed far has its S far from both wells, where deflation from them does not come."""
+    """Use a strongly compressed strip, whose S shape is too far from both wells for deflation from them to find it."""
     mesh = ms.meshes.rectangle(0.04, 0.005, cells=(24, 3))
     sheet = ms.Shell(mesh, thickness=0.4e-3, young_modulus=1e6, poisson_ratio=0.45)
     ends = [

@@ -1,4 +1,4 @@
-"""Off a saddle a sheet goes to the side where the energy falls deeper, which is where loads push it."""
+"""Escape from a saddle: the sheet goes to the side of lower energy, which is where loads push it."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ def in_field(scene, flux_density, **options):
 
 @pytest.mark.parametrize("bending", ["midedge", "hinge"])
 def test_a_compressed_strip_leaves_the_saddle(bending):
-    """Clamped at both ends it buckles at a shortening of pi^2 h^2 / (3 L^2) of its length."""
+    """Check a strip clamped at both ends, which buckles at a shortening of pi^2 h^2 / (3 L^2) of its length."""
     shell = strip(bending=bending)
     shortening = np.pi**2 * THICKNESS**2 / (3.0 * LENGTH)
     scene = compressed(shell, 4.0 * shortening)
@@ -73,7 +73,7 @@ def test_an_opposed_field_buckles_the_strip_beyond_its_critical_value(factor):
 
 
 def test_both_sides_of_a_saddle_cost_the_same():
-    """The strip may buckle to either side, and its mirror image is as good."""
+    """Check both buckling directions of a strip; they are mirror images."""
     shell = strip()
     scene = cantilever(shell)
     found = in_field(scene, (-2.0 * CRITICAL, 0, 0))
@@ -137,7 +137,7 @@ def test_newton_and_mixed_newton_find_the_same_state():
     assert mixed.iterations < plain.iterations
 
 
-# What a result says
+# Contents of a result
 
 
 def test_the_counters_make_sense():
@@ -175,7 +175,7 @@ def test_progress_is_called():
     assert all(0.0 <= progress <= 1.0 and residual >= 0.0 for progress, residual in calls)
 
 
-def test_what_progress_raises_ends_the_solve():
+def test_exception_in_progress_ends_the_solve():
     class Enough(Exception):
         pass
 
@@ -225,7 +225,7 @@ def in_threads(jobs):
 
 @pytest.mark.parametrize("shared", [False, True], ids=["a scene each", "one scene"])
 def test_solves_at_the_same_time_give_what_they_give_alone(shared):
-    """On one scene they wait for one another; each has its own magnetization."""
+    """Run solves on one scene, where they wait for one another, and on several; each has its own magnetization."""
     shell = strip((60, 8))
     scenes = [cantilever(shell)] * 3 if shared else [cantilever(shell) for _ in range(3)]
 

@@ -1,4 +1,4 @@
-"""How many factorizations equilibria take from rest in one call where steps of the load go astray, and where they end."""
+"""Numbers of factorizations of equilibria found from rest in one call, where load steps are difficult."""
 
 import numpy as np
 import pytest
@@ -41,7 +41,9 @@ def test_a_field_from_behind(angle, beta, most):
 
 @pytest.mark.parametrize("faces", [512, 2048, 8192])
 def test_strongly_bent_sheet_takes_10_factorizations_in_one_load_step_on_every_mesh(faces):
-    """Its steps are 2.51, 1.37, 1.60, 0.77, ... of the extent: the third is longer than the second, and not astray."""
+    """Check steps of 2.51, 1.37, 1.60, 0.77, ... of the extent: a third step longer than the second is no
+    divergence.
+    """
     scene, controls = strongly_bent(faces)
     found = ms.equilibrium(scene, **controls)
     assert found.stable
@@ -63,7 +65,7 @@ def test_strongly_bent_sheet_takes_10_factorizations_in_one_load_step_on_every_m
 )
 @pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
 def test_a_semi_cylinder_pulled_and_pushed(cells, force, most, energy):
-    """On coarse meshes it snaps from fold to fold; which it ends in may depend on rounding, none may be higher."""
+    """Bound the energy: on coarse meshes it snaps from crease to crease, and the final state may depend on rounding."""
     found = ms.equilibrium(semi_cylinder(cells, force))
     assert found.stable and found.load_fraction == 1.0
     assert found.energy <= energy + 1e-5 * abs(energy)
@@ -72,7 +74,11 @@ def test_a_semi_cylinder_pulled_and_pushed(cells, force, most, energy):
 
 @pytest.mark.parametrize(("ratio", "most"), [(1e-6, 100), (1e-5, 60), (1e-4, 60), (1e-3, 60), (1e-2, 60)])
 def test_a_thin_strip_rolled_up(ratio, most):
-    """What a load step leaves rough would stiffen the next one: thousandfold, where the strip is thin (343 and 131 then)."""
+    """Limit the effort where the error of an inexact load step would stiffen the next one, a thousandfold in a thin
+    strip.
+
+    With such inexact steps it took 343 and 131 factorizations.
+    """
     length, angle, stiffness = 0.1, 1.8 * np.pi, 1e6 * (ratio * 0.1) ** 3 / 12.0
     mesh = ms.meshes.rectangle(length, 0.1 * length, cells=(40, 2))
     sheet = ms.Shell(mesh, thickness=ratio * length, young_modulus=1e6, poisson_ratio=0.0)
@@ -86,7 +92,10 @@ def test_a_thin_strip_rolled_up(ratio, most):
 
 @pytest.mark.parametrize("ratio", [1e-2, 1e-3])
 def test_a_flat_strip_far_beyond_where_it_buckles(ratio):
-    """It falls along a hundred directions at once, of which strides follow the fastest (345 and 605 factorizations)."""
+    """Limit the effort where a hundred directions are unstable at once; gradient-flow steps follow the fastest ones.
+
+    They took 345 and 605 factorizations.
+    """
     mesh = ms.meshes.rectangle(0.1, 0.01, cells=(40, 2))
     sheet = ms.Shell(mesh, thickness=0.1 * ratio, young_modulus=1e6, poisson_ratio=0.0)
     push = ms.Clamp(mesh.edges_at(x=0.1), displacement=(-0.01, 0, 0))
@@ -98,7 +107,9 @@ def test_a_flat_strip_far_beyond_where_it_buckles(ratio):
 
 
 def test_a_strip_buckles_to_the_side_that_its_load_pushes():
-    """Plain steps from rest to the end are fewer, but they end on the other side, which is stable too."""
+    """Check the side: standard steps from rest take fewer factorizations, but end on the other side, which is
+    stable, too.
+    """
     mesh = ms.meshes.rectangle(1.0, 0.1, cells=(20, 2))
     sheet = ms.Shell(mesh, thickness=1e-2, young_modulus=1e6, poisson_ratio=0.3)
     pushed = ms.Clamp(mesh.edges_at(x=1.0), displacement=(-4e-4 * np.pi**2 / 3.0, 0, 0))
@@ -111,8 +122,8 @@ def test_a_strip_buckles_to_the_side_that_its_load_pushes():
         assert heights.max() > 1e-2 and heights.min() > -1e-3
 
 
-def test_what_an_early_end_hands_back_is_at_rest():
-    """On the way states are left where they are near enough. What an error holds is made exact, but for that of Ctrl-C."""
+def test_state_of_an_early_end_is_an_equilibrium():
+    """Check that the state in an error is converged, except after Ctrl-C; intermediate states are inexact."""
     scene, controls = oblique_field(150, 50.0, cells=(120, 12))
     with pytest.raises(ms.NotConverged) as caught:
         ms.equilibrium(semi_cylinder(8, 2000.0), solver=ms.MixedNewton(max_relaxation_steps=1))

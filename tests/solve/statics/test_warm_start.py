@@ -1,4 +1,4 @@
-"""WarmStart: design after design from the last equilibrium, jumps noticed, gradients and bits kept."""
+"""Tests of WarmStart: designs one after another from the last equilibrium, detected jumps, gradients, equal bits."""
 
 import io
 
@@ -13,7 +13,7 @@ MESH = ms.meshes.rectangle(2 * HALF, 0.02, cells=(20, 2))
 
 @pytest.fixture(scope="module")
 def buckled():
-    """A strip shortened by 1 %, its halves magnetized against each other, buckled upwards; and that state."""
+    """Return a strip shortened by 1 %, its halves magnetized against each other, and its state buckled upwards."""
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6)
     left = ms.Clamp(MESH.edges_at(x=0.0))
     right = ms.Clamp(MESH.edges_at(x=2 * HALF), displacement=(-1e-3, 0, 0))
@@ -36,7 +36,7 @@ def height(equilibrium):
 
 @pytest.fixture(scope="module")
 def critical_field(buckled):
-    """Where path following says that the strip snaps."""
+    """Return the field at which the strip snaps, by path following."""
     scene, start = buckled
     push = 0.02 if height(snap(buckled, 0.02)) < 0 else -0.02
     path = ms.follow_path(
@@ -155,7 +155,9 @@ def test_a_state_goes_on_with_the_same_bits(buckled, critical_field):
 
 
 def test_a_state_of_a_design_without_values_goes_on_by_halves(buckled, critical_field):
-    """It was taken for one with values, none of them, and no step between it and the next design could be made."""
+    """Check that a state without `values` is continued in smaller steps; it used to be taken for one with empty
+    values.
+    """
     pytest.importorskip("torch")
     scene, start = buckled
     one, other = ms.WarmStart(scene, start=start), ms.WarmStart(scene)
@@ -165,7 +167,7 @@ def test_a_state_of_a_design_without_values_goes_on_by_halves(buckled, critical_
         other(**design(1.2 * critical_field))
 
 
-def test_bad_input(buckled):
+def test_bad_input_is_refused(buckled):
     scene, start = buckled
     with pytest.raises(ValueError, match="scene must be a Scene"):
         ms.WarmStart("scene")
@@ -189,9 +191,9 @@ def test_a_design_crosses_a_snap_and_resumes_with_the_same_bits(buckled, critica
         warm = ms.WarmStart(scene, start=start)
         share = torch.tensor(0.5, dtype=torch.float64, requires_grad=True)
 
-        def objective(share):
+        def objective(strength):
             rest = warm(
-                remanent_magnetization=share * unit, applied_flux_density=(0, 0, 1.6 * critical_field)
+                remanent_magnetization=strength * unit, applied_flux_density=(0, 0, 1.6 * critical_field)
             )
             return 1e6 * (rest.positions[middle, 2].mean() - wanted) ** 2
 
@@ -216,7 +218,7 @@ def test_a_design_crosses_a_snap_and_resumes_with_the_same_bits(buckled, critica
 
 
 def test_values_of_everything_in_a_scene_go_through_a_state(tmp_path):
-    """Contacts and obstacles too: whatever `values` may name."""
+    """Include contacts and obstacles: whatever `values` may name."""
     torch = pytest.importorskip("torch")
     mesh = ms.meshes.rectangle(0.04, 0.01, cells=(4, 1))
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)

@@ -9,7 +9,7 @@ namespace {
 
 // [-] Rms distance to a known equilibrium below which a result is that one, over the extent; see test_both_wells_of_a_bistable_beam.
 constexpr double same_distance = 1e-5;
-// [-] Longest step, over the extent, and largest last step of a converged search; see test_its_saddles_if_asked_for.
+// [-] Longest step, over the extent, and largest last step of a converged search; see test_saddles_are_found_with_include_unstable.
 constexpr double longest_step = 0.25, last_step_tolerance = 1e-3;
 // [-] Largest factor between the deflated and the original step; see test_both_wells_of_a_bistable_beam.
 constexpr double max_step_factor = 10.0;

@@ -28,7 +28,7 @@ MotorReactions::MotorReactions(Newton& newton, const Inertia& inertia, const Mot
 
 // Solves for the state. It is so near the end of the step that GMRES with the last factorization usually suffices.
 bool MotorReactions::solve(const LoadParameters& load_parameters) {
-    constexpr int most_steps = 4;  // GMRES steps before Newton takes over; see test_what_motors_do_in_time
+    constexpr int most_steps = 4;  // GMRES steps before Newton takes over; see test_motor_outputs_of_a_motion
     Model& model = newton_.model();
     const ProximalTerm proximal = this->proximal();
     const VectorXd from = q_;

@@ -38,9 +38,9 @@ constexpr double max_step_ratio = 0.7;  // [-] see test_a_thin_strip_rolled_up
 constexpr double settling_ratio = 0.3;
 // [-] Growth of the second step that is allowed, as in the plane of a flat shell; see test_a_flat_strip_far_beyond_where_it_buckles.
 constexpr double max_second_growth = 4.0;
-// [-] Remaining displacement at which an inexact load step ends, over the first step; see test_what_an_early_end_hands_back_is_at_rest.
+// [-] Remaining displacement at which an inexact load step ends, over the first step; see test_state_of_an_early_end_is_an_equilibrium.
 constexpr double inexact_remainder = 1e-3;
-// [-] The same over the thickness, as a displacement stretches the shell; see test_what_an_early_end_hands_back_is_at_rest.
+// [-] The same over the thickness, as a displacement stretches the shell; see test_state_of_an_early_end_is_an_equilibrium.
 constexpr double inexact_thickness = 0.1;
 // [-] Reduction of the residual below which the next matrix is not projected; see test_strip_folds_onto_itself.
 constexpr double required_contraction = 0.5;

@@ -8,7 +8,7 @@
 namespace magshell {
 namespace {
 
-// [-] Penetration that counts as none, over the extent; see test_it_slides_above_it_with_all_of_its_friction.
+// [-] Penetration that counts as none, over the extent; see test_block_slides_above_the_angle_with_full_friction.
 constexpr double negligible_gap = 1e-14;
 
 }  // namespace
@@ -135,7 +135,7 @@ void CoulombContact::solve_forces(const VectorXd& q, VectorXd& move) {
     // Limits of the active-set loop and of the Gauss-Seidel sweeps; see test_a_block_sticks_or_slides_on_another.
     constexpr int max_rounds = 50, max_sweeps = 200;
     // [-] Reduction of the largest displacement, relative to the first sweep, that ends the sweeps: the next iteration moves the
-    // nodes anyway. See test_it_sticks_below_the_angle_of_friction.
+    // nodes anyway. See test_block_sticks_below_the_angle_of_friction.
     constexpr double sweep_tolerance = 1e-4;
     apply_forces(move);  // the closest points have moved
     for (int round = 0; round < max_rounds; ++round) {

@@ -12,7 +12,7 @@ namespace {
 
 // [-] Shortest admissible step length; see test_rounds_without_a_tolerance_do_not_run_away.
 constexpr double min_projective_step = 1e-9;
-// [-] Largest violation of Coulomb's law at convergence, over the extent; see test_it_sticks_below_the_angle_of_friction.
+// [-] Largest violation of Coulomb's law at convergence, over the extent; see test_block_sticks_below_the_angle_of_friction.
 constexpr double law_tolerance = 1e-10;
 // Iterations between two checks whether contacts have opened or closed, which changes the matrix; see test_free_bodies_and_obstacles_by_penalty.
 constexpr int iterations_between_checks = 5;

@@ -8,14 +8,16 @@ import magshell as ms
 pytest.importorskip("gymnasium")
 
 
-def pendulum(steered_by):
-    """An environment of a pendulum whose torque is steered so, its scene and hinge."""
+def pendulum(action_function):
+    """Build an environment of a pendulum whose torque is set by a function of the action; return its scene and
+    hinge, too.
+    """
     bob = ms.Link(mass=1.0, center=(0, 0, -1.0), inertia=0.1)
     hinge = ms.Revolute(bob, origin=(0, 0, 0), axis=(0, 1, 0), torque=0.0)
     scene = ms.Scene(ms.Skeleton([bob], [hinge]), gravity=(0, 0, -9.81))
     one = ms.envs.Environment(
         scene,
-        actuators=[ms.envs.ParametricAction(hinge, "torque", *steered_by)],
+        actuators=[ms.envs.ParametricAction(hinge, "torque", *action_function)],
         observation=lambda now: [now[hinge].angle],
         reward=lambda now: 0.0,
         time_step=1e-2,
@@ -27,7 +29,7 @@ def pendulum(steered_by):
 
 
 def test_a_value_that_a_function_of_the_action_sets():
-    """A speed instead of a place, and a function of the time: as one motion with the same courses."""
+    """Compare a rate instead of a value, and a function of the time, with one motion under the same time series."""
     one, scene, hinge = pendulum((2, lambda two, time, before: before + two[0] + time * two[1]))
     assert one.action_space.shape == (2,)
     assert repr(one.actuators[0]) == "ParametricAction(torque of Revolute, by 2 numbers)"
@@ -64,7 +66,7 @@ def swinging(actuators):
 
 
 def test_several_owners_at_once_move_as_each_by_itself():
-    """And the function is called once an action, with the values of all of them before."""
+    """Check also that the function is called once an action, with the former values of all owners."""
     seen = []
 
     def add(numbers, time, before):
@@ -125,7 +127,7 @@ def test_bad_steering_is_refused(steered_by, complaint):
         pendulum(steered_by)
 
 
-def test_what_is_steered_must_have_its_shape():
+def test_value_of_a_wrong_shape_is_refused():
     one, *_ = pendulum((1, lambda share, time, before: share))
     one.reset(seed=0)
     with pytest.raises(ValueError, match="what steers torque must be a number"):
