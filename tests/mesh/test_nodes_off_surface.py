@@ -10,7 +10,7 @@ import magshell as ms
 
 
 def thin_sphere(thickness: float, around: int) -> ms.TetMesh:
-    """A hollow sphere of radius 1 m, one layer of prisms of three tetrahedra each."""
+    """Build a hollow sphere of radius 1 m, one layer of prisms of three tetrahedra each."""
     outside = ms.meshes.spherical_cap(1.0, 0.0, np.pi, cells=(around, around // 2))
     normals = outside.rest_positions / np.linalg.norm(outside.rest_positions, axis=1, keepdims=True)
     points, n = np.concatenate([(1.0 - thickness) * normals, normals]), outside.n_vertices
