@@ -182,7 +182,7 @@ def _gradient(scene: ms.Scene, inputs: dict[str, Any], found: ms.Equilibrium, ro
     """Measure the gradient of a function of all positions by all inputs, from the stored factorization."""
     options = ms.MixedNewton()._options()
     options.keep_factor = True
-    state, turns, controls = found._state, found._turns, found._controls
+    state, turns, controls = found._state, found._angle_branches, found._controls
     with Inputs(scene, **inputs, differentiable=True).in_core():
         kept = _core.find_equilibrium(scene._model, state, turns, controls, controls, options)
         by_positions = np.ones((scene.mesh.n_vertices, 3))

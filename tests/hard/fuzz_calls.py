@@ -296,7 +296,7 @@ def _solves(s: Sample) -> Iterator[Call]:
         "time": 0.0,
         "state": s.state.state,
         "velocity": s.state.velocity,
-        "turns": s.state.turns,
+        "angle_branches": s.state.angle_branches,
         "acceleration": s.state.acceleration,
     }
     yield Call(

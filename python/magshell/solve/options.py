@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Clock:
-    """Counts steps, so that a motion in parts has the times of one in one piece, to the last bit: sums would not.
+    """A count of steps that gives a motion in parts the times of a motion in one piece, to the last bit; sums would not.
 
     origin: s; time_step: s; steps: that were taken since the origin.
     """
@@ -31,31 +31,31 @@ class Clock:
 
     @property
     def time(self) -> float:
-        """s"""
+        """The time now, s."""
         return self.at(0)
 
-    def at(self, steps: Any, share: Any = 0.0) -> Any:
-        """The times [s] when so many more steps, and a share of another, have been taken: numbers or arrays."""
-        return self.origin + ((self.steps + steps) + share) * self.time_step
+    def at(self, steps: Any, fraction: Any = 0.0) -> Any:
+        """Return the times [s] after so many more steps and a fraction of another one: numbers or arrays."""
+        return self.origin + ((self.steps + steps) + fraction) * self.time_step
 
     def after(self, steps: int) -> Clock:
         return Clock(self.origin, self.time_step, self.steps + steps)
 
     def going_on(self, time_step: float) -> Clock:
-        """With other steps counting begins again."""
+        """Return the clock for steps of this length: it starts a new count if the length differs."""
         return self if self.time_step == time_step else Clock(self.time, time_step)
 
-    def moment(self, steps: Any, share: float, time_step: Numbers) -> Any:
-        """As at(); where `time_step` is a tensor, another in its graph, with the time now as it is."""
-        time = self.at(steps, share)
+    def moment(self, steps: Any, fraction: float, time_step: Numbers) -> Any:
+        """Return the time as `at` does; if `time_step` is a tensor, as a tensor in its graph, the present time constant."""
+        time = self.at(steps, fraction)
         if not is_tensor(time_step):
             return time
         time_step = time_step.double()
-        return time + (steps + share) * (time_step - time_step.detach())
+        return time + (steps + fraction) * (time_step - time_step.detach())
 
 
 def clock_of(state: MotionState) -> Clock:
-    """A MotionState's. One whose time was set by hand begins to count there."""
+    """Return the clock of a MotionState; if its time was set by hand, a clock that starts there."""
     clock = state.clock
     return clock if clock is not None and clock.time == state.time else Clock(float(detached(state.time)))
 
@@ -195,7 +195,7 @@ class ProjectiveDynamics:
             raise ValueError(f"tolerance must be in (0, 1), or None, got {self.tolerance}")
 
     def without_gradient(self, scene: Scene) -> str:
-        """Why motions of a scene have no gradient; empty where they do."""
+        """Return why motions of a scene have no gradient; "" if they have one."""
         if self.tolerance is None:
             return (
                 "ProjectiveDynamics(tolerance=None) stops before its steps are solved, so that they are no function of the "
@@ -226,7 +226,7 @@ class ImplicitEuler:
     """
 
     _name = "euler"
-    _times = (1.0,)  # of the stages, as shares of the step
+    _times = (1.0,)  # of the stages, as fractions of the step
 
 
 @immutable
@@ -302,7 +302,7 @@ KINDS = ("stages", "checkpoints", "factors")
 @immutable
 @dataclass(frozen=True)
 class AdjointStorage:
-    """What a motion keeps for its gradients, and how much of it: `adjoint_storage` of ms.simulate.
+    """The storage of a motion for its gradients, and its largest size: `adjoint_storage` of ms.simulate.
 
     what: "stages", all states; "checkpoints", between which the steps are taken again on the way back, some of them several
         times; "factors": all states with their factorizations, which pays where several gradients are taken of one motion.
@@ -330,6 +330,6 @@ class AdjointStorage:
         object.__setattr__(self, "memory_budget", not_negative("memory_budget", "bytes", self.memory_budget))
 
 
-def kept(keep: str | AdjointStorage | None) -> AdjointStorage:
-    """What a caller hands in, as a Keep. Raises ValueError."""
-    return keep if isinstance(keep, AdjointStorage) else AdjointStorage(keep)
+def as_adjoint_storage(given: str | AdjointStorage | None) -> AdjointStorage:
+    """Return the argument `adjoint_storage` of a motion as an AdjointStorage. Raises ValueError for an unknown kind."""
+    return given if isinstance(given, AdjointStorage) else AdjointStorage(given)

@@ -132,7 +132,7 @@ def test_modes_must_be_a_positive_integer(modes) -> None:
 
 def test_not_more_modes_than_unknowns() -> None:
     scene = compressed(EULER)
-    with pytest.raises(ValueError, match=f"below the {scene.n_dofs} unknowns"):
+    with pytest.raises(ValueError, match=f"below the {scene.n_dofs} free degrees of freedom"):
         ms.linear_buckling(scene, modes=scene.n_dofs)
 
 

@@ -247,7 +247,7 @@ def test_bad_input_is_refused():
         ms.vibration_modes(scene, scene.mesh.rest_positions)
     with pytest.raises(ValueError, match="of another scene"):
         ms.vibration_modes(scene, ms.equilibrium(other, **along_the_axis(0.0)))
-    with pytest.raises(ValueError, match="below the 24 unknowns with mass"):
+    with pytest.raises(ValueError, match="below the 24 degrees of freedom with mass"):
         ms.vibration_modes(scene, count=24)
     light = ms.Shell(scene.mesh, thickness=1e-3, young_modulus=1e6)
     with pytest.raises(ValueError, match="no mass_density"):

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 class Leaf(NamedTuple):
     """An input tensor that requires a gradient.
 
-    owner: the object whose value it is; None for an argument of the solve itself. An owner with a method `by_knots`
-    stands for a value over time. refusal: why there is no gradient; NoGradient says so when it is asked for.
+    owner: the object whose value it is; None for an argument of the solve itself. An owner with a method
+    `by_time_points` stands for a value over time. refusal: why there is no gradient, for the message of NoGradient.
     """
 
     tensor: Any

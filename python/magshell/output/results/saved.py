@@ -40,7 +40,7 @@ def check_fits(held: dict[Any, Any], scene: Scene) -> None:
         _check_end(held["end"], model)
     else:
         shapes |= {"_state": (model.size,), "_controls": (scene._control_layout.size,)}
-        _check_angle_branches(held["_turns"])
+        _check_angle_branches(held["_angle_branches"])
     shapes["_own_points"] = (*n, own, 3)
     for name, shape in shapes.items():
         optional = name in ("_own_points", "_own_velocities", "applied_flux_density")
@@ -57,15 +57,15 @@ def _check_end(end, model) -> None:
         raise ValueError(f"its end is a {type(end).__name__}")
     quantity("end.state", "SI", end.state, (model.size,))
     quantity("end.velocity", "SI", end.velocity, (model.size,))
-    _check_angle_branches(end.turns)
+    _check_angle_branches(end.angle_branches)
 
 
 def _check_angle_branches(branches) -> None:
-    """Check that `turns`, the numbers of full turns of angles, is a list of arrays of finite numbers."""
+    """Check that `angle_branches`, the numbers of full turns of angles, is a list of arrays of finite numbers."""
     if not isinstance(branches, list | tuple):
-        raise ValueError(f"`turns` is a {type(branches).__name__} instead of a list")
+        raise ValueError(f"`angle_branches` is a {type(branches).__name__} instead of a list")
     for k, each in enumerate(branches):
-        quantity(f"turns[{k}]", "SI", each, ("n",))
+        quantity(f"angle_branches[{k}]", "SI", each, ("n",))
 
 
 def digests(scene: Scene) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""What a solve found, in torch's graph. The only module that touches torch.autograd; holds no physics."""
+"""Result arrays as tensors of torch's graph. The only module that uses torch.autograd; it holds no physics."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Solved(torch.autograd.Function):
-    """Arrays that were computed from the leaves (tensors); the adjoint knows the way back, once."""
+    """Result arrays that were computed from the leaves (tensors), with the adjoint that computes their gradients."""
 
     @staticmethod
     def forward(
@@ -27,7 +27,7 @@ class Solved(torch.autograd.Function):
         *leaves: torch.Tensor,
     ) -> tuple[torch.Tensor, ...]:
         ctx.adjoint = adjoint
-        # Not by save_for_backward: a design that was changed in place since is no error, its numbers are not used.
+        # Not by save_for_backward: that raises an error for a leaf changed in place since, whose numbers are not used here.
         ctx.leaves = leaves
         return tuple(torch.from_numpy(array).to(dtype=dtype) for array in arrays)
 
@@ -47,10 +47,10 @@ class Solved(torch.autograd.Function):
 
 
 class Once(torch.autograd.Function):
-    """Gradients as they are, with what they depend on; theirs in turn raise NoGradient.
+    """Gradients connected to the tensors that they depend on, so that second derivatives raise NoGradient.
 
-    Connected to the leaves, not only to what came back to the solve: a loss linear in the positions sends a constant,
-    and torch would take gradients without a graph for constants, whose derivatives are zero.
+    They are connected to the leaves as well as to the derivatives by the results: those of a loss linear in the positions
+    are constant, and torch would take gradients without a graph for constants, with zero derivatives.
     """
 
     @staticmethod
@@ -66,7 +66,7 @@ class Once(torch.autograd.Function):
 
 
 def depends_on(tensor: torch.Tensor, other: torch.Tensor) -> bool:
-    """Whether torch knows a way from one to the other."""
+    """Return whether torch can differentiate one tensor by another."""
     if not tensor.requires_grad:
         return False
     return torch.autograd.grad(tensor.sum(), other, retain_graph=True, allow_unused=True)[0] is not None
@@ -81,15 +81,15 @@ def _numbers(by_output) -> np.ndarray:
 def solved(
     adjoint: Adjoint | MotionAdjoint, arrays: tuple[np.ndarray, ...], dtype: torch.dtype, leaves: list[Any]
 ) -> tuple[torch.Tensor, ...]:
-    """The arrays as tensors from which gradients go back to the leaves."""
+    """Return the arrays as tensors that are connected to the leaves by the adjoint."""
     return Solved.apply(adjoint, arrays, dtype, *leaves)
 
 
 def is_transformed(tensor: torch.Tensor) -> bool:
-    """Whether torch.func has wrapped it, or it carries a tangent of forward-mode differentiation."""
+    """Return whether a tensor is wrapped by torch.func or has a tangent of forward-mode differentiation."""
     try:
         functorch = torch._C._functorch
         wrapped = functorch.is_functorch_wrapped_tensor(tensor) or functorch.is_legacy_batchedtensor(tensor)
-    except AttributeError:  # another torch: its own error says it
+    except AttributeError:  # a torch without these functions raises its own error later
         wrapped = False
     return wrapped or torch.autograd.forward_ad.unpack_dual(tensor).tangent is not None

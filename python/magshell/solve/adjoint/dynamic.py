@@ -1,4 +1,4 @@
-"""The way back from a motion to its inputs: arrays only, autograd.py has the tensors."""
+"""The adjoint of a motion: gradients by its inputs. Works on arrays; autograd.py has the tensors."""
 
 from __future__ import annotations
 
@@ -18,13 +18,16 @@ if TYPE_CHECKING:
 
 
 class MotionAdjoint:
-    """Gradients of one motion. Keeps what the memory budget allowed to keep of it."""
+    """The gradients of one motion, from as much of it as the memory budget allowed to store."""
 
     def __init__(self, asked: MotionInputs, found: _core.MotionResult):
         self._asked, self._found = asked, found
 
     def gradients(self, by_outputs: list[np.ndarray], wanted: Sequence[bool]) -> list[np.ndarray | None]:
-        """By each wanted leaf of the inputs, shaped like it. Raises NoGradient where there is none."""
+        """Compute the gradients by the wanted leaves of the inputs, each in the shape of its leaf.
+
+        Raises NoGradient where there is none.
+        """
         asked, found, inputs = self._asked, self._found, self._asked.inputs
         if found.outcome != _core.Outcome.converged:
             raise NoGradient(

@@ -1,4 +1,4 @@
-"""The way back from an equilibrium to its inputs: arrays only, autograd.py has the tensors."""
+"""The adjoint of an equilibrium: gradients by its inputs. Works on arrays; autograd.py has the tensors."""
 
 from __future__ import annotations
 
@@ -17,13 +17,16 @@ if TYPE_CHECKING:
 
 
 class Adjoint:
-    """Gradients of one equilibrium. Keeps its factorization, so that each costs one back-substitution."""
+    """The gradients of one equilibrium. Its factorization is stored, so that each costs one back-substitution."""
 
     def __init__(self, inputs: Inputs, found: _core.StaticsResult):
         self._inputs, self._found = inputs, found
 
     def gradients(self, by_outputs: list[np.ndarray], wanted: Sequence[bool]) -> list[np.ndarray | None]:
-        """By each wanted leaf of the inputs, shaped like it. Raises NoGradient where there is none."""
+        """Compute the gradients by the wanted leaves of the inputs, each in the shape of its leaf.
+
+        Raises NoGradient where there is none.
+        """
         self._refuse()
         inputs, model = self._inputs, self._inputs.scene._model
         with inputs.in_core():
@@ -47,15 +50,15 @@ class Adjoint:
 
 
 def by_leaf(inputs: Inputs, leaf: Leaf, gradient: Gradient) -> np.ndarray:
-    """By one leaf, from the core's gradients. Raises NoGradient where it has none."""
+    """Return the gradient by one leaf, in its shape, from the core's gradients. Raises NoGradient where it has none."""
     if leaf.refusal:
         raise NoGradient(f"no gradient by {leaf.name}: {leaf.refusal}")
     if leaf.owner is None:
         by_rows = np.asarray(gradient.own(leaf.name))
-    elif hasattr(leaf.owner, "by_knots"):
-        by_rows = np.asarray(leaf.owner.by_knots(gradient))
+    elif hasattr(leaf.owner, "by_time_points"):
+        by_rows = np.asarray(leaf.owner.by_time_points(gradient))
     else:
         by_rows = np.asarray(inputs.values.gradients(leaf.owner, gradient)[leaf.name])
     if by_rows.size == np.prod(leaf.shape, dtype=int):
         return by_rows.reshape(leaf.shape)
-    return by_rows.sum(axis=0).reshape(leaf.shape)  # one value for every row
+    return by_rows.sum(axis=0).reshape(leaf.shape)  # one value stands for all rows

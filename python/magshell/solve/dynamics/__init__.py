@@ -1,1 +1,1 @@
-"""Simulates motions."""
+"""Simulates motions of scenes."""

@@ -1,4 +1,4 @@
-"""Courses as the core takes them: values at all knots of a motion, among its controls."""
+"""Values prescribed over time as the core takes them: at all time points of a motion, beside its load parameters."""
 
 from __future__ import annotations
 
@@ -19,41 +19,43 @@ if TYPE_CHECKING:
 
 
 class InTime:
-    """What of a scene's values changes during one motion.
+    """The values of a scene that change during one motion, at all its time points.
 
-    entries: of the core's values, those that follow the other controls; rows: (knots, m), theirs. poses: {number of an
-    obstacle: its poses at the knots (knots, 4, 3)}. varied: {(actuator, shell or field, name): (knots, ...)}.
+    entries: indices of these values in the core's vector of values; rows: (time points, m), the numbers, which follow the
+    load parameters. poses: {number of an obstacle: its poses (time points, 4, 3)}. varied: {(actuator, shell or field,
+    name): (time points, ...)}.
     """
 
-    def __init__(self, asked: MotionInputs, courses: list[TimeSeries]):
+    def __init__(self, asked: MotionInputs, time_series: list[TimeSeries]):
         self._asked = asked
         self._layout = list(asked.inputs.scene._value_layout)
-        self._places: dict[tuple[int, str], list[slice]] = {}
+        self._slices: dict[tuple[int, str], list[slice]] = {}
         self.entries: list[int] = []
         self.poses: dict[int, np.ndarray] = {}
         self.varied: dict[tuple[Actuator | Shell | AppliedField, str], np.ndarray] = {}
-        for course in courses:
-            course.check(asked.steps)
-        of_values = [each for each in courses if not isinstance(each.owner, Obstacle)]
-        knots = [asked.at_knots(each.name, each.unit, each.value, each.row) for each in of_values]
+        for each in time_series:
+            each.check(asked.steps)
+        of_values = [each for each in time_series if not isinstance(each.owner, Obstacle)]
+        numbers_of = [asked.at_time_points(each.name, each.unit, each.value, each.row) for each in of_values]
         check_supports(
-            asked, [(c, k) for c, k in zip(of_values, knots, strict=True) if isinstance(c.owner, Support)]
+            asked,
+            [(c, k) for c, k in zip(of_values, numbers_of, strict=True) if isinstance(c.owner, Support)],
         )
-        rows = [np.zeros((asked.knots, 0))]
-        for course, at_knots in zip(of_values, knots, strict=True):
+        rows = [np.zeros((asked.n_time_points, 0))]
+        for each, given in zip(of_values, numbers_of, strict=True):
             numbers = np.reshape(
-                asked.inputs.take(course.name, at_knots, _Values(self, course)), (asked.knots, -1)
+                asked.inputs.take(each.name, given, _Values(self, each)), (asked.n_time_points, -1)
             )
-            if isinstance(course.owner, Actuator | Shell | AppliedField):
-                now = self.varied[course.owner, course.name] = numbers.reshape(-1, *course.row)
-                course.owner._check_in_time(course.name, now)
-            rows += [numbers] * self._add(course, numbers.shape[1])
+            if isinstance(each.owner, Actuator | Shell | AppliedField):
+                now = self.varied[each.owner, each.name] = numbers.reshape(-1, *each.row)
+                each.owner._check_in_time(each.name, now)
+            rows += [numbers] * self._add(each, numbers.shape[1])
         self.rows: np.ndarray = np.concatenate(rows, axis=1)
-        self._add_obstacles([each for each in courses if isinstance(each.owner, Obstacle)])
+        self._add_obstacles([each for each in time_series if isinstance(each.owner, Obstacle)])
 
-    def _add(self, course: TimeSeries, width: int) -> int:
-        """Finds the places of a value in the core; how many there are."""
-        owner, values = course.owner, self._asked.inputs.values
+    def _add(self, each: TimeSeries, width: int) -> int:
+        """Find the slices of a value in the core's vectors and return how many there are."""
+        owner, values = each.owner, self._asked.inputs.values
         labels = [label for each, label in self._asked.inputs.scene._labels if each is owner]
         if isinstance(owner, Support):
             labels = [label for label, _ in owner._moves(values)]
@@ -62,38 +64,38 @@ class InTime:
                     "a support that stays cannot be moved by a solve: give it a displacement in the scene, zero will do"
                 )
         end = self._asked.inputs.scene._control_layout.size
-        end += sum(place.stop - place.start for places in self._places.values() for place in places)
-        places = self._places[id(owner), course.name] = []
+        end += sum(part.stop - part.start for slices in self._slices.values() for part in slices)
+        slices = self._slices[id(owner), each.name] = []
         for label in labels:
-            self.entries.append(self._layout.index((label, course.name)))
-            places.append(slice(end, end + width))
+            self.entries.append(self._layout.index((label, each.name)))
+            slices.append(slice(end, end + width))
             end += width
         return len(labels)
 
-    def _add_obstacles(self, courses: list[TimeSeries]) -> None:
+    def _add_obstacles(self, time_series: list[TimeSeries]) -> None:
         values, obstacles = self._asked.inputs.values, self._asked.inputs.scene.obstacles
         for k, obstacle in enumerate(obstacles):
-            if its_own := {each.name: each.value for each in courses if each.owner is obstacle}:
+            if its_own := {each.name: each.value for each in time_series if each.owner is obstacle}:
                 path = ObstaclePath(self._asked, obstacle, its_own)
-                self.poses[k] = self._asked.inputs.take("center", path.knots, _Pose(k))
+                self.poses[k] = self._asked.inputs.take("center", path.poses, _Pose(k))
                 values.move(obstacle, path)
 
 
 class _Values:
-    """Owns the numbers of a course: by_knots is their gradient."""
+    """The owner of one time series as a leaf: gives its gradient at all time points."""
 
-    def __init__(self, in_time: InTime, course: TimeSeries):
-        self._places, self._key = in_time._places, (id(course.owner), course.name)
+    def __init__(self, in_time: InTime, each: TimeSeries):
+        self._slices, self._key = in_time._slices, (id(each.owner), each.name)
 
-    def by_knots(self, gradient: Any) -> np.ndarray:
-        return sum(gradient.of_controls(place) for place in self._places[self._key])
+    def by_time_points(self, gradient: Any) -> np.ndarray:
+        return sum(gradient.of_controls(part) for part in self._slices[self._key])
 
 
 class _Pose:
-    """Likewise of an obstacle's poses."""
+    """The owner of an obstacle's poses as a leaf: gives their gradient at all time points."""
 
     def __init__(self, number: int):
         self._number = number
 
-    def by_knots(self, gradient: Any) -> np.ndarray:
+    def by_time_points(self, gradient: Any) -> np.ndarray:
         return gradient.control(f"obstacle {self._number}", "pose")

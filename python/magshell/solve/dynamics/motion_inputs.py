@@ -1,4 +1,4 @@
-"""What a simulation is asked for beyond the scene's values, checked; and as the core takes it."""
+"""Checks the inputs of a motion and translates them for the core."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from ..options import AdjointStorage
 
 
-_CONTROLS = {  # (unit, of one time)
+_CONTROLS = {  # load parameters: (unit, shape at one time)
     "applied_flux_density": ("T", (3,)),
     "field_factor": ("1", ()),
     "load_factor": ("1", ()),
@@ -40,7 +40,7 @@ _CONTROLS = {  # (unit, of one time)
 
 
 class MotionInputs:
-    """The inputs of one simulation. Adds to the leaves of `inputs` what of them is a tensor with a gradient."""
+    """The inputs of one motion, checked. Tensors among them that require a gradient join the leaves of `inputs`."""
 
     inputs: Inputs
     integrator: Integrator
@@ -66,7 +66,7 @@ class MotionInputs:
         maxwell_time: Numbers,
         integrator: Integrator,
         solver: Newton,
-        courses: Iterable[TimeSeries] = (),
+        time_series: Iterable[TimeSeries] = (),
         **controls: Any,
     ):
         self.inputs, self.integrator = inputs, integrator
@@ -88,9 +88,9 @@ class MotionInputs:
         law = self._viscosity(stiffness_damping, maxwell_modulus, maxwell_time)
         self.start: MotionState = self._begin(start, velocities)
         self.clock: Clock = clock_of(self.start).going_on(self.time_step)
-        self.knots: int = self.steps * (len(integrator._times) + 1)
-        self._knots = {name: self._controls(name, value) for name, value in controls.items()}
-        self._in_time = InTime(self, list(courses))
+        self.n_time_points: int = self.steps * (len(integrator._times) + 1)
+        self._load_parameters = {name: self._controls(name, value) for name, value in controls.items()}
+        self._in_time = InTime(self, list(time_series))
         if self._outside is not None:
             check_outside(inputs.scene, inputs.values, self._outside, 0.0)
         self.core: _core.MotionInput = _core.MotionInput(
@@ -98,7 +98,7 @@ class MotionInputs:
             {
                 "state": self.start.state,
                 "velocity": self.start.velocity,
-                "turns": self.start.turns,
+                "turns": self.start.angle_branches,
                 **self._history(law),
                 "rotations_given": self.start.rotations_known,
                 **law,
@@ -116,34 +116,34 @@ class MotionInputs:
         )
 
     def recorded(self, name: str, count: int) -> np.ndarray:
-        """A control at the first `count` recorded states, (count, *row): at the start, then at the ends of steps."""
-        return self._knots[name][self._recorded_knots(count)]
+        """Return a load parameter at the first `count` recorded states, the start among them, (count, *row)."""
+        return self._load_parameters[name][self._recorded_points(count)]
 
     def varied(self, count: int) -> dict[tuple[Any, ...], np.ndarray]:
-        """Likewise {(actuator, shell or field, name): its values} of what varies."""
-        at = self._recorded_knots(count)
+        """Return the varying values of objects at the first `count` recorded states, {(object, name): (count, ...)}."""
+        at = self._recorded_points(count)
         return {key: rows[at] for key, rows in self._in_time.varied.items()}
 
-    def _recorded_knots(self, count: int) -> np.ndarray:
+    def _recorded_points(self, count: int) -> np.ndarray:
         a_step = len(self.integrator._times) + 1
         ends = a_step * self.record_every * np.arange(1, count) - 1
         return np.concatenate([[0], ends])
 
     def _all_controls(self) -> np.ndarray:
-        """(knots, m), in the core's layout."""
+        """Return all load parameters at all time points in the core's layout, (time points, m)."""
         layout, moving = self.inputs.scene._control_layout, {**self._poses(), **self._in_time.poses}
-        rows = {("scene", name): array for name, array in self._knots.items()}
+        rows = {("scene", name): array for name, array in self._load_parameters.items()}
         rows |= {(f"obstacle {k}", "pose"): array for k, array in moving.items()}
-        return np.concatenate([layout.rows(rows, self.knots), self._in_time.rows], axis=1)
+        return np.concatenate([layout.rows(rows, self.n_time_points), self._in_time.rows], axis=1)
 
     def _poses(self) -> dict[int, np.ndarray]:
-        """Of the obstacles that a motion of their own moves, by number, at all knots."""
+        """Return the poses at all time points of obstacles that have a `motion`, {number: (time points, 4, 3)}."""
         values, obstacles = self.inputs.values, self.inputs.scene.obstacles
         moving = {k: values.current(each) for k, each in enumerate(obstacles) if each.motion is not None}
         if moving:
             self.inputs.refuse("time_step", self.given_time_step, "obstacles move by a function of the time")
-        shares = np.array((0.0, *self.integrator._times))
-        times = self.clock.at(np.arange(self.steps)[:, None], shares).ravel()
+        fractions = np.array((0.0, *self.integrator._times))
+        times = self.clock.at(np.arange(self.steps)[:, None], fractions).ravel()
         return {k: poses(each, times) for k, each in moving.items()}
 
     def _controls(self, name: str, value) -> np.ndarray:
@@ -154,19 +154,23 @@ class MotionInputs:
             value = np.zeros(3)
         elif name == "applied_flux_density" and not self.inputs.scene.has_uniform_field:
             raise ValueError("applied_flux_density was given, but the scene has no UniformField")
-        knots = self.at_knots(name, unit, value, row)
+        numbers = self.at_time_points(name, unit, value, row)
         if name == "applied_flux_density":
-            warn_of_field(self.inputs.scene, np.asarray(detached(knots)))
-        return np.ascontiguousarray(self.inputs.take(name, knots), dtype=np.float64)
+            warn_of_field(self.inputs.scene, np.asarray(detached(numbers)))
+        return np.ascontiguousarray(self.inputs.take(name, numbers), dtype=np.float64)
 
-    def at_knots(self, name: str, unit: str, value: Any, row: tuple[int, ...]) -> Any:
-        """A value in time, as in `scheduled`, at all knots: a tensor in its graph if it is one."""
+    def at_time_points(self, name: str, unit: str, value: Any, row: tuple[int, ...]) -> Any:
+        """Return a value at all time points, given in one of the forms of `scheduled`; a tensor stays in its graph."""
         time_step = self.given_time_step
-        knots = scheduled(name, unit, value, row, self.steps, self.integrator._times, self.clock, time_step)
-        if callable(value) and requires_gradient(time_step) and not _differentiable_in_time(knots, time_step):
+        numbers = scheduled(name, unit, value, row, self.steps, self.integrator._times, self.clock, time_step)
+        if (
+            callable(value)
+            and requires_gradient(time_step)
+            and not _differentiable_in_time(numbers, time_step)
+        ):
             why = f"{name} is a function of the time that torch cannot follow; make its values from the time by torch"
             self.inputs.refuse("time_step", time_step, why)
-        return knots
+        return numbers
 
     def _checked_damping(self, given) -> np.ndarray:
         n_v = self.inputs.scene.mesh.n_vertices
@@ -182,7 +186,7 @@ class MotionInputs:
         return np.concatenate([on_vertices, np.zeros(len(self._mass) - n_v)])
 
     def _history(self, law: dict[str, float]) -> dict[str, np.ndarray]:
-        """What the start remembers of the motion that led to it, as far as this one can use it."""
+        """Return the rates and Maxwell strains of the starting state that this motion can use."""
         start, nothing = self.start, np.zeros(0)
         maxwell = law["maxwell_modulus"] > 0
         viscous = maxwell or law["stiffness_damping"] > 0
@@ -216,7 +220,9 @@ class MotionInputs:
             check_joints(inputs, model.points(origin.state))
         goes_on = isinstance(start, Trajectory | MotionState)
         own = own_velocities(inputs, start, goes_on)
-        if goes_on and inputs.scene.rigid_parts:  # free bodies go on as they did, whatever the vertices do
+        if (
+            goes_on and inputs.scene.rigid_parts
+        ):  # free rigid bodies keep their velocity, whatever the vertices have
             own = model.points(origin.velocity)[inputs.scene.mesh.n_vertices :]
         if velocities is None and (goes_on or not own.any()):
             return origin
@@ -237,7 +243,7 @@ class MotionInputs:
             origin.time,
             origin.state,
             velocity,
-            origin.turns,
+            origin.angle_branches,
             maxwell_strains=origin.maxwell_strains,
             clock=origin.clock,
             rotations_known=origin.rotations_known,
@@ -259,7 +265,7 @@ class MotionInputs:
             if requires_gradient(start.positions):
                 inputs.take("positions", start.positions)
                 inputs.take("edge_rotations", start.edge_rotations)
-            return MotionState(0.0, start._state, still, start._turns)
+            return MotionState(0.0, start._state, still, start._angle_branches)
         if isinstance(start, MotionState):
             return _checked_state(start, model.size, model.n_strains)
         given = inputs.take("positions", start)
@@ -274,9 +280,11 @@ class MotionInputs:
 
 
 def _checked_state(start: MotionState, size: int, n_strains: int) -> MotionState:
-    """A MotionState as it is. Its arrays come from a file, or from a caller who made it."""
+    """Check a MotionState, whose arrays may come from a file or from a caller, and return it."""
     if np.ndim(start.state) == 1 and len(start.state) != size:
-        raise ValueError(f"start is a state of {len(start.state)} unknowns, but the scene has {size}")
+        raise ValueError(
+            f"start is a state of {len(start.state)} degrees of freedom, but the scene has {size}"
+        )
     given = {name: getattr(start, name) for name in ("state", "velocity", "acceleration")}
     for name, values in given.items():
         optional = name == "acceleration" and np.shape(values) == (0,)
@@ -284,19 +292,21 @@ def _checked_state(start: MotionState, size: int, n_strains: int) -> MotionState
     for name in ("strain_rates", "maxwell_strains", "maxwell_strain_rates"):
         values = getattr(start, name)
         quantity(f"start.{name}", "SI", values, (0 if np.size(values) == 0 else n_strains,))
-    if not isinstance(start.turns, list | tuple):
-        raise ValueError(f"start.turns must be a list of lists of numbers, got {type(start.turns).__name__}")
-    for k, each in enumerate(start.turns):
-        quantity(f"start.turns[{k}]", "SI", each, ("n",))
+    if not isinstance(start.angle_branches, list | tuple):
+        raise ValueError(
+            f"start.angle_branches must be a list of lists of numbers, got {type(start.angle_branches).__name__}"
+        )
+    for k, each in enumerate(start.angle_branches):
+        quantity(f"start.angle_branches[{k}]", "SI", each, ("n",))
     quantity("start.time", "s", start.time, ())
     if not isinstance(start.clock, Clock | None):
         raise ValueError(f"start.clock must be that of a motion, or None, got {type(start.clock).__name__}")
     return start
 
 
-def _differentiable_in_time(knots, time_step) -> bool:
-    """Whether a control that came as a function has its derivative by the time, or is the same at all times."""
+def _differentiable_in_time(numbers, time_step) -> bool:
+    """Return whether a function's values are connected to the time step by torch, or are the same at all times."""
     from ..adjoint.autograd import depends_on
 
-    numbers = np.asarray(detached(knots))
-    return bool((numbers == numbers[0]).all()) or (is_tensor(knots) and depends_on(knots, time_step))
+    plain = np.asarray(detached(numbers))
+    return bool((plain == plain[0]).all()) or (is_tensor(numbers) and depends_on(numbers, time_step))

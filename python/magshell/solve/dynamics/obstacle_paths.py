@@ -20,26 +20,29 @@ if TYPE_CHECKING:
 
 
 class ObstaclePath:
-    """knots: center (m), rotation vector (rad), velocity (m/s) and spin (rad/s, world axes) at all knots of a motion,
-    (knots, 4, 3); a tensor if one of the courses is, or the time step. Called with a time [s], the center and the rotation
-    vector there, as an obstacle's motion returns them.
+    """The path of one obstacle during a motion. Called with a time [s], it returns the center and the rotation vector there.
 
-    Between the ends of steps places and rotation vectors lie on straight lines, as all that is given there does, and
-    their rates on straight lines between the slopes that parabolas through three neighbouring ends have there: of second
-    order, as the places are. Functions are differentiated over 1e-4 s to fourth order, as an obstacle's motion is.
+    poses: center (m), rotation vector (rad), velocity (m/s) and spin (rad/s, world axes) at all time points of a motion,
+    (time points, 4, 3); a tensor if the center, the rotation or the time step is one.
+
+    Centers and rotation vectors that are given at the ends of steps are interpolated linearly. Their rates are interpolated
+    linearly between the slopes at the ends of steps, each that of the parabola through three neighbouring ends: both are of
+    second order. Functions are differentiated over 1e-4 s to fourth order, as an obstacle's motion is.
     """
 
-    def __init__(self, asked: MotionInputs, obstacle: Any, courses: dict[str, object]):
+    def __init__(self, asked: MotionInputs, obstacle: Any, given: dict[str, object]):
         self._clock, self._time_step = asked.clock, asked.given_time_step
         self._given = {
-            "center": courses.get("center", obstacle.center),
-            "rotation": courses.get("rotation", obstacle.rotation),
+            "center": given.get("center", obstacle.center),
+            "rotation": given.get("rotation", obstacle.rotation),
         }
         rows = []
         for (name, value), unit in zip(self._given.items(), ("m", "rad"), strict=True):
-            rows.append((asked.at_knots(name, unit, value, (3,)), self._rates(asked, name, unit, value)))
+            rows.append(
+                (asked.at_time_points(name, unit, value, (3,)), self._rates(asked, name, unit, value))
+            )
         xp, ((center, velocity), (rotation, rate)) = alike(rows)
-        self.knots: Any = xp.stack((center, rotation, velocity, spin(xp, rotation, rate)), 1)
+        self.poses: Any = xp.stack((center, rotation, velocity, spin(xp, rotation, rate)), 1)
 
     def __call__(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         return self._at("center", time), self._at("rotation", time)
@@ -55,16 +58,18 @@ class ObstaclePath:
         return np.array([np.interp(time, ends, column) for column in numbers.T])
 
     def _as_given(self, time: float):
-        """A time as functions of it get it: a tensor where the time step is one."""
+        """Return a time as it is passed to functions of the time: a tensor where the time step is one."""
         return self._time_step.new_tensor(time).double() if is_tensor(self._time_step) else time
 
     @staticmethod
     def _rates(asked, name: str, unit: str, value):
-        """Of the value at all knots."""
+        """Return the rate of a value at all time points, (time points, 3)."""
         if callable(value):
-            return asked.at_knots(f"the rate of {name}", f"{unit}/s", lambda time: _slope(value, time), (3,))
+            return asked.at_time_points(
+                f"the rate of {name}", f"{unit}/s", lambda time: _slope(value, time), (3,)
+            )
         if len(shape_of(name, value)) == 1:
-            return np.zeros((asked.knots, 3))
+            return np.zeros((asked.n_time_points, 3))
         slopes = _slopes(value, asked.given_time_step)
         return scheduled(
             name, unit, slopes, (3,), asked.steps, asked.integrator._times, asked.clock, asked.given_time_step
@@ -73,8 +78,11 @@ class ObstaclePath:
 
 @dataclass(frozen=True)
 class ReadPath:
-    """A path as numbers, read at the times (n,) s of recorded states and at those that its rates are taken from there:
-    centers (n, 3) m, rotations (n, 3) rad. Between them it lies on straight lines."""
+    """An obstacle's path as numbers, for a copy or a file, with linear interpolation in between.
+
+    times: (n,) s, those of the recorded states and the ones around them from which rates are computed. centers: (n, 3) m.
+    rotations: (n, 3) rad.
+    """
 
     times: np.ndarray
     centers: np.ndarray
@@ -82,7 +90,7 @@ class ReadPath:
 
     @classmethod
     def of(cls, path: ObstaclePath, recorded: np.ndarray) -> ReadPath:
-        early = (recorded >= 0) & (recorded < 2 * STEP)  # as `rates` has it
+        early = (recorded >= 0) & (recorded < 2 * STEP)  # one-sided differences, as in `_slope`
         ahead = recorded[early][:, None] + np.array(list(FORWARD)) * STEP
         around = recorded[~early][:, None] + np.array([0, *CENTRAL]) * STEP
         times = np.unique(np.concatenate([ahead.ravel(), around.ravel()]))
@@ -98,7 +106,7 @@ class ReadPath:
 
 
 def _slopes(ends, time_step):
-    """(steps + 1, 3): at the ends of steps, those of the parabolas through three of them that lie next to each other."""
+    """Return the slopes (steps + 1, 3) at the ends of steps of parabolas through three neighbouring ends."""
     xp, (ends, time_step) = alike((ends, time_step))
     if len(ends) == 2:
         slope = (ends[1:] - ends[:-1]) / time_step
@@ -109,7 +117,7 @@ def _slopes(ends, time_step):
 
 
 def _slope(function, time):
-    """The derivative of a function of the time, numbers or a tensor, from times that it may be asked for."""
+    """Return the derivative of a function of the time, numbers or a tensor, by differences that use no negative time."""
     weights = FORWARD if 0 <= float(detached(time)) < 2 * STEP else CENTRAL
     found = [function(time + steps * STEP) for steps in weights]
     _, found = alike([list(each) if isinstance(each, tuple) else each for each in found])
@@ -117,7 +125,7 @@ def _slope(function, time):
 
 
 def spin(xp: ModuleType, vector: Any, rate: Numbers) -> Any:
-    """J(w) dw/dt (n, 3), J the left Jacobian of rotations: how fast R(w) turns, in world axes, as w changes."""
+    """Return the angular velocity J(w) dw/dt of R(w), (n, 3) rad/s in world axes, J the left Jacobian of rotations."""
     square = (vector * vector).sum(-1)[:, None]
     small = square < 1e-4  # where the closed forms cancel, and have no derivative at zero
     safe = xp.where(small, xp.ones_like(square), square)
@@ -142,7 +150,7 @@ def _cross(xp: ModuleType, a, b):
 
 
 def alike(values: Any) -> tuple[ModuleType, Any]:
-    """numpy or torch, and the values as arrays or tensors of it, float64: tensors if one of them is."""
+    """Return torch and the values as tensors if one of them is a tensor, else numpy and the values as arrays; float64."""
     if any(is_tensor(each) for each in _flat(values)):
         torch = require_torch("a path")
         tensor = lambda each: each if is_tensor(each) else torch.tensor(np.array(each, dtype=np.float64))  # noqa: E731
@@ -158,13 +166,13 @@ def _mapped(values, change):
     return [_mapped(each, change) if isinstance(each, tuple) else change(each) for each in values]
 
 
-def check_supports(asked: MotionInputs, courses: list[Any]) -> None:
+def check_supports(asked: MotionInputs, prescribed: list[Any]) -> None:
     """Raises ValueError where a support is moved, at the end of a step, against another that holds the same vertex.
 
-    courses: (course, its value at all knots) of supports.
+    prescribed: (time series of a support, its value at all time points).
     """
     scene, values = asked.inputs.scene, asked.inputs.values
-    moving = {id(course.owner) for course, _ in courses}
+    moving = {id(each.owner) for each, _ in prescribed}
     if not moving or len(scene.supports) < 2:
         return
     held = {
@@ -180,10 +188,10 @@ def check_supports(asked: MotionInputs, courses: list[Any]) -> None:
     if not any(np.isin(vertices, shared).any() for key, vertices in held.items() if key in moving):
         return
     a_step = len(asked.integrator._times) + 1
-    for knot in (0, *range(a_step - 1, asked.knots, a_step)):
+    for k in (0, *range(a_step - 1, asked.n_time_points, a_step)):
         now: dict[Any, Any] = {}
-        for course, knots in courses:
-            now.setdefault(course.owner, {})[course.name] = np.asarray(detached(knots))[knot]
+        for series, numbers in prescribed:
+            now.setdefault(series.owner, {})[series.name] = np.asarray(detached(numbers))[k]
         supports = [values.current(each) for each in scene.supports]
         supports = [
             there.replaced(**now[each]) if each in now else there

@@ -1,4 +1,4 @@
-"""Controls that vary in time, as the core takes them: at the beginning of every step and at its stages."""
+"""Values that vary in time, at the time points for which the core needs them: the start of each step and its stages."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ def scheduled(
     clock: Clock,
     time_step: Numbers,
 ) -> Any:
-    """The values at all (steps, stages + 1) knots, in one row after another: (steps (stages + 1), *row).
+    """Return a value at all time points, the start and the stages of each step: (steps (stages + 1), *row).
 
-    value: constant, row; one a step, (steps, *row); at the ends of the steps, (steps + 1, *row), with straight lines
-    between them; or a function of the motion's time [s], which `clock` tells. A tensor stays one, in its graph. Raises
-    ValueError otherwise.
+    value: a constant of shape row; one for each step, (steps, *row); at the ends of all steps, (steps + 1, *row),
+    interpolated linearly; or a function of the motion's time [s], which `clock` gives. A tensor stays in its graph. Raises
+    ValueError for anything else.
     """
-    shares = np.array((0.0, *times))
+    fractions = np.array((0.0, *times))
     if callable(value):
-        return _called(name, unit, value, row, steps, shares, clock, time_step)
+        return _called(name, unit, value, row, steps, fractions, clock, time_step)
     shape = shape_of(f"{name} [{unit}]", value)
     allowed = (row, (steps, *row), (steps + 1, *row))
     if shape not in allowed:
@@ -44,29 +44,29 @@ def scheduled(
     if not is_tensor(value):
         value = np.asarray(value, dtype=np.float64)
     if shape == row:
-        return _same(value, steps * len(shares))
+        return _same(value, steps * len(fractions))
     if len(value) == steps:
-        return _each(value, len(shares))
-    column = shares.reshape(1, -1, *(1 for _ in row))
+        return _each(value, len(fractions))
+    column = fractions.reshape(1, -1, *(1 for _ in row))
     if is_tensor(value):
         column = value.new_tensor(column)
     between = value[:-1, None] * (1.0 - column) + value[1:, None] * column
     return between.reshape(-1, *row)
 
 
-def _called(name: str, unit: str, function, row, steps: int, shares: np.ndarray, clock: Clock, time_step):
-    """A function's values; asked once for every time, and a time that two steps share is asked for once."""
+def _called(name: str, unit: str, function, row, steps: int, fractions: np.ndarray, clock: Clock, time_step):
+    """Return the values of a function of the time, which is called once for each time, also where two steps meet."""
     known = {}
 
-    def at(step: int, share: float):
-        key = (step + 1, 0.0) if share == 1.0 else (step, share)
+    def at(step: int, fraction: float):
+        key = (step + 1, 0.0) if fraction == 1.0 else (step, fraction)
         if key not in known:
             moment = clock.moment(*key, time_step)
             known[key] = function(moment)
             quantity(f"{name} at {float(detached(moment)):g} s", unit, detached(known[key]), row)
         return known[key]
 
-    values = [at(step, share) for step in range(steps) for share in shares]
+    values = [at(step, fraction) for step in range(steps) for fraction in fractions]
     if any(is_tensor(each) for each in values):
         import torch
 
@@ -75,13 +75,13 @@ def _called(name: str, unit: str, function, row, steps: int, shares: np.ndarray,
 
 
 def _same(value, count: int):
-    """One value at all knots."""
+    """Return one value repeated for all time points."""
     shape = (count, *value.shape)
     return value.expand(*shape) if is_tensor(value) else np.broadcast_to(value, shape)
 
 
 def _each(value, count: int):
-    """Every row so many times."""
+    """Return an array with every row repeated `count` times."""
     return value.repeat_interleave(count, 0) if is_tensor(value) else value.repeat(count, axis=0)
 
 

@@ -34,7 +34,7 @@ from ..options import (
     Integrator,
     MixedNewton,
     Newton,
-    kept,
+    as_adjoint_storage,
 )
 from .motion_inputs import MotionInputs
 from .trajectory import MotionState, Trajectory
@@ -76,7 +76,7 @@ def simulate(
     solver: Newton | None = None,
     progress: bool = True,
 ) -> Trajectory:
-    """The motion of a scene in time.
+    """Simulate the motion of a scene in time.
 
     steps, time_step: how many, and s.
     applied_flux_density: T: constant (3,), one a step (steps, 3), at the ends of all steps (steps + 1, 3) with straight
@@ -156,7 +156,7 @@ def simulate(
         mass_density=mass_density,
         curvature_scale=curvature_scale,
     )
-    replaced, courses = split_time_series(scene, replaced)
+    replaced, time_series = split_time_series(scene, replaced)
     uniform = np.zeros(3) if scene.has_uniform_field else None
     if integrator is None:
         integrator = ImplicitEuler() if scene.contacts else TRBDF2()
@@ -173,7 +173,7 @@ def simulate(
         steps=steps,
         time_step=time_step,
         record_every=record_every,
-        adjoint_storage=kept(adjoint_storage),
+        adjoint_storage=as_adjoint_storage(adjoint_storage),
         start=start,
         velocities=velocities,
         damping=damping,
@@ -182,7 +182,7 @@ def simulate(
         maxwell_time=maxwell_time,
         integrator=integrator,
         solver=solver,
-        courses=courses,
+        time_series=time_series,
         applied_flux_density=applied_flux_density,
         load_factor=load_factor,
         gravity_factor=gravity_factor,
@@ -228,14 +228,14 @@ def simulate(
 
 
 def _advice(result: Trajectory) -> str:
-    """What would help after a step that failed."""
+    """Return the advice for an error message about a step that failed."""
     fields = map(result._values_at(len(result) - 1).current, result.scene.fields)
     positions = np.asarray(detached(result.positions[-1]), dtype=np.float64)
     return describe_magnet_overlap(fields, positions, result.scene.mesh.edge_lengths) or "Take shorter steps."
 
 
 def _with_strains(result: Trajectory) -> Trajectory:
-    """With the largest strains of its states where sheets grew during the motion: each with its own growth."""
+    """Return the motion with its largest strains computed again, state by state, if sheets grew during it."""
     if not any(isinstance(owner, Shell) for owner, _ in result._varied):
         return result
     strain = StrainHistory.of_each(result.strains(k) for k in range(len(result)))
@@ -251,7 +251,7 @@ def _warn(result: Trajectory) -> None:
 
 
 def _warn_of_fields(result: Trajectory) -> None:
-    """Where the magnetic energy is largest, as the magnets are nearest there."""
+    """Warn of coarsely sampled fields in the state of largest magnetic energy, where magnets are nearest."""
     if not result.scene.fields:
         return
     k = int(np.argmax(np.abs(result.energies.get("magnetic", np.zeros(len(result))))))
@@ -326,7 +326,7 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
 
 
 def _by_name(names: list[str], by_term: np.ndarray) -> dict[str, np.ndarray]:
-    """Of each (n, terms), (n,); those of one name, of several bodies, as one."""
+    """Return the energies by name, {name: (n,)}, from those of all terms (n, terms); terms of one name are summed."""
     sums: dict[str, np.ndarray] = {}
     for name, each in zip(names, by_term.T, strict=True):
         sums[name] = sums[name] + each if name in sums else each
@@ -334,7 +334,7 @@ def _by_name(names: list[str], by_term: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _outputs(asked: MotionInputs, found):
-    """Positions, edge rotations, velocities, with the points of rigid parts; and what motors do."""
+    """Return positions, edge rotations and velocities, with the points of rigid bodies, and the forces of motors."""
     inputs, model = asked.inputs, asked.inputs.scene._model
     arrays = (
         found.positions(model),
@@ -350,7 +350,7 @@ def _outputs(asked: MotionInputs, found):
 
 
 def _advance(bar):
-    def advance(share: float, residual: float) -> None:
-        bar.to(share)
+    def advance(fraction: float, residual: float) -> None:
+        bar.to(fraction)
 
     return advance

@@ -1,4 +1,4 @@
-"""What a simulation computed."""
+"""The results of a motion: its recorded states, and the last one in full."""
 
 from __future__ import annotations
 
@@ -42,15 +42,16 @@ if TYPE_CHECKING:
 @immutable
 @dataclass(frozen=True)
 class MotionState:
-    """Where a sheet is and how fast it moves, exactly: what ms.simulate(..., start=...) goes on from with the same bits,
-    in steps of the same length.
+    """The full state of a motion at one time, from which ms.simulate(..., start=...) continues it.
 
-    time: s, since the start of the motion that led here; clock: how it was counted, in steps. Everything else is in the
-    core's order of unknowns and faces; what the motion had no need of is empty: accelerations and strain rates (TRBDF2),
-    strains of a Maxwell branch. rotations_known: False where the edge rotations are still to be put to rest.
+    Continued in steps of the same length, the motion has the same bits as one in a single piece.
 
-    state, velocity, acceleration: of all unknowns, (n,). turns: of folds that have gone round. strain_rates,
-    maxwell_strains, maxwell_strain_rates: of faces.
+    time: s, since the start of the motion; clock: the same time counted in steps. rotations_known: False where the edge
+    rotations are still to be computed.
+    state, velocity, acceleration: of all degrees of freedom in the core's order, (n,). angle_branches: the full turns of
+    dihedral and joint angles. strain_rates, maxwell_strains, maxwell_strain_rates: of faces.
+    Arrays that the motion did not need are empty: accelerations and strain rates are those of TRBDF2, Maxwell strains those
+    of a Maxwell branch.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -64,7 +65,7 @@ class MotionState:
     time: float
     state: np.ndarray = field(repr=False)
     velocity: np.ndarray = field(repr=False)
-    turns: Sequence[Any] = field(repr=False, default=())
+    angle_branches: Sequence[Any] = field(repr=False, default=())
     acceleration: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
     strain_rates: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
     maxwell_strains: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
@@ -73,28 +74,28 @@ class MotionState:
     rotations_known: bool = field(repr=False, default=True)
 
     def save(self, path: str | Path) -> None:
-        """Writes an .npz file."""
-        lengths = np.array([len(each) for each in self.turns], dtype=np.int64)
-        remembered = np.concatenate([np.zeros(0), *(np.asarray(each) for each in self.turns)])
+        """Write the state to an .npz file."""
+        lengths = np.array([len(each) for each in self.angle_branches], dtype=np.int64)
+        remembered = np.concatenate([np.zeros(0), *(np.asarray(each) for each in self.angle_branches)])
         arrays = {name: getattr(self, name) for name in _ARRAYS}
         arrays |= {
             "time": self.time,
             "clock": astuple(clock_of(self)),
             "rotations_known": self.rotations_known,
-            "turns": remembered,
-            "turn_lengths": lengths,
+            "angle_branches": remembered,
+            "branch_lengths": lengths,
         }
         replace_file(path, lambda file: np.savez(file, **arrays))
 
     @classmethod
     def load(cls, path: str | Path) -> MotionState:
-        """Reads what `save` wrote. Raises ValueError if it is something else."""
+        """Read a file that `save` wrote. Raises ValueError if it is something else."""
         try:
             with open_npz(Path(path)) as file:
                 time = float(quantity("time", "s", file["time"], ()))
                 origin, time_step, steps = quantity("clock", "SI", file["clock"], (3,)).tolist()
-                remembered = quantity("turns", "SI", file["turns"], ("n",))
-                lengths = index_array("turn_lengths", file["turn_lengths"])
+                remembered = quantity("angle_branches", "SI", file["angle_branches"], ("n",))
+                lengths = index_array("branch_lengths", file["branch_lengths"])
                 known = bool(file["rotations_known"])
                 arrays = {name: file[name] for name in _ARRAYS}
             clock = Clock(origin, time_step, int(steps))
@@ -103,7 +104,7 @@ class MotionState:
             raise ValueError(f"{path} is not a saved MotionState: {error}") from error
         return cls(
             time,
-            turns=[part.tolist() for part in parts],
+            angle_branches=[part.tolist() for part in parts],
             clock=clock,
             rotations_known=known,
             **arrays,
@@ -116,18 +117,19 @@ _ARRAYS = ("state", "velocity", "acceleration", "strain_rates", "maxwell_strains
 @immutable
 @dataclass(frozen=True, repr=False)
 class Trajectory(AnimateMixin, OfOneBody):
-    """A motion. With several bodies, rows are those of one after another; `trajectory[body]` has those of one.
+    """The recorded motion of a scene.
+
+    With several bodies, rows are those of one after another; `trajectory[body]` has those of one.
 
     times: (n,) s, of the recorded states, the start among them. positions: (n, n_v, 3) m; velocities: (n, n_v, 3) m/s;
     edge_rotations: (n, n_e) rad. kinetic_energy: (n,) J; energies: {term: (n,)} J, NaN where Ctrl-C came meanwhile.
     remanent_magnetization: as given, A/m, or None; applied_flux_density: (n, 3) T, the uniform part at those times.
     largest_membrane_strain, largest_bending_strain: (n,), magnitudes, 1, of what `strains` has. Beyond 0.2 the sheet
         leaves the model, of which ms.LargeStrainWarning warns.
-    steps_done: all of those asked for, unless the simulation stopped early. substeps: {step: in how many parts it was
-    taken}. fallback_steps: the steps, or steps with parts, that implicit Euler took instead of the integrator,
-    because bodies
-    touched and the step would have gained energy that nothing put in. end: the last state, from which another simulation
-    goes on. bytes: kept for gradients.
+    steps_done: equal to `steps` unless the simulation stopped early. substeps: {step: number of parts that it was taken in}.
+        fallback_steps: the steps of which implicit Euler took all or a part instead of the integrator, because bodies were
+        in contact and the step would have gained energy without a source.
+    end: the last state, from which another simulation continues. bytes: stored for gradients.
     """
 
     scene: Scene
@@ -167,11 +169,11 @@ class Trajectory(AnimateMixin, OfOneBody):
     _driving: Any = field(repr=False, default=None)  # (n, m) N m or N, of motors in joints
 
     def __copy__(self) -> Trajectory:
-        return self  # nothing of it changes
+        return self  # immutable
 
     def __getstate__(self) -> dict[Any, Any]:
-        """What a copy, another process or a file makes it from again: tensors as arrays, without their gradients, and paths
-        of obstacles as far as the recorded states need them."""
+        """Return the data of a copy, another process or a file: tensors as arrays without gradients, and the paths of
+        obstacles at the times that the recorded states need."""
         pairs = zip(self.scene.obstacles, self._obstacles, strict=True)
         paths = {
             each: ReadPath.of(now.motion, self.times)
@@ -180,26 +182,26 @@ class Trajectory(AnimateMixin, OfOneBody):
         }
         return {**plain_arrays(vars(self)), "_values": {**self._values.to_state(), "paths": paths}}
 
-    def __setstate__(self, kept: dict[Any, Any]) -> None:
-        values = Values.from_state(kept["scene"], kept["_values"])
-        for obstacle, path in kept["_values"]["paths"].items():
+    def __setstate__(self, state: dict[Any, Any]) -> None:
+        values = Values.from_state(state["scene"], state["_values"])
+        for obstacle, path in state["_values"]["paths"].items():
             values.move(obstacle, path)
-        AnimateMixin.__setstate__(self, {**kept, "_values": values})
+        AnimateMixin.__setstate__(self, {**state, "_values": values})
 
     def __getitem__(self, body: Any) -> Any:
-        """What it says of one body of the scene."""
+        """Return the results of one object of the scene, such as a body or a joint."""
         return result_of(self, body)
 
     @property
     def displacements(self) -> Computed:
-        """(n, n_v, 3) m, from the rest shape."""
+        """The displacements from the rest shape, (n, n_v, 3) m."""
         rest = self.scene.mesh.rest_positions
         if isinstance(self.positions, np.ndarray):
             return self.positions - rest
         return self.positions - self.positions.new_tensor(np.array(rest))
 
     def _values_at(self, index: int):
-        """With actuators, growth and field sources as they were then."""
+        """Return the values of a recorded state, with actuators, growth and field sources as they were then."""
         then: dict[Actuator | Shell | AppliedField, dict[Any, Any]] = {}
         for (owner, name), rows in self._varied.items():
             then.setdefault(owner, {})[name] = rows[index]
@@ -208,23 +210,24 @@ class Trajectory(AnimateMixin, OfOneBody):
 
     @property
     def _obstacles(self) -> tuple[Any, ...]:
-        """Of the scene, where they were and went."""
+        """The obstacles of the scene with their motions."""
         return tuple(self._values.current(each) for each in self.scene.obstacles)
 
     @property
     def energy(self) -> np.ndarray:
-        """Kinetic and potential, (n,) J."""
+        """The kinetic and potential energy together, (n,) J."""
         return self.kinetic_energy + sum(self.energies.values())
 
     @property
     def nonsmooth_vertices(self) -> dict[int, np.ndarray]:
-        """{recorded state: vertices} that touch where the motion is not differentiable, or within the smoothing of there: an
-        obstacle by the sharp edge of a box or a mesh, or in the middle of a body; of bodies in contact, the point or edge
-        whose closest point goes over a fold of the other surface by more than 0.3 rad, or over its border.
+        """The vertices in contact where the motion is not differentiable, {recorded state: vertices}.
 
-        A small change may bring such a point to another side. A gradient is that of the side on which it is. Looked up
-        when asked for, in the recorded states only. What opens and closes, sticks and slips is none: the laws of contact
-        and friction are smooth there, and `touching` tells what does.
+        They touch an obstacle at a sharp edge of a box or a mesh or in the middle of a body, within the smoothing; or, of
+        bodies in contact, their closest point passes an edge of the other surface that is bent by more than 0.3 rad, or its
+        border. A small change may bring such a vertex to another side; gradients are those of the side on which it is.
+
+        Computed when asked for, in the recorded states only. Opening, closing, sticking and sliding contacts do not count:
+        the laws of contact and friction are smooth there, and `contact_state` has them.
 
         >>> import magshell as ms
         >>> mesh = ms.meshes.rectangle(0.02, 0.02, cells=(2, 2))
@@ -258,8 +261,10 @@ class Trajectory(AnimateMixin, OfOneBody):
         return near_body_kinks(self.scene, self.contact_state(contact, index), smoothing, positions)
 
     def strains(self, index: int = -1) -> Any:
-        """The principal strains of every face of the sheets, Strains, in a recorded state, by default the last; where a
-        solid is alone, what result[solid] says."""
+        """Return the principal strains of all faces of the shells in a recorded state, by default the last, as Strains.
+
+        In a scene of one solid, return those of trajectory[solid].
+        """
         if (solid := self._one_solid()) is not None:
             return solid.strains(index)
         state = self._state_at(index)
@@ -267,7 +272,7 @@ class Trajectory(AnimateMixin, OfOneBody):
             return strains_of(self.scene, state, self._thickness)
 
     def _state_at(self, index: int) -> np.ndarray:
-        """Of the core."""
+        """Return the core's vector of a recorded state."""
         positions, rotations = (detached(each)[index] for each in (self.positions, self.edge_rotations))
         model = self.scene._model
         with self._values.in_core():
@@ -275,14 +280,14 @@ class Trajectory(AnimateMixin, OfOneBody):
                 np.asarray(positions, dtype=np.float64), np.asarray(rotations, dtype=np.float64)
             )
         before = 3 * self.scene._bodies.n_points
-        if self._own_points is not None:  # free parts are where no vertex tells
+        if self._own_points is not None:  # vertices do not determine where free rigid bodies are
             own = np.asarray(detached(self._own_points)[index], dtype=np.float64)
             state[:before] = model.full_vector(np.concatenate([positions, own]))[:before]
         state[before : before + self._directions.shape[1]] = self._directions[index]
         return state
 
     def contact_state(self, contact: BodyContact | Contact, index: int = -1) -> ContactState:
-        """The pairs of a contact that touch in a recorded state, by default the last, and their forces."""
+        """Return the active pairs of a contact and their forces in a recorded state, by default the last."""
         own = () if self._own_velocities is None else (self._own_velocities,)
         velocities = np.concatenate(
             [np.asarray(detached(each)[index], dtype=np.float64) for each in (self.velocities, *own)]
@@ -291,12 +296,14 @@ class Trajectory(AnimateMixin, OfOneBody):
         return compute_contact_state(self.scene, self._values, contact, state, velocities, time)
 
     def reaction(self, support: Pin | Clamp | SymmetryPlane, index: int = -1) -> Reaction:
-        """With what forces a support of the scene held it in a recorded state, by default the last, inertia and damping
-        included: those at the end of the time step that led there, NaN at the start."""
+        """Return the forces of a support on the scene in a recorded state, by default the last.
+
+        They include inertia and damping and are those at the end of the step that led there; NaN at the start.
+        """
         return reaction_in(self.scene, support, self._state_at(index), self._held_forces[index])
 
     def self_intersections(self, index: int = -1) -> np.ndarray:
-        """The faces that pass through each other in a recorded state, as in TriangleMesh.self_intersections, (k, 2)."""
+        """Return the pairs of faces that intersect in a recorded state, (k, 2), as TriangleMesh.self_intersections does."""
         return self.scene.mesh.self_intersections(detached(self.positions)[index])
 
     def __len__(self) -> int:

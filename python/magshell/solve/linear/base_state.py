@@ -1,4 +1,4 @@
-"""Linear theory about an equilibrium: what it is asked for, and the stiffness there."""
+"""Linear theory about an equilibrium: its inputs, and the stiffness there."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .stiffness import Stiffness
 
 
 def idle_inputs(scene: Scene, replaced: dict[Any, Any], flux_density: Any = None, **factors: Any) -> Inputs:
-    """By default no loads and no field, with a magnetization of zero for the sheets and skins that are given none."""
+    """Return inputs without loads and field unless they are given; shells and skins without magnetization get zero."""
     if scene.fields:
         nothing = {"remanent_magnetization": np.zeros(3)}
         magnetic = (*scene._bodies.sheets, *scene._bodies.skins)
@@ -33,8 +33,10 @@ def inputs_about(
     values: dict[Any, Any] | None = None,
     **factors: Any,
 ) -> Inputs:
-    """Magnetization and values of an equilibrium, with other controls than it was found for, if any are given. Raises
-    ValueError where it is none of the scene's, or brings its own."""
+    """Return inputs with the magnetization and the values of an equilibrium, and with the load parameters given here.
+
+    Raises ValueError if the equilibrium is of another scene, or if values are given that it has itself.
+    """
     if not isinstance(scene, Scene):
         raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
     if not isinstance(equilibrium, Equilibrium):
@@ -63,7 +65,7 @@ def asked_inputs(
     values: dict[Any, Any] | None,
     **factors: Any,
 ) -> Inputs:
-    """Of a linear question, at rest or about an equilibrium. Raises ValueError on what does not fit."""
+    """Return the inputs of a linear solve, at rest or about an equilibrium. Raises ValueError for what does not fit."""
     if equilibrium is None:
         return plain_inputs(scene, remanent_magnetization, applied_flux_density, values, **factors)
     inputs = inputs_about(
@@ -79,15 +81,19 @@ def asked_inputs(
 
 
 def set_state(equilibrium: Equilibrium) -> None:
-    """Evaluates the core there, with the full turns of angles that the state does not tell: what is evaluated next goes on
-    from them."""
+    """Set the full turns of angles in the core to those of an equilibrium, from which later evaluations continue.
+
+    The state itself has angles up to full turns only.
+    """
     model = equilibrium.scene._model
-    model.held_forces(equilibrium._state, equilibrium._turns, equilibrium._controls)
+    model.held_forces(equilibrium._state, equilibrium._angle_branches, equilibrium._controls)
 
 
 class StiffnessAbout(Stiffness):
-    """The Hessian K at an equilibrium with its own controls. Raises ValueError, once something is factorized, where it is
-    not stable."""
+    """The Hessian K at an equilibrium with its own load parameters.
+
+    Raises ValueError if the equilibrium turns out not to be stable when K is factorized.
+    """
 
     def __init__(self, equilibrium: Equilibrium):
         set_state(equilibrium)
@@ -95,7 +101,7 @@ class StiffnessAbout(Stiffness):
         super().__init__(model, equilibrium._state, equilibrium._controls, "at the equilibrium")
 
     def response(self, inputs: Inputs) -> np.ndarray:
-        """du of all unknowns, held ones included, as the controls go to those of the inputs: K du = g(c) - g(c1) - K dm."""
+        """Return du of all degrees of freedom for load parameters that change from c to c1: K du = g(c) - g(c1) - K dm."""
         model, layout = self._model, inputs.scene._control_layout
         further = inputs.controls - self.controls
         moved = model.prescribed_rate(self.controls) * layout.of(further, "scene", "support_factor")
@@ -104,7 +110,7 @@ class StiffnessAbout(Stiffness):
 
 
 def refuse_what_cannot_be(function: str, equilibrium: Equilibrium, inputs: Inputs) -> None:
-    """Raises ValueError where nothing changes, where the equilibrium is not stable, or asks for a gradient."""
+    """Raise ValueError if no load parameter changes, or if the equilibrium is not stable or requires a gradient."""
     for name in ("positions", "edge_rotations"):
         if requires_gradient(getattr(equilibrium, name)):
             raise ValueError(

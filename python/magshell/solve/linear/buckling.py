@@ -36,8 +36,8 @@ _LARGEST_DISPLACEMENT = 0.1  # before buckling, over the sheet's size: beyond, l
 class Buckling:
     """The lowest buckling modes of a scene.
 
-    factors: (k,), ascending: what to multiply the controls by so that the sheet buckles in mode k; about an equilibrium,
-        what share of the way from its controls to those given.
+    factors: (k,), ascending: by which the load parameters are multiplied where the scene buckles in mode k; about an
+        equilibrium, the fraction of the way from its load parameters to those given.
     modes: (k, n_v, 3), displacements of the vertices, the largest component 1.
     edge_rotations: (k, n_e), rad, that go with them. equilibrium: that one, or None.
     """
@@ -70,32 +70,32 @@ def linear_buckling(
     values: dict[Any, Any] | None = None,
     modes: int = 1,
 ) -> Buckling:
-    """The smallest positive multiples of the controls at which a scene buckles, by linear theory.
+    """Compute the smallest positive multiples of the load parameters at which a scene buckles, by linear theory.
 
-    With K(q, c) the Hessian, c the controls and u the linear response to them,
+    With K(q, c) the Hessian, c the load parameters and u the linear response to them,
 
         (K + lambda dK) v = 0,     dK = d/dt K(rest + t u, t c) at t = 0, by a central difference     [Pa m]
 
     so the state before buckling is assumed proportional to lambda, and K to change linearly along it. Exact
     in the limit of small displacements before buckling: columns, plates loaded in their plane, closed shells.
-    A shallow arch that softens on its way needs ms.follow_path. Controls and values as in ms.equilibrium; a field's own
-    stiffness counts.
+    A shallow arch that softens on its way needs ms.follow_path. Load parameters and values as in ms.equilibrium; a field's
+    own stiffness counts.
 
     equilibrium: of this scene, a stable one: a grown or loaded sheet, one in a field. K is then that of the equilibrium, u
-        the response to controls that go from its own to those given here (`ms.linear_response`), and the factors are
-        shares of that way: the parameter of ms.follow_path(..., start=). Magnetization and values are its own.
+        the response to load parameters that go from its own to those given here (`ms.linear_response`), and the factors are
+        fractions of that way: the parameter of ms.follow_path(..., start=). Magnetization and values are its own.
 
     modes: how many to find. Fewer come back where the others lie beyond what linear theory can tell: where
         the sheet has moved by a tenth of its size, or at a thousand times the first factor of either sign.
 
-    Joints that pull at rest, or have motors, are refused, as they are no controls. Bodies in contact are refused: a contact
-    bears in one direction only, so that a mode and its opposite have different factors, and none of them is linear;
-    ms.follow_path passes where contacts open and close. So are actuators that are springs of their own.
+    Joints that pull at rest or have motors are refused, as no load parameter multiplies them. Bodies in contact are refused:
+    a contact bears in one direction only, so that a mode and its opposite have different factors, and none of them is
+    linear; ms.follow_path passes where contacts open and close. Actuators that are springs of their own are refused too.
 
-    Raises ValueError on bad input, about an equilibrium that is not stable, with its own controls, or one that requires a
-    gradient, as there is none here; in a scene with contact of bodies, where the supports leave the sheet a motion without
-    stiffness, where the controls do nothing, and where the sheet does not buckle under them (a column that is pulled);
-    Interrupted.
+    Raises ValueError on bad input, about an equilibrium that is not stable, with its own load parameters, or one that
+    requires a gradient, as there is none here; in a scene with contact of bodies, where the supports leave the sheet a
+    motion without stiffness, where the load parameters do nothing, and where the sheet does not buckle under them (a column
+    that is pulled); Interrupted.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.01, cells=(20, 2))
@@ -133,7 +133,9 @@ def linear_buckling(
     began = time.perf_counter()
     model = scene._model
     if modes >= model.free_size:
-        raise ValueError(f"modes must be below the {model.free_size} unknowns of the scene, got {modes}")
+        raise ValueError(
+            f"modes must be below the {model.free_size} free degrees of freedom of the scene, got {modes}"
+        )
     with inputs.in_core():
         stiffness = RestStiffness(inputs) if equilibrium is None else StiffnessAbout(equilibrium)
         stiffness.factorize()
@@ -154,7 +156,7 @@ def linear_buckling(
 
 
 def _size(scene: Scene) -> float:
-    """m, of its bodies; of its links, where there is nothing else."""
+    """Return the size of the bodies of a scene, m; that of its links if there are no others."""
     if scene._bodies.size > 0.0:
         return scene._bodies.size
     return float(np.ptp(scene._model.points(scene._model.rest_state()), axis=0).max())
@@ -163,7 +165,7 @@ def _size(scene: Scene) -> float:
 def _stiffness_change(
     scene: Scene, stiffness: Stiffness, response: np.ndarray, displacement: float, inputs: Inputs
 ) -> np.ndarray:
-    """The values of dK, in the pattern of K, as the controls go from those of K to the inputs'."""
+    """Return the nonzeros of dK, in the pattern of K, for load parameters that go from those of K to those of the inputs."""
     # Where nothing moves before buckling, K is linear in the controls and any step is exact.
     edges = scene.mesh.edge_lengths
     length = float(edges.mean()) if len(edges) else _size(scene)
@@ -186,9 +188,12 @@ def _stiffness_change(
 
 
 def _lowest(
-    stiffness: Stiffness, change: np.ndarray, count: int, reach: float, displacement: float
+    stiffness: Stiffness, change: np.ndarray, count: int, max_displacement: float, displacement: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Positive factors (k,), ascending, and their modes (n, k), k <= count. It moves by `reach` at most."""
+    """Return the positive factors (k,), ascending, and their modes (n, k), k <= count.
+
+    max_displacement: m, before buckling; factors that would need more are left out.
+    """
     # -dK v = (1/lambda) K v, with K positive definite: the smallest positive lambda are the largest
     # eigenvalues.
     negative_change = -stiffness.with_values(change)
@@ -199,9 +204,9 @@ def _lowest(
     try:
         extreme = abs(scipy.sparse.linalg.eigsh(k=1, which="LM", return_eigenvectors=False, **pencil)[0])
         # By Sylvester's law, K + lambda dK has as many negative directions as there are factors between 0 and
-        # lambda. Looked for no further than theory reaches: beyond are strains of order one, closely spaced
-        # and meaningless.
-        largest = min(1e3 / extreme, reach / displacement if displacement > 0.0 else np.inf)
+        # lambda. The search ends where the theory does: factors beyond belong to strains of order one, are closely
+        # spaced and mean nothing.
+        largest = min(1e3 / extreme, max_displacement / displacement if displacement > 0.0 else np.inf)
         available = stiffness.negative_directions(largest * change)
         if available == 0:
             raise ValueError(

@@ -1,4 +1,4 @@
-"""Eigenvectors of free unknowns as shapes of the sheet."""
+"""Converts eigenvectors of the free degrees of freedom to mode shapes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ if TYPE_CHECKING:
 
 
 def mode_shapes(model: _core.Model, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Displacements (k, n_v, 3), the largest component of each mode 1, and edge rotations (k, n_e) of vectors (n, k)."""
+    """Return the displacements (k, n_v, 3) and the edge rotations (k, n_e) of eigenvectors (n, k).
+
+    Each is scaled so that its largest component of displacement is 1.
+    """
     shapes = [_normalized(model, vector) for vector in vectors.T]
     return (
         np.array([model.positions(shape) for shape in shapes]),
@@ -20,7 +23,7 @@ def mode_shapes(model: _core.Model, vectors: np.ndarray) -> tuple[np.ndarray, np
 
 
 def _normalized(model, vector: np.ndarray) -> np.ndarray:
-    """By the vertices; by the links of a skeleton where no vertex moves."""
+    """Return one mode scaled by its largest displacement of a vertex, or of a link where no vertex moves."""
     shape = model.expand(vector)
     vertices, links = model.positions(shape), model.points(shape)
     moved = np.abs(vertices).max(initial=0.0) > _STILL * np.abs(links).max(initial=0.0)
@@ -28,4 +31,4 @@ def _normalized(model, vector: np.ndarray) -> np.ndarray:
     return shape / displacements.ravel()[np.argmax(np.abs(displacements))]
 
 
-_STILL = 1e-9
+_STILL = 1e-9  # [-] of the largest displacement of a link: vertices that move less do not move

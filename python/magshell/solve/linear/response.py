@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 @immutable
 @dataclass(frozen=True, repr=False)
 class LinearResponse(PlotMixin):
-    """What linear theory says of a scene: the deflection in proportion to the controls. Not an equilibrium.
+    """The deflection of a scene by linear theory, proportional to the load parameters. It is not an equilibrium.
 
     displacements: (n_v, 3) m, from the rest shape, or from the equilibrium that was given; edge_rotations: (n_e,) rad, zero
         where an edge has none.
@@ -40,7 +40,7 @@ class LinearResponse(PlotMixin):
 
     @property
     def positions(self) -> Computed:
-        """(n_v, 3) m. They mean something as long as the displacements are small."""
+        """The positions, (n_v, 3) m; accurate for small displacements only."""
         from_, of = self.scene.mesh.rest_positions, self.displacements
         if self.equilibrium is not None:
             from_ = detached(self.equilibrium.positions)
@@ -64,24 +64,23 @@ def linear_response(
     support_factor: float = 1.0,
     values: dict[Any, Any] | None = None,
 ) -> LinearResponse:
-    """The deflection to first order in the loads, by one factorization of the stiffness at the rest shape.
+    """Compute the deflection to first order in the loads, by one factorization of the stiffness at the rest shape.
 
     The stiffness is that of the unloaded sheet: loads and fields act as the forces they are at rest, without
     the stiffness they add; supports that move do so at the rate they start with. Torques, springs, servos and limits that
-    pull in joints at rest are loads too, and motors move. Controls and values as in ms.equilibrium.
+    pull in joints at rest are loads too, and motors move. Load parameters and values as in ms.equilibrium.
 
     equilibrium: of this scene, a stable one: a grown or loaded sheet, one in a field. The deflection is then that from there
-        as the controls go from its own to those given here, to first order: the tangent of ms.follow_path(...,
-        start=) at its
-        start. The stiffness is that of the equilibrium, with what loads, fields and actuators add to it; magnetization and
-        values are its own. Contacts stay as they are.
+        as the load parameters go from its own to those given here, to first order: the tangent of ms.follow_path(...,
+        start=) at its start. The stiffness is that of the equilibrium, with what loads, fields and actuators add to it;
+        magnetization and values are its own. Contacts stay as they are.
 
     What no stiffness couples with a load stays at rest, and costs nothing: of a flat sheet in a coordinate plane, bending
     where it is loaded across, stretching where it is loaded in its plane.
 
-    Raises ValueError on bad input, about an equilibrium that is not stable, with its own controls, under a pressure without
-    a potential, or one that requires a gradient, as there is none here; and where the supports leave a motion without
-    stiffness to what is loaded; Interrupted.
+    Raises ValueError on bad input, about an equilibrium that is not stable, with its own load parameters, under a pressure
+    without a potential, or one that requires a gradient, as there is none here; and where the supports leave a motion
+    without stiffness to what is loaded; Interrupted.
 
     remanent_magnetization, applied_flux_density, load_factor, gravity_factor, field_factor, support_factor: as in
     `equilibrium`.

@@ -1,4 +1,4 @@
-"""A scene's stiffness at its rest shape, unloaded: what linear theory works with."""
+"""The stiffness of a scene at its rest shape, unloaded, for linear theory."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ _ROUND_OFF = 1e-9  # of a muscle's strength
 
 
 class RestStiffness(Stiffness):
-    """The Hessian K at the rest shape without controls.
+    """The Hessian K at the rest shape without loads.
 
-    Raises ValueError where actuators are springs of their own, which are no part of K, and as `refuse_what_acts`; once
-    something is factorized, where that is not positive definite: the scene is not held, or not stable at rest.
+    Raises ValueError if actuators are springs of their own, which are no part of K, or if muscles pull or shells have grown
+    (`refuse_what_acts`); when K is factorized, if it is not positive definite: the scene is not held, or not stable.
     """
 
     def __init__(self, inputs: Inputs):
@@ -28,10 +28,12 @@ class RestStiffness(Stiffness):
         super().__init__(scene._model, scene._model.rest_state(), scene._control_layout.zeros(), "at rest")
 
     def response(self, inputs: Inputs, at_rest: np.ndarray | None = None) -> np.ndarray:
-        """du of all unknowns, held ones included: K du = g(0) - g(c) - K dm, with dm what supports and motors move. Where
-        the whole K is not factorized, only what is coupled with a load is, and the rest of K need not be regular.
+        """Return du of all degrees of freedom: K du = g(0) - g(c) - K dm, with dm the motion of supports and motors.
 
-        at_rest: g(0) by `forces_at_rest`; by default with all that joints do, which is no load then.
+        Unless the whole of K is factorized already, only the part that is coupled with a load is factorized, and the rest of
+        K may be singular.
+
+        at_rest: g(0) from `forces_at_rest`; by default with the forces of joints, which are no load then.
         """
         model, layout = self._model, inputs.scene._control_layout
         if not self.factorized:
@@ -46,7 +48,7 @@ class RestStiffness(Stiffness):
 
 
 def refuse_springs(inputs: Inputs) -> None:
-    """Raises ValueError where an actuator is a spring of its own."""
+    """Raise ValueError if an actuator is a spring of its own."""
     if springs := [each for each in map(inputs.values.current, inputs.scene.actuators) if each._is_spring]:
         raise ValueError(
             f"linear theory takes the stiffness at rest without what acts there, and {springs[0]!r} is a spring that "
@@ -55,14 +57,16 @@ def refuse_springs(inputs: Inputs) -> None:
 
 
 def pulling_joints(inputs: Inputs) -> dict[Any, Any]:
-    """{joint of the scene: itself without what pulls at rest} of those in which something does."""
+    """Return the joints that pull at rest, {joint of the scene: the same joint without what pulls}."""
     joints = {own: inputs.values.current(own) for own in inputs.scene.joints}
     return {own: joint._resting for own, joint in joints.items() if joint._resting is not joint}
 
 
 def forces_at_rest(inputs: Inputs) -> np.ndarray | None:
-    """g(0) of all unknowns at the rest shape, without what pulls in joints: so that this is a load. None where nothing
-    pulls."""
+    """Return g(0) of all degrees of freedom at the rest shape without what pulls in joints, so that this becomes a load.
+
+    Return None if no joint pulls.
+    """
     if not (pulling := pulling_joints(inputs)):
         return None
     scene = inputs.scene
@@ -71,8 +75,7 @@ def forces_at_rest(inputs: Inputs) -> np.ndarray | None:
 
 
 def refuse_what_acts(inputs: Inputs) -> None:
-    """Raises ValueError where a muscle pulls at the rest shape, or a sheet has grown, whatever the controls: it is no
-    equilibrium then."""
+    """Raise ValueError if a muscle pulls at the rest shape or a shell has grown: the rest shape is no equilibrium then."""
     model = inputs.scene._model
     for body in map(inputs.values.current, inputs.scene._bodies.sheets):
         if body._has_grown:

@@ -1,4 +1,4 @@
-"""Finds modes of vibration, with the inertia that they need."""
+"""Small vibrations about an equilibrium: ms.vibration_modes."""
 
 from __future__ import annotations
 
@@ -27,8 +27,10 @@ from .stiffness import symmetric
 
 
 def consistent_masses(values: Values) -> scipy.sparse.csc_array:
-    """M (n, n), kg, of the free unknowns: zero for edge rotations. Raises ValueError with rigid parts, or where a body has
-    no density."""
+    """Return the consistent mass matrix of the free degrees of freedom, (n, n) kg, zero for edge rotations.
+
+    Raises ValueError if there are rigid bodies, or if a body has no density.
+    """
     scene = values.scene
     if scene.rigid_parts:
         raise ValueError(
@@ -36,7 +38,7 @@ def consistent_masses(values: Values) -> scipy.sparse.csc_array:
         )
     values.vertex_masses  # noqa: B018 - says which body has no density
     of_vertices = masses_of_vertices(values)
-    # Each free unknown moves one vertex, along an axis or, where a support turns it, along one of its frame.
+    # Each free degree of freedom moves one vertex: along a world axis, or along an axis of the local frame of a support.
     model, n_v = scene._model, scene.mesh.n_vertices
     total = scipy.sparse.csc_array((model.free_size, model.free_size))
     for axis in range(3):
@@ -69,8 +71,8 @@ def masses_of_vertices(values: Values) -> scipy.sparse.csc_array:
     )
 
 
-def in_places(matrix: scipy.sparse.csc_array, starts: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """The entries of a symmetric matrix (n, n) in the places of a lower triangle, by columns."""
+def nonzeros_in_pattern(matrix: scipy.sparse.csc_array, starts: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Return the entries of a symmetric matrix (n, n) at the nonzeros of a lower triangle that is given by columns."""
     columns = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
     lower = scipy.sparse.coo_array(matrix)
     size = matrix.shape[0]
@@ -96,7 +98,7 @@ _TOLD_APART = (
 @immutable
 @dataclass(frozen=True, repr=False)
 class VibrationModes:
-    """The slowest small vibrations of a scene about an equilibrium.
+    """The slowest small vibrations of a scene about an equilibrium, with their frequencies and shapes.
 
     squares: (k,) 1/s2, ascending: of the angular frequencies. Zero for a motion that nothing resists, negative for one
         that grows: the equilibrium is not stable.
@@ -115,13 +117,13 @@ class VibrationModes:
 
     @property
     def frequencies(self) -> np.ndarray:
-        """(k,) Hz. NaN where the mode does not vibrate but grows."""
+        """The frequencies, (k,) Hz; NaN for a mode that grows instead of vibrating."""
         vibrating = np.where(self.squares < 0.0, np.nan, self.squares)
         return np.sqrt(vibrating) / (2.0 * np.pi)
 
     @property
     def growth_rates(self) -> np.ndarray:
-        """(k,) 1/s: r of the modes that grow as exp(r t), zero for those that vibrate."""
+        """The rates r of the modes that grow as exp(r t), (k,) 1/s; zero for those that vibrate."""
         return np.sqrt(np.maximum(-self.squares, 0.0))
 
     def __repr__(self) -> str:
@@ -142,14 +144,14 @@ def vibration_modes(
     count: int = 6,
     mass: str = "lumped",
 ) -> VibrationModes:
-    """The slowest small vibrations of a scene about an equilibrium, loaded, magnetised or buckled.
+    """Compute the slowest small vibrations of a scene about an equilibrium, loaded, magnetised or buckled.
 
         K x = w^2 M x
 
     with K the Hessian there, M the masses and the edge rotations without mass; what supports hold stands still. Damping
     does not count.
 
-    equilibrium: of this scene, with the controls and values it was found for; one that is not stable has modes that
+    equilibrium: of this scene, with the load parameters and values it was found for; one that is not stable has modes that
         grow. By default the rest shape without loads and fields.
     values: as in ms.equilibrium, where there is no equilibrium, which has its own.
     count: how many modes.
@@ -177,7 +179,7 @@ def vibration_modes(
     masses = model.free_weights(inputs.values.masses) if consistent is None else consistent.diagonal()
     if count >= np.count_nonzero(masses):
         raise ValueError(
-            f"count must be below the {np.count_nonzero(masses)} unknowns with mass, got {count}"
+            f"count must be below the {np.count_nonzero(masses)} degrees of freedom with mass, got {count}"
         )
     with inputs.in_core():
         if equilibrium is None:
@@ -186,15 +188,15 @@ def vibration_modes(
         else:
             set_state(equilibrium)
             stiffness = model.hessian(equilibrium._state, equilibrium._controls)
-        beside = model.low_rank()
+        low_rank = model.low_rank()
         inertia = None
         if scene.rigid_parts:
             masses = model.free_weights(inputs.values.masses)  # as the parts are turned there
             inertia = model.free_weight_values(inputs.values.masses)
     slow = min(map(_slow_square, inputs.values.sheets), default=1.0)
     if consistent is not None:
-        inertia = in_places(consistent, *stiffness[1:3])
-    pencil = _Pencil(stiffness, beside, model.free_points, masses, slow, inertia, consistent)
+        inertia = nonzeros_in_pattern(consistent, *stiffness[1:3])
+    pencil = _Pencil(stiffness, low_rank, model.free_points, masses, slow, inertia, consistent)
     squares, vectors = pencil.lowest(int(count))
     modes, edge_rotations = mode_shapes(model, vectors)
     return VibrationModes(
@@ -211,17 +213,17 @@ def vibration_modes(
 class _Pencil:
     """K and M, and a factorization of K - shift M with the shift below every square of a frequency.
 
-    stiffness: (n, column starts, rows, values), the lower triangle of K. beside: columns (n, k) and their stiffnesses, what
-    K has beside that. points: (n, 3), where the unknowns are.
-    masses: (n,), the diagonal of M, zero for edge rotations. inertia: all of M, in the places of K, if that is more.
-    consistent: M (n, n), where it has no root at hand.
-    slow_square: 1/s2, about as large as the lowest of a sheet that is held.
+    stiffness: (n, column starts, rows, nonzeros), the lower triangle of K. low_rank: columns (n, k) and their stiffnesses,
+    the rest of K. points: (n, 3) m, where the degrees of freedom are.
+    masses: (n,), the diagonal of M, zero for edge rotations. inertia: M at the nonzeros of K, if it is not diagonal.
+    consistent: M (n, n), if it is the consistent matrix, of which no root is computed.
+    slow_square: 1/s2, estimate of the lowest square of a sheet that is held.
     """
 
     def __init__(
         self,
         stiffness: tuple[Any, ...],
-        beside: tuple[Any, ...],
+        low_rank: tuple[Any, ...],
         points: np.ndarray,
         masses: np.ndarray,
         slow_square: float,
@@ -229,14 +231,16 @@ class _Pencil:
         consistent=None,
     ):
         *pattern, self._values = stiffness
-        self._beside = beside
+        self._low_rank = low_rank
         self._diagonal = pattern[1][:-1]
         self._masses = masses
         self._moving = np.flatnonzero(masses)
         self._inertia = inertia
         self._consistent = consistent
         if consistent is None:
-            self._root = _root(masses) if inertia is None else _root_of(symmetric(*pattern, inertia), masses)
+            self._root = (
+                _root(masses) if inertia is None else _coupled_root(symmetric(*pattern, inertia), masses)
+            )
         self._factor = _core.analyze(*pattern, points=points)
         self.factorizations = 0
         stiffest = self._values[self._diagonal][self._moving] / masses[self._moving]
@@ -251,11 +255,11 @@ class _Pencil:
                 )
 
     def growing(self) -> int:
-        """How many squares are negative."""
+        """Count the negative squares, which are modes that grow."""
         return self._squares_below(-self._lost)
 
     def lowest(self, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """The lowest squares (k,), ascending, and their modes of all free unknowns (n, k)."""
+        """Return the lowest squares (k,), ascending, and their modes of all free degrees of freedom (n, k)."""
         for attempt in range(_ATTEMPTS):
             squares, modes = self._search(count, seed=attempt, space=(2 * count + 20) << attempt)
             # A search may miss one of several equal ones. By Sylvester's law K - s M has as many negative pivots as
@@ -294,7 +298,7 @@ class _Pencil:
         return 1.0 / inverses[order] + self._shift, modes
 
     def _search_generalized(self, count: int, seed: int, space: int) -> tuple[np.ndarray, np.ndarray]:
-        """K x = w^2 M x with M in the inner product: nearest to the shift are the lowest."""
+        """Find modes of K x = w^2 M x with M in the inner product: those nearest to the shift are the lowest."""
         size = len(self._masses)
         inverse = scipy.sparse.linalg.LinearOperator(
             (size, size), matvec=self._factor.solve, dtype=np.float64
@@ -325,20 +329,20 @@ class _Pencil:
         else:
             values -= shift * self._inertia
         self.factorizations += 1
-        report = self._factor.factorize(values, *self._beside)
+        report = self._factor.factorize(values, *self._low_rank)
         if not report.succeeded:
             raise NotConverged(f"the vibration modes: {report.reason}")
         return report
 
 
 def _root(masses: np.ndarray) -> tuple[Any, ...]:
-    """Products with L and with L^T, M = L L^T a diagonal."""
+    """Return the functions that multiply by L and by L^T, for a diagonal M = L L^T."""
     roots = np.sqrt(masses)
     return (lambda x: roots * x), (lambda x: roots * x)
 
 
-def _root_of(inertia, masses: np.ndarray) -> tuple[Any, ...]:
-    """The same of a matrix whose last rows, of rigid parts, are coupled."""
+def _coupled_root(inertia, masses: np.ndarray) -> tuple[Any, ...]:
+    """Return the functions that multiply by L and by L^T, for an M whose last rows, of rigid bodies, are coupled."""
     coupled = inertia.copy()
     coupled.setdiag(0.0)
     coupled.eliminate_zeros()
@@ -351,7 +355,7 @@ def _root_of(inertia, masses: np.ndarray) -> tuple[Any, ...]:
 
 
 def _inputs(scene: Scene, equilibrium: Equilibrium | None, values: dict[Any, Any] | None) -> Inputs:
-    """Magnetization and values of the equilibrium; the scene's own, without a field, at rest."""
+    """Return the inputs of the equilibrium; without one, the scene's own values without a field."""
     if equilibrium is not None:
         return inputs_about(scene, equilibrium, values=values)
     if not isinstance(scene, Scene):
@@ -360,7 +364,7 @@ def _inputs(scene: Scene, equilibrium: Equilibrium | None, values: dict[Any, Any
 
 
 def _slow_square(body: Shell | Solid) -> float:
-    """D / (rho h size^4), 1/s2: the square of the slowest angular frequency of a body that is held, but for a factor."""
+    """Estimate the square of the slowest angular frequency of a body that is held, D / (rho h size^4), 1/s2."""
     if isinstance(body, Solid):
         mesh = body.mesh
         modulus, thickness = (

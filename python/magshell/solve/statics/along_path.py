@@ -1,4 +1,4 @@
-"""Values that move along a path of equilibria: on straight lines from those of its start to those that were asked for."""
+"""Values that change along a path of equilibria, linearly from those of its start to those of its end."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ if TYPE_CHECKING:
 
 
 class AlongPath:
-    """What of the values at `start` (an Equilibrium, or None: nothing) is elsewhere at the end of the path.
+    """The values of a solve that change linearly from those at `start` (an Equilibrium, or None) to those of the inputs.
 
-    entries: of the core's values, those that vary; before, after: their numbers, which follow the other controls.
-    at_once: what cannot move, or is neither an obstacle nor a support, is at its end from the start on. Without it, raises
-    ValueError where anything differs that cannot move.
+    entries: indices of the changing values in the core's vector of values; before, after: their numbers at both ends, which
+    follow the load parameters.
+    at_once: only obstacles and supports move along the path; everything else has its final value from the start on.
+    Otherwise raises ValueError if a value differs that cannot change along a path.
     """
 
     after: np.ndarray
@@ -51,7 +52,7 @@ class AlongPath:
         )
 
     def values(self, parameter: float) -> Values:
-        """Those of the scene there."""
+        """Return the values of the scene at a parameter of the path, 0 to 1."""
         if not self.entries or parameter == 1.0:
             return self._after
         there = copy.copy(self._after)
@@ -78,7 +79,7 @@ class AlongPath:
 
 
 def all_can_move(inputs: Inputs, start: Origin) -> bool:
-    """Whether all values that `start` has elsewhere can vary on the way from there."""
+    """Return whether all values in which `start` differs from the inputs can change along a path."""
     can = _keys_that_move(inputs)
     return all(key in can for key in _differing(inputs.scene._value_layout, start._values, inputs.values))
 
@@ -92,7 +93,7 @@ def _differing(layout, before: Values, after: Values) -> list[tuple[str, str]]:
 
 
 def _keys_that_move(inputs: Inputs) -> dict[tuple[str, str], object]:
-    """{(the core's name for an object, name of a value): the object} of all that can move."""
+    """Return the values that can change along a path, {(label of an object in the core, name of a value): the object}."""
     scene = inputs.scene
     can = {(label, name): each for each, label in scene._labels for name in names_in_time(each)}
     for k, move in enumerate(scene._constraints.moves):

@@ -19,7 +19,7 @@ _DIMENSIONS = {FLUX_DENSITY: 1, **dict.fromkeys(FACTORS, 0)}  # of one case
 
 
 def _check_shape(name: str, shape: tuple[int, ...]) -> None:
-    """Raises ValueError on a shape that is neither of one load case nor of several."""
+    """Raise ValueError for a shape that is neither of one load case nor of several."""
     if name == FLUX_DENSITY and not (len(shape) in (1, 2) and shape[-1] == 3):
         raise ValueError(f"{name} [T] must have shape (3,), or (k, 3) for k load cases, got {shape}")
     if name != FLUX_DENSITY and len(shape) > 1:
@@ -27,7 +27,10 @@ def _check_shape(name: str, shape: tuple[int, ...]) -> None:
 
 
 def split(arguments: dict[Any, Any]) -> list[dict[Any, Any]] | None:
-    """The arguments of each case; None where they are those of one. Raises ValueError where the counts differ."""
+    """Split the arguments of several load cases, one dict each; return None for a single case.
+
+    Raises ValueError if arguments have different numbers of cases.
+    """
     for name, value in arguments.items():
         if name in _DIMENSIONS and (isinstance(value, Number | list | tuple) or hasattr(value, "ndim")):
             _check_shape(name, shape_of(name, value))
@@ -49,12 +52,12 @@ def split(arguments: dict[Any, Any]) -> list[dict[Any, Any]] | None:
 
 
 def join(found: Sequence[Equilibrium], of_cases: bool) -> Equilibrium | EquilibriumSet:
-    """As the split arguments had it."""
+    """Return the equilibria as a set if there were load cases, else the only one."""
     return EquilibriumSet(found) if of_cases else found[0]
 
 
 def starts_of(start: Any, count: int) -> Sequence[Any]:
-    """Where each case starts."""
+    """Return the start of each load case."""
     if not isinstance(start, EquilibriumSet):
         return [start] * count
     if len(start) != count:
@@ -63,7 +66,7 @@ def starts_of(start: Any, count: int) -> Sequence[Any]:
 
 
 def of_case(error: BaseException, number: int, count: int, last_good: Any) -> BaseException:
-    """The error that says which load case failed."""
+    """Return the error with the number of its load case in the message."""
     told = f"load case {number} of {count}: {error}"
     if isinstance(error, DesignRejected):
         return type(error)(told, last_good, load_case=number)
@@ -73,7 +76,10 @@ def of_case(error: BaseException, number: int, count: int, last_good: Any) -> Ba
 def find_all(
     scene: Scene, cases: list[dict[Any, Any]], starts: Sequence[Any], search: Search
 ) -> EquilibriumSet:
-    """The equilibrium of each case. An error tells which one failed, and holds those before it and its last state."""
+    """Find the equilibrium of each load case.
+
+    An error says which case failed; its `last_good` has the cases before and the last state of this one.
+    """
     found: list[Equilibrium] = []
     for k, (arguments, start) in enumerate(zip(cases, starts, strict=True)):
         search.note(f"load case {k + 1} of {len(cases)}")
@@ -87,7 +93,7 @@ def find_all(
 
 
 def _part_of(search: Search, k: int, count: int) -> Search:
-    """With the progress of one case as a share of the whole."""
+    """Return the search whose progress is reported as a fraction of that of all load cases."""
     if search.progress is None:
         return search
     return replace(

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def numbers_only(design: dict[Any, Any]) -> dict[Any, Any]:
-    """Copies without a graph, without what was left out."""
+    """Copy a design as arrays of numbers, without tensors' graphs and without arguments that are None."""
     kept = {name: value for name, value in design.items() if value is not None}
     return {
         name: {owner: numbers_only(named) for owner, named in value.items()}
@@ -25,21 +25,21 @@ def numbers_only(design: dict[Any, Any]) -> dict[Any, Any]:
     }
 
 
-def between(old: dict[Any, Any], new: dict[Any, Any], share: float) -> dict[Any, Any]:
-    """The design at a share of the way. Raises ValueError where one of them has what the other lacks."""
+def between(old: dict[Any, Any], new: dict[Any, Any], fraction: float) -> dict[Any, Any]:
+    """Interpolate linearly between two designs. Raises ValueError if they do not have the same arguments."""
     if old.keys() != new.keys():
         names = ", ".join(sorted(str(name) for name in old.keys() ^ new.keys()))
         raise ValueError(f"this design and the last one differ in which arguments they have: {names}")
     return {
-        name: between(value, new[name], share)
+        name: between(value, new[name], fraction)
         if isinstance(value, dict)
-        else value + share * (new[name] - value)
+        else value + fraction * (new[name] - value)
         for name, value in old.items()
     }
 
 
 def packed(scene: Scene, design: dict[Any, Any], form: Callable[[np.ndarray], Any]) -> dict[Any, Any]:
-    """With numbers in place of the scene's objects, and form(array) in place of each array."""
+    """Return a design with indices instead of the scene's objects, and form(array) instead of each array."""
     objects, own = (
         [id(each) for each in _objects(scene)],
         {name: value for name, value in design.items() if name != "values"},
@@ -54,7 +54,7 @@ def packed(scene: Scene, design: dict[Any, Any], form: Callable[[np.ndarray], An
 
 
 def unpacked(scene: Scene, design: dict[Any, Any]) -> dict[Any, Any]:
-    """The other way; a design without values has none then. Raises ValueError where the scene lacks an object."""
+    """Restore a design from the result of `packed`. Raises ValueError if the scene lacks an object."""
     objects = _objects(scene)
     if any(number >= len(objects) for number in design["values"]):
         raise ValueError("this state is of another scene: it has values of more objects than there are here")

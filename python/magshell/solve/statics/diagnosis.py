@@ -1,4 +1,4 @@
-"""Why a search for an equilibrium failed, as far as can be seen, and what would help."""
+"""Describes why a search for an equilibrium failed, and gives advice."""
 
 from __future__ import annotations
 
@@ -16,16 +16,18 @@ if TYPE_CHECKING:
     from ... import _core
     from ...model.scene.solve_inputs import Inputs
 
-# Of a face, over the usual length of an edge: below, round-off hides what is stiff less.
+# [-] Height of a face over the median edge length, below which round-off of its stiffness hides softer parts.
 SHORTEST_HEIGHT = 1e-4
-NEARLY_FLAT = np.radians(150.0)  # largest angle of a face that counts as almost flat
-_MOST_NAMED = 4  # places in a message
-LARGEST_STRAIN = 1.0  # of what acts at rest: beyond, a unit is likely to be wrong
-_SMALLEST_MOVE = 1e-6  # of the sheet's size, in one step of relaxation
+NEARLY_FLAT = np.radians(150.0)  # [rad] faces with a larger angle count as almost flat
+_MOST_NAMED = 4  # vertices in a message
+LARGEST_STRAIN = 1.0  # [-] by what acts at rest: beyond, a unit is likely to be wrong
+_SMALLEST_MOVE = (
+    1e-6  # [-] of the scene's size, in one relaxation step: below, relaxation came to a standstill
+)
 
 
 def why_not(inputs: Inputs, found: _core.StaticsResult, at_rest: bool) -> str:
-    """The text of a NotConverged. found: what the core handed back; at_rest: whether it started from an equilibrium."""
+    """Return the message of a NotConverged. at_rest: whether the solve started from an equilibrium."""
     scene, failed = inputs.scene, found.failed
     whole = found.load_fraction >= 1.0
     head = (
@@ -45,7 +47,7 @@ def why_not(inputs: Inputs, found: _core.StaticsResult, at_rest: bool) -> str:
         sentences += _seen(inputs, found)
     elif failed.state.size:
         sentences += _attempts(found, at_rest and not whole, scene._bodies)
-        told, near = _places(inputs, found)
+        told, near = _unbalanced_vertices(inputs, found)
         sentences += told
         positions = scene._model.positions(failed.state)
         fields = map(inputs.values.current, scene.fields)
@@ -55,7 +57,7 @@ def why_not(inputs: Inputs, found: _core.StaticsResult, at_rest: bool) -> str:
 
 
 def _seen(inputs, found) -> list[str]:
-    """What of a search that cost too much."""
+    """Describe the last state of a search that took too many factorizations."""
     scene, failed = inputs.scene, found.failed
     state = failed.state if failed.state.size else found.state
     controls = failed.controls if failed.state.size else found.controls
@@ -87,8 +89,8 @@ def _still_moves(failed, size: float) -> bool:
     return failed.last_move > _SMALLEST_MOVE * size
 
 
-def _places(inputs, found) -> tuple[list[str], np.ndarray]:
-    """Where forces are out of balance and where the energy still falls, in words and as vertices."""
+def _unbalanced_vertices(inputs, found) -> tuple[list[str], np.ndarray]:
+    """Find where forces are out of balance and where the energy still falls; return sentences and the vertices."""
     if found.relaxation_steps == 0:  # the forces are still those that the new controls began with
         return [], np.zeros(0, dtype=int)
     model, failed = inputs.scene._model, found.failed
@@ -127,7 +129,7 @@ def _advice(inputs, found, at_rest: bool, near: np.ndarray) -> str:
             "there (StableNeoHookean)."
         )
     if not scene._bodies.flat_sheets_alone:
-        return _advice_of_any(inputs, found, at_rest)
+        return _general_advice(inputs, found, at_rest)
     mesh, quality = scene.mesh, shell.quality
     tiny = np.flatnonzero(quality.heights < SHORTEST_HEIGHT * np.median(mesh.edge_lengths))
     if tiny.size:
@@ -145,7 +147,7 @@ def _advice(inputs, found, at_rest: bool, near: np.ndarray) -> str:
             f"{describe_faces(shell, flat[np.argsort(-quality.largest_angles[flat], kind='stable')])} beside that, and "
             "almost flat: mend the mesh there first."
         )
-    return _advice_of_any(inputs, found, at_rest)
+    return _general_advice(inputs, found, at_rest)
 
 
 def _free(inputs, found) -> str:
@@ -159,8 +161,8 @@ def _free(inputs, found) -> str:
     )
 
 
-def _advice_of_any(inputs, found, at_rest: bool) -> str:
-    """Whatever the bodies are."""
+def _general_advice(inputs, found, at_rest: bool) -> str:
+    """Return advice that holds for bodies of all kinds."""
     scene = inputs.scene
     if free := _free(inputs, found):
         return free

@@ -1,4 +1,4 @@
-"""What energies a scene has in a shape that need not be at rest: ms.energies."""
+"""Energies of a scene at given positions, which need not be an equilibrium: ms.energies."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def energies(
     vertex_loads: Numbers | None = None,
     values: dict[Any, Any] | None = None,
 ) -> dict[str, float]:
-    """{name: J}, the potential energies of a scene with its vertices at given places, whether it is at rest there or not.
+    """Compute the potential energies of a scene at given positions, in equilibrium or not, {name: J}.
 
     positions: (n_v, 3) m. edge_rotations: (n_e,) rad, as a result has them, of sheets with bending="midedge"; by default
         none, which leaves the normals across edges half-way between those of their faces.
@@ -97,7 +97,7 @@ def energies(
         rotations = quantity("edge_rotations", "rad", rotations, (scene._bodies.n_rotations,))
     with inputs.in_core():
         state = model.state(places, rotations)
-        # The directions of clamps are unknowns that no positions tell: they are where the clamps turn them.
+        # Positions do not determine the directions that clamps hold: the clamps prescribe these degrees of freedom.
         first = 3 * scene._bodies.n_points
         directions = slice(first, first + 3 * len(scene._constraints.directions))
         state[directions] += model.driven_increment(state, inputs.controls)[directions]
@@ -113,7 +113,7 @@ def energies(
 
 
 def _of_body(scene, number: int, of_terms: list[tuple[str, float]]) -> dict[str, float]:
-    """Elastic terms stand in the order of their bodies, one each."""
+    """Return the elastic energies of one body; the core lists elastic terms in the order of the bodies, one each."""
     body, bodies = scene.bodies[number], scene._bodies
     kind, names = (bodies.solids, ("solid",)) if isinstance(body, Solid) else (bodies.sheets, _ELASTIC)
     before = next(k for k, each in enumerate(kind) if each is body)

@@ -1,4 +1,4 @@
-"""Several equilibria of one scene: of load cases, or at the same controls."""
+"""Several equilibria of one scene: of load cases, or with the same load parameters."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class EquilibriumSet(SaveMixin, OfOneBody, Sequence[Equilibrium]):
-    """A scene at rest in each of k load cases, or in k ways in one; a sequence of Equilibrium.
+    """The equilibria of a scene in k load cases, or k equilibria of one; a sequence of Equilibrium.
 
     positions, displacements: (k, n_v, 3) m; edge_rotations: (k, n_e) rad. Tensors where those of the cases are.
 
@@ -43,51 +43,51 @@ class EquilibriumSet(SaveMixin, OfOneBody, Sequence[Equilibrium]):
     def __getstate__(self) -> dict[Any, Any]:
         return {"_cases": self._cases}
 
-    def __setstate__(self, kept: dict[Any, Any]) -> None:
-        self.__init__(kept["_cases"])
+    def __setstate__(self, state: dict[Any, Any]) -> None:
+        self.__init__(state["_cases"])
 
     @property
     def scene(self) -> Scene:
-        """Of all cases."""
+        """The scene of all cases."""
         return self._cases[0].scene
 
     @property
     def displacements(self) -> Computed:
-        """(k, n_v, 3) m, from the rest shape."""
+        """The displacements from the rest shape, (k, n_v, 3) m."""
         return stacked([case.displacements for case in self._cases])
 
     @property
     def energy(self) -> np.ndarray:
-        """(k,) J, the potential energy of each."""
+        """The potential energies, (k,) J."""
         return np.array([case.energy for case in self._cases])
 
     @property
     def stable(self) -> bool:
-        """Whether all are."""
+        """The stability of all together: True if every equilibrium is stable."""
         return all(case.stable for case in self._cases)
 
     @property
     def largest_membrane_strain(self) -> float:
-        """Of all cases."""
+        """The largest membrane strain of all cases."""
         return max(case.largest_membrane_strain for case in self._cases)
 
     @property
     def largest_bending_strain(self) -> float:
-        """Of all cases."""
+        """The largest bending strain of all cases."""
         return max(case.largest_bending_strain for case in self._cases)
 
     @property
     def wall_time(self) -> float:
-        """s, in all."""
+        """The time that all cases took together, s."""
         return sum(case.wall_time for case in self._cases)
 
     @property
     def factorizations(self) -> int:
-        """In all."""
+        """The number of factorizations of all cases."""
         return sum(case.factorizations for case in self._cases)
 
     def strains(self, index: int = -1) -> Any:
-        """The strains that one of the cases, by default the last, says: `Equilibrium.strains`."""
+        """Return the strains of one of the cases, by default the last, as `Equilibrium.strains` does."""
         return self._cases[index].strains()
 
     def _values_at(self, index: int):
@@ -104,7 +104,7 @@ class EquilibriumSet(SaveMixin, OfOneBody, Sequence[Equilibrium]):
         return len(self._cases)
 
     def __getitem__(self, index: Any) -> Any:
-        """A case, some of them, or what all say of one body of the scene."""
+        """Return one case, a slice of them, or the results of one body of the scene in all cases."""
         if isinstance(index, BODIES) or hasattr(index, "_result_in"):
             return result_of(self, index)
         chosen = self._cases[index]

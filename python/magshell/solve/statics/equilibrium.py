@@ -1,4 +1,4 @@
-"""The state of a scene at rest, and what it took to find it."""
+"""The result of ms.equilibrium: the state of a scene at rest, and the cost of finding it."""
 
 from __future__ import annotations
 
@@ -66,30 +66,30 @@ class Equilibrium(SaveMixin, OfOneBody):
     memory: int
     factorization: str
     _state: np.ndarray = field(repr=False)
-    _turns: list[Any] = field(repr=False)
+    _angle_branches: list[Any] = field(repr=False)
     _controls: Any = field(repr=False)
     _values: Any = field(repr=False)
     _own_points: Any = field(repr=False, default=None)  # (10 a rigid part, 3)
     _driving: Any = field(repr=False, default=None)  # (m,) N m or N, of motors in joints, in the core's order
 
     def __copy__(self) -> Equilibrium:
-        return self  # nothing of it changes
+        return self  # immutable
 
     def __getstate__(self) -> dict[Any, Any]:
-        """What a copy, another process or a file makes it from again: tensors as arrays, without their gradients."""
+        """Return the data of a copy, another process or a file: tensors as arrays, without their gradients."""
         return {**plain_arrays(vars(self)), "_values": self._values.to_state()}
 
-    def __setstate__(self, kept: dict[Any, Any]) -> None:
-        values = Values.from_state(kept["scene"], kept["_values"])
-        SaveMixin.__setstate__(self, {**kept, "_values": values})
+    def __setstate__(self, state: dict[Any, Any]) -> None:
+        values = Values.from_state(state["scene"], state["_values"])
+        SaveMixin.__setstate__(self, {**state, "_values": values})
 
     def __getitem__(self, body: Any) -> Any:
-        """What it says of one body of the scene."""
+        """Return the results of one object of the scene, such as a body or a joint."""
         return result_of(self, body)
 
     @property
     def displacements(self) -> Computed:
-        """(n_v, 3) m, from the rest shape."""
+        """The displacements from the rest shape, (n_v, 3) m."""
         rest = self.scene.mesh.rest_positions
         if isinstance(self.positions, np.ndarray):
             return self.positions - rest
@@ -100,7 +100,7 @@ class Equilibrium(SaveMixin, OfOneBody):
 
     @property
     def _load_factors(self) -> np.ndarray:
-        """Of its one state, ()."""
+        """The load factor of the only state, ()."""
         return self.scene._control_layout.of(self._controls, "scene", "load_factor")[0]
 
     def _state_at(self, index: int) -> np.ndarray:
@@ -108,11 +108,11 @@ class Equilibrium(SaveMixin, OfOneBody):
 
     @property
     def energy(self) -> float:
-        """The potential energy, J."""
+        """The potential energy, all terms together, J."""
         return sum(self.energies.values())
 
     def strains(self) -> Any:
-        """The principal strains of every face of the sheets, Strains; where a solid is alone, what result[solid] says.
+        """Return the principal strains of all faces of the shells, as Strains; with one solid alone, those of result[solid].
 
         >>> import magshell as ms
         >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -128,11 +128,11 @@ class Equilibrium(SaveMixin, OfOneBody):
             return strains_of(self.scene, self._state, self._values.all_sheets.thickness)
 
     def contact_state(self, contact: BodyContact | Contact) -> ContactState:
-        """The pairs of a contact that touch, and their forces."""
+        """Return the active pairs of a contact and their forces."""
         return compute_contact_state(self.scene, self._values, contact, self._state)
 
     def reaction(self, support: Pin | Clamp | SymmetryPlane) -> Reaction:
-        """With what forces a support of the scene holds it.
+        """Return the forces of a support on the scene.
 
         >>> import magshell as ms
         >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -143,11 +143,11 @@ class Equilibrium(SaveMixin, OfOneBody):
         0.01962
         """
         with self._values.in_core():
-            held = self.scene._model.held_forces(self._state, self._turns, self._controls)
+            held = self.scene._model.held_forces(self._state, self._angle_branches, self._controls)
         return reaction_in(self.scene, support, self._state, held.reshape(-1, 3))
 
     def self_intersections(self) -> np.ndarray:
-        """The faces that pass through each other, as in TriangleMesh.self_intersections, (k, 2)."""
+        """Return the pairs of faces that intersect, (k, 2), as TriangleMesh.self_intersections does."""
         return self.scene.mesh.self_intersections(detached(self.positions))
 
     def __repr__(self) -> str:

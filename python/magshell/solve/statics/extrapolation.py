@@ -29,7 +29,7 @@ _ROUND_OFF = 1e-12  # of the values: differences below tell no order
 @immutable
 @dataclass(frozen=True)
 class Extrapolation:
-    """What nested meshes say of the exact solution; each a number, an array, or a dict of these, as `solve` returned.
+    """An estimate of the exact solution from nested meshes; each attribute is of the kind that `solve` returned.
 
     value: extrapolated to infinitely fine meshes. Where values are by vertex, at the vertices of the coarsest mesh;
         of six-node elements at their corners, mesh.corner_vertices.
@@ -49,17 +49,19 @@ class Extrapolation:
     def __repr__(self) -> str:
         if isinstance(self.value, dict):
             told = [
-                f"{name}: {_told(self.value[name], self.error[name], self.order[name])}"
+                f"{name}: {_description(self.value[name], self.error[name], self.order[name])}"
                 for name in self.value
             ]
             return "\n  ".join([f"Extrapolation of {len(self.values)} meshes", *told])
-        return f"Extrapolation of {len(self.values)} meshes: {_told(self.value, self.error, self.order)}"
+        return (
+            f"Extrapolation of {len(self.values)} meshes: {_description(self.value, self.error, self.order)}"
+        )
 
 
 def richardson_extrapolation(
     solve: Callable[..., Any], meshes: Sequence[Any], *, order: float | None = None
 ) -> Extrapolation:
-    """What `solve` tends to as the mesh becomes finer, and how far it still is from that.
+    """Estimate the limit of `solve` for ever finer meshes, and the error of the finest mesh.
 
     With f at mesh width h, c at r h, and errors that fall as h^p (Richardson 1911):
 
@@ -116,7 +118,9 @@ def richardson_extrapolation(
             raise ValueError(
                 f"solve returned {sorted(each)} for {mesh_name}, but {sorted(kept[0])} for {names[0]}"
             )
-    found = {name: _of_one(name, [each[name] for each in kept], meshes, nests, given) for name in kept[0]}
+    found = {
+        name: _extrapolated(name, [each[name] for each in kept], meshes, nests, given) for name in kept[0]
+    }
     plain = not isinstance(returned[0], dict)
     value, error, orders = (
         found[""][k] if plain else {name: each[k] for name, each in found.items()} for k in range(3)
@@ -132,10 +136,10 @@ def richardson_extrapolation(
     return result
 
 
-def _of_one(
+def _extrapolated(
     name: str, values: list[Any], meshes: list[Any], nests: list[Nesting], order: float | None
 ) -> tuple[Any, ...]:
-    """Value, error, order, and where it does not converge how it changes, in words."""
+    """Return value, error and order of one quantity, and how it changes, in words, if it does not converge."""
     values = _at_same_points(name, values, meshes, nests)
     fine, ratio = values[-1], nests[0].ratio
     differences = [after - before for before, after in itertools.pairwise(values)]
@@ -150,7 +154,7 @@ def _of_one(
 
 
 def _found_order(differences: list[Any], ratio: int) -> tuple[float, str]:
-    """The order, and where there is none how the values change."""
+    """Return the order, and how the values change, in words, if they do not converge."""
     first, last = (_norm(each) for each in differences)
     order = math.log(first / last) / math.log(ratio) if first > 0.0 else -math.inf
     along = np.vdot(*(np.asarray(detached(each)) for each in differences))
@@ -208,7 +212,7 @@ def _norm(value) -> float:
     return float(np.linalg.norm(np.asarray(detached(value)).ravel()))
 
 
-def _told(value, error, order: float) -> str:
+def _description(value, error, order: float) -> str:
     if np.ndim(detached(value)):
         off = f"the finest mesh is off by at most {float(np.max(np.asarray(detached(error)))):.2g}"
         return f"{tuple(value.shape)}, {off}, order {order:.3g}"

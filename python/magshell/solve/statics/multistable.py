@@ -1,4 +1,4 @@
-"""Several equilibria of one scene at the same controls: ms.find_equilibria."""
+"""Several equilibria of one scene with the same load parameters: ms.find_equilibria."""
 
 from __future__ import annotations
 
@@ -27,15 +27,14 @@ if TYPE_CHECKING:
     from ..._input.kinds import Numbers, Starting
 
 
-_MODES = 4  # that each equilibrium is pushed along, beside its unstable ones
-_NUDGE, _PUSH = (
-    0.1,
-    2.0,
-)  # along a mode, of the usual displacement: what it turns round is pushed twice as far
-_REACH = 0.25  # of a deflation, of the usual displacement
-_SAME = 1e-4  # of the scene's size: equilibria nearer than that are one
-_HARDLY_MOVED = 1e-3  # of the size: no displacement to go by
-_USUAL = 0.05  # of the size, then
+_MODES = 4  # along which each equilibrium is pushed, beside its unstable ones
+# [-] Displacements along a mode, over the usual displacement: a small one for Newton's method, a large one that turns over a
+# body that buckled to one side.
+_NUDGE, _PUSH = 0.1, 2.0
+_DEFLATION_LENGTH = 0.25  # [-] over the usual displacement
+_SAME = 1e-4  # [-] over the scene's size: equilibria nearer to each other count as one
+_HARDLY_MOVED = 1e-3  # [-] over the scene's size: smaller displacements are no scale for pushes
+_USUAL = 0.05  # [-] over the scene's size, the usual displacement then
 
 
 @grouped(solver=MixedNewton)
@@ -65,15 +64,14 @@ def find_equilibria(
     solver: Newton | None = None,
     progress: bool | Callable[[float, float], None] = True,
 ) -> EquilibriumSet:
-    """The equilibria of a scene that can be found at the same controls, the lowest energy first: is it bistable?
+    """Find several equilibria of a scene with the same load parameters, the lowest energy first: is it bistable?
 
-    The first is that of ms.equilibrium. From each that is known others are looked for in turns: by Newton's method
-    deflated so that it cannot end in a known one (Farrell, Birkisson, Funke 2015), from a nudge along its lowest modes;
-    down both sides of each saddle; and down from where pushes along the modes, and at random, lead. What comes out is
-    what was found, never a proof that there are no others: `attempts` more find more. Far beyond its first instability a
-    thin sheet has equilibria beyond count.
+    The first is that of ms.equilibrium. From each known equilibrium, in turn, others are searched for: by Newton's method
+    deflated so that it cannot end in a known one (Farrell, Birkisson, Funke 2015), from a small push along its lowest modes;
+    downhill on both sides of each saddle; and downhill from large pushes along the modes and at random. The result is no
+    proof that there are no others: more `attempts` find more. Far beyond its first instability a thin sheet has very many.
 
-    Controls, values and ignore_velocity_forces as in ms.equilibrium, for one load case.
+    Load parameters, values and ignore_velocity_forces as in ms.equilibrium, for one load case.
 
     start: an equilibrium, EquilibriumSet, positions (n_v, 3) m, or a list of these: where to look as well, for saddles too
         if they are asked for.
@@ -86,7 +84,7 @@ def find_equilibria(
         1e-4 of the scene's
         size by default. Mirror images are two.
     seed: of the random pushes.
-    progress: show a bar once it has taken two seconds; or a function of the share of the attempts made, and a residual.
+    progress: show a bar once it has taken two seconds; or a function of the fraction of the attempts made, and a residual.
 
     Raises NotConverged where not even the first is found, Interrupted (on Ctrl-C) with the Equilibria found until then;
     ValueError on bad input. With torch tensors among the inputs gradients go back through each that is stable.
@@ -127,19 +125,21 @@ def find_equilibria(
         starts = _listed(start)
         for each in starts:
             starting_point(scene, each, inputs)  # raises before any work
-        hunt = _Hunt(scene, numbers_only(design), search, tolerance, count("seed", seed, least=0))
+        wide = _EquilibriumSearch(
+            scene, numbers_only(design), search, tolerance, count("seed", seed, least=0)
+        )
         try:
-            hunt.run(starts, attempts, include_unstable)
-            return EquilibriumSet([_again(inputs, each, search) for each in hunt.sorted(include_unstable)])
+            wide.run(starts, attempts, include_unstable)
+            return EquilibriumSet([_again(inputs, each, search) for each in wide.sorted(include_unstable)])
         except Interrupted as error:
-            kept = EquilibriumSet(hunt.sorted(include_unstable)) if hunt.known else error.last_good
+            found = EquilibriumSet(wide.sorted(include_unstable)) if wide.known else error.last_good
             raise Interrupted(
-                f"interrupted after {len(hunt.known)} equilibria were found, saddles counted", kept
+                f"interrupted after {len(wide.known)} equilibria were found, saddles counted", found
             ) from error
 
 
-class _Hunt:
-    """The equilibria that are known, and the searches for others."""
+class _EquilibriumSearch:
+    """The search for further equilibria from those that are known."""
 
     def __init__(
         self, scene: Scene, design: dict[Any, Any], search: Search, tolerance: float | None, seed: int
@@ -151,7 +151,7 @@ class _Hunt:
         self._rest = scene._model.points(scene._model.rest_state())
         self._size = float(np.linalg.norm(np.ptp(self._rest, axis=0)))
         self._tolerance = _SAME * self._size if tolerance is None else tolerance
-        self._share, self._failed = 0.0, 0
+        self._fraction, self._failed = 0.0, 0
 
     def run(self, starts: list[Any], attempts: int, unstable: bool) -> None:
         for start in starts or [None]:
@@ -161,16 +161,16 @@ class _Hunt:
                 self._add(self._find(start, require_stable=False))  # a saddle that looks like this
             except NotConverged:
                 self._failed += 1
-        ways = [(each, self._ways_from(each)) for each in self.known]
+        searches = [(each, self._searches_from(each)) for each in self.known]
         made = 0
         while made < attempts:
-            for way in list(ways):  # each in its turn; what was found meanwhile has its own in the next round
-                self._share = min(1.0, made / attempts)
+            for _, search in list(searches):  # in turn; equilibria found meanwhile follow in the next round
+                self._fraction = min(1.0, made / attempts)
                 self._search.note(f"{len(self.known)} found, {made} searches, {self._failed} in vain")
-                new = next(way[1], None)
+                new = next(search, None)
                 made += 1
                 if new is not None and self._add(new):
-                    ways.append((new, self._ways_from(new)))
+                    searches.append((new, self._searches_from(new)))
                 if made >= attempts:
                     break
 
@@ -181,8 +181,8 @@ class _Hunt:
         search = replace(self._search, progress=self._progress(), require_stable=require_stable)
         return find(self._scene, self._design, start, search).equilibrium
 
-    def _ways_from(self, known: Equilibrium) -> Iterator[Equilibrium | None]:
-        """Without end: what each search from an equilibrium comes to, None where it fails."""
+    def _searches_from(self, known: Equilibrium) -> Iterator[Equilibrium | None]:
+        """Yield the results of an endless series of searches from one equilibrium; None for a search that fails."""
         eigenvalues, shapes = self._modes(known)
         falling = [shape for value, shape in zip(eigenvalues, shapes, strict=True) if value < 0.0]
         for shape in falling:  # down both sides of a saddle
@@ -200,11 +200,11 @@ class _Hunt:
             yield self._relax(known, _PUSH * push)
 
     def _modes(self, known: Equilibrium) -> tuple[list[float], list[np.ndarray]]:
-        """Its unstable ones and those of least stiffness: eigenvalues, and shapes of all unknowns; none of a neutral one."""
+        """Return the unstable and the softest modes of an equilibrium: eigenvalues and shapes, without neutral ones."""
         with self._inputs.in_core():
             try:
                 values, shapes, _ = _core.lowest_modes(
-                    self._scene._model, known._state, known._turns, known._controls, _MODES
+                    self._scene._model, known._state, known._angle_branches, known._controls, _MODES
                 )
             except KeyboardInterrupt as stopped:
                 raise Interrupted("interrupted while modes were looked for", known) from stopped
@@ -216,7 +216,7 @@ class _Hunt:
     def _deflect(self, known: Equilibrium, push: np.ndarray) -> Equilibrium | None:
         options = self._options(False)
         options.away_from = [each._state for each in self.known]
-        options.away_length = _REACH * self._displacement()
+        options.away_length = _DEFLATION_LENGTH * self._displacement()
         return self._from(known, push, options)
 
     def _options(self, require_stable: bool):
@@ -229,24 +229,26 @@ class _Hunt:
         with self._inputs.in_core():
             state = _core.moved(model, known._state, self._displacement() * push)
         try:
-            found = solve(self._inputs, state, known._turns, controls, controls, options, self._progress())
+            found = solve(
+                self._inputs, state, known._angle_branches, controls, controls, options, self._progress()
+            )
         except NotConverged:
             self._failed += 1
             return None
         return found.equilibrium
 
     def _progress(self) -> Callable[[float, float], None] | None:
-        """Of all attempts, for one search."""
-        advance, share = self._search.progress, self._share
-        return None if advance is None else lambda _, residual: advance(share, residual)
+        """Return the function that reports the progress of all attempts, for one search."""
+        advance, fraction = self._search.progress, self._fraction
+        return None if advance is None else lambda _, residual: advance(fraction, residual)
 
     def _displacement(self) -> float:
-        """m, the largest of those that are known."""
+        """Return the usual displacement, the largest of all known equilibria, m."""
         largest = max(np.linalg.norm(self._points(each) - self._rest, axis=1).max() for each in self.known)
         return float(largest) if largest > _HARDLY_MOVED * self._size else _USUAL * self._size
 
     def _add(self, found: Equilibrium) -> bool:
-        """Whether it is none of those that are known."""
+        """Add an equilibrium unless it is a known one; return whether it was added."""
         points = self._points(found)
         for known in self.known:
             if np.linalg.norm(points - self._points(known), axis=1).max() <= self._tolerance:
@@ -261,11 +263,13 @@ class _Hunt:
 
 
 def _again(inputs, found: Equilibrium, search: Search) -> Equilibrium:
-    """The equilibrium with the inputs as they were handed in, gradients and all."""
+    """Return the equilibrium solved again with the inputs as they were given, so that gradients go back to them."""
     if not inputs.leaves:
         return found
     options = Search(search.solver, False, None, search.ignore_velocity_forces).options()
-    again: Solution = solve(inputs, found._state, found._turns, inputs.controls, inputs.controls, options)
+    again: Solution = solve(
+        inputs, found._state, found._angle_branches, inputs.controls, inputs.controls, options
+    )
     return again.equilibrium
 
 
@@ -278,5 +282,5 @@ def _listed(start) -> list[Any]:
 
 
 def _is_positions(start) -> bool:
-    """Whether a list is rows of numbers."""
+    """Return whether a list has rows of numbers, which are positions."""
     return isinstance(start, list | tuple) and np.ndim(start[0] if len(start) else 0.0) == 1

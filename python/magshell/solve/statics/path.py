@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 @immutable
 @dataclass(frozen=True)
 class CriticalPoint:
-    """Where a path gains or loses an unstable direction.
+    """A point of a path where it gains or loses an unstable direction.
 
     parameter: on the path. kind: "limit" (the path turns round here) or "bifurcation" (another branch crosses).
     positions: (n_v, 3) m. mode: (n_v, 3), the displacement that costs nothing here, largest component 1.
@@ -58,7 +58,7 @@ class CriticalPoint:
 class EquilibriumPath(AnimateMixin, OfOneBody):
     """A path of equilibria, stable and unstable. `path[body]` has those of one body.
 
-    parameters: (n,), 0 at the controls of the start, 1 at the new ones. positions: (n, n_v, 3) m.
+    parameters: (n,), 0 at the load parameters of the start, 1 at the new ones. positions: (n, n_v, 3) m.
     n_negative_eigenvalues: (n,), zero where the equilibrium is stable. critical: CriticalPoints, in order.
     remanent_magnetization: (n_f, 3) or (3,) A/m, or None.
     largest_membrane_strain, largest_bending_strain: (n,), magnitudes, 1, of what `strains` has. Beyond 0.2 the sheet
@@ -85,7 +85,7 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
     _to: Any = field(repr=False)
 
     def equilibrium(self, index: int) -> Equilibrium:
-        """One of the points, stable or not, as an Equilibrium: to look at, or to start another solve from."""
+        """Return one of the points, stable or not, as an Equilibrium, from which another solve may start."""
         index = range(len(self))[index]
         controls = self._controls[index]
         options = MixedNewton()._options()
@@ -95,45 +95,47 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
         return solve(inputs, point.state, point.turns, controls, controls, options).equilibrium
 
     def strains(self, index: int = -1) -> Any:
-        """The principal strains of every face of the sheets, Strains, at one of the points, by default the last; where a
-        solid is alone, what result[solid] says."""
+        """Return the principal strains of all faces of the shells at one of the points, by default the last, as Strains.
+
+        In a scene of one solid, return those of path[solid].
+        """
         if (solid := self._one_solid()) is not None:
             return solid.strains(index)
         with self._values_at(index).growth_in_core():
             return strains_of(self.scene, self._state_at(index), self._inputs.values.all_sheets.thickness)
 
     def __getitem__(self, body: Any) -> Any:
-        """What it says of one body of the scene, a row for each point; points themselves: `equilibrium`."""
+        """Return the results of one object of the scene, a row for each point; `equilibrium` returns points."""
         return result_of(self, body)
 
     @property
     def displacements(self) -> np.ndarray:
-        """(n, n_v, 3) m, from the rest shape."""
+        """The displacements from the rest shape, (n, n_v, 3) m."""
         return self.positions - self.scene.mesh.rest_positions
 
     @property
     def edge_rotations(self) -> np.ndarray:
-        """(n, n_e) rad, zero where an edge has none."""
+        """The edge rotations, (n, n_e) rad, zero where an edge has none."""
         return self._at_points(self.scene._model.edge_rotations)
 
     @property
     def _own_points(self) -> np.ndarray:
-        """(n, 10 a rigid part, 3) m, of the rigid parts."""
+        """The points of rigid bodies, ten each, (n, k, 3) m."""
         return self._at_points(self.scene._model.points)[:, self.scene.mesh.n_vertices :]
 
     @property
     def _driving(self) -> np.ndarray:
-        """(n, m) N m or N, of motors in joints."""
+        """The torques and forces of motors in joints, (n, m) N m or N."""
         model, rows = self.scene._model, []
         for k, (point, controls) in enumerate(zip(self._points, self._controls, strict=True)):
             with self._values_at(k).in_core():
                 rows.append(model.driving(point.state, controls, point.turns))
         return np.array(rows)
 
-    def _at_points(self, what: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """(n, ...), of each point's state."""
-        shape = what(self.scene._model.rest_state()).shape
-        return np.reshape([what(point.state) for point in self._points], (len(self), *shape))
+    def _at_points(self, function: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """Return a function of the state at each point, (n, ...)."""
+        shape = function(self.scene._model.rest_state()).shape
+        return np.reshape([function(point.state) for point in self._points], (len(self), *shape))
 
     def _state_at(self, index: int) -> np.ndarray:
         return self._points[index].state
@@ -147,12 +149,12 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
 
     @property
     def applied_flux_densities(self) -> np.ndarray:
-        """The uniform field at each point, (n, 3), T."""
+        """The uniform field at each point, (n, 3) T."""
         return self._control("applied_flux_density")[:, 0]
 
     @property
     def _controls(self) -> np.ndarray:
-        """All of them at each point, (n, m): on a straight line."""
+        """The load parameters at each point, (n, m), interpolated linearly."""
         along = self.parameters[:, None]
         return (1.0 - along) * self._from + along * self._to
 
@@ -161,7 +163,7 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
 
     @property
     def stable(self) -> np.ndarray:
-        """(n,), bool."""
+        """The stability of each point, (n,) of bool."""
         return self.n_negative_eigenvalues == 0
 
     def __len__(self) -> int:
@@ -207,11 +209,12 @@ def follow_path(
     solver: Newton | None = None,
     progress: bool = True,
 ) -> EquilibriumPath:
-    """Follows a path of equilibria by arc length, from `start` as its controls go towards the new ones.
+    """Follows a path of equilibria by arc length, from `start` as its load parameters go towards the new ones.
 
-    The path parameter is 0 at the controls of `start` (an Equilibrium of this scene; by default the rest shape,
+    The path parameter is 0 at the load parameters of `start` (an Equilibrium of this scene; by default the rest shape,
     unloaded) and 1 at those given here; it may turn back on the way, and the path with it. The path ends where the
-    parameter passes 1 or `min_parameter`, or where until(parameter, positions) says so. Controls as in ms.equilibrium.
+    parameter passes 1 or `min_parameter`, or where until(parameter, positions) says so. Load parameters as in
+    ms.equilibrium.
 
     values: as in ms.equilibrium. Where `start` was found with other places of field sources, obstacles or supports, or with
         other activations of muscles, those move along the path, on straight lines from the start's to these; everything
@@ -259,7 +262,7 @@ def follow_path(
         field_factor=field_factor,
         support_factor=support_factor,
     )
-    state, turns, from_, _ = starting_point(scene, start, inputs)
+    state, angle_branches, from_, _ = starting_point(scene, start, inputs)
     moving = AlongPath(inputs, start)
     options = _core.PathOptions()
     options.newton = solver._newton_options()
@@ -272,7 +275,7 @@ def follow_path(
         found = _core.follow_path(
             scene._model,
             state,
-            turns,
+            angle_branches,
             np.concatenate([from_, moving.before]),
             np.concatenate([inputs.controls, moving.after]),
             options,
@@ -302,7 +305,7 @@ def follow_path(
 
 
 def _bending_energies(scene: Scene, found, controls) -> list[float]:
-    """Of its points, where faces are to be looked at for which that matters."""
+    """Return the bending energies of the points if the mesh has obtuse faces, to which they matter; else none."""
     if not scene._bodies.flat_sheets_alone or not scene._obtuse_faces.faces.size:
         return []
     return [scene._model.energies(point.state, controls).get("bending", 0.0) for point in found.points]

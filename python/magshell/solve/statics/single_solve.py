@@ -35,29 +35,30 @@ if TYPE_CHECKING:
 
 
 class Solution(NamedTuple):
-    """An equilibrium, what the core found (with the factorization, where it was to be kept), and for what inputs."""
+    """An equilibrium, the result of the core (with the factorization, if it was to be stored), and the inputs."""
 
     equilibrium: Equilibrium
     found: Any
     inputs: Inputs
 
 
-def _unnoted(text: str) -> None:
-    """Where nobody looks."""
+def _ignore(text: str) -> None:
+    """Discard a note on the progress."""
 
 
 @dataclass(frozen=True)
 class Search:
-    """How to look. Raises ValueError where an option is no such thing.
+    """The options of a search for an equilibrium. Raises ValueError for an option of the wrong kind.
 
-    progress, note: what is called as it goes on. ignore_velocity_forces: without forces of motion.
+    progress: called with the fraction of the way and the residual. note: called with a text on the progress.
+    ignore_velocity_forces: leave out friction and water.
     """
 
     solver: Newton = field(default_factory=MixedNewton)
     require_stable: bool = True
     progress: Callable[[float, float], None] | None = None
     ignore_velocity_forces: bool = False
-    note: Callable[[str], None] = _unnoted
+    note: Callable[[str], None] = _ignore
 
     def __post_init__(self) -> None:
         if not isinstance(self.solver, Newton):
@@ -77,12 +78,12 @@ def find(
     arguments: dict[Any, Any],
     start: Starting | Origin | None = None,
     search: Search | None = None,
-    keep_factor: bool = False,
+    store_factor: bool = False,
 ) -> Solution:
-    """The equilibrium at the arguments of ms.equilibrium, cases apart. Raises as it does."""
+    """Find the equilibrium of one load case, with the arguments and the errors of ms.equilibrium."""
     search = Search() if search is None else search
     inputs = inputs_of(scene, arguments, search.ignore_velocity_forces)
-    state, turns, from_, at_rest = starting_point(scene, start, inputs)
+    state, angle_branches, from_, at_rest = starting_point(scene, start, inputs)
     moving = None
     if isinstance(start, Equilibrium) and not at_rest:
         at_rest = all_can_move(inputs, start)
@@ -91,17 +92,17 @@ def find(
         moving = AlongPath(inputs, start) if at_rest else moving
     options = search.options()
     options.start_at_rest = at_rest
-    options.keep_factor = keep_factor
-    # A volume is filled by at least as small a share of that at rest as of the way to it.
+    options.keep_factor = store_factor
+    # A load step fills a volume by at most the same fraction of its rest volume as the step is of the way.
     filling = max((each._filling(scene) for each in map(inputs.values.current, scene.actuators)), default=0.0)
     options.smallest_step /= max(filling, 1.0)
     with inputs.in_core():
         check_apart(scene, state)
-    return solve(inputs, state, turns, from_, inputs.controls, options, search.progress, moving)
+    return solve(inputs, state, angle_branches, from_, inputs.controls, options, search.progress, moving)
 
 
 def inputs_of(scene: Scene, arguments: dict[Any, Any], ignore_velocity_forces: bool = False) -> Inputs:
-    """The arguments of ms.equilibrium, checked against the scene."""
+    """Check the arguments of ms.equilibrium against the scene and return them as Inputs."""
     given = dict(arguments)
     shell = {name: given.pop(name, None) for name in SHELL_NAMES}
     vertex_loads, values = given.pop("vertex_loads", None), given.pop("values", None)
@@ -125,14 +126,17 @@ def inputs_of(scene: Scene, arguments: dict[Any, Any], ignore_velocity_forces: b
 def solve(
     inputs: Inputs,
     state: np.ndarray,
-    turns: list[Any],
+    angle_branches: list[Any],
     from_: np.ndarray,
     to: np.ndarray,
     options: _core.StaticsOptions,
     progress: Callable[[float, float], None] | None = None,
     moving: AlongPath | None = None,
 ) -> Solution:
-    """The core's search for an equilibrium at the controls `to`, from a state at `from_`; moving: values that go along."""
+    """Run the core's search for an equilibrium at the load parameters `to`, from a state at those of `from_`.
+
+    moving: values of the scene that change along with the load parameters.
+    """
     scene, entries = inputs.scene, []
     if moving is not None:
         from_, to = np.concatenate([from_, moving.before]), np.concatenate([to, moving.after])
@@ -140,7 +144,9 @@ def solve(
     options.keep_factor = options.keep_factor or bool(inputs.leaves)
     began = time.perf_counter()
     with inputs.in_core():
-        found = _core.find_equilibrium(scene._model, state, turns, from_, to, options, progress, entries)
+        found = _core.find_equilibrium(
+            scene._model, state, angle_branches, from_, to, options, progress, entries
+        )
         if moving is not None and found.load_fraction < 1.0:
             inputs = inputs.with_values(moving.values(found.load_fraction))
     with inputs.in_core():
@@ -177,7 +183,7 @@ def solve(
 
 
 def _energies(scene: Scene, found) -> dict[str, float] | None:
-    """By term; None where Ctrl-C came meanwhile, in a field of the caller's."""
+    """Return the energies by term; None if Ctrl-C came meanwhile in a field function of the caller."""
     try:
         return scene._model.energies(found.state, found.controls)
     except KeyboardInterrupt:
@@ -215,7 +221,7 @@ def _result(
         memory=found.bytes,
         factorization=found.factorization,
         _state=found.state,
-        _turns=found.turns,
+        _angle_branches=found.turns,
         _controls=found.controls,
         _values=inputs.values,
         _own_points=points[n_v:] if scene.rigid_parts else None,
@@ -224,8 +230,10 @@ def _result(
 
 
 def _outputs(inputs: Inputs, found):
-    """Positions, points of rigid parts among them, edge rotations, and what motors do; tensors where an input asks for a
-    gradient."""
+    """Return the positions with the points of rigid bodies, the edge rotations and the forces of motors.
+
+    They are tensors if an input requires a gradient.
+    """
     model, driven = inputs.scene._model, any(joint._driven for joint in inputs.scene.joints)
     arrays = (
         np.ascontiguousarray(model.points(found.state)),

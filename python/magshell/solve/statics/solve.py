@@ -44,7 +44,7 @@ def equilibrium(
     solver: Newton | None = None,
     progress: bool | Callable[[float, float], None] = True,
 ) -> Equilibrium | Any:  # Equilibria where there are load cases
-    """A stable equilibrium of a scene, or one for each of several load cases.
+    """Find a stable equilibrium of a scene, or one for each of several load cases.
 
     remanent_magnetization: A/m, rest frame, world axes: (n_f, 3), or (3,) on every face. Needed in a scene with a field.
     applied_flux_density: T, (3,): the value of the scene's UniformField. (k, 3): k load cases, and so many equilibria.

@@ -1,4 +1,4 @@
-"""Where a solve starts from."""
+"""The starting state of a solve, and the load parameters at which it holds."""
 
 from __future__ import annotations
 
@@ -20,27 +20,27 @@ if TYPE_CHECKING:
 
 
 class Origin(NamedTuple):
-    """A state that is an equilibrium for these inputs, and the turns that its terms have made on the way."""
+    """An equilibrium for given inputs: its state, and the full turns of its angles (`angle_branches`)."""
 
     state: np.ndarray
-    turns: list[Any]
+    angle_branches: list[Any]
     inputs: Inputs
 
 
 def starting_point(
     scene: Scene, start: Starting | Origin, inputs: Inputs
 ) -> tuple[np.ndarray, list[Any], np.ndarray, bool]:
-    """State, the turns its terms have made, controls at which it holds, and whether it is an equilibrium there."""
+    """Return the starting state, the full turns of its angles, its load parameters, and whether it is at rest there."""
     model = scene._model
     if start is None:
         check_outside(scene, inputs.values, scene.mesh.rest_positions, 0.0)
         return model.rest_state(), [], scene._control_layout.zeros(), True
     if isinstance(start, Origin):
-        return start.state, start.turns, start.inputs.controls, True
+        return start.state, start.angle_branches, start.inputs.controls, True
     if isinstance(start, Equilibrium):
         if start.scene is not scene:
             raise ValueError("start is an equilibrium of another scene; hand over its positions instead")
-        return start._state, start._turns, start._controls, start._values.same_as(inputs.values)
+        return start._state, start._angle_branches, start._controls, start._values.same_as(inputs.values)
     positions = quantity("start", "m", to_array("start", start), ("n_v", 3))
     n_v = scene.mesh.n_vertices
     if len(positions) != n_v:
@@ -55,7 +55,7 @@ def starting_point(
 
 
 def check_faces(scene: Scene, positions: np.ndarray) -> None:
-    """A face of a shell without area has no normal, and no forces either. Solids may be flat: their materials say."""
+    """Raise ValueError for a face of a shell without area, which has no normal. Materials check the elements of solids."""
     for body, span in zip(scene._bodies.shells, scene._bodies.spans, strict=True):
         if isinstance(body, Solid):
             continue

@@ -1,4 +1,4 @@
-"""Equilibria of a design that changes step by step: each from the last, and no jump unnoticed."""
+"""Equilibria of a design that changes step by step, each found from the last one, with a check for jumps."""
 
 from __future__ import annotations
 
@@ -69,11 +69,11 @@ class WarmStart(Frozen):
 
     @property
     def equilibria(self) -> Equilibrium | EquilibriumSet | None:
-        """Those of the last design."""
+        """The equilibrium, or equilibria, of the last design."""
         return join([each.equilibrium for each in self._last], self._of_cases) if self._last else None
 
     def __call__(self, **design: Any) -> Equilibrium | Any:
-        """The equilibrium, or equilibria, of a design: the arguments of ms.equilibrium."""
+        """Find the equilibrium, or the equilibria, of a design, given by the arguments of ms.equilibrium."""
         design = as_keywords(self.scene, design, CONTROLS)
         cases = split(design)
         self._check(cases)
@@ -96,7 +96,7 @@ class WarmStart(Frozen):
 
     @contextmanager
     def accept_jumps(self) -> Iterator[None]:
-        """Designs evaluated in here may jump to another equilibrium."""
+        """Allow designs that are evaluated within this context to jump to another equilibrium."""
         before = self._accepting
         remember(self, _accepting=True)
         try:
@@ -105,27 +105,29 @@ class WarmStart(Frozen):
             remember(self, _accepting=before)
 
     def state_dict(self) -> dict[Any, Any]:
-        """What a later WarmStart of an equal scene needs to go on with the same bits: tensors and plain values."""
+        """Return what a later WarmStart of an equal scene needs to continue with the same bits: tensors and plain values."""
         torch = require_torch("a state_dict")
-        states = [{"state": torch.tensor(s.found.state), "turns": s.found.turns} for s in self._last]
+        states = [{"state": torch.tensor(s.found.state), "angle_branches": s.found.turns} for s in self._last]
         designs = [packed(self.scene, arguments, torch.from_numpy) for arguments in self._design]
         return {"states": states, "designs": designs, "of_cases": self._of_cases}
 
     def load_state_dict(self, state: dict[Any, Any]) -> None:
-        """Goes on from what another one had."""
+        """Continue from the state of another WarmStart."""
         designs = [unpacked(self.scene, arguments) for arguments in state["designs"]]
         last = []
-        for arguments, kept in zip(designs, state["states"], strict=True):
-            origin = Origin(kept["state"].numpy(), kept["turns"], inputs_of(self.scene, arguments))
-            last.append(find(self.scene, arguments, origin, self._search, keep_factor=True))
+        for arguments, stored in zip(designs, state["states"], strict=True):
+            origin = Origin(
+                stored["state"].numpy(), stored["angle_branches"], inputs_of(self.scene, arguments)
+            )
+            last.append(find(self.scene, arguments, origin, self._search, store_factor=True))
         remember(self, _last=last, _design=designs, _of_cases=state["of_cases"])
 
     def _first(self, start, arguments: dict[Any, Any]) -> Solution:
         remember(self, solves=self.solves + 1)
-        return find(self.scene, arguments, start, self._search, keep_factor=True)
+        return find(self.scene, arguments, start, self._search, store_factor=True)
 
     def _next(self, k: int, arguments: dict[Any, Any]) -> Solution:
-        """Case k of the new design, in as few steps as lead there without straying."""
+        """Find case k of the new design, in as few steps as possible without straying from the first-order change."""
         if self._accepting:
             return self._step(self._last[k], arguments)
         old, solution = self._design[k], self._last[k]
@@ -147,7 +149,7 @@ class WarmStart(Frozen):
         return solution
 
     def _try(self, last: Solution, arguments: dict[Any, Any]) -> Solution | None:
-        """The next equilibrium, or None where it is not the old one's continuation."""
+        """Find the next equilibrium; return None if it does not continue the last one."""
         try:
             there = self._step(last, arguments)
         except NotConverged:
@@ -158,7 +160,7 @@ class WarmStart(Frozen):
 
     def _step(self, last: Solution, arguments: dict[Any, Any]) -> Solution:
         remember(self, solves=self.solves + 1)
-        return find(self.scene, arguments, last.equilibrium, self._search, keep_factor=True)
+        return find(self.scene, arguments, last.equilibrium, self._search, store_factor=True)
 
     def _continues(self, last: Solution, there: Solution) -> bool:
         model = self.scene._model
