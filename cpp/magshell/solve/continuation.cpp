@@ -11,33 +11,40 @@
 namespace magshell {
 namespace {
 
-// Newton iterations of the corrector: most per step, and the number that the step length aims at; see
+// Newton iterations of the corrector per step: the largest number allowed, and the number at which the step length is kept; see
 // test_buckling_is_where_the_path_branches.
 constexpr int max_corrector_iterations = 8, target_iterations = 3;
-// [-] Smallest cosine between successive tangents; a sharper bend halves the step. See test_buckling_is_where_the_path_branches.
+// [-] Smallest cosine between the tangents at both ends of a step; if the path bends more, the step is halved. See
+// test_buckling_is_where_the_path_branches.
 constexpr double min_tangent_cosine = 0.5;
-// [-] Least movement for which psi is scaled, of the largest step. Below it only round-off moves the bodies, and arc length is
-// that of the parameter. See test_buckling_without_a_load_is_refused.
+// [-] Lower bound of psi (see the header), over the largest step. It applies where the load moves the bodies by round-off only; arc length
+// is then that of the path parameter. See test_buckling_without_a_load_is_refused.
 constexpr double min_movement = 1e-3;
 // [rad] Largest rotation of an obstacle in one step, so that a full turn is not skipped; see test_obstacles_that_move_far.py.
 constexpr double max_obstacle_rotation = 0.5;
-// [-] Critical points closer than this share of a step count as one; see test_buckling_is_where_the_path_branches.
+// [-] Distance along the path, over the step, below which several critical points are located as one; see
+// test_buckling_is_where_the_path_branches.
 constexpr double coincident_step = 1e-6;
-// [-] Distance of supports from their target below which they are in place, over the extent; see test_a_clamp_that_shakes.
+// [-] Largest distance of supports from their target positions at a point of the path, over the extent; see test_a_clamp_that_shakes.
 constexpr double support_tolerance = 1e-14;
-// [-] Shortest step along the path, over the step first tried; see test_buckling_is_where_the_path_branches.
+// [-] Shortest step from a point of the path, over the step that was proposed there; if it fails as well, the path ends. See
+// test_buckling_is_where_the_path_branches.
 constexpr double min_step_ratio = 1e-7;
-// [-] Eigenvalue and step length at which a critical point is located, over their initial sizes; see test_buckling_is_where_the_path_branches.
+// [-] A critical point is located once the eigenvalue nearest to zero is below this fraction of the larger one at the ends of the interval,
+// or once the interval is below this fraction of the step; see test_buckling_is_where_the_path_branches.
 constexpr double eigenvalue_tolerance = 1e-6, location_tolerance = 1e-9;
-// [-] Cosine between mode and load rate above which a critical point is a limit point; see test_buckling_is_where_the_path_branches.
+// [-] Cosine between the mode and the derivative of the residual by the path parameter, above which a critical point is a limit point and
+// below which it is a bifurcation; see test_buckling_is_where_the_path_branches.
 constexpr double limit_alignment = 1e-3;
-constexpr double no_norm = 1e-300;  // keeps a division by zero out; plain-words: ok
+constexpr double no_norm = 1e-300;  // added to a denominator, against division by zero; plain-words: ok
 
+// The tangent (dq/ds, dlambda/ds) of the path.
 struct Tangent {
     VectorXd state;
     double parameter = 0.0;
 };
 
+// Follows one path: predictor along the tangent, corrector, control of the step length, location of critical points.
 class Follower {
   public:
     Follower(Newton& newton, const LoadParameters& from, const LoadParameters& to, const PathOptions& options,
@@ -51,11 +58,13 @@ class Follower {
           until_(until),
           result_(result),
           sides_(model_) {
-        // The metric gives every component of a vertex the area of the vertex, so the area is a third of the sum.
+        // The diagonal metric holds the area of each vertex three times, once per component; so the total area is a third of its sum.
         const double area = model_.metric().sum() / 3.0;
         weight_ = model_.metric() / (area * model_.extent() * model_.extent());
     }
 
+    // Follows the path from `start` to the end of the parameter range, or until until_ returns true. Returns false, with a reason in
+    // the result, if it cannot be followed that far.
     bool run(const VectorXd& start) {
         PathPoint here{start, 0.0, {}, 0};
         const NewtonReport at_rest = newton_.solve(here.state, load_parameters(0.0));
@@ -92,6 +101,7 @@ class Follower {
         return false;
     }
 
+    // The inner product, norm and angle of the arc length (see the header).
     double product(const VectorXd& a, const VectorXd& b) const { return a.dot(weight_.cwiseProduct(b)); }
     double length(const VectorXd& a) const { return std::sqrt(product(a, a)); }
 
@@ -110,13 +120,15 @@ class Follower {
         return product(a.state, b.state) + psi_ * psi_ * a.parameter * b.parameter;
     }
 
-    // Returns dq/dlambda from K dq = -(dR/dlambda + K dq_held), with the last factorization; pull: K dq_held.
+    // Returns dq/dlambda with the last factorization: the given motion `held` of the supports plus the motion dq of the free dofs, from
+    // K dq = -(dR/dlambda + K held). pull: K held.
     VectorXd response(const VectorXd& q, const LoadParameters& at, const VectorXd& held,
                       const VectorXd& pull) const {
         return held + newton_.solve_with_factor(-model_.gradient_rate(q, at, rate_) - pull);
     }
 
-    // Factorizes at a point; sets its tangent, not normalized, and its number of unstable directions.
+    // Factorizes the Hessian at a point of the path. Sets its tangent, not normalized, and its number of unstable directions. Returns false
+    // if the Hessian is singular.
     bool find_tangent(PathPoint& point, Tangent& tangent) {
         const LoadParameters at = load_parameters(point.parameter);
         model_.evaluate(point.state, at);
@@ -130,8 +142,8 @@ class Follower {
         return true;
     }
 
-    // Corrects a step along the tangent of a point, at which the model must have been evaluated last. Returns false if it does not
-    // converge.
+    // Takes a step along the tangent of the point `base` and corrects it by mixed Newton steps in state and path parameter, perpendicular to
+    // the tangent. The model must have been evaluated at `base` last. Returns false if the corrector does not converge.
     bool correct(const PathPoint& base, const Tangent& along, double step, PathPoint& found,
                  int& iterations) {
         VectorXd q = base.state;
@@ -167,6 +179,8 @@ class Follower {
         }
     }
 
+    // Appends the next point of the path and replaces the tangent by the tangent there. The step is halved until the corrector converges, no
+    // obstacle is passed through or rotates too far, and the path does not bend too much. Returns false if no step is short enough.
     bool advance(Tangent& tangent) {
         const PathPoint base = result_.points.back();
         const double shortest = min_step_ratio * step_;
@@ -203,7 +217,8 @@ class Follower {
         }
     }
 
-    // Replaces a point beyond the end of the parameter range by the equilibrium at the end.
+    // Replaces a point with a path parameter outside its range by an equilibrium at the end of the range, solved from that point. Returns
+    // false if the solve does not converge.
     bool end_in_range(PathPoint& point) {
         const double end = std::clamp(point.parameter, options_.lowest_parameter, options_.highest_parameter);
         if (end == point.parameter) return true;
@@ -213,7 +228,8 @@ class Follower {
         return true;
     }
 
-    // Returns the eigenvalue nearest to zero at the point factorized last, positive if it has `count` unstable directions.
+    // Returns the size of the eigenvalue nearest to zero at the point factorized last, with a sign that changes at the critical point:
+    // positive as long as the point has `count` unstable directions, negative otherwise.
     double signed_eigenvalue(const PathPoint& point, Index count, VectorXd* mode) {
         const std::vector<Mode> modes = modes_near_zero(newton_, 1);
         if (mode) *mode = modes.front().shape;
@@ -221,13 +237,13 @@ class Follower {
         return point.unstable_directions == count ? size : -size;
     }
 
-    // A point of the path between two accepted points, at `step` along the tangent of the first one.
+    // A trial point of the path, a step along the tangent from the last accepted point.
     struct Probe {
         double step;
         PathPoint point;
     };
 
-    // Computes and factorizes a point between two accepted points. Returns an empty value if it does not converge.
+    // Computes the point at a step along the tangent from `base`, and factorizes there. Returns an empty value if it does not converge.
     std::optional<Probe> probe(const PathPoint& base, const Tangent& along, double step) {
         Probe found{step, base};
         Tangent unused;
@@ -237,7 +253,8 @@ class Follower {
         return there && find_tangent(found.point, unused) ? std::optional(found) : std::nullopt;
     }
 
-    // Locates every critical point between two points of different stability, by bisection until each is alone in its interval.
+    // Locates the critical points between two points with different numbers of unstable directions. Bisects until the number changes by one in
+    // each interval, or the interval is very short.
     void locate(const Probe& low, const Probe& high, const Tangent& along) {
         const Index crossings = std::abs(high.point.unstable_directions - low.point.unstable_directions);
         if (crossings == 0) return;
@@ -249,7 +266,8 @@ class Follower {
         locate(*middle, high, along);
     }
 
-    // Locates one critical point by regula falsi (Illinois variant) on the eigenvalue nearest to zero.
+    // Locates the critical point between two points by regula falsi (Illinois variant) on the eigenvalue nearest to zero, and appends it to
+    // the result.
     void locate_one(const Probe& below, const Probe& above, const Tangent& along) {
         const PathPoint& base = result_.points.back();
         const Index count = below.point.unstable_directions;
@@ -296,8 +314,9 @@ class Follower {
     const Until& until_;
     PathResult& result_;
     ObstacleSides sides_;  // at the last accepted point
-    VectorXd weight_;
-    double psi_ = 1.0, step_ = 0.0;
+    VectorXd weight_;      // diagonal matrix of |dx|^2 / extent^2
+    double psi_ = 1.0;     // weight of the path parameter in the arc length
+    double step_ = 0.0;    // arc length of the next or current step
 };
 
 }  // namespace

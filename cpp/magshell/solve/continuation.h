@@ -1,13 +1,13 @@
 // Follows a path of equilibria by pseudo-arclength continuation in the load parameters, through limit points, and locates its
 // critical points [Riks; Crisfield 9].
 //
-// A point of the path is a state and a path parameter lambda, 0 at the initial load parameters and 1 at the final ones. The arc
-// length is measured by
+// A point of the path is a state q and a path parameter lambda, which is 0 at the initial load parameters and 1 at the final ones. The arc
+// length s is measured by
 //
-//   ds^2 = |dx|^2 / extent^2 + psi^2 dlambda^2          |.|: root mean square over the area of the bodies
+//   ds^2 = |dx|^2 / extent^2 + psi^2 dlambda^2          |.|: root mean square of the displacement over the area of the bodies
 //
-// with psi chosen so that both parts have the same weight at the start. The corrector takes mixed Newton steps perpendicular to
-// the tangent.
+// with psi chosen so that both terms are equal at the start. A step goes along the tangent (predictor); mixed Newton steps perpendicular to
+// the tangent then lead back to the path (corrector).
 #pragma once
 
 #include <functional>
@@ -20,18 +20,19 @@ namespace magshell {
 
 struct PathOptions {
     NewtonOptions newton;
-    double first_step = 0.05;    // initial step, of the path parameter [-]
-    double largest_step = 0.02;  // largest step, of the arc length [-]: rms displacement over the extent
+    double first_step = 0.05;  // [-] change of the path parameter in the first step
+    double largest_step =
+        0.02;  // [-] largest arc length of a step: about its rms displacement over the extent
     int max_points = 1000;
-    double lowest_parameter = -1e300, highest_parameter = 1.0;
-    bool locate_critical = true;
+    double lowest_parameter = -1e300, highest_parameter = 1.0;  // [-] the path ends at either
+    bool locate_critical = true;  // whether to compute the critical points between path points
 };
 
 struct PathPoint {
     VectorXd state;
     double parameter = 0.0;
     Model::AngleBranches angle_branches;
-    Index unstable_directions = 0;
+    Index unstable_directions = 0;  // number of negative eigenvalues of the Hessian
 };
 
 enum class CriticalKind { limit, bifurcation };
@@ -54,7 +55,8 @@ struct PathResult {
 /// Called with every accepted point; the path ends there if it returns true.
 using Until = std::function<bool(const PathPoint&)>;
 
-/// Follows the path from an equilibrium at the load parameters `from` towards `to`. The values of `varying` are appended to both.
+/// Follows the path from an equilibrium `start` at the load parameters `from` towards `to`. `varying`: parameters that vary with them;
+/// their values are appended to both.
 PathResult follow_path(Model& model, const VectorXd& start, const Model::AngleBranches& angle_branches,
                        const LoadParameters& from, const LoadParameters& to, const PathOptions& options,
                        const Until& until, const StaticsWatch& watch = {},

@@ -7,21 +7,26 @@
 namespace magshell {
 namespace {
 
-// [-] Rms distance to a known equilibrium below which a result is that one, over the extent; see test_both_wells_of_a_bistable_beam.
+// [-] Rms distance from a known equilibrium, over the extent, below which a solution is taken for the same one; see
+// test_both_wells_of_a_bistable_beam.
 constexpr double same_distance = 1e-5;
-// [-] Longest step, over the extent, and largest last step of a converged search; see test_saddles_are_found_with_include_unstable.
+// [-] Largest displacement in one step, and in the last step before a search counts as converged, both over the extent; see
+// test_saddles_are_found_with_include_unstable.
 constexpr double longest_step = 0.25, last_step_tolerance = 1e-3;
-// [-] Largest factor between the deflated and the original step; see test_both_wells_of_a_bistable_beam.
+// [-] Largest size of the factor between the deflated and the original Newton step; see test_both_wells_of_a_bistable_beam.
 constexpr double max_step_factor = 10.0;
-// [-] Shortest admissible fraction of a deflated step; see test_far_beyond_its_first_instability_a_sheet_has_many.
+// [-] The search ends if less than this fraction of a deflated step leads to a state that has an energy; see
+// test_far_beyond_its_first_instability_a_sheet_has_many.
 constexpr double min_deflated_step = 1e-4;
 
+// The deflation operator M(q) of the header, with |.| the root mean square over the area of the bodies.
 class Deflation {
   public:
     Deflation(const Model& model, const KnownEquilibria& known)
         : known_(known.states), weights_(3.0 * model.metric() / model.metric().sum()), scale_(known.length) {}
 
-    // Returns the number by which the Newton step from q is multiplied.
+    // Returns the number by which the Newton step from q is multiplied: 1 / (1 - d(ln M) . step), limited in size. It is negative, and the
+    // deflated step points backwards, if the Newton step leads far towards a known equilibrium.
     double factor(const VectorXd& q, const VectorXd& step) const {
         double change = 0.0;  // d(ln M) . step
         for (const VectorXd& each : known_) {
@@ -34,6 +39,7 @@ class Deflation {
                                      : max_step_factor;
     }
 
+    // Returns true if a known equilibrium is at most this rms distance [m] away.
     bool is_known(const VectorXd& q, double length) const {
         for (const VectorXd& each : known_)
             if (std::sqrt(weights_.dot((q - each).cwiseAbs2())) <= length) return true;

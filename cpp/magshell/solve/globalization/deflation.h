@@ -1,11 +1,12 @@
 // Finds further equilibria at the same load parameters, by deflation of Newton's method.  [Farrell, Birkisson, Funke 2015]
 //
-// Instead of g(q) = 0, the deflated problem M(q) g(q) = 0 is solved. It has all other solutions, but none of the known ones q_i, at which M
-// has a pole:
+// Instead of g(q) = 0, with g the gradient of the energy, the deflated problem M(q) g(q) = 0 is solved. Its solutions are those of g = 0
+// without the known ones q_i, because M has a pole there:
 //
 //   M(q) = prod_i (1 + (s / |q - q_i|)^2)
 //
-// The Jacobians differ by a rank-one matrix, so the deflated Newton step is the one of g times a number (Sherman-Morrison):
+// The Jacobians of both problems differ by a factor and a rank-one matrix. By the Sherman-Morrison formula the deflated Newton step p_M is the
+// Newton step p of g = 0 times a number:
 //
 //   p_M = p / (1 - d(ln M) . p)
 #pragma once
@@ -16,7 +17,7 @@
 
 namespace magshell {
 
-/// The equilibria from which the search is kept away.
+/// The known equilibria q_i, and the length s at which their deflation acts.
 struct KnownEquilibria {
     const std::vector<VectorXd>& states;
     double length;  // [m] s, as root mean square displacement over the bodies

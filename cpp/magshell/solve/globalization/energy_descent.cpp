@@ -11,47 +11,57 @@
 namespace magshell {
 namespace {
 
-// Newton iterations of a gradient flow step, and L-BFGS steps of a descent, at most; see test_a_semi_cylinder_pulled_and_pushed.
+// Largest number of Newton iterations in a gradient flow step, and of L-BFGS steps per factorization; see
+// test_a_semi_cylinder_pulled_and_pushed.
 constexpr int max_flow_iterations = 6, max_lbfgs_steps = 20;
-// [-] Rate 1/dt of a gradient flow step, over the size of the most negative eigenvalue; see test_a_compressed_strip_leaves_the_saddle.
+// [-] Rate 1/dt of a gradient flow step, over the size of the most negative eigenvalue; above 1, so that H + M/dt is positive definite. See
+// test_a_compressed_strip_leaves_the_saddle.
 constexpr double rate_above_instability = 1.1;
 // [-] Largest and smallest trust radius of a gradient flow step, over the extent; see test_a_semi_cylinder_pulled_and_pushed.
 constexpr double longest = 0.3, shortest = 1e-3;
-// [-] Length of the last iteration of a converged gradient flow step, over its longest; see test_a_semi_cylinder_pulled_and_pushed.
-constexpr double flow_tolerance = 1e-2;
-// Gradient flow steps of decreasing length that are tried before L-BFGS: by default, if they have done better than L-BFGS, and if
-// they have done worse. See test_both_sides_of_a_saddle_cost_the_same.
-constexpr int tries = 2, more_tries = 5, fewer_tries = 1;
-// Directions of negative curvature from which on L-BFGS is tried first; see test_a_flat_strip_far_beyond_where_it_buckles.
-constexpr Index many_directions = 4;
-// Steps for which the worse method is not tried, at most (exponential back-off); see test_a_semi_cylinder_pulled_and_pushed.
-constexpr int max_backoff = 16;
-// [-] Trust radius after a failure, over the length that failed; growth of that length with every success; see
+// [-] A gradient flow step has converged once a Newton iteration is shorter than this fraction of its longest one; see
 // test_a_semi_cylinder_pulled_and_pushed.
+constexpr double flow_tolerance = 1e-2;
+// Number of gradient flow steps of decreasing length that are tried before L-BFGS: by default; if gradient flow decreased the energy more per
+// factorization than L-BFGS; and if L-BFGS is preferred (lbfgs_preference). See test_both_sides_of_a_saddle_cost_the_same.
+constexpr int tries = 2, more_tries = 5, fewer_tries = 1;
+// Number of negative pivots of the Hessian from which on L-BFGS is tried first; see test_a_flat_strip_far_beyond_where_it_buckles.
+constexpr Index many_directions = 4;
+// Largest number of steps for which the worse method is skipped (exponential back-off); see test_a_semi_cylinder_pulled_and_pushed.
+constexpr int max_backoff = 16;
+// [-] The shortest length at which a gradient flow step failed limits the trust radius: the limit over that length, and the factor by which
+// that length grows with every success; see test_a_semi_cylinder_pulled_and_pushed.
 constexpr double below_failed_length = 0.75, failed_length_growth = 1.2;
-// [-] Ratio of decreases per factorization above which L-BFGS is preferred; see test_both_sides_of_a_saddle_cost_the_same.
+// [-] L-BFGS is preferred if its decrease of the energy per factorization is more than this many times that of gradient flow; see
+// test_both_sides_of_a_saddle_cost_the_same.
 constexpr double lbfgs_preference = 4.0;
-// [-] Length of a Newton step, over the extent, below which Newton's method is tried; see test_a_compressed_strip_leaves_the_saddle.
+// [-] Length of a Newton step, over the extent, below which Newton's method is tried to finish the descent; see
+// test_a_compressed_strip_leaves_the_saddle.
 constexpr double near = 0.05;
-// [-] Length of a Newton step, over the extent, below which the energy cannot resolve it; see test_small_load_on_a_shallow_roof.
+// [-] Length of a Newton step, over the extent, below which the change of the energy is lost in round-off; see
+// test_small_load_on_a_shallow_roof.
 constexpr double round_off = 1e-6;
-// [-] First rates of a gradient flow step, over the rate given by the forces and over the largest stiffness; see test_both_sides_of_a_saddle_cost_the_same.
+// [-] The first nonzero rate of a gradient flow step is the larger of these fractions of forced_rate() and of largest_stiffness(); see
+// test_both_sides_of_a_saddle_cost_the_same.
 constexpr double first_forced_rate = 1e-3, first_stiffness_rate = 1e-12;
-// [-] Shortest admissible fraction of a gradient flow step; see test_landing_solid_is_not_inverted.
+// [-] A gradient flow step fails if less than this fraction of a Newton iteration leads to a state that has an energy; see
+// test_landing_solid_is_not_inverted.
 constexpr double min_flow_alpha = 1e-4;
 
-/// The success of one of the two methods, and for how many steps it is not tried (exponential back-off).
+/// The success of one of the two methods, and the number of steps for which it is skipped (exponential back-off).
 struct MethodScore {
-    double decrease_per_factorization = 0.0;  // [J]
-    bool slower = false;                      // than with the step before
+    double decrease_per_factorization = 0.0;  // [J] in its last step
+    bool slower = false;                      // whether that was less than in the step before
     bool known = false;                       // whether the method has been tried
-    int backoff = 0, next_backoff = 1;
+    int backoff = 0, next_backoff = 1;  // steps for which it is skipped: now, and after its next failure
 
+    /// Records the decrease of the energy per factorization [J] of a step.
     void record(double more) {
         slower = more < decrease_per_factorization;
         decrease_per_factorization = more;
     }
 
+    /// Returns true if the method may be tried in this step; otherwise counts the step as skipped.
     bool is_due() { return backoff == 0 || --backoff < 0; }
     void back_off() {
         backoff = next_backoff;
@@ -59,6 +69,7 @@ struct MethodScore {
     }
 };
 
+// The descent of descend_to_stable(); the header says how it works.
 class PostBucklingDescent : private EnergyDescent {
   public:
     PostBucklingDescent(Newton& newton, VectorXd& q, const LoadParameters& load_parameters)
@@ -71,8 +82,8 @@ class PostBucklingDescent : private EnergyDescent {
     }
 
   private:
-    // Assesses q by its Hessian. Returns false if the descent is finished; otherwise sets the rate of the next step, 0 if the
-    // factorization at hand will do.
+    // Assesses the state q by its Hessian. Returns false if the descent is finished. Otherwise sets the rate 1/dt of the next step: 0 (a
+    // Newton step) if the Hessian is positive definite, so that its factorization can be used.
     bool assess() {
         const FactorReport factor = factor_ = newton_.factorize_at(q_, load_parameters_);
         const double residual = newton_.relative_residual(q_, {});
@@ -89,14 +100,15 @@ class PostBucklingDescent : private EnergyDescent {
         rate_ = 0.0;
         report_.descent_direction.resize(0);
         report_.residual = residual;
-        // Below the floor of round-off a thin shell may still be far from equilibrium; the length of the Newton step decides.
+        // The residual of a thin shell may be at the level of its round-off far from equilibrium. So either the residual is small without
+        // allowance for round-off, or a Newton solve confirms the equilibrium.
         report_.converged =
             newton_.relative_residual(q_, {}, false) <= newton_.options().tolerance || newton_converges();
         return !report_.converged;
     }
 
-    // Returns true if Newton's method finds an equilibrium from here, where the Hessian is positive definite. It is tried where its
-    // step is short, and elsewhere at exponentially growing intervals.
+    // Returns true if Newton's method converges from q, where the Hessian is positive definite, to an acceptable equilibrium. It is tried if
+    // its first step is short, and otherwise in the 2nd, 4th, 8th, ... such state.
     bool newton_converges() {
         const double expected = length(newton_.solve_with_factor(-newton_.gradient(q_, {})));
         if (++assessments_ == next_newton_)
@@ -109,6 +121,8 @@ class PostBucklingDescent : private EnergyDescent {
         return false;
     }
 
+    // Solves by Newton's method from q. Accepts a stable result that has a lower energy, or that is as near as the first Newton step
+    // predicts if this step is too short for the energy to tell. expected: length of the first Newton step [m].
     bool finish_from_here(double expected) {
         return finish_with_newton(
             [&](VectorXd& trial) {
@@ -122,6 +136,8 @@ class PostBucklingDescent : private EnergyDescent {
             });
     }
 
+    // Takes a step by the better method, or by the other one if it fails, and records how much each decreases the energy per factorization.
+    // On a saddle, displaces q along the unstable mode first. Returns false if no step lowers the energy.
     bool advance() {
         const bool definite = rate_ == 0.0;
         const double before = energy_, first_rate = rate_;
@@ -138,8 +154,8 @@ class PostBucklingDescent : private EnergyDescent {
             newton_.evaluate(q_, load_parameters_, {});
             if (!factorize_definite()) return false;
         }
-        // In a state with many directions of negative curvature, gradient flow steps follow only the fastest one. With few of
-        // them they leave a saddle at a growing speed.
+        // With many directions of negative curvature L-BFGS goes first, because gradient flow follows only the fastest growing of
+        // them. With few directions gradient flow goes first, because it leaves a saddle exponentially fast.
         const bool doubtful =
             flow_.slower || (factor_.succeeded && factor_.negative_pivots >= many_directions);
         const bool strides_first = flow_.is_due() && !(doubtful && lbfgs_.is_due());
@@ -179,6 +195,7 @@ class PostBucklingDescent : private EnergyDescent {
 
     VectorXd newton_step() const { return newton_.solve_with_factor(-newton_.gradient(q_, {})); }
 
+    // Multiplies the rate, or sets the first one if it is 0. Returns false if steps at the new rate would be useless.
     bool raise_rate(double times = 4.0) {
         rate_ = rate_ > 0.0
                     ? times * rate_
@@ -186,7 +203,8 @@ class PostBucklingDescent : private EnergyDescent {
         return is_sensible(rate_);
     }
 
-    // Factorizes with the rate, which is raised until the matrix is positive definite. The model is evaluated at q.
+    // Factorizes H + rate M, and raises the rate until this matrix is positive definite. The model must have been evaluated at q. Returns
+    // false if the rate becomes too large.
     bool factorize_definite() {
         Eigen::MatrixXd no_moves(q_.size(), 0);
         for (double times = 4.0;; times *= 4.0) {
@@ -198,7 +216,7 @@ class PostBucklingDescent : private EnergyDescent {
         }
     }
 
-    // Raises the rate so that the step p becomes as long as the trust radius, and factorizes.
+    // Raises the rate so that the Newton step, which is p now, becomes about as long as the trust radius, and factorizes.
     bool shorten_to_radius(const VectorXd& p) {
         const double stiffness = -newton_.gradient(q_, {}).dot(p) / p.dot(model_.metric().cwiseProduct(p));
         const double more = stiffness * (length(p) / trust_radius_ - 1.0);
@@ -209,7 +227,8 @@ class PostBucklingDescent : private EnergyDescent {
         return factorize_definite();
     }
 
-    // Tries gradient flow steps of decreasing length until one succeeds. Returns false if no rate is left to try.
+    // Tries a limited number of gradient flow steps of decreasing length until one succeeds; `found` tells whether one did. Returns false
+    // if the rate becomes too large.
     bool try_flow_steps(bool& found) {
         const double radius = trust_radius_;
         const bool proven = lbfgs_.decrease_per_factorization > 0.0 &&
@@ -237,7 +256,8 @@ class PostBucklingDescent : private EnergyDescent {
         return true;
     }
 
-    // Takes an implicit Euler step of the gradient flow by mixed Newton iterations, of which p is the first.
+    // Takes an implicit Euler step of the gradient flow by mixed Newton iterations, of which p is the first. Returns false, and leaves q as it
+    // was, if the iterations do not converge, the energy does not fall, or a point would pass through an obstacle.
     bool gradient_flow_step(VectorXd p) {
         const VectorXd from = q_, weights = rate_ * model_.metric();
         const ProximalTerm proximal{&weights, &from};
@@ -276,8 +296,10 @@ class PostBucklingDescent : private EnergyDescent {
         return true;
     }
 
+    // Descends by L-BFGS steps with the last factorization; raises the rate until they move the bodies. Returns false if the rate becomes
+    // too large.
     bool lbfgs_slide() {
-        // [-] Displacement over the extent that counts as none; see test_both_sides_of_a_saddle_cost_the_same.
+        // [-] Displacement over the extent below which the L-BFGS steps count as failed; see test_both_sides_of_a_saddle_cost_the_same.
         constexpr double no_displacement = 1e-9;
         for (;;) {
             const double moved = lbfgs_descent(newton_, q_, energy_, load_parameters_, max_lbfgs_steps);
@@ -290,15 +312,17 @@ class PostBucklingDescent : private EnergyDescent {
         }
     }
 
-    double failed_length_ =
-        std::numeric_limits<double>::infinity();  // [m] shortest length at which a gradient flow step failed
-    double trust_radius_,
-        newton_radius_;    // [m] limits of a gradient flow step, and of a Newton step that may be the last
-    FactorReport factor_;  // of the last factorization at q
-    Mode mode_;            // the mode of the most negative eigenvalue, if the energy falls along it
+    // [m] shortest length at which a gradient flow step failed, increased after every success
+    double failed_length_ = std::numeric_limits<double>::infinity();
+    double trust_radius_;   // [m] largest length of a gradient flow step
+    double newton_radius_;  // [m] largest length of a Newton step at which Newton's method is tried to finish
+    FactorReport factor_;   // of the last factorization at q
+    Mode mode_;             // the mode of the most negative eigenvalue, if the energy falls along it
     bool has_negative_curvature_ = false, is_stationary_ = false;
-    bool stretched_ =
-        false;  // whether the last step was L-BFGS, whose residual stretch the next gradient flow step removes
+    // Whether the last step was one of L-BFGS. It leaves some membrane strain, which the next gradient flow step removes; the success of
+    // that step is not recorded.
+    bool stretched_ = false;
+    // Number of states with a positive definite Hessian so far, and the number at which Newton's method is tried in any case.
     int assessments_ = 0, next_newton_ = 2;
     MethodScore flow_, lbfgs_;
 };
