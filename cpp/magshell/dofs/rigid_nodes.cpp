@@ -8,7 +8,8 @@
 namespace magshell {
 namespace {
 
-// Returns the rotation that maps one point set onto another best, given the sum of their outer products (Kabsch).
+// Returns the rotation R that minimizes sum |x_i - R y_i|^2 (Kabsch). products: sum x_i y_i^T, with both point sets relative to their
+// centers.
 Mat3 nearest_rotation(const Mat3& products) {
     const Eigen::JacobiSVD<Mat3> svd(products, Eigen::ComputeFullU | Eigen::ComputeFullV);
     const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0 ? -1.0 : 1.0;
@@ -17,7 +18,8 @@ Mat3 nearest_rotation(const Mat3& products) {
 
 }  // namespace
 
-// Newton's iteration for the polar decomposition; three iterations reach round-off.
+// Computes the orthogonal factor of the polar decomposition by Newton's iteration. Three iterations reach round-off from a matrix that is
+// nearly a rotation.
 Mat3 orthonormal(Mat3 m) {
     for (int round = 0; round < 3; ++round) m = (0.5 * (m + m.inverse().transpose())).eval();
     return m;

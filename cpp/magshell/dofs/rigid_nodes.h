@@ -2,8 +2,9 @@
 //
 //   x_i = c + R rho_i
 //
-// The first four nodes are the corners of a regular tetrahedron with center c; l is half the edge of the cube around it.
-// With sum rho_k rho_k^T = 4 l^2 I they determine the pose.
+// c is the center and R the rotation of the pose, rho_i the offset of node i from the center in the reference configuration. The first
+// four nodes are the corners of a regular tetrahedron with center c, at alternate corners of a cube with edge 2 l. Their offsets satisfy
+// sum rho_k rho_k^T = 4 l^2 I, so R is the rotation nearest to sum (x_k - c) rho_k^T / (4 l^2).
 #pragma once
 
 #include <vector>
@@ -19,7 +20,8 @@ class RigidNodes {
         Mat3 rotation;
     };
 
-    /// own: how many of the nodes, the four corners first, are no vertices of a shell or solid. rest: of all nodes of the scene [m].
+    /// nodes: first the points of the body itself, beginning with the four corners, then vertices of shells and solids that belong to the
+    /// body. own: the number of the former. rest: reference positions of all nodes of the scene [m].
     RigidNodes(std::vector<Index> nodes, Index own, const std::vector<Vec3>& rest);
 
     const std::vector<Index>& nodes() const { return nodes_; }
@@ -28,18 +30,21 @@ class RigidNodes {
     bool has_vertices() const { return size() > own_; }
     /// Returns l [m].
     double length() const { return length_; }
-    /// Returns c in the reference configuration.
+    /// Returns c in the reference configuration [m].
     const Vec3& middle() const { return middle_; }
 
+    /// Returns c at q [m], the mean of the four corners.
     Vec3 center(const VectorXd& q) const;
+    /// Returns the pose at q, from the four corners.
     Pose pose(const VectorXd& q) const;
-    /// Returns the pose that fits the vertices best, in the least-squares sense.
+    /// Returns the pose that fits the vertices of shells and solids best, in the least-squares sense.
     Pose pose_of_vertices(const VectorXd& q) const;
+    /// Sets the positions of all nodes in q from a pose.
     void set_positions(const Pose& pose, VectorXd& q) const;
 
-    static constexpr Index corners = 4;  // the nodes of the tetrahedron
-    static constexpr Index points =
-        10;  // nodes of its own that determine its start: corners and edge midpoints; more are on its surface
+    static constexpr Index corners = 4;  // of the tetrahedron
+    // The points with mass: the corners and edge midpoints of the tetrahedron. More points of the body may lie on its surface.
+    static constexpr Index points = 10;
 
   private:
     std::vector<Index> nodes_;
@@ -49,7 +54,7 @@ class RigidNodes {
     double length_;
 };
 
-/// Returns the rotation nearest to a matrix that is a rotation up to round-off.
+/// Returns the rotation nearest to a matrix that is nearly a rotation.
 Mat3 orthonormal(Mat3 m);
 
 }  // namespace magshell

@@ -14,14 +14,19 @@ namespace {
 
 using Eigen::MatrixXd;
 
-// Iterations that fit the coordinates to a start, and the relative size of the last one [-]; see test_joints_hold_to_round_off_over_ten_thousand_steps.
-constexpr int max_fit_iterations = 30;  // see test_joints_hold_to_round_off_over_ten_thousand_steps
-// [-] over the lengths involved; see test_motor_holds_an_arm_at_its_angle_and_reports_its_torque
+// Largest number of Gauss-Newton iterations that fit the coordinates to a start; see test_joints_hold_to_round_off_over_ten_thousand_steps.
+constexpr int max_fit_iterations = 30;
+// [-] Change of the coordinates, over the length of the first link, at which the fit ends; see
+// test_joints_hold_to_round_off_over_ten_thousand_steps.
+constexpr double fit_tolerance = 1e-14;
+// [-] Distance of a motor from its target, over the lengths from which it is computed, that counts as round-off; see
+// test_motor_holds_an_arm_at_its_angle_and_reports_its_torque.
 constexpr double motor_round_off = 1e-14;
-constexpr double fit_tolerance = 1e-14;  // [-] see test_joints_hold_to_round_off_over_ten_thousand_steps
-// [-] part of epsilon |x|/l that four corners leave; see test_long_chains_of_links_move_at_the_usual_tolerance
+// [-] Error of the rotation of a link that is computed from four corners, over epsilon |x|/l; see rounding() and
+// test_long_chains_of_links_move_at_the_usual_tolerance.
 constexpr double rotation_round_off = 0.125;
 
+// Returns a unit vector perpendicular to an axis.
 Vec3 across(const Vec3& axis) {
     Index smallest;
     axis.cwiseAbs().minCoeff(&smallest);
@@ -34,13 +39,14 @@ double angle_about(const Vec3& axis, const Mat3& turn) {
     return std::atan2(v.dot(turn * u) - u.dot(turn * v), u.dot(turn * u) + v.dot(turn * v));
 }
 
+// Returns the nodes of all links, link by link.
 std::vector<Index> nodes_of(const std::vector<RigidNodes>& links) {
     std::vector<Index> all;
     for (const RigidNodes& link : links) all.insert(all.end(), link.nodes().begin(), link.nodes().end());
     return all;
 }
 
-// Returns the minimum-norm least-squares solver, as the rows may leave coordinates undetermined.
+// Returns the factorization that solves for the minimum-norm least-squares solution, because the rows may not determine all coordinates.
 auto solver_of(const MatrixXd& rows) {
     return rows.completeOrthogonalDecomposition();
 }
@@ -139,15 +145,19 @@ LinkTwists SkeletonCoordinates::twists(const VectorXd& q) const {
     return {paths_, std::move(points), std::move(arms), std::move(twists)};
 }
 
-// With F = sum g and M = sum (x - o_b) g^T over all nodes that b moves: for rotations about w_a and w_b,
-//   sum g . (w_a x (w_b x (x - o_b))) = w_a . M w_b - (w_a . w_b) tr M,   for a rotation a and a translation b  (w_a x w_b) . F.
-// The entry of two rotations of one joint is that of the rotation about a after the one about b.
+// Let F = sum g and M = sum (x - o_b) g^T over all nodes that coordinate b moves. The entry (a, b), with a on the path from the root to b, is
+//
+//   a and b rotate:                  sum g . (w_a x (w_b x (x - o_b))) = w_a . M w_b - (w_a . w_b) tr M
+//   a rotates, b translates:         (w_a x w_b) . F
+//   a translates:                    0
+//
+// each times the scales of a and b. For two rotations of one joint, in entry (a, b) the rotation b acts first.
 MatrixXd SkeletonCoordinates::second_derivative(const VectorXd& q, const VectorXd& gradient) const {
     const std::vector<Column> columns = this->columns(poses(q));
     std::vector<Vec3> forces(n_links(), Vec3::Zero());
     std::vector<Mat3> products(n_links(),
-                               Mat3::Zero());  // sum (x - place) g^T, about one point per link
-    std::vector<Vec3> place(n_links());
+                               Mat3::Zero());  // sum (x - place) g^T
+    std::vector<Vec3> place(n_links());        // one point per link: o of its joint, or its center
     MatrixXd out = MatrixXd::Zero(coordinates_, coordinates_);
     for (Index k = 0; k < n_links(); ++k)
         place[k] = joints_[k].freedom() > 0 ? columns[first_[k]].origin : links_[k].center(q);
@@ -158,7 +168,7 @@ MatrixXd SkeletonCoordinates::second_derivative(const VectorXd& q, const VectorX
             forces[k] += g;
             products[k] += (q.segment<3>(3 * node) - place[k]) * g.transpose();
         }
-        // No later link adds to this one.
+        // The sums of this link are complete: all links beyond it have later numbers and were added before.
         if (const Index parent = joint.parent; parent >= 0) {
             forces[parent] += forces[k];
             products[parent] += products[k] + (place[k] - place[parent]) * forces[k].transpose();
@@ -251,16 +261,15 @@ void SkeletonCoordinates::retract(VectorXd& q, const VectorXd& z) const {
     move_links(q, poses(q), z);
 }
 
-// The pose of a link is computed from corners l apart, with coordinates rounded relative to their distance |x| from the origin. Its rotation
-// has an error of about epsilon |x|/l, an eighth of it after averaging over four corners. The rotation of a joint transmits the error
-// to all links after it, by the length of their arms; the errors of several joints add up like random numbers.
+// The pose of a link is computed from corners with distances of about l, whose coordinates have round-off errors of epsilon |x|, |x| the
+// distance from the origin. So its rotation has an error of about epsilon |x|/l, of which the mean of four corners leaves an eighth
+// (rotation_round_off); computing the rotation adds epsilon. If a joint rotates by such an error, all links beyond it are displaced by the
+// error times their distance from the joint. The errors of several joints add up like independent random numbers, so their squares are added.
 VectorXd SkeletonCoordinates::rounding(const VectorXd& q) const {
     const std::vector<Pose> poses = this->poses(q);
-    struct Sums {  // of w^2, w^2 o and w^2 |o|^2 over the joints on the way, w the rounding of a turn about o
-        double
-            one = 0.0,
-            square =
-                0.0;  // of w^2, w^2 o and w^2 |o|^2 over the joints on the path, with w the error of a rotation about o
+    // Sums over the joints on the path from the root, with w the error of the rotation about o, over epsilon: w^2, w^2 |o|^2 and w^2 o.
+    struct Sums {
+        double one = 0.0, square = 0.0;
         Vec3 place = Vec3::Zero();
     };
     std::vector<Sums> all(n_links());
@@ -306,6 +315,8 @@ void SkeletonCoordinates::scatter_leading(const VectorXd& leading, VectorXd& row
         rows.segment<3>(3 * leading_[k]) = leading.segment<3>(3 * k);
 }
 
+// Fits each link to its own vertices, puts the links onto their joints, then fits all coordinates to the leading nodes by Gauss-Newton
+// iterations. The velocities are those of the coordinates z that fit the velocities of the leading nodes best.
 void SkeletonCoordinates::project_state(VectorXd& q, VectorXd* v) const {
     const VectorXd given = leading(gather(q));
     move_links(q, first_fit(q), VectorXd::Zero(coordinates_));
@@ -323,7 +334,8 @@ void SkeletonCoordinates::project_state(VectorXd& q, VectorXd* v) const {
     scatter(b * solver_of(leading(b)).solve(leading(gather(*v))), *v);
 }
 
-// v = B z with z = B_l^+ v_l. If the pose changes by dz, B changes by products of d2x with dz.
+// With B_l and v_l the rows of the leading nodes, project_state() returns v = B z with z = B_l^+ v_l (pseudoinverse). B depends on the pose;
+// its derivative is d2x/dz2.
 void SkeletonCoordinates::project_state_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q,
                                             VectorXd& by_v, Gradient& out) const {
     const MatrixXd b = jacobian(q), led = leading(b);
@@ -341,7 +353,7 @@ void SkeletonCoordinates::project_state_vjp(const VectorXd& q, const VectorXd& v
         scatter(by_rates - given, apart);
         by_pose += second_derivative(q, apart).transpose() * rates;
     }
-    if (leading_.size() < nodes().size()) {  // otherwise the pose is the caller's own
+    if (leading_.size() < nodes().size()) {  // otherwise all nodes are given, and the gradient by them stays
         VectorXd given = nothing;
         scatter_leading(led * inverse.solve(by_pose), given);
         scatter(gather(by_q) - given, by_state);
@@ -352,7 +364,7 @@ void SkeletonCoordinates::project_state_vjp(const VectorXd& q, const VectorXd& v
 
 // Motors of joints: the distance of their coordinates from the targets, and the gradients by the targets.
 
-// Rotations take the shorter path.
+// A rotation takes the shorter way to its target, at most half a turn.
 VectorXd SkeletonCoordinates::motor_increment(const VectorXd& q) const {
     if (motors_.empty()) return {};
     const std::vector<Pose> poses = this->poses(q);
@@ -438,18 +450,18 @@ VectorXd SkeletonCoordinates::motor_force_change(const VectorXd& q, const Vector
     return change;
 }
 
-// Gradients by the origins and axes of joints. The links keep their rest positions if a joint is moved or its axis is rotated, but at given
-// joint coordinates all links beyond the joint are displaced. With the rotations R of the parent link p and the child link k, their
-// angular velocities w along z, and the current position o of the joint:
+// Gradients by the origins and axes of joints. A change of an origin or axis leaves the reference positions of the links as they are; at given
+// joint coordinates it displaces all links beyond the joint. With the rotations R of the parent link p and the child link k, their
+// angular velocities w in the motion B z, the joint's coordinate s and its rate s', and the current position o of the joint:
 //
 //   origin, rotation            dx/do = R_p - R_k,      d(B z)/do = [w_p]x R_p - [w_k]x R_k;         for a translation they cancel
 //   axis, translation by s      dx = s R_p da,          d(B z) = s w_p x R_p da + s' R_p da
 //   axis, rotation by s         dx = u x (x - o),       d(B z) = u' x (x - o) + u x (B z - B z at o)
 //                               u = R_p (sin s da + (1 - cos s) a x da),   u' = w_p x u + s' R_p (cos s da + sin s a x da)
 //
-// Axes are unit vectors, so da is perpendicular to a. The columns of ball joints beyond keep to the world axes, which subtracts a moment that is
-// zero where B^T g is zero. Springs and dampers in a joint depend on its axis, too, but with u, and with s and its rate fixed, the joint coordinate
-// and its rate do not change.
+// Axes are unit vectors, so da is perpendicular to a. The columns of ball joints beyond the joint are rotations about the world axes and do
+// not rotate with u; this subtracts the moment of ball_moments(). Springs and dampers in the joint contribute nothing: they depend on s and s',
+// which are fixed here.
 
 bool SkeletonCoordinates::has_joint_parameters() const {
     return std::ranges::any_of(slices_, [](const ParameterSlices& slices) {

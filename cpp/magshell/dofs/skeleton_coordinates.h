@@ -1,13 +1,20 @@
 // Reduced coordinates of rigid links in a tree of joints.                                    [Qiao21] 4, Algorithm 2
 //
-// A column of B is the motion of the nodes of a joint's link, and of all links after it, along one coordinate: a rotation
-// about an axis w through o, or a translation along w,
+// Each joint connects a link to its parent and has one to six coordinates, or none if it is fixed. A coordinate moves the nodes of its link
+// and of all links further from the root: it rotates them about an axis w through o, or translates them along w. This motion is a column of
+// B = dx/dz:
 //
-//   dx/dz_b = w_b x (x - o_b) / l   or   w_b,      d2x/dz_a dz_b = w_a x dx/dz_b / l_a   (a rotates and precedes b),  0 (a translates)
+//   rotation:        dx/dz_b = w_b x (x - o_b) / l_b            translation:     dx/dz_b = w_b
 //
-// and for two rotations of one joint the symmetric half of this. l, the length of the link, makes all coordinates lengths. The links
-// are placed from their joint coordinates from the root down, so that no round-off accumulates at the joints. A single rigid body is a
-// skeleton of one link with a free joint.
+// l_b, the length of the link (rigid_nodes.h), makes all coordinates lengths. The second derivatives, for a coordinate a that belongs to an
+// earlier joint on the path from the root than b, are
+//
+//   a rotates:       d2x/dz_a dz_b = w_a x dx/dz_b / l_a        a translates:    d2x/dz_a dz_b = 0
+//
+// For two rotations of one joint (ball or free) it is the part of this that is symmetric in a and b.
+//
+// The pose of each link is computed from its joint coordinates and the pose of its parent, from the root on, so that no round-off accumulates
+// at the joints. A single rigid body is a skeleton of one link with a free joint.
 #pragma once
 
 #include "magshell/body/joint.h"
@@ -47,58 +54,68 @@ class SkeletonCoordinates final : public ReducedCoordinates {
 
   private:
     using Pose = RigidNodes::Pose;
+    /// A column of B: a rotation about an axis, or a translation along it.
     struct Column {
-        bool turns;
-        Vec3 axis;
-        Vec3 origin;   // of a rotation
-        double scale;  // radians, or meters, per unit of the coordinate
+        bool turns;    // whether it is a rotation
+        Vec3 axis;     // w, a unit vector
+        Vec3 origin;   // o, a point on the axis of a rotation [m]
+        double scale;  // angle or displacement per unit of the coordinate: 1/l [rad/m] or 1
     };
 
     Index n_links() const { return static_cast<Index>(links_.size()); }
     std::vector<Pose> poses(const VectorXd& q) const;
     /// Returns the columns of all coordinates, joint by joint.
     std::vector<Column> columns(const std::vector<Pose>& poses) const;
-    /// Returns the current position of a joint's origin; and the rotation of a link's parent.
+    /// Returns the current position of the origin of a link's joint [m], as a point of the parent.
     Vec3 joint_position(Index link, const std::vector<Pose>& poses) const;
+    /// Returns the current rotation of a link's parent; the identity for a root.
     Mat3 frame(Index link, const std::vector<Pose>& poses) const;
-    /// Returns the angle [rad] or displacement [m] of a joint with an axis.
+    /// Returns the angle [rad] of a revolute joint, or the displacement [m] of a prismatic one.
     double coordinate(Index link, const std::vector<Pose>& poses) const;
-    /// Returns the pose of a link whose parent was moved already, after its own coordinates change by z.
+    /// Returns the pose of a link after the coordinates of its joint change by z. from: poses before; to: poses after, already set for the
+    /// parent.
     Pose moved_pose(Index link, const std::vector<Pose>& from, const std::vector<Pose>& to,
                     const double* z) const;
-    /// Sums of forces over the links beyond a joint, for joint_parameters_vjp: by_state and gradient, and their moments.
+    /// Sums over the nodes of a link and of all links beyond it, for joint_parameters_vjp. c is the center of the link, and v its velocity in
+    /// the motion B z.
     struct Beyond {
-        Vec3 slide = Vec3::Zero(), force = Vec3::Zero();  // sums of by_state and of gradient
-        Vec3 twist = Vec3::Zero(),
-             moment = Vec3::Zero();  // (x - c) x by_state + B z x gradient, and (x - c) x gradient
-        Vec3 center, velocity;       // c, the point of the moments, and its velocity
-        Vec3 rate = Vec3::Zero();    // angular velocity of the link along B z
+        Vec3 slide = Vec3::Zero(), force = Vec3::Zero();  // sum by_state; sum gradient
+        // sum (x - c) x by_state + (B z - v) x gradient, minus the moments of ball joints (ball_moments)
+        Vec3 twist = Vec3::Zero();
+        Vec3 moment = Vec3::Zero();  // sum (x - c) x gradient
+        Vec3 center, velocity;       // c and v
+        Vec3 rate = Vec3::Zero();    // angular velocity of the link in the motion B z
 
+        /// Adds the sums of a later link, converted to c and v of this one.
         void add(const Beyond& later);
     };
+    /// Returns these sums for every link.
     std::vector<Beyond> beyond(const VectorXd& q, const VectorXd& by_state, const VectorXd& z,
                                const VectorXd& gradient, const std::vector<Pose>& poses,
                                const std::vector<Column>& columns) const;
+    /// Returns the gradient by the axis of a link's joint. of: sums of the link; parent_rate: angular velocity of its parent.
     Vec3 axis_gradient(Index link, const Beyond& of, const Vec3& parent_rate, const VectorXd& z,
                        const std::vector<Pose>& poses, const std::vector<Column>& columns) const;
-    /// Returns for each ball joint, by link, the moment that is subtracted from the derivative of sum g . B z because its columns do not rotate with
-    /// the links before it. Zero if the joint is free and B^T g is zero.
+    /// Returns a moment for each link, zero unless its joint is a ball joint. The columns of a ball joint are rotations about the world axes,
+    /// also if earlier links rotate; so the derivative of sum g . B z by a rotation of an earlier link is smaller by this moment than if
+    /// the columns rotated with that link. The moment is zero where B^T g is zero, as at an equilibrium without a motor in the joint.
     std::vector<Vec3> ball_moments(const VectorXd& q, const VectorXd& gradient, const VectorXd& z,
                                    const std::vector<Column>& columns) const;
-    /// Returns sum_i g_i d2x_i/dz2 without symmetrization: the columns of rotations of one joint do not rotate with it.
+    /// Returns sum_i g_i d2x_i/dz2 before the blocks of rotations of one joint are symmetrized.
     Eigen::MatrixXd second_derivative(const VectorXd& q, const VectorXd& gradient) const;
+    /// Moves all links along z, counted from the poses `from`, and sets the positions of their nodes in q.
     void move_links(VectorXd& q, std::vector<Pose> from, const VectorXd& z) const;
-    /// Returns poses that fit the vertices approximately, each link by itself.
+    /// Returns the pose of each link that fits its own vertices best, regardless of the joints; without vertices, its pose at q.
     std::vector<Pose> first_fit(const VectorXd& q) const;
-    /// Select the rows of B that a start prescribes: of vertices, or of all nodes if there are none; and put them back.
+    /// Returns the rows of the nodes that determine a start (leading_).
     Eigen::MatrixXd leading(const Eigen::MatrixXd& rows) const;
+    /// Writes these rows back into a vector with the rows of all nodes.
     void scatter_leading(const Eigen::VectorXd& leading, Eigen::VectorXd& rows) const;
 
     std::vector<RigidNodes> links_;
     std::vector<Joint> joints_;
-    std::vector<Index> first_, row_;  // per link: first coordinate of its joint; its first node among all
-    std::vector<Index>
-        column_of_;  // per coordinate, joint by joint: its column of B; those of motors come last
+    std::vector<Index> first_, row_;  // per link: first coordinate of its joint; its first node in nodes()
+    std::vector<Index> column_of_;    // per coordinate, joint by joint: its column of B; motors come last
     struct Motor {
         Index link;
         ParameterSlice slice;
@@ -108,8 +125,10 @@ class SkeletonCoordinates final : public ReducedCoordinates {
     std::vector<Motor> motors_;
     Index n_motor_coordinates_ = 0;
     std::vector<ParameterSlices> slices_;  // per joint
-    std::vector<Index> leading_;           // the nodes that a start prescribes
-    Index coordinates_ = 0;
+    // Nodes from which project_state() takes a start: all vertices of shells and solids, or, if there are none, the ten points with mass of
+    // each link.
+    std::vector<Index> leading_;
+    Index coordinates_ = 0;  // of all joints, those of motors included
     std::shared_ptr<const LinkPaths> paths_;
 };
 

@@ -20,9 +20,8 @@ namespace magshell {
 
 struct PathOptions {
     NewtonOptions newton;
-    double first_step = 0.05;  // [-] change of the path parameter in the first step
-    double largest_step =
-        0.02;  // [-] largest arc length of a step: about its rms displacement over the extent
+    double first_step = 0.05;    // [-] change of the path parameter in the first step
+    double largest_step = 0.02;  // [-] largest arc length: about the rms displacement over the extent
     int max_points = 1000;
     double lowest_parameter = -1e300, highest_parameter = 1.0;  // [-] the path ends at either
     bool locate_critical = true;  // whether to compute the critical points between path points
