@@ -8,11 +8,12 @@
 namespace magshell {
 namespace {
 
-// Returns the number of elements of a block, a multiple of the SIMD width. 512 faces have about 600 kB of Hessian, slots and element
-// data; a small body gets at least a few blocks of each colour. Tetrahedra of four nodes take a quarter of the memory of a
-// face and share more nodes with neighbouring blocks, so their blocks are longer if there are enough elements.
+// Returns the number of elements per block of a body, a multiple of the SIMD width. The longest block of a shell, 512 faces, has about 600 kB of
+// Hessian, slots and element data. A smaller body gets shorter blocks, so that there are several of each colour. A four-node tetrahedron
+// takes a quarter of the memory of a face, and its blocks share more nodes with each other, so they are longer if there are enough elements.
 Index part_length(const Body& of) {
-    // Elements per block, and blocks per body; only speed depends on them. See test_any_number_of_threads_gives_the_same_bits_on_a_large_sheet.
+    // Elements per block (shortest, longest, longest_of_four), and blocks per body (element_blocks, blocks_of_four); "four": of four-node
+    // tetrahedra. Only speed depends on them. See test_any_number_of_threads_gives_the_same_bits_on_a_large_sheet.
     constexpr Index shortest = 128, longest = 512, element_blocks = 8, longest_of_four = 2048,
                     blocks_of_four = 32;
     const Index elements = of.n_elements();
@@ -22,7 +23,7 @@ Index part_length(const Body& of) {
     return length / SimdDouble::width * SimdDouble::width;
 }
 
-// Finds which blocks share nodes.
+// The neighbours of each block: the blocks that share a node with it.
 class Neighbours {
   public:
     Neighbours(Index nodes, const std::vector<const Body*>& bodies,
@@ -38,7 +39,7 @@ class Neighbours {
                     }
     }
 
-    /// Returns the colour of each block: the first that no neighbour has had before (greedy colouring).
+    /// Returns the colour of each block: the smallest number that no neighbour coloured before it has (greedy colouring).
     std::vector<Index> colours() const {
         std::vector<Index> colour_of(nodes_in_.size(), -1);
         Index count = 0;
@@ -53,7 +54,7 @@ class Neighbours {
         return colour_of;
     }
 
-    /// Returns the blocks by number, but each after its neighbours of earlier colours.
+    /// Returns the blocks by number, except that the neighbours of a block with earlier colours come before it.
     std::vector<Index> order(const std::vector<Index>& colour_of) const {
         std::vector<Index> order;
         std::vector<bool> taken(nodes_in_.size(), false);
@@ -77,10 +78,12 @@ class Neighbours {
             for (const Index other : element_blocks_at_[node]) visit(other);
     }
 
+    // The blocks of each node, and the nodes of each block.
     std::vector<std::vector<Index>> element_blocks_at_, nodes_in_;
 };
 
-// Cuts an order into segments, and each segment into its colours. A segment holds enough blocks of a colour for several threads.
+// Cuts an order of blocks into segments, and each segment into one round per colour. A segment is so long that several threads have blocks of
+// each colour to process.
 std::vector<std::vector<Index>> rounds(const std::vector<Index>& order, const std::vector<Index>& colour_of) {
     constexpr std::size_t stretch =
         32;  // blocks per segment; see test_results_have_the_same_bits_with_more_threads_than_processors

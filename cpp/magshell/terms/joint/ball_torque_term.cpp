@@ -14,7 +14,7 @@ BallTorqueTerm::BallTorqueTerm(const std::vector<Input>& joints, const std::vect
             std::copy_n(corners, 4, side.corners.begin());
             side.sign = corners == input.child ? 1.0 : -1.0;
             side.slice = slice;
-            double squares = 0.0;  // sum over six edges, 8 l^2 each
+            double squares = 0.0;  // sum of the squares of the six edges, 8 l^2 each
             for (int i = 0; i < 4; ++i)
                 for (int j = 0; j < i; ++j) squares += (rest[corners[i]] - rest[corners[j]]).squaredNorm();
             side.share = 6.0 / squares;
@@ -48,6 +48,7 @@ void BallTorqueTerm::evaluate(const double* q, const LoadParameters&, Residual& 
     }
 }
 
+// Adds d(-f_i)/dx_j = -[m]x (delta_ij - 1/4) / (8 l^2), because x_i - c depends on all four corners.
 void BallTorqueTerm::add_nonsymmetric_tangent(const double*, const LoadParameters&,
                                               NonsymmetricTangent& out) const {
     for (const Side& side : sides_)

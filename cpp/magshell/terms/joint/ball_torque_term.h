@@ -1,9 +1,12 @@
-// BallTorqueTerm: moments in ball joints about axes fixed in the world, m on the child link and -m on the
-// parent. Such a moment has no potential, so its tangent has a nonsymmetric part.
+// BallTorqueTerm: prescribed moments in ball joints, m on the child link and -m on the parent. m is given in world axes and does not rotate
+// with the links. Such a moment has no potential, so its tangent has a nonsymmetric part.
 //
-//   f_k = m x (x_k - c)/(8 l^2)      force on corner k of a link's tetrahedron, as sum rho rho^T = 4 l^2 I
+// It acts as forces on the four corners of the tetrahedron that represents a link (dofs/rigid_nodes.h):
 //
-// c is the mean of the four corners and l a length of the tetrahedron (edges sqrt(8) l).
+//   f_k = m x (x_k - c) / (8 l^2)
+//
+// c is the mean of the corners, and l the length of the link, sqrt(8) l an edge. As sum_k (x_k - c) (x_k - c)^T = 4 l^2 I, these forces
+// have no resultant, and their moment is m.
 #pragma once
 
 #include <array>
@@ -18,8 +21,8 @@ class BallTorqueTerm final : public Term {
   public:
     struct Input {
         std::string owner;
-        const Index* parent;  // four corners; nullptr for the world
-        const Index* child;
+        const Index* parent;  // the four corners of the link; nullptr for the world
+        const Index* child;   // the four corners of the link
     };
 
     BallTorqueTerm(const std::vector<Input>& joints, const std::vector<Vec3>& rest, Registry& registry);
@@ -38,10 +41,12 @@ class BallTorqueTerm final : public Term {
   private:
     struct Side {  // one of the two links of a joint
         std::array<Index, 4> corners;
-        double sign, share;  // share: 1/(8 l^2)
+        double sign;   // 1 for the child, -1 for the parent
+        double share;  // 1/(8 l^2) [1/m2]
         ParameterSlice slice;
-        Vec3 moment = Vec3::Zero();
+        Vec3 moment = Vec3::Zero();  // sign m / (8 l^2) [N/m]
 
+        /// Returns x_k - c at q.
         std::array<Vec3, 4> arms(const double* q) const;
     };
     std::vector<Side> sides_;

@@ -8,7 +8,8 @@
 namespace magshell {
 namespace {
 
-// Each couple fills a whole SIMD vector: there are few of them, so the other lanes are not used for more.
+// Returns the positions of the nodes of a couple at q, zero for absent nodes. All lanes of the SIMD vectors hold the same couple, and only lane 0
+// of results is read: there are too few couples to compute several at once.
 EdgeMomentTerm::Nine places(const EdgeMomentTerm::EdgeMoment& couple, const double* q) {
     EdgeMomentTerm::Nine x{};
     for (int k = 0; k < 9; ++k)
@@ -18,10 +19,12 @@ EdgeMomentTerm::Nine places(const EdgeMomentTerm::EdgeMoment& couple, const doub
     return x;
 }
 
+// The angle between the face and the fixed direction, on an edge of a linear triangle.
 DihedralAngle flat_fold(const EdgeMomentTerm::Nine& x) {
     return DihedralAngle(x[0], x[1], x[2], x[3], SimdDouble(0.0));
 }
 
+// The same angle at a Gauss point of an edge of a quadratic triangle.
 DihedralAngleSix curved_fold(const EdgeMomentTerm::Nine& x, int point) {
     return DihedralAngleSix(x.data(), SimdDouble(0.0), point);
 }
@@ -52,7 +55,7 @@ EdgeMomentTerm::EdgeMomentTerm(const Nodes& nodes, const SystemMatrix& matrix,
       unwrapped_angles_(couples_.size(), 0.0) {
     for (const EdgeMoment& couple : couples_) {
         PairSlots<9>& slices = slots_.emplace_back(pair_slots<9>(matrix, couple.nodes));
-        // The second derivative has no block between the face's own nodes and the direction.
+        // The second derivative of the angle has no block between the fixed direction and the nodes of the face that are not on the edge.
         const int direction = couple.point < 0 ? 3 : 6;
         for (int own = couple.point < 0 ? 2 : 3; own < direction; ++own)
             slices[lower_index(direction - 1, own)] = -1;

@@ -1,10 +1,13 @@
-// EdgeMomentTerm: couples on free boundary edges of a shell, each rotating the edge's director about the edge.
+// EdgeMomentTerm: couples C [N m] on free boundary edges of a shell. Each rotates the director of its edge about the edge.
 //
 //   E = - factor C psi,   psi = theta_d - theta~_d - s phi                          [J]
 //
-// theta_d is the angle between the adjacent face and a fixed direction; the director is at the angle s phi to
-// that face. The couple follows the edge: its axis is the current edge, with the shell to the left. On an edge
-// of a quadratic triangle it acts at the two Gauss points, where both the angle and phi are known.
+// psi is the rotation of the director from the reference configuration. theta_d is the angle between the adjacent face and a fixed direction,
+// theta~_d that angle in the reference configuration, and s phi the angle between the director and the face: phi is the rotation dof of the
+// edge, s = 1 or -1 its sign. Without directors psi is the rotation of the face. factor is the load factor.
+//
+// The axis of the couple is the current edge, directed so that the shell is on its left. On an edge of a quadratic triangle the couple is
+// divided between the two Gauss points of the edge.
 #pragma once
 
 #include "magshell/assembly/lanes.h"
@@ -16,25 +19,25 @@ namespace magshell {
 class EdgeMomentTerm final : public Term {
   public:
     struct EdgeMoment {
-        // The nodes from and to of the edge, the third corner of the face, and the fixed direction; or the
-        // nodes of strain/dihedral_angle_six.h. Unused entries are -1.
+        // On a linear triangle: start and end of the edge, the third corner of the face, and the fixed direction. On a
+        // quadratic triangle: the nodes of strain/dihedral_angle_six.h. Unused entries are -1.
         std::array<Index, 9> nodes;
-        int point;  // Gauss point, 0 or 1; -1 on a linear triangle
-        double rest_angle;
-        Index rotation;  // -1 without directors
-        double rotation_sign;
-        Index row;            // index of the couple in the caller's array
-        double share = 1.0;   // fraction of that couple
-        double couple = 0.0;  // the fraction's couple [N m]
+        int point;             // Gauss point, 0 or 1; -1 on a linear triangle
+        double rest_angle;     // theta~_d [rad]
+        Index rotation;        // scalar dof of phi; -1 without directors
+        double rotation_sign;  // s
+        Index row;             // index of the caller's couple
+        double share = 1.0;    // fraction of the caller's couple that acts here
+        double couple = 0.0;   // C [N m], that fraction
     };
     using Nine = std::array<SimdVec3, 9>;
 
-    /// angle() returns the angle [rad] between the face and the direction at q; gradient() its derivatives by
-    /// the nodes.
+    /// Returns theta_d at q [rad], between -pi and pi.
     static double angle(const EdgeMoment& couple, const double* q);
+    /// Returns the derivatives of theta_d by the nodes, in lane 0.
     static Nine gradient(const EdgeMoment& couple, const double* q);
 
-    /// Creates the term; rows is the number of couples, each on one edge.
+    /// Creates the term. rows: number of couples of the caller; `couples` has one entry for each, or two on quadratic triangles.
     EdgeMomentTerm(const Nodes& nodes, const SystemMatrix& matrix, std::vector<EdgeMoment> couples,
                    Index rows, Registry& registry);
 
@@ -53,14 +56,15 @@ class EdgeMomentTerm final : public Term {
     std::size_t bytes() const override { return bytes_of(couples_) + bytes_of(slots_); }
 
   private:
+    /// Returns theta_d - theta~_d of the k-th entry, with as many full turns as make it nearest to its value at the last evaluated state.
     double unwrapped_angle(const double* q, std::size_t k) const;
 
     const Index first_scalar_;
     ParameterSlice slice_, factor_;
     std::vector<EdgeMoment> couples_;
     std::vector<PairSlots<9>> slots_;
-    std::vector<double>
-        unwrapped_angles_;  // unwrapped angles: each is taken on the branch nearest to the last evaluated one
+    // theta_d - theta~_d of each entry at the last evaluated state, full turns included.
+    std::vector<double> unwrapped_angles_;
 };
 
 }  // namespace magshell

@@ -23,7 +23,7 @@ MembraneTerm::MembraneTerm(const Surface& surface, Index body, const MembraneFac
         }
 }
 
-// Returns the natural configuration of a face. A face that combines parts of two faces takes their mean growth.
+// Returns the natural configuration of a triangle, with the mean growth of the faces that it consists of.
 GrownFace MembraneTerm::grown(Index face) const {
     Mat3 growth = Mat3::Zero();
     for (const MembraneFaces::FacePart& share : faces_.parts(face))
@@ -31,6 +31,7 @@ GrownFace MembraneTerm::grown(Index face) const {
     return {faces_.rest_corners(face), growth, Mat3::Zero()};
 }
 
+// Returns the triangle in its natural configuration, which is the reference configuration if nothing grows.
 RestFace MembraneTerm::rest_face(Index face) const {
     if (growth_.any()) return grown(face).face();
     const std::array<Vec3, 3> corners = faces_.rest_corners(face);
@@ -56,8 +57,9 @@ bool MembraneTerm::set_values(const Values& values) {
     return true;
 }
 
-// Adds A h w g_k . g_l, with the plane-stress wave modulus w = E/(1 - nu^2). With e_k the edge opposite node k,
-// g_k . g_l = e_k . e_l / 4 A^2.
+// Adds the blocks A h w g_k . g_l of the constant matrix of Projective Dynamics: A is the area, h the thickness, w = E/(1 - nu^2) the
+// plane-stress modulus of uniaxial strain, and g_k the gradient of the shape function of node k. With e_k the edge opposite node k,
+// g_k . g_l = e_k . e_l / (4 A^2).
 bool MembraneTerm::add_projective_stiffness(NodeMatrix& out) const {
     for (Index f = 0; f < surface_.n_faces(); ++f) {
         double modulus = 0.0;
@@ -129,8 +131,8 @@ void MembraneTerm::rate(Index group, const double* p, SimdDouble d[3]) const {
 }
 
 void MembraneTerm::vjp(const double* q, const LoadParameters&, const double* lambda, Gradient& out) {
-    // Work of each part of a face, and its derivative by the Poisson ratio. A part may belong to a face of
-    // another block.
+    // For both parts of each triangle: lambda . g, and its derivative by the Poisson ratio. They are stored first and added below, outside the
+    // parallel loop, because a part may belong to a face that another thread processes.
     using OfShares = std::array<Eigen::Vector2d, 2>;
     std::vector<OfShares> by_shares(surface_.n_faces(),
                                     OfShares{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()});
@@ -157,6 +159,7 @@ void MembraneTerm::vjp(const double* q, const LoadParameters&, const double* lam
         for (int k = 0; k < 2; ++k)
             materials_.add_vjp(faces_.parts(f)[k].face, 1, by_shares[f][k][0], by_shares[f][k][1], out);
     if (!growth_.any()) return;
+    // lambda . g by growth: of the reference lengths in the strains, and of the stiffness.
     std::vector<Mat3> by_faces(surface_.n_faces());
     each_group([&](Index group) {
         SimdDouble strains[3], rates[3], stresses[3];
@@ -205,8 +208,9 @@ void MembraneTerm::add_forces(const Strains& stresses, Residual& out) {
     });
 }
 
-// Bounds round-off: |a|^2 has its own, and that of the positions whose difference a is. Far from the origin, or
-// in slender faces, the latter is larger.
+// Adds a bound of the forces that cancel in the strains |a|^2 - |a~|^2. |a|^2 has two round-off errors: that of the square, proportional to
+// |a|^2, and that of the positions whose difference is a, proportional to |a| times their coordinates. The second one is larger
+// far from the origin and in slender faces.
 void MembraneTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
     for (Index f = 0; f < surface_.n_faces(); ++f) {
         const Membrane::Element& element = elements_[f / SimdDouble::width];

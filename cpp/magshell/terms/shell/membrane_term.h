@@ -1,4 +1,8 @@
-// MembraneTerm: the membrane energy of a shell of linear triangles, energy/membrane.h on every face.
+// MembraneTerm: the membrane energy of a shell of linear triangles; energy/membrane.h has the formula for one triangle.
+//
+// A "face" below is a triangle of body/membrane_faces.h. Most of these are faces of the shell. Where an obtuse face was cut along the other
+// diagonal together with its neighbour, a triangle consists of parts of two faces and has the mean of their materials and growth,
+// weighted by the fractions of its parts.
 #pragma once
 
 #include "magshell/assembly/element_loop.h"
@@ -13,7 +17,7 @@ namespace magshell {
 
 class MembraneTerm final : public StrainScaffold<MembraneTerm> {
   public:
-    /// Creates the term. `loop` iterates over the corners of `faces`.
+    /// Creates the term. `loop` must iterate over the corners of `faces`.
     MembraneTerm(const Surface& surface, Index body, const MembraneFaces& faces, const FaceLoop& loop,
                  const GrowthForm& growth, const Nodes& nodes, Registry& registry);
 
