@@ -316,5 +316,5 @@ def test_a_selection_of_nothing_says_what_is_there(select, message):
 def test_a_part_inside_has_no_faces():
     mesh = ms.meshes.box((3.0, 3.0, 3.0), cells=(3, 3, 3))
     middle = (abs(mesh.tetrahedron_barycenters - 1.5) < 0.5).all(axis=1)
-    with pytest.raises(ValueError, match="part 1 lies inside"):
+    with pytest.raises(ValueError, match="part 1 has no faces"):
         mesh.with_parts(middle).faces_in(1)

@@ -1,4 +1,4 @@
-"""Welding of meshes: merges the vertices of different meshes that coincide."""
+"""Welding of meshes into one: vertices of different meshes that coincide become one vertex."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def weld_tolerance(meshes: Sequence[MeshBase], tolerance: float | None) -> float:
-    """Return the tolerance, m; None stands for 1e-6 of the bounding-box diagonal of the largest mesh.
+    """Return the distance below which vertices coincide, m; by default 1e-6 of the largest bounding-box diagonal.
 
     Raises ValueError if it is not below half the length of the shortest edge.
     """
@@ -41,7 +41,8 @@ def weld_tolerance(meshes: Sequence[MeshBase], tolerance: float | None) -> float
 class TetWeld(NamedTuple):
     """A welded tetrahedral mesh, and the maps from the given meshes to it.
 
-    vertex_maps[k][i] is the number in `mesh` of vertex i of mesh k; tetrahedron_maps are built alike.
+    vertex_maps[k][i] is the vertex of `mesh` that vertex i of the k-th given mesh has become; tetrahedron_maps[k][i] is the
+    tetrahedron of `mesh` that its tetrahedron i has become.
     """
 
     mesh: TetMesh
@@ -50,23 +51,22 @@ class TetWeld(NamedTuple):
 
 
 def weld_solids(meshes: tuple[TetMesh, ...], tolerance: float | None) -> TetWeld:
-    """Weld tetrahedral meshes, as `weld` describes.
-
-    Parts keep their numbers. Raises ValueError if two meshes use one part name for different numbers.
-    """
+    """Weld tetrahedral meshes; see `weld`."""
     for k, mesh in enumerate(meshes):
         if not isinstance(mesh, TetMesh):
             raise ValueError(f"mesh {k} must be a TetMesh as the others, got {type(mesh).__name__}")
         if mesh.order != meshes[0].order:
-            raise ValueError(f"meshes 0 and {k} have tetrahedra of {_nodes(meshes[0])} and of {_nodes(mesh)}")
+            raise ValueError(
+                f"meshes 0 and {k} have tetrahedra of {_describe_nodes(meshes[0])} and of {_describe_nodes(mesh)}"
+            )
     tolerance = weld_tolerance(meshes, tolerance)
     offsets = np.cumsum([0, *(mesh.n_vertices for mesh in meshes)])
     positions = np.concatenate([mesh.rest_positions for mesh in meshes])
     owner = np.repeat(np.arange(len(meshes)), np.diff(offsets))
-    skins = np.concatenate(
+    surface = np.concatenate(
         [mesh.surface_vertices + start for mesh, start in zip(meshes, offsets, strict=False)]
     )
-    pairs = skins[scipy.spatial.cKDTree(positions[skins]).query_pairs(tolerance, output_type="ndarray")]
+    pairs = surface[scipy.spatial.cKDTree(positions[surface]).query_pairs(tolerance, output_type="ndarray")]
     pairs = pairs[owner[pairs[:, 0]] != owner[pairs[:, 1]]]
     group = groups(len(positions), pairs)
     first = np.unique(group, return_index=True)[1]
@@ -75,7 +75,7 @@ def weld_solids(meshes: tuple[TetMesh, ...], tolerance: float | None) -> TetWeld
     number[kept] = np.arange(len(kept))
     number = number[first[group]]
 
-    names = _names(meshes)
+    names = _merged_part_names(meshes)
     joined = TetMesh(
         positions[kept],
         np.concatenate(
@@ -85,16 +85,18 @@ def weld_solids(meshes: tuple[TetMesh, ...], tolerance: float | None) -> TetWeld
         names,
     )
     maps = tuple(np.split(number, offsets[1:-1]))
-    _check_joined(meshes, joined, maps, tolerance)
+    _check_solids_connected(meshes, joined, maps, tolerance)
     ends = np.cumsum([0, *(mesh.n_tetrahedra for mesh in meshes)])
     return TetWeld(joined, maps, tuple(np.arange(a, b) for a, b in pairwise(ends)))
 
 
-def _nodes(mesh: TetMesh) -> str:
+def _describe_nodes(mesh: TetMesh) -> str:
+    """Return how many nodes the tetrahedra have, for error messages."""
     return "four nodes" if mesh.order == 1 else "ten nodes"
 
 
-def _names(meshes) -> dict[str, int]:
+def _merged_part_names(meshes) -> dict[str, int]:
+    """Return the part names of all meshes. Raises ValueError if one name has different numbers in two meshes."""
     names: dict[str, int] = {}
     for k, mesh in enumerate(meshes):
         for name, number in mesh.part_names.items():
@@ -106,8 +108,13 @@ def _names(meshes) -> dict[str, int]:
     return names
 
 
-def _check_joined(meshes, joined: TetMesh, maps, tolerance: float) -> None:
-    """Check that the meshes are connected to each other through shared faces, without a crack between them."""
+def _check_solids_connected(meshes, joined: TetMesh, maps, tolerance: float) -> None:
+    """Check that shared faces connect all meshes, without a crack between them. Raises ValueError.
+
+    A mesh may have several components. They count as connected to each other, because they belong to one mesh.
+    """
+    # A graph with a node for each component of each mesh, then one for each component of the welded mesh. Two nodes are
+    # connected if they have a vertex in common, or if they are components of one given mesh.
     first = np.concatenate([[0], np.cumsum([mesh.n_components for mesh in meshes])])
     pairs = []
     for k, mesh in enumerate(meshes):
@@ -120,14 +127,17 @@ def _check_joined(meshes, joined: TetMesh, maps, tolerance: float) -> None:
     apart = np.flatnonzero(group != group[0])
     if len(apart):
         raise ValueError(
-            f"mesh {apart[0]} shares no face with mesh 0 or what is joined to it (tolerance {tolerance:.3g} m). Move them "
-            "together, and divide the faces between them alike in both"
+            f"mesh {apart[0]} shares no face with mesh 0 or a mesh welded to it (tolerance {tolerance:.3g} m). Move them "
+            "together, and give both the same triangles where they meet"
         )
-    _check_hanging(meshes, joined, maps, tolerance)
+    _check_no_hanging_in_faces(meshes, joined, maps, tolerance)
 
 
-def _check_hanging(meshes, joined: TetMesh, maps, tolerance: float) -> None:
-    """Raise ValueError if a vertex of one mesh lies within a face of another, which would leave a crack."""
+def _check_no_hanging_in_faces(meshes, joined: TetMesh, maps, tolerance: float) -> None:
+    """Raise ValueError for a hanging node: a vertex of one mesh within a face of another, which would leave a crack.
+
+    Only faces with a welded vertex are searched.
+    """
     from_mesh = np.full(joined.n_vertices, -1)
     shared = np.zeros(joined.n_vertices, dtype=bool)
     for k, mapped in enumerate(maps):
@@ -156,8 +166,8 @@ def _check_hanging(meshes, joined: TetMesh, maps, tolerance: float) -> None:
             k = from_mesh[vertices[within][0]]
             vertex = int(np.flatnonzero(maps[k] == vertices[within][0])[0])
             raise ValueError(
-                f"vertex {vertex} of mesh {k} lies on a face of mesh {owner[face]} and is no corner of it: divide the faces "
-                "between them alike in both, or the joined solid would have a crack there"
+                f"vertex {vertex} of mesh {k} lies on a face of mesh {owner[face]} and is no corner of it: give both meshes "
+                "the same triangles where they meet, or the welded solid would have a crack there"
             )
 
 
@@ -165,7 +175,8 @@ def _check_hanging(meshes, joined: TetMesh, maps, tolerance: float) -> None:
 class Weld(NamedTuple):
     """A welded triangle mesh, and the maps from the given meshes to it.
 
-    vertex_maps[k][i] is the number in `mesh` of vertex i of mesh k; face_maps are built alike.
+    vertex_maps[k][i] is the vertex of `mesh` that vertex i of the k-th given mesh has become; face_maps[k][i] is the face of
+    `mesh` that its face i has become.
     """
 
     mesh: TriangleMesh
@@ -174,22 +185,29 @@ class Weld(NamedTuple):
 
 
 def weld(*meshes: TriangleMesh | TetMesh, tolerance: float | None = None) -> Weld | TetWeld:
-    """Weld meshes along boundaries whose vertices coincide.
+    """Weld meshes into one along the edges or faces at which they meet.
 
-    Boundary vertices of different meshes within `tolerance` become one vertex, at the position of the first mesh.
-    Vertices of the same mesh are never merged, so its slits stay open.
+    Triangle meshes are welded along boundary edges: boundary vertices of different meshes within `tolerance` become one
+    vertex, at its position in the first of these meshes. Two vertices of the same mesh are never merged, so that its slits
+    stay open; if both sides of a slit would be welded to one vertex, ValueError is raised.
 
-    Tetrahedral meshes are welded at the vertices of their surfaces, where they share faces. They keep their `parts`, and the
-    result has `tetrahedron_maps` instead of `face_maps`.
+    Tetrahedral meshes are welded along faces of their surfaces, in the same way. But a slit closes if both of its sides are
+    welded to the same vertices. The tetrahedra keep the numbers and names of their `parts`.
 
     Args:
-        meshes: two or more; their normals must point to the same side along the seams.
+        meshes: two or more, all triangle meshes or all tetrahedral meshes of one order. Normals of triangle meshes must
+            point to the same side along the seams.
         tolerance: m; by default 1e-6 of the bounding-box diagonal of the largest mesh. It must be below half the length of
             the shortest edge.
 
+    Returns:
+        A Weld (triangles) or a TetWeld (tetrahedra): the welded `mesh`, `vertex_maps`, and `face_maps` or
+        `tetrahedron_maps`.
+
     Raises:
-        ValueError: if a mesh shares no edge with the others, if a shared boundary is divided differently, if two meshes have
-            opposite orientations, or if more than two faces would meet at an edge.
+        ValueError: if a mesh shares no edge (tetrahedra: no face) with the others, if a common boundary is divided
+            differently in two meshes, if two triangle meshes have opposite orientations, if more than two triangles would
+            meet at an edge, or if one part name has different numbers in two tetrahedral meshes.
 
     >>> import magshell as ms
     >>> left = ms.meshes.rectangle(1.0, 1.0, cells=(4, 4))
@@ -207,7 +225,7 @@ def weld(*meshes: TriangleMesh | TetMesh, tolerance: float | None = None) -> Wel
 
     maps = _vertex_maps(meshes, tolerance)
     _check_seams(meshes, maps, tolerance)
-    _check_hanging_vertices(meshes, maps, tolerance)
+    _check_no_hanging_in_edges(meshes, maps, tolerance)
     merged = np.concatenate(maps)
     first = np.unique(merged, return_index=True)[1]
     positions = np.concatenate([mesh.rest_positions for mesh in meshes])[first]
@@ -219,27 +237,31 @@ def weld(*meshes: TriangleMesh | TetMesh, tolerance: float | None = None) -> Wel
 
 
 def _vertex_maps(meshes, tolerance: float) -> list[np.ndarray]:
-    """Return for each mesh the merged vertex of each of its vertices, numbered in order of first appearance."""
-    part_of = np.concatenate([np.full(mesh.n_vertices, part) for part, mesh in enumerate(meshes)])
+    """Return for each mesh the numbers that its vertices have in the welded mesh, one array (n_v,) per mesh.
+
+    Merged vertices are numbered in the order in which they first occur in the meshes. Raises ValueError if no vertices
+    coincide, or if a slit would be closed.
+    """
+    mesh_of = np.concatenate([np.full(mesh.n_vertices, part) for part, mesh in enumerate(meshes)])
     offsets = np.concatenate([[0], np.cumsum([mesh.n_vertices for mesh in meshes])])
-    rims = np.concatenate([mesh.boundary_vertices + offsets[part] for part, mesh in enumerate(meshes)])
+    boundary = np.concatenate([mesh.boundary_vertices + offsets[part] for part, mesh in enumerate(meshes)])
     positions = np.concatenate([mesh.rest_positions for mesh in meshes])
 
-    pairs = rims[scipy.spatial.cKDTree(positions[rims]).query_pairs(tolerance, output_type="ndarray")]
-    pairs = pairs[part_of[pairs[:, 0]] != part_of[pairs[:, 1]]]
+    pairs = boundary[scipy.spatial.cKDTree(positions[boundary]).query_pairs(tolerance, output_type="ndarray")]
+    pairs = pairs[mesh_of[pairs[:, 0]] != mesh_of[pairs[:, 1]]]
     if len(pairs) == 0:
-        _refuse_apart(meshes, np.arange(len(meshes)), tolerance)
+        _raise_not_connected(meshes, np.arange(len(meshes)), tolerance)
     graph = scipy.sparse.coo_array(
-        (np.ones(len(pairs), dtype=bool), tuple(pairs.T)), shape=(len(part_of), len(part_of))
+        (np.ones(len(pairs), dtype=bool), tuple(pairs.T)), shape=(len(mesh_of), len(mesh_of))
     )
     cluster = scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
 
-    # two vertices of one part in a cluster: a slit's two sides against one vertex of another part
-    owner = np.stack([cluster, part_of], axis=1)
+    # Two vertices of one mesh in a cluster are both sides of a slit at one vertex of another mesh.
+    owner = np.stack([cluster, mesh_of], axis=1)
     _, which, counts = np.unique(owner, axis=0, return_inverse=True, return_counts=True)
     doubled = np.flatnonzero(counts[which.ravel()] > 1)
     if len(doubled):
-        part = part_of[doubled[0]]
+        part = mesh_of[doubled[0]]
         vertices = doubled[(owner[doubled] == owner[doubled[0]]).all(axis=1)] - offsets[part]
         raise ValueError(
             f"vertices {vertices[0]} and {vertices[1]} of mesh {part} both coincide with a vertex of another "
@@ -253,9 +275,9 @@ def _vertex_maps(meshes, tolerance: float) -> list[np.ndarray]:
 
 
 def _check_seams(meshes, maps: list[np.ndarray], tolerance: float) -> None:
-    """Check the seams: at most two faces at an edge, equal orientations, and no mesh unconnected.
+    """Check that at most two faces meet at an edge, that orientations agree, and that all meshes are connected.
 
-    TriangleMesh refuses the first two cases as well, but its message could not name the meshes.
+    TriangleMesh would raise ValueError for the first two as well, but its message could not name the meshes.
     """
     starts, ends, parts = [], [], []
     for number, (mesh, mapped) in enumerate(zip(meshes, maps, strict=True)):
@@ -291,11 +313,11 @@ def _check_seams(meshes, maps: list[np.ndarray], tolerance: float) -> None:
     )
     n_groups, group = scipy.sparse.csgraph.connected_components(graph, directed=False)
     if n_groups > 1:
-        _refuse_apart(meshes, group, tolerance)
+        _raise_not_connected(meshes, group, tolerance)
 
 
-def _check_hanging_vertices(meshes, maps: list[np.ndarray], tolerance: float) -> None:
-    """Raise ValueError if a vertex lies in the middle of another mesh's boundary edge, which would leave a crack."""
+def _check_no_hanging_in_edges(meshes, maps: list[np.ndarray], tolerance: float) -> None:
+    """Raise ValueError for a hanging node: a vertex within a boundary edge of another mesh, which would leave a crack."""
     for part, mesh in enumerate(meshes):
         foreign = [
             (other, vertex)
@@ -322,25 +344,26 @@ def _check_hanging_vertices(meshes, maps: list[np.ndarray], tolerance: float) ->
                 other, vertex = foreign[candidates[hanging[0]]]
                 raise ValueError(
                     f"vertex {vertex} of mesh {other} lies in the middle of edge {edge} of mesh {part}: "
-                    "divide the shared boundary alike in both, or the joined sheet would have a crack there"
+                    "give both meshes the same vertices along their common boundary, or the joined sheet would have a "
+                    "crack there"
                 )
 
 
-def _refuse_apart(meshes, group: np.ndarray, tolerance: float) -> None:
-    """Raise a ValueError that names a mesh that is not connected to the first one.
+def _raise_not_connected(meshes, group: np.ndarray, tolerance: float) -> None:
+    """Raise a ValueError that names a mesh that is not connected to mesh 0, and its vertex nearest to the others.
 
-    group: (n_meshes,), the connected group that each mesh belongs to.
+    group: (n_meshes,), equal for meshes that are connected to each other.
     """
     apart = np.flatnonzero(group == group[np.argmax(group != group[0])])
-    rims = [(part, vertex) for part in apart for vertex in meshes[part].boundary_vertices]
+    boundary = [(part, vertex) for part in apart for vertex in meshes[part].boundary_vertices]
     others = [mesh.rest_positions[mesh.boundary_vertices] for k, mesh in enumerate(meshes) if k not in apart]
-    if not rims or not sum(map(len, others)):
+    if not boundary or not sum(map(len, others)):
         raise ValueError("a closed mesh has no boundary to weld")
-    points = np.array([meshes[part].rest_positions[vertex] for part, vertex in rims])
+    points = np.array([meshes[part].rest_positions[vertex] for part, vertex in boundary])
     distance, _ = scipy.spatial.cKDTree(np.concatenate(others)).query(points)
-    part, vertex = rims[np.argmin(distance)]
+    part, vertex = boundary[np.argmin(distance)]
     raise ValueError(
         f"mesh {part} shares no edge with the others: its boundary vertex {vertex} comes closest to theirs, "
-        f"at {distance.min():.4g} m (tolerance {tolerance:.3g} m). Move the parts together, and divide the "
-        "shared boundary alike in both"
+        f"at {distance.min():.4g} m (tolerance {tolerance:.3g} m). Move the meshes together, and give both "
+        "the same vertices along their common boundary"
     )

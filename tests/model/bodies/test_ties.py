@@ -139,7 +139,7 @@ def test_a_tied_scene_does_not_pass_through_itself():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda a, b: ms.Tie(a, a), "a and b are one: to join a mesh to itself use ms.weld"),
+        (lambda a, b: ms.Tie(a, a), "a and b are the same body: to join meshes into one body use ms.weld"),
         (lambda a, b: ms.Tie(a, b.mesh), "Tie b must be a Shell or a Solid of the scene"),
         (lambda a, b: ms.Tie(a, b, tolerance=0.0), "tolerance .m. must be positive, got 0"),
         (lambda a, b: ms.Tie(a, b, vertices=[0]), "vertex 0 of a to one of b within .* the nearest is 0.02 m away"),

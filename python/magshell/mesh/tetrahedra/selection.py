@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 class TetSelection(MeshBase):
     """Base class of TetMesh with its selection methods. Faces are the triangles of its surface; edges join corners.
 
-    Tolerances are those of `vertices_at`. A selection that finds nothing raises a ValueError that says what lies nearest.
+    The default tolerance is that of `vertices_at`. A selection that finds nothing raises ValueError; the message says what
+    the mesh has instead: the nearest vertex, the range of coordinates or the parts.
     """
 
     def tetrahedra_at(
@@ -29,7 +30,7 @@ class TetSelection(MeshBase):
         z: Numbers | None = None,
         tolerance: float | None = None,
     ) -> np.ndarray:
-        """Select the tetrahedra with a corner at the given coordinates [m], such as the layer next to a plane."""
+        """Select the tetrahedra with at least one corner at the given coordinates [m], such as all that touch a plane."""
         wanted, tolerance = self._coordinates(x, y, z, tolerance)
         found = np.flatnonzero(self._matches(wanted, tolerance)[self.corners].any(axis=1))
         if len(found) == 0:
@@ -52,14 +53,17 @@ class TetSelection(MeshBase):
         return Indices(np.flatnonzero(self._in_parts(part)), "tetrahedra")
 
     def vertices_in(self, part: int | str | Sequence[int | str]) -> np.ndarray:
-        """Select the vertices of a part's tetrahedra; a vertex on the border between two parts belongs to both."""
+        """Select the vertices of the tetrahedra of a part, or of several; a vertex between two parts belongs to both."""
         return Indices(np.unique(self.tetrahedra[self._in_parts(part)]).astype(np.int64), "vertices")
 
     def faces_in(self, part: int | str | Sequence[int | str]) -> np.ndarray:
-        """Select the faces of the surface whose tetrahedron belongs to a part. Raises ValueError if there are none."""
+        """Select the faces of the surface whose tetrahedron belongs to a part, or to one of several.
+
+        Raises ValueError if there are none.
+        """
         found = np.flatnonzero(self._in_parts(part)[self.face_tetrahedra])
         if len(found) == 0:
-            raise ValueError(f"part {part!r} lies inside: none of its tetrahedra is on the surface")
+            raise ValueError(f"part {part!r} has no faces: none of its tetrahedra is on the surface")
         return Indices(found, "faces")
 
     def _in_parts(self, part) -> np.ndarray:
@@ -83,7 +87,7 @@ class TetSelection(MeshBase):
 
 
 def checked_parts(parts: Numbers, n_tetrahedra: int) -> np.ndarray:
-    """Return the part of each tetrahedron, (n_t,) int32, zeros for None. Raises ValueError for invalid parts."""
+    """Return the part numbers of the tetrahedra, (n_t,) int32, after a check; all 0 for None. Raises ValueError."""
     if parts is None:
         return np.zeros(n_tetrahedra, dtype=np.int32)
     array = np.asarray(parts) if isinstance(parts, np.ndarray) else parts
@@ -100,12 +104,15 @@ def checked_parts(parts: Numbers, n_tetrahedra: int) -> np.ndarray:
 
 
 def checked_part_names(names: dict[str, int]) -> dict[str, int]:
-    """Return the names of parts as {name: number}, after a check; a part may have no tetrahedra."""
+    """Return {name: number} of the parts, after a check. Raises ValueError.
+
+    Names of numbers that no tetrahedron has are allowed.
+    """
     if not isinstance(names, Mapping | None):
         raise ValueError(f"part_names must be a dictionary of name: number, got {type(names).__name__}")
     checked = {}
     for name, number in (names or {}).items():
         if not (isinstance(name, str) and name):
-            raise ValueError(f"part_names: a name must be a word, got {name!r:.60}")
+            raise ValueError(f"part_names: a name must be a string, not empty, got {name!r:.60}")
         checked[name] = count(f"part_names[{name!r}]", number, least=0)
     return checked

@@ -1,4 +1,4 @@
-"""The mesh of six-node triangles, for second-order shells."""
+"""Mesh of six-node (quadratic) triangles, which may be curved, for shells of second order."""
 
 from __future__ import annotations
 
@@ -32,11 +32,17 @@ if TYPE_CHECKING:
     from ..._input.kinds import Numbers, Rotates
 
 
-_MIRRORED = [0, 2, 1, 5, 4, 3]
+_REVERSED = [0, 2, 1, 5, 4, 3]  # order of the nodes of an element whose normal is reversed
 
 
 class QuadraticTriangleMesh(MeshBase):
     """An oriented manifold mesh of six-node triangles, which may be curved, with or without boundary. Immutable.
+
+    Its vertices are corners and midside nodes together. An edge runs from corner to corner; `edge_nodes` has the midside
+    node of each edge. A face is one of four flat triangles that represent an element in contact, water, pictures and files:
+    faces 4 k to 4 k + 2 are at the corners 0, 1, 2 of element k, face 4 k + 3 is between its midside nodes. `surface` is
+    the TriangleMesh of the faces. Quantities that are given per face for a first-order mesh, such as thickness or
+    magnetization, are given per element here.
 
     Args:
         rest_positions: (n_v, 3), m.
@@ -44,15 +50,10 @@ class QuadraticTriangleMesh(MeshBase):
             midside nodes on the edges 01, 12, 20, in the order of VTK and gmsh.
 
     Raises:
-        ValueError: for corners that a TriangleMesh would refuse, midside nodes that neighbours do not share or that occur
-            elsewhere as well, and midside nodes so far off the middle that the Jacobian determinant of an element is not
-            positive. The message names the first of them.
-
-    `faces` are four flat triangles per element, 4 k to 4 k + 3 of element k: those at its corners 0, 1, 2, and the one
-    between its midside nodes. They represent the element in contact, water, pictures and files. `surface` is the
-    TriangleMesh of these faces, with the same vertex numbers. `edges` run from corner to corner, and `edge_nodes` are the
-    midside nodes on them. Quantities given per face of a first-order mesh, such as thickness or magnetization, are given
-    per element here.
+        ValueError: if a TriangleMesh of the corners would be refused, if two elements with a common edge have different
+            midside nodes on it, if a midside node is used anywhere else as well, or if midside nodes are so far from the
+            middle of their edges that the Jacobian determinant of an element is not positive. The message names the first
+            such node or element.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(2.0, 1.0, cells=(2, 1), order=2)
@@ -65,25 +66,27 @@ class QuadraticTriangleMesh(MeshBase):
     order = 2
 
     def __init__(self, rest_positions: Numbers, elements: Numbers):
-        vars(self).update(_parts(rest_positions, elements))
+        vars(self).update(_checked_attributes(rest_positions, elements))
         warn_of_straight_edges(self._corners, self.edge_midpoints)
 
     @classmethod
-    def _again(cls, rest_positions: Numbers, elements: Numbers) -> QuadraticTriangleMesh:
-        """Make a mesh from the data of an existing one, without repeating the warning about straight edges."""
+    def _without_warning(cls, rest_positions: Numbers, elements: Numbers) -> QuadraticTriangleMesh:
+        """Make a mesh derived from an existing one, without warning of straight edges again."""
         mesh = object.__new__(cls)
-        vars(mesh).update(_parts(rest_positions, elements))
+        vars(mesh).update(_checked_attributes(rest_positions, elements))
         return mesh
 
     @classmethod
     def from_triangles(
         cls, mesh: TriangleMesh, project: Callable[[np.ndarray], np.ndarray] | None = None
     ) -> QuadraticTriangleMesh:
-        """Build a six-node mesh from a three-node one: vertices keep their numbers, edge k gets node n_v + k.
+        """Build a six-node mesh from a three-node one.
 
-        project: a function that moves the midpoints of all edges, (n_e, 3) m, onto the surface; its values are the midside
-            nodes. Without it edges stay straight, and on a curved surface most of the accuracy of six nodes is lost
-            (MeshQualityWarning, if the angles between faces are those of a smooth surface).
+        Vertices keep their numbers. The midside node of edge k of `mesh` gets the number n_v + k.
+
+        project: a function that maps the midpoints of all edges, (n_e, 3) m, to points on the curved surface, the midside
+            nodes. Without it the edges stay straight. On a curved surface most of the accuracy of six nodes is then lost; a
+            MeshQualityWarning says so if the angles between faces are those of a smooth surface.
 
         >>> import magshell as ms
         >>> coarse = ms.meshes.cylinder(1.0, 1.0, angle=1.0, cells=(4, 4))
@@ -106,15 +109,17 @@ class QuadraticTriangleMesh(MeshBase):
     def fitted(cls, mesh: TriangleMesh, to: TriangleMesh | None = None) -> QuadraticTriangleMesh:
         """Build a six-node mesh whose midside nodes lie on a smooth surface through the vertices of a finer mesh.
 
-        This is for surfaces known only as a mesh, from a scan or another program. Around the midpoint of each edge, a
-        polynomial of fourth degree is fitted to some thirty connected vertices of `to`; along the boundary, a curve is
-        fitted up to its corners. The midpoint moves across the edge onto the fit. Vertices keep their positions and
-        numbers, and edge k gets node n_v + k.
+        Use it for a surface that is known only as a mesh, from a scan or another program. Around the midpoint of each inner
+        edge a polynomial of fourth degree is fitted to about thirty connected vertices of `to`; the midpoint moves along the
+        normal onto the fit. For a boundary edge a curve of fourth degree is fitted to the boundary vertices of `to` nearby,
+        but not beyond corners of the boundary; the midpoint moves perpendicular to the edge onto this curve. Vertices keep
+        their positions and numbers. The midside node of edge k of `mesh` gets the number n_v + k.
 
-        to: a mesh of the same surface, a few times as fine, with normals on the same side; the boundary vertices of `mesh`
+        to: a mesh of the same surface, a few times as fine, with normals on the same side. The boundary vertices of `mesh`
             must be boundary vertices of it. By default `mesh` itself.
 
-        Raises ValueError if `to` has creases of more than 40 degrees or does not cover an edge, and as `from_triangles`.
+        Raises ValueError if `to` has creases of more than 40 degrees or no surface near an edge of `mesh`, and for the same
+        reasons as `from_triangles`.
 
         >>> import magshell as ms
         >>> fine = ms.meshes.cylinder(1.0, 1.0, angle=1.0, cells=(16, 16))
@@ -128,9 +133,9 @@ class QuadraticTriangleMesh(MeshBase):
         middles = middles_on_fit(mesh, mesh if to is None else checked_mesh(to, "to"), name)
         return cls.from_triangles(mesh, project=lambda _: middles)
 
-    # Copies and worker processes compute the connectivity again, which is cheap.
+    # A copy or a pickle stores positions and elements only; the connectivity is computed again, which is cheap.
     def __reduce__(self) -> tuple[Any, ...]:
-        return QuadraticTriangleMesh._again, (self.rest_positions, self.elements)
+        return QuadraticTriangleMesh._without_warning, (self.rest_positions, self.elements)
 
     def __repr__(self) -> str:
         extent = " x ".join(f"{length:.4g}" for length in np.ptp(self.rest_positions, axis=0))
@@ -162,12 +167,15 @@ class QuadraticTriangleMesh(MeshBase):
 
     @property
     def corners(self) -> TriangleMesh:
-        """The flat mesh of the corners; its vertices are `corner_vertices`, edges and faces keep their numbers."""
+        """The flat three-node mesh of the corners, with a face per element.
+
+        Its faces and edges have the numbers of the elements and edges here; its vertex k is vertex `corner_vertices[k]`.
+        """
         return self._corners
 
     @property
     def corner_vertices(self) -> np.ndarray:
-        """The number in this mesh of each vertex of `corners`, ascending."""
+        """The vertex of this mesh that each vertex of `corners` is, ascending."""
         return frozen(self._corner_vertices)
 
     # Connectivity
@@ -193,7 +201,7 @@ class QuadraticTriangleMesh(MeshBase):
     def edge_elements(self) -> np.ndarray:
         """The two elements at each edge, (n_e, 2), -1 for none.
 
-        The first element runs the edge from its lower to its higher vertex, the second the other way.
+        Counter-clockwise, the first element has the edge from its lower to its higher vertex, the second the other way.
         """
         return self._corners.edge_faces
 
@@ -227,12 +235,12 @@ class QuadraticTriangleMesh(MeshBase):
 
     @cached_property
     def surface(self) -> TriangleMesh:
-        """The flat triangles as a mesh, with the same faces and the same vertices as this one."""
+        """The flat triangles `faces` as a TriangleMesh, with the same vertex numbers."""
         return TriangleMesh(self.rest_positions, self.faces)
 
     @property
     def surface_vertices(self) -> np.ndarray:
-        """The number in this mesh of each vertex of `surface`, (n_v,): the same number."""
+        """The vertex of this mesh that each vertex of `surface` is: 0, 1, ..., n_v - 1."""
         return np.arange(self.n_vertices)
 
     # Geometry of the reference configuration
@@ -244,7 +252,7 @@ class QuadraticTriangleMesh(MeshBase):
 
     @cached_property
     def element_centers(self) -> np.ndarray:
-        """The points of the elements with barycentric coordinates 1/3, (n, 3) m."""
+        """The centers of the curved elements, where all barycentric coordinates are 1/3, (n, 3) m."""
         nodes = self.rest_positions[self.elements]
         return frozen((4.0 * nodes[:, 3:].sum(axis=1) - nodes[:, :3].sum(axis=1)) / 9.0)
 
@@ -280,7 +288,7 @@ class QuadraticTriangleMesh(MeshBase):
 
     @property
     def element_normals(self) -> np.ndarray:
-        """The unit vectors along the mean normal of each element, (n, 3)."""
+        """The mean normals of the curved elements as unit vectors, (n, 3)."""
         vectors = area_vectors(self.rest_positions[self.elements])
         return frozen(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
 
@@ -309,33 +317,33 @@ class QuadraticTriangleMesh(MeshBase):
         return self._corners
 
     def refined(self, project: Callable[[np.ndarray], np.ndarray] | None = None) -> QuadraticTriangleMesh:
-        """Return the mesh with each element divided into four, 4 k to 4 k + 3, in the order of `faces`.
+        """Return the mesh with each element divided into four: element k into 4 k to 4 k + 3, in the order of `faces`.
 
-        Vertices keep their numbers, midside nodes become corners, and new nodes follow. The new nodes lie on the curved
-        elements by default. project: a function that moves the new nodes, (m, 3) m, onto another surface.
+        Vertices keep their numbers, the midside nodes become corners, and the new midside nodes follow, on the curved
+        elements. project: a function that maps the new nodes, (m, 3) m, to points on another surface.
         """
         new, elements = divided(self)
         if project is not None:
             new = _projected("project(nodes)", "m", project, new)
-        return self._again(np.concatenate([self.rest_positions, new]), elements)
+        return self._without_warning(np.concatenate([self.rest_positions, new]), elements)
 
     def flipped(self) -> QuadraticTriangleMesh:
         """Return the same surface with reversed normals; elements and vertices keep their numbers."""
-        return self._again(self.rest_positions, self.elements[:, _MIRRORED])
+        return self._without_warning(self.rest_positions, self.elements[:, _REVERSED])
 
     def transformed(
         self, rotation: Rotates | None = None, translation: Numbers | None = None
     ) -> QuadraticTriangleMesh:
         """Return the mesh transformed by x -> rotation x + translation; see `TriangleMesh.transformed`."""
-        return self._again(moved(self.rest_positions, rotation, translation), self.elements)
+        return self._without_warning(moved(self.rest_positions, rotation, translation), self.elements)
 
     def scaled(self, factor: float) -> QuadraticTriangleMesh:
         """Return the mesh with all coordinates multiplied by a positive factor."""
-        return self._again(self.rest_positions * positive("factor", "", factor), self.elements)
+        return self._without_warning(self.rest_positions * positive("factor", "", factor), self.elements)
 
 
-def _parts(rest_positions: Numbers, elements: Numbers) -> dict[str, Any]:
-    """Check the data of a mesh and return its attributes. Raises ValueError as QuadraticTriangleMesh does."""
+def _checked_attributes(rest_positions: Numbers, elements: Numbers) -> dict[str, Any]:
+    """Check the arguments of QuadraticTriangleMesh and return the attributes that it stores. Raises its ValueErrors."""
     positions = quantity("rest_positions", "m", rest_positions, ("n_v", 3))
     nodes = index_array("elements", elements)
     check_elements(nodes, len(positions))
@@ -354,7 +362,10 @@ def _parts(rest_positions: Numbers, elements: Numbers) -> dict[str, Any]:
 def _projected(
     name: str, rows: str, project: Callable[[np.ndarray], np.ndarray], points: np.ndarray
 ) -> np.ndarray:
-    """Return project(points), (n, 3) m, after a check of its shape; messages call it `name`."""
+    """Return project(points), (n, 3) m, after a check of its shape.
+
+    name, rows: what error messages call the result, and its number of rows.
+    """
     moved_points = quantity(name, "m", project(np.array(points)), (rows, 3))
     if moved_points.shape != points.shape:
         raise ValueError(f"{name} [m] must have shape ({rows}, 3) = {points.shape}, got {moved_points.shape}")

@@ -21,7 +21,7 @@ from ..solids.skin import Skin
 from ..solids.solid import Solid
 from .body_ranges import Span, magnetized_rows, rotations_of, turning_edges
 from .joined_mesh import JoinedMesh, NoMesh
-from .ties import Tie, joined_components, originals
+from .ties import Tie, first_of_welded, joined_components
 
 if TYPE_CHECKING:
     from ..contact.contact import Contact
@@ -78,7 +78,7 @@ class Bodies:
             row += magnetized_rows(mesh)
         self.ties: tuple[Tie, ...] = checked_list("ties", ties, (Tie,))
         self._welded = np.concatenate([np.zeros((0, 2), dtype=np.int64), *map(self._pairs, self.ties)])
-        self.original: np.ndarray = originals(vertex, self._welded)
+        self.original: np.ndarray = first_of_welded(vertex, self._welded)
         self._check_welded_once()
 
     def _first_rotations(self) -> list[int]:

@@ -1,4 +1,4 @@
-"""Ties weld bodies: vertices that have the same position in the rest shape become one vertex of the scene."""
+"""Ties between bodies: vertices with the same reference position become one vertex of the scene."""
 
 from __future__ import annotations
 
@@ -19,18 +19,23 @@ if TYPE_CHECKING:
 
 
 class Tie(Frozen):
-    """Welds two bodies: vertices of both that have the same position in the rest shape are one vertex of the scene.
+    """A connection of two bodies at common vertices, which move as one.
 
-    Results list such a vertex for each body, with equal positions. Masses, loads and damping of both bodies add up
-    there; a support of one body holds the other. A seam is a hinge: bodies that share no more than a line turn freely
-    about it, and bodies that share faces (a patch on a sheet) bend together. For a seam that carries moments make one
-    mesh, `ms.weld(mesh, mesh)`, with thickness and modulus by face. A sheet on a solid's face moves with it; one that
-    is tied by an edge alone can turn.
+    A vertex of `a` and a vertex of `b` with the same position in the reference configuration are welded: they become one
+    vertex of the scene. Results list it for both bodies, with equal positions. Masses, loads and damping of both bodies add
+    up there, and a support of one body holds the other as well.
+
+    A tie transmits forces, but no moments. Bodies that are tied along a line only, such as a sheet along its edge, can
+    rotate freely about this line, as at a hinge. Bodies that are tied over faces, such as a patch on a sheet or a sheet on
+    a face of a solid, deform together. For a seam of sheets that transmits moments, weld the meshes into one by
+    `ms.weld(mesh, mesh)`, and give thickness and modulus per face.
 
     a, b: two bodies of the scene.
-    vertices: those of `a` that are welded, each to one of `b`; by default all that have one within the tolerance.
-    tolerance: m, largest distance of the two vertices in the rest shape; the position is that in `a`. By default 1e-6
-        of the larger body.
+    vertices: the vertices of `a` to weld; each needs a vertex of `b` within the tolerance. By default all vertices of `a`
+        that have one.
+    tolerance: m, largest distance of two vertices that are welded, in the reference configuration. The welded vertex has its
+        position in the body that comes first in the scene. By default 1e-6 of the larger bounding-box diagonal of both
+        bodies.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.02, 0.01, cells=(4, 2))
@@ -57,7 +62,7 @@ class Tie(Frozen):
                 raise ValueError(f"Tie {name} must be a Shell or a Solid of the scene, got {body!r:.60}")
         if a is b:
             raise ValueError(
-                "a Tie joins two bodies, but a and b are one: to join a mesh to itself use ms.weld"
+                "a Tie joins two bodies, but a and b are the same body: to join meshes into one body use ms.weld"
             )
         self.a, self.b = a, b
         self.vertices: np.ndarray | None = None if vertices is None else selection("Tie vertices", vertices)
@@ -68,28 +73,29 @@ class Tie(Frozen):
             raise ValueError(f"tolerance [m] must be positive, got {self.tolerance:g}")
 
     def pairs(self) -> np.ndarray:
-        """Return the pairs of vertices of `a` and of `b` that are welded, (k, 2).
+        """Return the pairs of vertices that are welded, (k, 2): a vertex of `a` and one of `b`.
 
-        Raises ValueError if there are none, if a given vertex has no partner, or if one has several.
+        Raises ValueError if there are none, if one of `vertices` has no vertex of `b` within the tolerance, or if several
+        vertices of `a` would be welded to one of `b`.
         """
-        reach = self.tolerance
-        if reach is None:
-            reach = RELATIVE_TOLERANCE * max(self.a.mesh.size, self.b.mesh.size)
+        tolerance = self.tolerance
+        if tolerance is None:
+            tolerance = RELATIVE_TOLERANCE * max(self.a.mesh.size, self.b.mesh.size)
         of_a = np.arange(self.a.mesh.n_vertices)
         if self.vertices is not None:
             of_a = indices("Tie vertices", self.vertices, self.a.mesh.n_vertices)
         points, others = self.a.mesh.rest_positions[of_a], self.b.mesh.rest_positions
         apart, of_b = scipy.spatial.cKDTree(others).query(points, distance_upper_bound=np.inf)
-        near = apart <= reach
+        near = apart <= tolerance
         if self.vertices is not None and not near.all():
             far = int(np.argmax(apart))
             raise ValueError(
-                f"a Tie welds vertex {of_a[far]} of a to one of b within {reach:.3g} m, but the nearest is "
+                f"a Tie welds vertex {of_a[far]} of a to one of b within {tolerance:.3g} m, but the nearest is "
                 f"{apart[far]:.3g} m away"
             )
         if not near.any():
             raise ValueError(
-                f"a Tie finds no vertices of a and b within {reach:.3g} m of each other: "
+                f"a Tie finds no vertices of a and b within {tolerance:.3g} m of each other: "
                 f"the nearest are {apart.min():.3g} m apart"
             )
         pairs = np.stack([of_a[near], of_b[near]], axis=1)
@@ -97,7 +103,7 @@ class Tie(Frozen):
         if times.max() > 1:
             raise ValueError(
                 f"a Tie would weld {times.max()} vertices of a to vertex {taken[np.argmax(times)]} of b: "
-                f"its tolerance of {reach:.3g} m is too wide"
+                f"its tolerance of {tolerance:.3g} m is too wide"
             )
         return pairs
 
@@ -105,10 +111,10 @@ class Tie(Frozen):
         return f"Tie({len(self.pairs())} vertices)"
 
 
-def originals(count: int, welded: np.ndarray) -> np.ndarray:
-    """Return for each vertex the first of the vertices that it is welded to, itself if there is none, (count,).
+def first_of_welded(count: int, welded: np.ndarray) -> np.ndarray:
+    """Return for each vertex the lowest number among itself and all vertices that it is welded to, (count,).
 
-    welded: (k, 2), pairs of vertices.
+    count: number of vertices. welded: (k, 2), pairs of vertices; ties may weld more than two vertices to each other.
     """
     if not len(welded):
         return np.arange(count)
@@ -119,11 +125,15 @@ def originals(count: int, welded: np.ndarray) -> np.ndarray:
 
 
 def joined_components(components: np.ndarray, welded: np.ndarray) -> np.ndarray:
-    """Return the connected component of each vertex after welding, numbered in the order of their first vertices."""
+    """Return the number of the connected component that each vertex belongs to after welding, (n_v,).
+
+    components: (n_v,), those before. welded: (k, 2), pairs of vertices.
+    """
     parts = _groups(int(components.max()) + 1, components[welded])
     return np.unique(parts[components], return_inverse=True)[1]
 
 
 def _groups(count: int, pairs: np.ndarray) -> np.ndarray:
+    """Return the number of the group of each of `count` items, if pairs (k, 2) of items are in the same group."""
     graph = scipy.sparse.coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     return scipy.sparse.csgraph.connected_components(graph, directed=False)[1]

@@ -1,4 +1,4 @@
-"""Planes and slopes."""
+"""Obstacles with a plane surface: floors, walls and slopes."""
 
 from __future__ import annotations
 
@@ -16,15 +16,17 @@ if TYPE_CHECKING:
     from ...._input.kinds import Numbers
 
 
-CELLS = 16  # per side of the square that stands for a plane; small triangles are sorted better in pictures
+# Cells along each side of the square that represents a plane in pictures. Small triangles are sorted better by their depth.
+CELLS = 16
 
 
 class Plane(Obstacle):
-    """The half-space below a plane through the center, on the side opposite to its normal.
+    """A solid half-space bounded by a plane; bodies are kept on the side to which the normal points.
 
     Args:
-        normal: (3,), of any length but zero, in the body's own frame.
-        center, rotation, motion: see Obstacle.
+        normal: (3,), of any length but zero, in the obstacle's own frame.
+        center: (3,) m, a point of the plane.
+        rotation, motion: see Obstacle.
 
     >>> Plane(center=(0, 0, -0.01)).signed_distance([1, 2, 0]).round(6).item()
     0.01
@@ -69,12 +71,13 @@ def slope(
     rotation: Numbers = (0.0, 0.0, 0.0),
     motion: Callable[..., Any] | None = None,
 ) -> Plane:
-    """Make an inclined plane through the center.
+    """Make an inclined Plane, with z as the vertical axis.
 
     Args:
-        angle: rad from the horizontal, within a quarter turn.
-        uphill: (2,), the direction in x and y in which it rises.
-        center, rotation, motion: see Obstacle.
+        angle: rad between the plane and the horizontal, between -pi/2 and pi/2.
+        uphill: (2,), the horizontal direction (x, y) in which a plane with a positive angle rises.
+        center: (3,) m, a point of the plane.
+        rotation, motion: see Obstacle.
 
     >>> slope(0.1)
     Plane(normal (-0.09983, 0, 0.995))

@@ -1,4 +1,4 @@
-"""Pipes, tunnels and horns."""
+"""Obstacles with a round cross-section along a curve: pipes, tunnels and horns."""
 
 from __future__ import annotations
 
@@ -18,21 +18,24 @@ if TYPE_CHECKING:
 
 
 class Tube(Obstacle):
-    """A ball swept along a smooth curve while its radius changes; by default the sheet is inside.
+    """A hollow tube, or a solid rod, with a radius that may change along its smooth center line.
 
-    Curve and radius are cubic splines with one knot per point, twice continuously differentiable, through all the points,
-    which should have about equal distances. An open tube continues straight beyond both ends, without end and with the
-    radius of its last point, which it reaches smoothly; a closed one ends in its last balls.
+    Its surface is the envelope of balls whose centers move along the center line. By default bodies are kept inside it.
+
+    The center line and the radius are cubic splines through all given values, twice continuously differentiable, with one
+    knot per point. Neighbouring points should have about equal distances. An open tube (the default) continues straight and
+    to infinity beyond its first and last point, with the radius given there; the radius becomes constant smoothly, within
+    three knots. A closed tube ends at its first and last point with half a ball.
 
     Args:
-        points: (k, 3) m, along the curve, in the body's own frame.
-        radius: m, a number, or (k,), one a point.
-        inside: True if the bodies of the scene are inside of it, a hollow.
-        closed: with ends.
+        points: (k, 3) m, points of the center line in the obstacle's own frame, two at least.
+        radius: m, one number, or (k,) with one number per point.
+        inside: True if bodies are kept inside the surface (a pipe), False if outside (a rod).
+        closed: whether the tube ends at its first and last point.
         center, rotation, motion: see Obstacle.
 
-    Raises ValueError where the radius is not positive between the points, or where it changes as fast as the curve
-    advances, so that one ball lies in the next.
+    Raises ValueError if the radius is not positive somewhere between the points, or if it changes by as much as the center
+    line advances, so that one ball contains the next.
 
     >>> Tube([[0, 0, 0], [1, 0, 0], [2, 0, 0]], radius=0.1).signed_distance([1, 0.04, 0]).round(6).item()
     0.06
