@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 from fuzz_calls import Call, Sample
+from solid_materials import SAMPLES
 
 import magshell as ms
 from magshell import meshes, shapes
@@ -174,14 +175,8 @@ def _solids() -> Iterator[Call]:
     magnetized = {"skin": ms.Skin(**skin), "remanent_magnetization": (1e4, 0, 0)}
     yield Call("Solid", ms.Solid, {**solid, **magnetized, "material": ms.NeoHookean(**moduli)})
     yield Call("Skin", lambda **a: ms.Solid(mesh, material=ms.NeoHookean(**moduli), skin=ms.Skin(**a)), skin)
-    yield Call("NeoHookean", ms.NeoHookean, {"volume": "J", **moduli})
-    yield Call("StableNeoHookean", ms.StableNeoHookean, {"log_barrier": True, **moduli})
-    yield Call("StVenantKirchhoff", ms.StVenantKirchhoff, moduli)
-    yield Call("Corotated", ms.Corotated, moduli)
-    yield Call("ProjectiveMaterial", ms.ProjectiveMaterial, moduli)
-    exponents = dict.fromkeys(("fibre_exponent", "cross_fibre_exponent", "fibre_shear_exponent"), 2.0)
-    fibres = {"stiffness": 1e3, "bulk_modulus": 1e5, "fibres": (1.0, 0.0, 0.0)}
-    yield Call("Guccione", ms.Guccione, {**exponents, **fibres})
+    for name, sample in SAMPLES.items():
+        yield Call(name, sample.make, {**sample.options, **sample.constants})
 
 
 def _muscles() -> Iterator[Call]:

@@ -45,6 +45,7 @@ from gradient_world import (
     torch,
     under,
 )
+from solid_materials import SAMPLES
 
 import magshell as ms
 from magshell import obstacles as ob
@@ -258,6 +259,11 @@ MAKERS = {
     ),
     **CONTACT_MAKERS,
     "a solid at rest": solid_at_rest,
+    **{
+        f"a solid of {name} at rest": lambda sample=sample: solid_at_rest(sample.scaled(100.0))
+        for name, sample in SAMPLES.items()
+        if "young_modulus" not in sample.constants
+    },
     "a solid in motion": solid_in_motion,
     "a solid by Projective Dynamics": solid_by_projective_dynamics,
     "a magnetized solid at rest": magnetized_solid_at_rest,

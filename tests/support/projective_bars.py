@@ -1,6 +1,7 @@
 """Makes bars of every material, and moves them by two methods."""
 
 import numpy as np
+from solid_materials import SAMPLES
 
 import magshell as ms
 
@@ -24,6 +25,8 @@ MATERIALS = {
         fibres=(1.0, 0.2, 0.0),
     ),
 }
+_LISTED = {type(each) for each in MATERIALS.values()}
+MATERIALS |= {name: each.scaled(20.0) for name, each in SAMPLES.items() if each.make not in _LISTED}
 TIGHT = ms.ProjectiveDynamics(tolerance=1e-12, iterations=3000)
 NEWTON = ms.MixedNewton(tolerance=1e-12)
 

@@ -8,6 +8,7 @@ import pkgutil
 
 import numpy as np
 from public_names import public_names
+from solid_materials import SAMPLES
 
 import magshell as ms
 from magshell._runtime.frozen import Frozen
@@ -80,7 +81,6 @@ def _bodies(given: Arrays) -> dict[str, object]:
         link, origin=given([0, 0, 0]), axis=given([0, 1.0, 0]), torque=0.1, spring_stiffness=1.0
     )
     ball = ms.Ball(lower, link, origin=given([0, 0, -1.5]), torque=given([0, 0.1, 0]))
-    moduli = dict(young_modulus=1e6, poisson_ratio=0.3)
     return {
         "flat": flat,
         "six": ms.QuadraticTriangleMesh(given(six.rest_positions), given(six.elements, np.int64)),
@@ -92,18 +92,10 @@ def _bodies(given: Arrays) -> dict[str, object]:
         "solid": solid,
         "balloon": ms.Shell(box.surface, thickness=1e-3, young_modulus=1e6),
         "NeoHookean": material,
-        "StableNeoHookean": ms.StableNeoHookean(**moduli),
-        "StVenantKirchhoff": ms.StVenantKirchhoff(**moduli),
-        "Corotated": ms.Corotated(**moduli),
-        "Projective": ms.ProjectiveMaterial(**moduli),
-        "Guccione": ms.Guccione(
-            stiffness=2e3,
-            fibre_exponent=8.0,
-            cross_fibre_exponent=2.0,
-            fibre_shear_exponent=4.0,
-            bulk_modulus=1e5,
-            fibres=given([1.0, 0, 0]),
-        ),
+        **{
+            name: each.make(**each.options, **{key: given(value) for key, value in each.constants.items()})
+            for name, each in SAMPLES.items()
+        },
         "rigid": ms.RigidBody(
             mass=1.0,
             inertia=given(np.eye(3)),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from scipy.optimize import minimize
+from solid_materials import SAMPLES, Deformation
 
 from magshell import _core
 from magshell.model.scene.parameter_layout import Layout
@@ -12,34 +12,17 @@ from magshell.model.scene.parameter_layout import Layout
 EDGES = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]
 
 # By the core's names. Those of the second list have an energy where elements are inverted.
-REFUSING = ["NeoHookean ln J", "NeoHookean J", "NeoHookean isochoric"]
-STABLE = [
-    "StableNeoHookean",
-    "StableNeoHookean barrier",
-    "StVenantKirchhoff",
-    "Corotated",
-    "Guccione",
-    "Projective",
-]
+REFUSING = [name for name, each in SAMPLES.items() if each.refuses_inversion]
+STABLE = [name for name, each in SAMPLES.items() if not each.refuses_inversion]
 MATERIALS = REFUSING + STABLE
 ELEMENTS = ["linear", "quadratic", "mean"]
 MADE = [
     (m, e) for m in MATERIALS for e in ELEMENTS if (m, e) != ("Projective", "mean")
 ]  # that one is refused
 
-LAME = {"young_modulus": 1.0e3, "poisson_ratio": 0.3}
-GUCCIONE = {
-    "stiffness": 2.0e3,
-    "fibre_exponent": 8.0,
-    "cross_fibre_exponent": 2.0,
-    "fibre_shear_exponent": 4.0,
-    "bulk_modulus": 5.0e3,
-    "fibres": (0.48, 0.6, 0.64),
-}
-
 
 def values_of(material: str) -> dict:
-    return GUCCIONE if material == "Guccione" else LAME
+    return SAMPLES[material].constants
 
 
 def second_order(nodes, tetrahedra):
@@ -203,87 +186,10 @@ def torch_energy(model: SolidModel, material: str, mean: bool, values: dict | No
 
     def energy(x):
         f = torch.einsum("tni,tpnj->tpij", x[tetrahedra], gradients)
-        return (volumes * density(material, f, given, averaged)).sum()
+        constants = {name: each[:, None] if each.ndim == 1 else each for name, each in given.items()}
+        return (volumes * SAMPLES[material].density(constants, Deformation(f, averaged))).sum()
 
     return energy
-
-
-def determinant(f):
-    """Return the determinant of matrices (..., 3, 3), written out as a polynomial whose derivatives hold everywhere.
-
-    Derivatives of torch.linalg.det divide by pivots, which are mere round-off where a matrix is singular."""
-    a, b, c = f.unbind(-2)
-    return (a * torch.linalg.cross(b, c)).sum(-1)
-
-
-def density(material, f, values, averaged):
-    """Return the energy density from its definition, (n_t, p) J/m3."""
-    i1, j = (f * f).sum((-1, -2)), determinant(f)
-    strain = 0.5 * (f.transpose(-1, -2) @ f - torch.eye(3, dtype=torch.float64))
-    if material == "Guccione":
-        c, bf, bt, bfs, bulk = (values[name][:, None] for name in list(GUCCIONE)[:5])
-        m = values["fibres"]
-        helper = torch.tensor([0.3, -0.2, 0.9], dtype=torch.float64).expand_as(m)
-        s = torch.linalg.cross(m, helper)
-        s = s / s.norm(dim=-1, keepdim=True)
-        frame = torch.stack([m, s, torch.linalg.cross(m, s)], dim=-1)[:, None]
-        e = frame.transpose(-1, -2) @ strain @ frame
-        q = bf * e[..., 0, 0] ** 2 + bt * (e[..., 1, 1] ** 2 + e[..., 2, 2] ** 2 + 2 * e[..., 1, 2] ** 2)
-        q = q + 2 * bfs * (e[..., 0, 1] ** 2 + e[..., 0, 2] ** 2)
-        return 0.5 * c * (torch.exp(q) - 1) + 0.5 * bulk * (averaged(j) - 1) ** 2
-    young, nu = values["young_modulus"][:, None], values["poisson_ratio"][:, None]
-    lam, mu = young * nu / ((1 + nu) * (1 - 2 * nu)), young / (2 * (1 + nu))
-    if material == "NeoHookean ln J":
-        return mu / 2 * (i1 - 3) - mu * torch.log(j) + lam / 2 * torch.log(averaged(j)) ** 2
-    if material == "NeoHookean J":
-        return mu / 2 * (i1 - 3) - mu * torch.log(j) + lam / 2 * (averaged(j) - 1) ** 2
-    if material == "NeoHookean isochoric":
-        return mu / 2 * (j ** (-2 / 3) * i1 - 3) + (lam + 2 * mu / 3) / 2 * (averaged(j) - 1) ** 2
-    if material == "StableNeoHookean":
-        shear = mu / 2 * (i1 - 3) - mu * (j - 1) + mu / 2 * (j - 1) ** 2
-        return shear + lam / 2 * (averaged(j) - 1) ** 2
-    if material == "StableNeoHookean barrier":
-        m, ell = 4 / 3 * mu, lam + 5 / 6 * mu
-        a = 1 + m / ell - m / (4 * ell)
-        at_rest = ell / 2 * (1 - a) ** 2
-        own = m / 2 * (i1 - 3) + ell / 2 * (j - a) ** 2 - m / 2 * torch.log((i1 + 1) / 4) - at_rest
-        return own + lam / 2 * ((averaged(j) - 1) ** 2 - (j - 1) ** 2)
-    if material == "StVenantKirchhoff":
-        trace = strain.diagonal(dim1=-2, dim2=-1).sum(-1)
-        return mu * (strain * strain).sum((-1, -2)) + lam / 2 * averaged(trace) ** 2
-    u, s, vh = torch.linalg.svd(f)
-    sign = torch.sign(torch.linalg.det(u) * torch.linalg.det(vh))
-    s = torch.cat([s[..., :2], sign[..., None] * s[..., 2:]], dim=-1)
-    if material == "Projective":
-        return mu * ((s - 1) ** 2).sum(-1) + lam / 2 * ((s - nearest_of_product_one(s)) ** 2).sum(-1)
-    trace = s.sum(-1)  # tr(R^T F)
-    return mu * ((s - 1) ** 2).sum(-1) + lam / 2 * (averaged(trace) - 3) ** 2
-
-
-def nearest_of_product_one(s):
-    """Return the d with d1 d2 d3 = 1 that is nearest to s, (..., 3), among positive ones.
-
-    It is searched from many starts; two Newton steps on d - k/d = s with that product then carry the derivatives.
-    """
-    rows = []
-    for row in s.detach().reshape(-1, 3).numpy():
-        away = lambda p, row=row: float(((np.array([*np.exp(p), np.exp(-p.sum())]) - row) ** 2).sum())  # noqa: E731
-        found = min(
-            (minimize(away, (a, b), method="BFGS") for a in (-1.0, 0.3, 1.5) for b in (-1.2, 0.2, 1.0)),
-            key=lambda each: each.fun,
-        )
-        rows.append([*np.exp(found.x), np.exp(-found.x.sum())])
-    d = torch.tensor(np.array(rows)).reshape(s.shape)
-    k = ((d - s) * d).mean(-1, keepdim=True).detach()
-    for _ in range(6):
-        # (1 + k/d^2) dd - dk/d = s - d + k/d,  sum dd/d = - ln(product)
-        b = 1 + k / d**2
-        rest = s - d + k / d
-        dk = (-torch.log(d.prod(-1, keepdim=True)) - (rest / (b * d)).sum(-1, keepdim=True)) / (
-            1 / (b * d**2)
-        ).sum(-1, keepdim=True)
-        d, k = d + (rest + dk / d) / b, k + dk
-    return d
 
 
 def sample_element(element: str, curved: bool = True):

@@ -10,7 +10,6 @@
 #pragma once
 
 #include "magshell/energy/invariant_solid.h"
-#include "magshell/energy/neo_hookean.h"
 #include "magshell/strain/polar.h"
 
 namespace magshell {
@@ -18,7 +17,7 @@ namespace magshell {
 struct Corotated : LameSolid {
     static constexpr int stresses = 1;
     static constexpr bool refuses_inversion = false;
-    static constexpr bool keeps_measures = false;
+    static constexpr int stored_measures = 0;
 
     SimdMat3 f;
     Polar polar;

@@ -11,6 +11,8 @@
 //   P = F S + p cof F,   S = C/2 e^Q D,   p = K (J - 1)                           [Pa]
 #pragma once
 
+#include <algorithm>
+
 #include "magshell/core/simd_functions.h"
 #include "magshell/energy/st_venant_kirchhoff.h"
 
@@ -18,9 +20,12 @@ namespace magshell {
 
 struct Guccione {
     static constexpr int constants = 8;  // C [Pa], bf, bt, bfs, K [Pa], m
-    static constexpr int stresses = 7;   // S, p
+    static constexpr NamedConstant named_constants[] = {
+        {"stiffness", "Pa"},           {"fibre_exponent", "1"}, {"cross_fibre_exponent", "1"},
+        {"fibre_shear_exponent", "1"}, {"bulk_modulus", "Pa"},  {"fibres", "1", 3}};
+    static constexpr int stresses = 7;  // S, p
     static constexpr bool refuses_inversion = false;
-    static constexpr bool keeps_measures = false;
+    static constexpr int stored_measures = 0;
 
     SimdMat3 f, cof;
     SimdDouble e[6], j;
@@ -37,6 +42,9 @@ struct Guccione {
         out[0] += SimdDouble(0.5) * c[2] * by.mu;
         out[2] += SimdDouble(0.5) * c[0] * by.mu;
     }
+
+    /// Returns a modulus [Pa] of the size of the forces' stiffness.
+    static double size(const double c[]) { return c[0] * std::max({c[1], c[2], c[3]}) + c[4]; }
 
     static Volumetric volumetric(const SimdDouble c[], const SimdDouble& v) {
         return quadratic_volume(c[4], v);

@@ -24,7 +24,7 @@ namespace magshell {
 struct Projective : LameSolid {
     static constexpr int stresses = 3;
     static constexpr bool refuses_inversion = false;
-    static constexpr bool keeps_measures = false;
+    static constexpr int stored_measures = 0;
 
     static RestModuli rest_moduli(const SimdDouble c[]) { return {SimdDouble(1.0 / 3.0) * c[0], c[1]}; }
     static void rest_moduli_vjp(const SimdDouble[], const RestModuli& by, SimdDouble out[]) {

@@ -8,7 +8,6 @@
 #pragma once
 
 #include "magshell/energy/invariant_solid.h"
-#include "magshell/energy/neo_hookean.h"
 
 namespace magshell {
 
@@ -80,7 +79,7 @@ class QuadraticTangent {
 struct StVenantKirchhoff : LameSolid {
     static constexpr int stresses = 6;
     static constexpr bool refuses_inversion = false;
-    static constexpr bool keeps_measures = false;
+    static constexpr int stored_measures = 0;
 
     SimdMat3 f;
     SimdDouble e[6];

@@ -1,16 +1,10 @@
 #include "magshell/energy/corotated.h"
-#include "magshell/terms/solid/solid_materials.h"
 #include "magshell/terms/solid/tetrahedra_term.h"
 
 namespace magshell {
 
-std::unique_ptr<SolidTerm> make_corotated_term(const SolidResponse& response, const Solid& solid, Index body,
-                                               const ColoredLoop& element_blocks, const SystemMatrix& matrix,
-                                               const Nodes& nodes, Registry& registry) {
-    if (response.material == "Corotated")
-        return make_tetrahedra_term<Corotated, LameModuli>(response.mean_volume, solid, body, element_blocks,
-                                                           matrix, nodes, registry);
-    return nullptr;
+SolidMaterials corotated_materials() {
+    return {{"Corotated", &make_tetrahedra_term<Corotated, LameModuli>}};
 }
 
 }  // namespace magshell

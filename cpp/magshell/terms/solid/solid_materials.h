@@ -1,16 +1,30 @@
-// Creates the solid terms of each family of materials. Each function is in a file of its own, so that its
-// templates compile in parallel; it returns nullptr if the material's name is not one of its family.
+// The materials of solids: what a file terms/solid/solid_<file>.cpp defines, and from what its terms are made.
 #pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "magshell/terms/solid/solid_term.h"
 
 namespace magshell {
 
-using MakeSolidTerm = std::unique_ptr<SolidTerm>(const SolidResponse&, const Solid&, Index body,
-                                                 const ColoredLoop&, const SystemMatrix&, const Nodes&,
-                                                 Registry&);
+/// Everything from which the term of a solid is made.
+struct SolidTermInput {
+    const SolidResponse& response;
+    const Solid& solid;
+    Index body;
+    const ColoredLoop& element_blocks;
+    const SystemMatrix& matrix;
+    const Nodes& nodes;
+    Registry& registry;
+};
 
-MakeSolidTerm make_neo_hookean_term, make_isochoric_term, make_stable_neo_hookean_term,
-    make_strain_quadratic_term, make_corotated_term, make_guccione_term, make_projective_term;
+using MakeSolidTerm = std::unique_ptr<SolidTerm> (*)(const SolidTermInput&);
+
+/// The materials of one file terms/solid/solid_<file>.cpp, which defines `SolidMaterials <file>_materials()`: by the
+/// name that Python gives each, the function that creates its term. CMake lists the files.
+using SolidMaterials = std::vector<std::pair<std::string, MakeSolidTerm>>;
 
 }  // namespace magshell

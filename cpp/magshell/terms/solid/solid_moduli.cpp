@@ -6,17 +6,18 @@
 namespace magshell {
 namespace {
 
-ParameterSlice of_elements(const Solid& solid, Registry& registry, const char* name, const char* unit,
-                           Index width = 1) {
-    return registry.values.add(solid.owner, name, unit, solid.n_elements(), width, &solid.elements);
+ParameterSlice of_elements(const SolidTermInput& input, const NamedConstant& constant) {
+    const Solid& solid = input.solid;
+    return input.registry.values.add(solid.owner, constant.name, constant.unit, solid.n_elements(),
+                                     constant.width, &solid.elements);
 }
 
 }  // namespace
 
-LameModuli::LameModuli(const Solid& solid, Registry& registry)
-    : young_modulus_(of_elements(solid, registry, "young_modulus", "Pa")),
-      poisson_ratio_(of_elements(solid, registry, "poisson_ratio", "1")),
-      of_elements_(solid.n_elements()) {}
+LameModuli::LameModuli(const SolidTermInput& input)
+    : young_modulus_(of_elements(input, {"young_modulus", "Pa"})),
+      poisson_ratio_(of_elements(input, {"poisson_ratio", "1"})),
+      of_elements_(input.solid.n_elements()) {}
 
 bool LameModuli::set_values(const Values& values) {
     if (!values.changed(young_modulus_, poisson_ratio_)) return false;
@@ -47,44 +48,32 @@ double LameModuli::size(Index element) const {
     return std::abs(c[0]) + 2.0 * c[1];
 }
 
-GuccioneModuli::GuccioneModuli(const Solid& solid, Registry& registry)
-    : stiffness_(of_elements(solid, registry, "stiffness", "Pa")),
-      fibre_(of_elements(solid, registry, "fibre_exponent", "1")),
-      cross_(of_elements(solid, registry, "cross_fibre_exponent", "1")),
-      shear_(of_elements(solid, registry, "fibre_shear_exponent", "1")),
-      bulk_modulus_(of_elements(solid, registry, "bulk_modulus", "Pa")),
-      fibres_(of_elements(solid, registry, "fibres", "1", 3)),
-      of_elements_(solid.n_elements()) {}
-
-bool GuccioneModuli::set_values(const Values& values) {
-    if (!values.changed(stiffness_, fibre_, cross_, shear_, bulk_modulus_, fibres_)) return false;
-    for (Index t = 0; t < static_cast<Index>(of_elements_.size()); ++t) {
-        const Vec3 m = values.vector(fibres_, t);
-        of_elements_[t] = {values.number(stiffness_, t),
-                           values.number(fibre_, t),
-                           values.number(cross_, t),
-                           values.number(shear_, t),
-                           values.number(bulk_modulus_, t),
-                           m.x(),
-                           m.y(),
-                           m.z()};
+ConstantTable::ConstantTable(const SolidTermInput& input, std::span<const NamedConstant> constants) {
+    for (const NamedConstant& each : constants) {
+        slices_.push_back(of_elements(input, each));
+        width_ += each.width;
     }
+    rows_.resize(width_ * input.solid.n_elements());
+}
+
+bool ConstantTable::set_values(const Values& values) {
+    if (std::none_of(slices_.begin(), slices_.end(),
+                     [&](const ParameterSlice& each) { return values.changed(each); }))
+        return false;
+    double* to = rows_.data();
+    for (Index t = 0; t < slices_.front().rows; ++t)
+        for (const ParameterSlice& each : slices_)
+            to = std::copy_n(values[each] + t * each.width, each.width, to);
     return true;
 }
 
-void GuccioneModuli::constants(Index element, double out[8]) const {
-    std::copy(of_elements_[element].begin(), of_elements_[element].end(), out);
+void ConstantTable::constants(Index element, double out[]) const {
+    std::copy_n(of(element), width_, out);
 }
 
-void GuccioneModuli::add_vjp(Index element, const double by[8], Gradient& out) const {
-    const ParameterSlice* slices[5] = {&stiffness_, &fibre_, &cross_, &shear_, &bulk_modulus_};
-    for (int k = 0; k < 5; ++k) out.values[slices[k]->at(element)] += by[k];
-    for (int k = 0; k < 3; ++k) out.values[fibres_.at(element) + k] += by[5 + k];
-}
-
-double GuccioneModuli::size(Index element) const {
-    const std::array<double, 8>& c = of_elements_[element];
-    return c[0] * std::max({c[1], c[2], c[3]}) + c[4];
+void ConstantTable::add_vjp(Index element, const double by[], Gradient& out) const {
+    for (const ParameterSlice& each : slices_)
+        for (Index k = 0; k < each.width; ++k) out.values[each.at(element) + k] += *by++;
 }
 
 }  // namespace magshell

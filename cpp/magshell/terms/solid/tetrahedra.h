@@ -22,20 +22,20 @@ namespace magshell {
 template <class Element, class Material, class Moduli, bool mean>
 class Tetrahedra : public SolidTerm {
   public:
-    Tetrahedra(const Solid& solid, const std::vector<std::array<Index, Element::nodes>>& element_nodes,
-               Index body, const ColoredLoop& element_blocks, const SystemMatrix& matrix, Registry& registry)
-        : solid_(solid),
-          body_(body),
-          loop_(element_nodes, element_blocks, matrix),
+    Tetrahedra(const SolidTermInput& input,
+               const std::vector<std::array<Index, Element::nodes>>& element_nodes)
+        : solid_(input.solid),
+          body_(input.body),
+          loop_(element_nodes, input.element_blocks, input.matrix),
           element_nodes_(element_nodes),
-          moduli_(solid, registry),
+          moduli_(input),
           rest_(loop_.groups()),
           constants_(loop_.groups()),
-          height_(solid.smallest_height()) {
+          height_(input.solid.smallest_height()) {
         for (Index group = 0; group < loop_.groups(); ++group)
             for (int lane = 0; lane < SimdDouble::width; ++lane) {
                 Vec3 x[N];
-                for (int k = 0; k < N; ++k) x[k] = solid.rest(loop_.element(group, lane), k);
+                for (int k = 0; k < N; ++k) x[k] = solid_.rest(loop_.element(group, lane), k);
                 const RestElement<Element> at(x);
                 for (int p = 0; p < points; ++p) {
                     rest_[group].volume[p].set(lane, at.volume[p]);
@@ -221,11 +221,11 @@ class Tetrahedra : public SolidTerm {
         State(const Tetrahedra& term, Index group, const double* q)
             : State(term, group, Gradients(term, group, q), std::make_index_sequence<points>()) {}
 
-        /// Evaluates the law at other measures, two per point.
+        /// Evaluates the law at other measures, those of each point in a row.
         void take_measures(const Tetrahedra& term, Index group, const SimdDouble* measures) {
             SimdDouble before[mean ? 1 : points];
             for (int k = 0; k < (mean ? 1 : points); ++k) before[k] = measure(k);
-            for (int p = 0; p < points; ++p) at[p].take_measures(measures + 2 * p);
+            for (int p = 0; p < points; ++p) at[p].take_measures(measures + Material::stored_measures * p);
             respond(term, group);
             for (int k = 0; k < (mean ? 1 : points); ++k)
                 volumetric[k].bulk = Material::bulk_between(term.constants_[group].at, measure(k), before[k]);

@@ -26,17 +26,16 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean> 
     using typename Base::State;
     static constexpr int stresses_ = Material::stresses;
     // Stored per point: its stresses, or its measures at the end of a linearized step.
-    static constexpr bool measures_ = Material::keeps_measures;
-    static constexpr int kept_ = measures_ ? 2 : stresses_;
+    static constexpr bool measures_ = Material::stored_measures > 0;
+    static constexpr int kept_ = measures_ ? Material::stored_measures : stresses_;
 
   public:
-    TetrahedraTerm(const Solid& solid, const std::vector<std::array<Index, Element::nodes>>& element_nodes,
-                   Index body, const ColoredLoop& element_blocks, const SystemMatrix& matrix,
-                   const Nodes& nodes, Registry& registry)
-        : Base(solid, element_nodes, body, element_blocks, matrix, registry),
-          n_nodes_(nodes.n_nodes()),
-          stress_(measures_ ? 0 : solid.n_elements(), points * kept_),
-          extrapolated_(solid.n_elements(), points * kept_) {}
+    TetrahedraTerm(const SolidTermInput& input,
+                   const std::vector<std::array<Index, Element::nodes>>& element_nodes)
+        : Base(input, element_nodes),
+          n_nodes_(input.nodes.n_nodes()),
+          stress_(measures_ ? 0 : input.solid.n_elements(), points * kept_),
+          extrapolated_(input.solid.n_elements(), points * kept_) {}
 
     int strains_per_element() const override { return ViscousStrain::size * points; }
 
@@ -286,20 +285,24 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean> 
 
 /// Creates the term of a solid with linear or quadratic elements of a material.
 template <class Material, class Moduli>
-std::unique_ptr<SolidTerm> make_tetrahedra_term(bool mean_volume, const Solid& solid, Index body,
-                                                const ColoredLoop& element_blocks, const SystemMatrix& matrix,
-                                                const Nodes& nodes, Registry& registry) {
-    const auto make = [&]<class Term>(const auto& element_nodes, Term*) -> std::unique_ptr<SolidTerm> {
-        return std::make_unique<Term>(solid, element_nodes, body, element_blocks, matrix, nodes, registry);
-    };
+std::unique_ptr<SolidTerm> make_tetrahedra_term(const SolidTermInput& input) {
+    const Solid& solid = input.solid;
     if (!solid.quadratic())
-        return make(solid.linear_nodes,
-                    static_cast<TetrahedraTerm<LinearTetrahedron, Material, Moduli, false>*>(nullptr));
-    if (mean_volume)
-        return make(solid.quadratic_nodes,
-                    static_cast<TetrahedraTerm<QuadraticTetrahedron, Material, Moduli, true>*>(nullptr));
-    return make(solid.quadratic_nodes,
-                static_cast<TetrahedraTerm<QuadraticTetrahedron, Material, Moduli, false>*>(nullptr));
+        return std::make_unique<TetrahedraTerm<LinearTetrahedron, Material, Moduli, false>>(
+            input, solid.linear_nodes);
+    if (input.response.mean_volume)
+        return std::make_unique<TetrahedraTerm<QuadraticTetrahedron, Material, Moduli, true>>(
+            input, solid.quadratic_nodes);
+    return std::make_unique<TetrahedraTerm<QuadraticTetrahedron, Material, Moduli, false>>(
+        input, solid.quadratic_nodes);
+}
+
+/// Lists an isochoric law under its name, and under "<name> poisson_ratio" for Poisson's ratio in place of the bulk
+/// modulus (IsochoricModuli).
+template <class Law>
+SolidMaterials isochoric_entries(const std::string& name) {
+    const MakeSolidTerm make = &make_tetrahedra_term<InvariantSolid<Law>, IsochoricModuli<Law>>;
+    return {{name, make}, {name + " poisson_ratio", make}};
 }
 
 }  // namespace magshell

@@ -1,4 +1,4 @@
-"""Materials of solids: energies a volume, each under its own name."""
+"""Materials of solids: strain energy densities, each a class with its constants."""
 
 from __future__ import annotations
 
@@ -14,24 +14,26 @@ from ..._runtime.solver_entry_point import grouped
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
 
-
-# Beyond this Poisson's ratio the volume of quadratic elements counts on their mean, see Solid.
+# [-] Poisson's ratio above which quadratic elements evaluate the volumetric energy at their mean volume change, see Solid.
 NEARLY_INCOMPRESSIBLE = 0.4
 
 
 class SolidMaterial(Frozen):
-    """What a solid is made of. Every value is a number, or an array with one entry a tetrahedron.
+    """A material of a solid. Every constant is a number, or an array with one entry per tetrahedron.
 
-    Raises ValueError where a value is out of range.
+    Raises ValueError where a constant is out of range.
     """
 
-    isochoric = False  # whether the part that resists shear is blind to growth
+    isochoric = False  # whether the part of the energy that resists shear does not change with uniform growth
 
-    # Of each value: unit, what it has to be, and a test of that.
+    _energy: ClassVar[str] = (
+        ""  # the name of its energy in the core, in a file cpp/magshell/terms/solid/solid_*.cpp
+    )
+    # By the name of each constant: its unit, the words for its range, and the function that tests the range.
     _ranges: ClassVar[dict[str, tuple[str, str, Callable[..., Any]]]] = {}
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """A keyword that its constructor does not have is told with those that it has."""
+        """Wrap the constructor, so that an unknown keyword raises TypeError with the known ones."""
         super().__init_subclass__(**options)
         if "__init__" in vars(cls):
             setattr(cls, "__init__", grouped()(cls.__init__))  # noqa: B010 - assigned, it were declared to type checkers
@@ -61,21 +63,24 @@ class SolidMaterial(Frozen):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of its values."""
+        """The names of its constants."""
         return tuple(self._given)
 
     @property
     def _core_name(self) -> str:
-        """The name of the energy in the core, which is that of the class without `Material`."""
-        return type(self).__name__.removesuffix("Material")
+        """The name of its energy in the core."""
+        return self._energy
 
     def replaced(self, **values: Any) -> SolidMaterial:
-        """The same material with other values."""
+        """Return the same material with other values of some constants. Raises ValueError as the constructor does."""
+        for name in values:
+            if name not in self._given:
+                raise ValueError(f"a {type(self).__name__} has no {name}; it has {', '.join(self._given)}")
         given = {**self._given, **{name: self._checked(name, value) for name, value in values.items()}}
         return variant(self, _given=given)
 
     def rows(self, name: str, n_tetrahedra: int) -> np.ndarray:
-        """One value a tetrahedron. Raises ValueError where there are not so many."""
+        """Return a constant as one row per tetrahedron. Raises ValueError if its array has another number of rows."""
         array = self._given[name]
         row = self._row_shapes().get(name, ())
         if array.shape not in (row, (n_tetrahedra, *row)):
@@ -90,11 +95,11 @@ class SolidMaterial(Frozen):
 
     @property
     def _nearly_incompressible(self) -> bool:
-        """Whether it hardly changes its volume anywhere."""
+        """Return whether Poisson's ratio exceeds NEARLY_INCOMPRESSIBLE anywhere."""
         return bool(np.max(self.poisson_ratio) > NEARLY_INCOMPRESSIBLE)
 
     def _wave_modulus(self, n_tetrahedra: int) -> np.ndarray:
-        """Pa, (n_t,): a modulus that its stiffness for small strains is of the size of."""
+        """Return a modulus of the size of its stiffness for small strains, (n_t,) Pa."""
         return self.rows("young_modulus", n_tetrahedra)
 
     def __repr__(self) -> str:
@@ -130,9 +135,9 @@ class _Isotropic(SolidMaterial):
 
 
 class NeoHookean(_Isotropic):
-    """Neo-Hookean; refuses elements that are turned inside out, and solves take steps that leave none so.
+    """The neo-Hookean material. It refuses elements that are turned inside out, and no step of a solve turns one inside out.
 
-    volume: what it charges for a change of volume,
+    volume: the energy of a change of volume,
         "ln J": mu/2 (I1 - 3) - mu ln J + lam/2 (ln J)^2, the default;
         "J": mu/2 (I1 - 3) - mu ln J + lam/2 (J - 1)^2;
         "isochoric": mu/2 (J^(-2/3) I1 - 3) + K/2 (J - 1)^2, K = lam + 2/3 mu, for nearly incompressible material.
@@ -145,6 +150,7 @@ class NeoHookean(_Isotropic):
 
     isochoric: bool
 
+    _energy = "NeoHookean"
     _VOLUMES = ("ln J", "J", "isochoric")
 
     def __init__(self, volume: str = "ln J", *, young_modulus: Numbers, poisson_ratio: Numbers):
@@ -155,15 +161,15 @@ class NeoHookean(_Isotropic):
 
     @property
     def _core_name(self) -> str:
-        return f"NeoHookean {self.volume}"
+        return f"{self._energy} {self.volume}"
 
 
 class StableNeoHookean(_Isotropic):
-    """Neo-Hookean that comes back from elements turned inside out: mu/2 (I1 - 3) - mu (J - 1) + (lam + mu)/2 (J - 1)^2
-    (Smith, de Goes, Kim 2018).
+    """A neo-Hookean material whose elements recover from being turned inside out (Smith, de Goes, Kim 2018):
+    mu/2 (I1 - 3) - mu (J - 1) + (lam + mu)/2 (J - 1)^2.
 
-    log_barrier: with their barrier, m/2 (I1 - 3) + l/2 (J - a)^2 - m/2 ln((I1 + 1)/4), m = 4/3 mu, l = lam + 5/6 mu,
-        a = 1 + 3 m/(4 l), which is stable where elements are flat as well.
+    log_barrier: adds their barrier, m/2 (I1 - 3) + l/2 (J - a)^2 - m/2 ln((I1 + 1)/4), m = 4/3 mu, l = lam + 5/6 mu,
+        a = 1 + 3 m/(4 l), with which flat elements are stable too.
     young_modulus: Pa, positive. poisson_ratio: in (-1, 1/2). Each a number, or (n_t,).
 
     >>> import magshell as ms
@@ -171,6 +177,8 @@ class StableNeoHookean(_Isotropic):
     >>> ms.Solid(bar, material=ms.StableNeoHookean(young_modulus=1e6, poisson_ratio=0.3)).material.young_modulus
     array(1000000.)
     """
+
+    _energy = "StableNeoHookean"
 
     def __init__(self, *, young_modulus: Numbers, poisson_ratio: Numbers, log_barrier: bool = False):
         if not isinstance(log_barrier, bool):
@@ -180,12 +188,13 @@ class StableNeoHookean(_Isotropic):
 
     @property
     def _core_name(self) -> str:
-        return "StableNeoHookean barrier" if self.log_barrier else "StableNeoHookean"
+        return f"{self._energy} barrier" if self.log_barrier else self._energy
 
 
 class StVenantKirchhoff(_Isotropic):
-    """Quadratic in Green's strain, as shells are: mu tr(E^2) + lam/2 (tr E)^2. For small strains; it softens under
-    compression, and a mirror image costs it nothing.
+    """The St. Venant-Kirchhoff material, quadratic in Green's strain as shells are: mu tr(E^2) + lam/2 (tr E)^2.
+
+    It is for small strains: it softens under compression, and an element turned into its mirror image has no energy.
 
     young_modulus: Pa, positive. poisson_ratio: in (-1, 1/2). Each a number, or (n_t,).
 
@@ -195,9 +204,11 @@ class StVenantKirchhoff(_Isotropic):
     array(1000000.)
     """
 
+    _energy = "StVenantKirchhoff"
+
 
 class Corotated(_Isotropic):
-    """Linear elasticity in a frame that turns along: mu |F - R|^2 + lam/2 tr(R^T F - I)^2, R the nearest rotation.
+    """Corotated linear elasticity: mu |F - R|^2 + lam/2 tr(R^T F - I)^2, R the rotation nearest to F.
 
     young_modulus: Pa, positive. poisson_ratio: in (-1, 1/2). Each a number, or (n_t,).
 
@@ -207,11 +218,15 @@ class Corotated(_Isotropic):
     array(1000000.)
     """
 
+    _energy = "Corotated"
+
 
 class ProjectiveMaterial(_Isotropic):
-    """What Projective Dynamics is for: mu |F - R|^2 + lam/2 |F - P|^2, R the nearest rotation, P the nearest matrix with
-    determinant 1 (Bouaziz et al. 2014; with the weights 2 mu and lam of [Qiao21]). Elements turned inside out come back.
-    Volume counts at every point of an element, so that it has no mean_volume.
+    """The material of Projective Dynamics (Bouaziz et al. 2014): mu |F - R|^2 + lam/2 |F - P|^2.
+
+    R is the rotation nearest to F, P the nearest matrix with determinant 1; the weights 2 mu and lam are those of [Qiao21].
+    Elements recover from being turned inside out. No part of the energy depends on the volume alone, so it has no
+    mean_volume.
 
     young_modulus: Pa, positive. poisson_ratio: in [0, 1/2). Each a number, or (n_t,). They give mu and lam as everywhere;
         but for small strains e this energy is mu |e|^2 + lam/6 (tr e)^2: it resists changes of volume with a third of lam.
@@ -222,6 +237,7 @@ class ProjectiveMaterial(_Isotropic):
     array(1000000.)
     """
 
+    _energy = "Projective"
     _ranges: ClassVar = {
         "young_modulus": _YOUNG["young_modulus"],
         "poisson_ratio": ("1", "in [0, 1/2): lam is a weight here", lambda nu: (nu >= 0) & (nu < 0.5)),
@@ -233,7 +249,7 @@ class ProjectiveMaterial(_Isotropic):
 
 
 class Guccione(SolidMaterial):
-    """Muscle, transversely isotropic (Guccione et al. 1995): C/2 (exp(Q) - 1) + K/2 (J - 1)^2,
+    """A transversely isotropic material of muscle (Guccione et al. 1995): C/2 (exp(Q) - 1) + K/2 (J - 1)^2,
     Q = bf Eff^2 + bt (Ess^2 + Enn^2 + 2 Esn^2) + 2 bfs (Efs^2 + Efn^2), E Green's strain.
 
     stiffness: C, Pa. fibre_exponent, cross_fibre_exponent, fibre_shear_exponent: bf, bt, bfs. bulk_modulus: K, Pa. All
@@ -253,6 +269,7 @@ class Guccione(SolidMaterial):
     array(2000.)
     """
 
+    _energy = "Guccione"
     _ranges: ClassVar = {
         **{name: ("Pa", "positive", _positive) for name in ("stiffness", "bulk_modulus")},
         **{
