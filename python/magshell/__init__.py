@@ -68,6 +68,7 @@ from .model.solids.fibres import Fibres, fibres_along
 from .model.solids.materials import (
     Corotated,
     Guccione,
+    MooneyRivlin,
     NeoHookean,
     ProjectiveMaterial,
     StableNeoHookean,
@@ -151,6 +152,7 @@ __all__ = [
     "MeshQualityWarning",
     "MinimizeResult",
     "MixedNewton",
+    "MooneyRivlin",
     "MotionState",
     "MultistartFailed",
     "MultistartResult",

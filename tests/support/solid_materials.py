@@ -13,6 +13,7 @@ from scipy.optimize import minimize
 import magshell as ms
 
 LAME = {"young_modulus": 1.0e3, "poisson_ratio": 0.3}
+MOONEY_RIVLIN = {"c10": 120.0, "c01": 80.0}
 GUCCIONE = {
     "stiffness": 2.0e3,
     "fibre_exponent": 8.0,
@@ -59,7 +60,6 @@ class Sample:
     density: Callable[..., torch.Tensor]
     options: dict = field(default_factory=dict)
     refuses_inversion: bool = False
-    isotropic: bool = True
 
     @property
     def material(self):
@@ -98,6 +98,19 @@ def _neo_hookean_volume(values, at):
 def _neo_hookean_isochoric(values, at):
     lam, mu = _lame(values)
     return mu / 2 * (at.j ** (-2 / 3) * at.i1 - 3) + at.bulk_energy(lam + 2 * mu / 3)
+
+
+def _bulk_modulus(values, shear_modulus):
+    if "bulk_modulus" in values:
+        return values["bulk_modulus"]
+    nu = values["poisson_ratio"]
+    return 2 * shear_modulus * (1 + nu) / (3 * (1 - 2 * nu))
+
+
+def _mooney_rivlin(values, at):
+    c10, c01 = values["c10"], values["c01"]
+    shear = c10 * (at.j ** (-2 / 3) * at.i1 - 3) + c01 * (at.j ** (-4 / 3) * at.i2 - 3)
+    return shear + at.bulk_energy(_bulk_modulus(values, 2 * (c10 + c01)))
 
 
 def _stable_neo_hookean(values, at):
@@ -175,11 +188,13 @@ _SAMPLES = [
     Sample(ms.NeoHookean, LAME, _neo_hookean_logarithm, refuses_inversion=True),
     Sample(ms.NeoHookean, LAME, _neo_hookean_volume, {"volume": "J"}, refuses_inversion=True),
     Sample(ms.NeoHookean, LAME, _neo_hookean_isochoric, {"volume": "isochoric"}, refuses_inversion=True),
+    Sample(ms.MooneyRivlin, {**MOONEY_RIVLIN, "bulk_modulus": 2e3}, _mooney_rivlin, refuses_inversion=True),
+    Sample(ms.MooneyRivlin, {**MOONEY_RIVLIN, "poisson_ratio": 0.4}, _mooney_rivlin, refuses_inversion=True),
     Sample(ms.StableNeoHookean, LAME, _stable_neo_hookean),
     Sample(ms.StableNeoHookean, LAME, _stable_neo_hookean_barrier, {"log_barrier": True}),
     Sample(ms.StVenantKirchhoff, LAME, _st_venant_kirchhoff),
     Sample(ms.Corotated, LAME, _corotated),
-    Sample(ms.Guccione, GUCCIONE, _guccione, isotropic=False),
+    Sample(ms.Guccione, GUCCIONE, _guccione),
     Sample(ms.ProjectiveMaterial, LAME, _projective),
 ]
 SAMPLES = {each.material._core_name: each for each in _SAMPLES}

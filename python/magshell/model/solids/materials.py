@@ -116,6 +116,10 @@ def _positive(values: np.ndarray) -> np.ndarray:
     return values > 0
 
 
+def _not_negative(values: np.ndarray) -> np.ndarray:
+    return values >= 0
+
+
 _YOUNG = {
     "young_modulus": ("Pa", "positive", _positive),
     "poisson_ratio": (
@@ -162,6 +166,91 @@ class NeoHookean(_Isotropic):
     @property
     def _core_name(self) -> str:
         return f"{self._energy} {self.volume}"
+
+
+class _NearlyIncompressible(SolidMaterial):
+    """A material of constants that resist shear, and either a bulk modulus or Poisson's ratio."""
+
+    isochoric = True
+    _volume: ClassVar = {
+        "bulk_modulus": ("Pa", "positive", _positive),
+        "poisson_ratio": _YOUNG["poisson_ratio"],
+    }
+
+    def __init__(self, bulk_modulus: Numbers | None, poisson_ratio: Numbers | None, **constants: Numbers):
+        if (bulk_modulus is None) == (poisson_ratio is None):
+            found = "neither" if bulk_modulus is None else "both"
+            raise ValueError(
+                f"a {type(self).__name__} needs either bulk_modulus [Pa] or poisson_ratio [1], got {found}"
+            )
+        volume = {"bulk_modulus": bulk_modulus} if poisson_ratio is None else {"poisson_ratio": poisson_ratio}
+        super().__init__(**constants, **volume)
+
+    @property
+    def _core_name(self) -> str:
+        return self._energy if "bulk_modulus" in self._given else f"{self._energy} poisson_ratio"
+
+    def _shear_modulus(self, constants: dict[str, np.ndarray]) -> np.ndarray:
+        """Return the shear modulus for small strains by the constants, Pa."""
+        raise NotImplementedError
+
+    def _poisson_ratio(self, constants: dict[str, np.ndarray]) -> np.ndarray:
+        if "poisson_ratio" in constants:
+            return constants["poisson_ratio"]
+        shear, bulk = self._shear_modulus(constants), constants["bulk_modulus"]
+        return (3.0 * bulk - 2.0 * shear) / (6.0 * bulk + 2.0 * shear)
+
+    @property
+    def _nearly_incompressible(self) -> bool:
+        # Bounds of each constant, as arrays of other lengths are refused later, where the mesh is known.
+        softest, stiffest = (
+            {name: bound(value) for name, value in self._given.items()} for bound in (np.min, np.max)
+        )
+        if "poisson_ratio" in stiffest:
+            return bool(stiffest["poisson_ratio"] > NEARLY_INCOMPRESSIBLE)
+        return bool(
+            self._poisson_ratio({**softest, "bulk_modulus": stiffest["bulk_modulus"]}) > NEARLY_INCOMPRESSIBLE
+        )
+
+    def _wave_modulus(self, n_tetrahedra: int) -> np.ndarray:
+        rows = {name: self.rows(name, n_tetrahedra) for name in self.names}
+        return 2.0 * self._shear_modulus(rows) * (1.0 + self._poisson_ratio(rows))
+
+
+class MooneyRivlin(_NearlyIncompressible):
+    """The Mooney-Rivlin material of rubber, nearly incompressible (Mooney 1940, Rivlin 1948):
+    c10 (J^(-2/3) I1 - 3) + c01 (J^(-4/3) I2 - 3) + K/2 (J - 1)^2, I2 = |cof F|^2.
+
+    It refuses elements that are turned inside out, and no step of a solve turns one inside out.
+
+    c10: Pa, positive. c01: Pa, not negative. The shear modulus for small strains is 2 (c10 + c01).
+    bulk_modulus: K, Pa, positive; Abaqus has D1 = 2/K. Or poisson_ratio: in (-1, 1/2), for
+        K = 4 (c10 + c01) (1 + nu)/(3 (1 - 2 nu)). One of the two. Each constant a number, or (n_t,).
+
+    >>> import magshell as ms
+    >>> ms.MooneyRivlin(c10=0.16e6, c01=0.04e6, poisson_ratio=0.49)
+    MooneyRivlin(c10 160000, c01 40000, poisson_ratio 0.49)
+    """
+
+    _energy = "MooneyRivlin"
+    _ranges: ClassVar = {
+        "c10": ("Pa", "positive", _positive),
+        "c01": ("Pa", "not negative", _not_negative),
+        **_NearlyIncompressible._volume,
+    }
+
+    def __init__(
+        self,
+        *,
+        c10: Numbers,
+        c01: Numbers,
+        bulk_modulus: Numbers | None = None,
+        poisson_ratio: Numbers | None = None,
+    ):
+        super().__init__(bulk_modulus, poisson_ratio, c10=c10, c01=c01)
+
+    def _shear_modulus(self, constants: dict[str, np.ndarray]) -> np.ndarray:
+        return 2.0 * (constants["c10"] + constants["c01"])
 
 
 class StableNeoHookean(_Isotropic):

@@ -30,7 +30,7 @@ class Solid(Owner):
     mesh: TetMesh; its positions are the rest shape. For quadratic elements a mesh of four-node tetrahedra is raised to
         ten nodes, so `solid.mesh` may be another mesh than the one given: select the vertices for supports and loads on
         `solid.mesh`, which has the nodes between the corners too, as in `ms.Pin(solid.mesh.vertices_at(x=0.0))`.
-    material: NeoHookean, StableNeoHookean, StVenantKirchhoff, Corotated or Guccione.
+    material: a material of solids, such as NeoHookean, MooneyRivlin or Guccione.
     mass_density: kg/m3, positive, a number or (n_t,); needed for gravity and motions only.
     element: "quadratic", the default, ten nodes each; or "linear", four, as in [Chen22]: cheap, but far too stiff in
         bending: with one or two cells through the thickness a finger has 11 to 31 % of the true deflection at a Poisson's
