@@ -73,6 +73,7 @@ from .model.solids.materials import (
     ProjectiveMaterial,
     StableNeoHookean,
     StVenantKirchhoff,
+    Yeoh,
 )
 from .model.solids.skin import Skin
 from .model.solids.solid import Solid
@@ -205,6 +206,7 @@ __all__ = [
     "WarmStart",
     "Water",
     "Weld",
+    "Yeoh",
     "__version__",
     "animate",
     "control",

@@ -13,6 +13,7 @@ from scipy.optimize import minimize
 import magshell as ms
 
 LAME = {"young_modulus": 1.0e3, "poisson_ratio": 0.3}
+YEOH = {"c10": 200.0, "c20": -6.0, "c30": 3.0}
 MOONEY_RIVLIN = {"c10": 120.0, "c01": 80.0}
 GUCCIONE = {
     "stiffness": 2.0e3,
@@ -107,6 +108,12 @@ def _bulk_modulus(values, shear_modulus):
     return 2 * shear_modulus * (1 + nu) / (3 * (1 - 2 * nu))
 
 
+def _yeoh(values, at):
+    c10, c20, c30 = (values[name] for name in YEOH)
+    x = at.j ** (-2 / 3) * at.i1 - 3
+    return c10 * x + c20 * x**2 + c30 * x**3 + at.bulk_energy(_bulk_modulus(values, 2 * c10))
+
+
 def _mooney_rivlin(values, at):
     c10, c01 = values["c10"], values["c01"]
     shear = c10 * (at.j ** (-2 / 3) * at.i1 - 3) + c01 * (at.j ** (-4 / 3) * at.i2 - 3)
@@ -188,6 +195,8 @@ _SAMPLES = [
     Sample(ms.NeoHookean, LAME, _neo_hookean_logarithm, refuses_inversion=True),
     Sample(ms.NeoHookean, LAME, _neo_hookean_volume, {"volume": "J"}, refuses_inversion=True),
     Sample(ms.NeoHookean, LAME, _neo_hookean_isochoric, {"volume": "isochoric"}, refuses_inversion=True),
+    Sample(ms.Yeoh, {**YEOH, "bulk_modulus": 2e3}, _yeoh, refuses_inversion=True),
+    Sample(ms.Yeoh, {**YEOH, "poisson_ratio": 0.4}, _yeoh, refuses_inversion=True),
     Sample(ms.MooneyRivlin, {**MOONEY_RIVLIN, "bulk_modulus": 2e3}, _mooney_rivlin, refuses_inversion=True),
     Sample(ms.MooneyRivlin, {**MOONEY_RIVLIN, "poisson_ratio": 0.4}, _mooney_rivlin, refuses_inversion=True),
     Sample(ms.StableNeoHookean, LAME, _stable_neo_hookean),

@@ -10,13 +10,17 @@ import torch
 import magshell as ms
 from magshell.model.solids.solid_stresses import states_of
 
+YEOH = {"c10": 0.2e6, "c20": -4e3, "c30": 0.3e3}
 MOONEY_RIVLIN = {"c10": 0.16e6, "c01": 0.04e6}
 SHEAR = 0.4e6  # Pa, of both for small strains
-LAWS = [(ms.MooneyRivlin, MOONEY_RIVLIN)]
+LAWS = [(ms.Yeoh, YEOH), (ms.MooneyRivlin, MOONEY_RIVLIN)]
 
 
 def slopes(i1, i2, law, constants):
     """dW/dI1 and dW/dI2 of the incompressible laws, Pa."""
+    if law is ms.Yeoh:
+        x = i1 - 3
+        return constants["c10"] + 2 * constants["c20"] * x + 3 * constants["c30"] * x**2, 0.0
     return constants["c10"], constants["c01"]
 
 
@@ -74,7 +78,7 @@ def test_shear_stress_of_simple_shear_is_the_closed_form(law, constants, gamma):
     assert np.allclose(cauchy(solid, rest)[:, 0, 1], 2 * gamma * (w1 + w2), rtol=1e-8)
 
 
-@pytest.mark.parametrize("law, zero", [(ms.MooneyRivlin, {"c01": 0.0})])
+@pytest.mark.parametrize("law, zero", [(ms.Yeoh, {"c20": 0.0, "c30": 0.0}), (ms.MooneyRivlin, {"c01": 0.0})])
 def test_without_the_other_constants_both_are_isochoric_neo_hookean(law, zero):
     young, nu = 1e5, 0.48
     own = cube(law(c10=young / (4 * (1 + nu)), **zero, poisson_ratio=nu))
@@ -160,7 +164,25 @@ def test_elements_have_a_mean_volume_where_poissons_ratio_is_large(law, constant
 
 @pytest.mark.parametrize(
     "call, message",
-    [],
+    [
+        (
+            lambda: ms.Yeoh(**YEOH),
+            r"Yeoh needs either bulk_modulus \[Pa\] or poisson_ratio \[1\], got neither",
+        ),
+        (lambda: ms.Yeoh(**YEOH, bulk_modulus=1e6, poisson_ratio=0.4), "got both"),
+        (lambda: ms.Yeoh(**{**YEOH, "c10": 0.0}, bulk_modulus=1e6), r"c10 \[Pa\] must be positive, got 0"),
+        (lambda: ms.Yeoh(**{**YEOH, "c30": -1.0}, bulk_modulus=1e6), r"c30 \[Pa\] must be not negative"),
+        (lambda: ms.Yeoh(**YEOH, poisson_ratio=0.5), r"poisson_ratio \[1\] must be in \(-1, 1/2\)"),
+        (lambda: ms.MooneyRivlin(c10=1e5, c01=[0.0, -1.0], bulk_modulus=1e6), r"c01 \[Pa\].*entry 1 is -1"),
+        (
+            lambda: ms.MooneyRivlin(c10=1e5, c01=0.0, bulk_modulus=-1.0),
+            r"bulk_modulus \[Pa\] must be positive",
+        ),
+        (
+            lambda: ms.Yeoh(**YEOH, bulk_modulus=1e6).replaced(poisson_ratio=0.4),
+            "a Yeoh has no poisson_ratio; it has c10, c20, c30, bulk_modulus",
+        ),
+    ],
 )
 def test_bad_constants_are_named_with_their_unit(call, message):
     with pytest.raises(ValueError, match=message):

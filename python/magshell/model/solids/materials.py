@@ -217,6 +217,45 @@ class _NearlyIncompressible(SolidMaterial):
         return 2.0 * self._shear_modulus(rows) * (1.0 + self._poisson_ratio(rows))
 
 
+class Yeoh(_NearlyIncompressible):
+    """Yeoh's material of filled rubber, nearly incompressible (Yeoh 1993): with x = J^(-2/3) I1 - 3,
+    c10 x + c20 x^2 + c30 x^3 + K/2 (J - 1)^2.
+
+    It refuses elements that are turned inside out, and no step of a solve turns one inside out.
+
+    c10: Pa, positive; the shear modulus for small strains is 2 c10.
+    c20: Pa; negative in most fits, as rubber first softens. c30: Pa, not negative: rubber stiffens at large stretches.
+    bulk_modulus: K, Pa, positive; Abaqus has D1 = 2/K. Or poisson_ratio: in (-1, 1/2), for
+        K = 4 c10 (1 + nu)/(3 (1 - 2 nu)). One of the two. Each constant a number, or (n_t,).
+
+    >>> import magshell as ms
+    >>> ms.Yeoh(c10=0.2e6, c20=-3e3, c30=100.0, bulk_modulus=2e8)
+    Yeoh(c10 200000, c20 -3000, c30 100, bulk_modulus 2e+08)
+    """
+
+    _energy = "Yeoh"
+    _ranges: ClassVar = {
+        "c10": ("Pa", "positive", _positive),
+        "c20": ("Pa", "a finite number", np.isfinite),
+        "c30": ("Pa", "not negative", _not_negative),
+        **_NearlyIncompressible._volume,
+    }
+
+    def __init__(
+        self,
+        *,
+        c10: Numbers,
+        c20: Numbers,
+        c30: Numbers,
+        bulk_modulus: Numbers | None = None,
+        poisson_ratio: Numbers | None = None,
+    ):
+        super().__init__(bulk_modulus, poisson_ratio, c10=c10, c20=c20, c30=c30)
+
+    def _shear_modulus(self, constants: dict[str, np.ndarray]) -> np.ndarray:
+        return 2.0 * constants["c10"]
+
+
 class MooneyRivlin(_NearlyIncompressible):
     """The Mooney-Rivlin material of rubber, nearly incompressible (Mooney 1940, Rivlin 1948):
     c10 (J^(-2/3) I1 - 3) + c01 (J^(-4/3) I2 - 3) + K/2 (J - 1)^2, I2 = |cof F|^2.
