@@ -175,8 +175,8 @@ def _solids() -> Iterator[Call]:
     magnetized = {"skin": ms.Skin(**skin), "remanent_magnetization": (1e4, 0, 0)}
     yield Call("Solid", ms.Solid, {**solid, **magnetized, "material": ms.NeoHookean(**moduli)})
     yield Call("Skin", lambda **a: ms.Solid(mesh, material=ms.NeoHookean(**moduli), skin=ms.Skin(**a)), skin)
-    for name, sample in SAMPLES.items():
-        yield Call(name, sample.make, {**sample.options, **sample.constants})
+    for sample in SAMPLES.values():
+        yield Call(sample.make.__name__, sample.make, {**sample.options, **sample.constants})
 
 
 def _muscles() -> Iterator[Call]:

@@ -67,7 +67,7 @@ class Sample:
         return self.make(**self.options, **self.constants)
 
     def scaled(self, factor: float):
-        """The same material `factor` times as stiff."""
+        """Return the same material `factor` times as stiff."""
         moduli = [name for name, (unit, *_) in self.make._ranges.items() if unit == "Pa"]
         given = {name: factor * value if name in moduli else value for name, value in self.constants.items()}
         return self.make(**self.options, **given)

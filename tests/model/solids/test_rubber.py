@@ -17,7 +17,7 @@ LAWS = [(ms.Yeoh, YEOH), (ms.MooneyRivlin, MOONEY_RIVLIN)]
 
 
 def slopes(i1, i2, law, constants):
-    """dW/dI1 and dW/dI2 of the incompressible laws, Pa."""
+    """Return dW/dI1 and dW/dI2 of the incompressible laws, Pa."""
     if law is ms.Yeoh:
         x = i1 - 3
         return constants["c10"] + 2 * constants["c20"] * x + 3 * constants["c30"] * x**2, 0.0
@@ -49,8 +49,9 @@ def pulled(solid, axes, stretch):
 def test_stresses_of_stretched_blocks_are_the_closed_form_of_incompressible_rubber(
     law, constants, axes, stretch, element
 ):
-    """Holzapfel, Nonlinear Solid Mechanics (2000), 6.5: Cauchy's stress along is 2 (l^2 - l_t^2) (W1 + f W2), with the
-    transverse stretch l_t and f the square of the other stretch in the plane of the two."""
+    """Compare with 2 (l^2 - l_t^2) (W1 + f W2), Cauchy's stress along (Holzapfel, Nonlinear Solid Mechanics, 2000, 6.5).
+
+    l_t is the transverse stretch, f the square of the other stretch in the plane of the two."""
     solid = cube(law(**constants, bulk_modulus=1e6 * SHEAR), element)
     rest = ms.equilibrium(pulled(solid, axes, stretch))
     across = stretch ** (-0.5 if axes == "x" else -2.0)
@@ -68,7 +69,7 @@ def test_stresses_of_stretched_blocks_are_the_closed_form_of_incompressible_rubb
 @pytest.mark.parametrize("gamma", [0.3, 2.0])
 @pytest.mark.parametrize("law, constants", LAWS)
 def test_shear_stress_of_simple_shear_is_the_closed_form(law, constants, gamma):
-    """s12 = 2 gamma (W1 + W2) at any bulk modulus, as the volume stays (Holzapfel 2000, 6.5)."""
+    """Compare with s12 = 2 gamma (W1 + W2), which holds at any bulk modulus, as the volume stays (Holzapfel 2000, 6.5)."""
     solid = cube(law(**constants, bulk_modulus=10 * SHEAR), cells=(2, 2, 2))
     x = solid.mesh.rest_positions
     outside = np.flatnonzero(np.abs(x - 0.5).max(axis=1) > 0.5 - 1e-9)
@@ -144,7 +145,7 @@ def test_results_are_saved_and_loaded_and_materials_copied(law, constants, tmp_p
 
 @pytest.mark.parametrize("law, constants", LAWS)
 def test_blocks_under_large_loads_keep_their_elements_upright(law, constants):
-    """A block pressed to half its height, and pulled to three times it, in one call each."""
+    """Press a block to half its height, and pull it to three times it, in one call each."""
     for end in (-0.5, 2.0):
         solid = cube(law(**constants, bulk_modulus=50 * SHEAR), cells=(2, 2, 2))
         x = solid.mesh.rest_positions

@@ -320,7 +320,7 @@ class StableNeoHookean(_Isotropic):
 
 
 class StVenantKirchhoff(_Isotropic):
-    """The St. Venant-Kirchhoff material, quadratic in Green's strain as shells are: mu tr(E^2) + lam/2 (tr E)^2.
+    """The Saint-Venant-Kirchhoff material, quadratic in Green's strain as shells are: mu tr(E^2) + lam/2 (tr E)^2.
 
     It is for small strains: it softens under compression, and an element turned into its mirror image has no energy.
 
