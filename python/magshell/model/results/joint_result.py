@@ -32,12 +32,12 @@ class JointResult(Frozen):
     @property
     def angle(self) -> Computed:
         """The angle of a Revolute, with full turns over a motion, or that of the rotation of a Ball, (...) rad."""
-        kind = self.joint._kind
-        if kind not in ("revolute", "ball"):
+        spec = self.joint._spec
+        if not spec.freedoms or spec.slides:
             raise ValueError(f"a {type(self.joint).__name__} has no angle")
         rotation = self._relative
         xp = np if isinstance(rotation, np.ndarray) else __import__("torch")
-        if kind == "ball":
+        if spec.freedoms == 3:
             trace = rotation[..., 0, 0] + rotation[..., 1, 1] + rotation[..., 2, 2]
             return 2.0 * xp.arcsin(xp.sqrt(xp.clip(0.25 * (3.0 - trace), 0.0, 1.0)))
         axis = _like(self._axis, rotation)
@@ -53,7 +53,7 @@ class JointResult(Frozen):
     @property
     def displacement(self) -> Computed:
         """The displacement of a Prismatic, (...) m."""
-        if self.joint._kind != "prismatic":
+        if not self.joint._spec.slides:
             raise ValueError(f"a {type(self.joint).__name__} has no displacement")
         along = _like(self._axis, self._child.center)
         if self._parent is not None:
@@ -66,17 +66,17 @@ class JointResult(Frozen):
 
         Of a Ball it is the angular velocity of the child relative to the parent, in the world's axes, (n, 3) rad/s.
         """
-        kind = self.joint._kind
-        if kind not in ("revolute", "prismatic", "ball"):
+        spec = self.joint._spec
+        if not spec.freedoms:
             raise ValueError(f"a {type(self.joint).__name__} has no rate")
-        if kind == "ball":
+        if spec.freedoms == 3:
             turning = self._child.angular_velocity
             return turning if self._parent is None else turning - self._parent.angular_velocity
         axis, spin = _like(self._axis, self._child.center), 0.0
         velocity = self._velocity_of(self._child) - self._velocity_of(self._parent)
         if self._parent is not None:
             axis, spin = _rotated(self._parent.rotation, axis), self._parent.angular_velocity
-        if kind == "revolute":
+        if not spec.slides:
             return (axis * (self._child.angular_velocity - spin)).sum(-1)
         slid = self.place - self._position_on(self._parent)
         turned = 0.0 if self._parent is None else (_cross(spin, axis) * slid).sum(-1)

@@ -238,7 +238,7 @@ def check_joints(inputs: Inputs, points: np.ndarray) -> None:
         return at_rest, middle, (rows - middle).T @ (rigid.rest[:4] - at_rest) / (4.0 * rigid.length**2)
 
     for own in scene.joints:
-        if own._kind not in ("revolute", "prismatic", "ball"):
+        if not own._spec.freedoms:
             continue
         joint = inputs.values.current(own)
         (rest, middle, turn), (parent_rest, parent_middle, parent_turn) = pose(own.child), pose(own.parent)
@@ -246,9 +246,9 @@ def check_joints(inputs: Inputs, points: np.ndarray) -> None:
             middle + turn @ (joint.origin - rest) - parent_middle - parent_turn @ (joint.origin - parent_rest)
         )
         along, tilt = parent_turn @ joint.axis, 0.0
-        if own._kind == "prismatic":
+        if own._spec.slides:
             gap = gap - along * (along @ gap)
-        elif own._kind == "revolute":
+        elif own._spec.freedoms == 1:
             tilt = float(np.linalg.norm(turn @ joint.axis - along))
         if np.linalg.norm(gap) > _OPEN * size or tilt > _OPEN:
             raise ValueError(

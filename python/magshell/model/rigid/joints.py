@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -15,18 +16,117 @@ if TYPE_CHECKING:
     from ..._input.kinds import Numbers
 
 
-class Joint(Owner):
-    """Between two links; make one of its subclasses.
+_FAR = 1e300  # a limit that no joint reaches
 
-    child: the link (Rigid) that it carries. parent: the link that it is fixed to, or None for the world.
+
+@dataclass(frozen=True)
+class JointSpec:
+    """The properties that set one kind of joint apart from the others.
+
+    kind: its name in the core. freedoms: how many coordinates it has. slides: whether its coordinate is a length [m], not
+    an angle [rad]. defaults: by the name of each number, the value with which it does not act. vectors: the unit of each
+    number that has three components. axis: whether it has an axis: "none", "required", or "optional".
+    """
+
+    kind: str
+    freedoms: int = 0
+    slides: bool = False
+    axis: str = "none"
+    defaults: dict[str, Any] = field(default_factory=dict)
+    vectors: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def motor(self) -> str:
+        """The name of the number that prescribes its coordinate; empty without one."""
+        return next((name for name in self.defaults if name.startswith("motor_")), "")
+
+    @property
+    def replaceable(self) -> tuple[str, ...]:
+        """The names of all numbers that a solve can replace."""
+        rate = ("rate",) if self.freedoms else ()
+        return (*self.defaults, *rate, "origin", *(() if self.axis == "none" else ("axis",)))
+
+    def unit(self, name: str) -> str:
+        """Return the unit of one of its numbers; that of its coordinate if the name is empty."""
+        if name in self.vectors:
+            return self.vectors[name]
+        for names, of_angle, of_length in _UNITS:
+            if name in names:
+                return of_length if self.slides else of_angle
+        return "m" if self.slides else "rad"
+
+
+_UNITS = (
+    (("damping",), "N m s/rad", "N s/m"),
+    (("spring_stiffness", "servo_stiffness", "limit_stiffness"), "N m/rad", "N/m"),
+    (("torque", "torque_limit", "force", "force_limit"), "N m", "N"),
+)
+
+
+def _one_coordinate(coordinate: str, force: str) -> dict[str, Any]:
+    """Return the numbers of a joint with one coordinate, and the values with which they do not act."""
+    return {
+        "spring_stiffness": 0.0,
+        f"rest_{coordinate}": 0.0,
+        "damping": 0.0,
+        force: 0.0,
+        f"motor_{coordinate}": 0.0,
+        f"target_{coordinate}": 0.0,
+        "servo_stiffness": 0.0,
+        f"{force}_limit": _FAR,
+        "lower_limit": -_FAR,
+        "upper_limit": _FAR,
+        "limit_stiffness": 0.0,
+        "limit_smoothing": 1.0,
+    }
+
+
+_BALL: dict[str, Any] = {
+    "spring_stiffness": 0.0,
+    "damping": 0.0,
+    "torque": np.zeros(3),
+    "motor_rotation": np.zeros(3),
+    "target_rotation": np.zeros(3),
+    "servo_stiffness": 0.0,
+    "torque_limit": _FAR,
+    "upper_limit": _FAR,
+    "cone_limit": _FAR,
+    "limit_stiffness": 0.0,
+    "limit_smoothing": 1.0,
+}
+
+_SPECS = (
+    JointSpec("fixed"),
+    JointSpec("revolute", freedoms=1, axis="required", defaults=_one_coordinate("angle", "torque")),
+    JointSpec(
+        "prismatic",
+        freedoms=1,
+        slides=True,
+        axis="required",
+        defaults=_one_coordinate("displacement", "force"),
+    ),
+    JointSpec(
+        "ball",
+        freedoms=3,
+        axis="optional",
+        defaults=_BALL,
+        vectors={"torque": "N m", "motor_rotation": "rad", "target_rotation": "rad"},
+    ),
+    JointSpec("closure", defaults={"stiffness": 0.0}),
+)
+JOINTS = {spec.kind: spec for spec in _SPECS}
+
+
+class Joint(Owner):
+    """A joint between two links; make one of its subclasses.
+
+    child: the link (RigidBody) that it carries. parent: the link that it is fixed to, or None for the world.
     """
 
     child: RigidBody
     parent: RigidBody | None
 
-    _kind: ClassVar[str] = ""
-    _defaults: ClassVar[dict[str, Any]] = {}  # by name: where it does not act
-    _vectors: ClassVar[dict[str, str]] = {}  # the units of those that have three numbers
+    _spec: ClassVar[JointSpec] = JointSpec("")
 
     def __init__(
         self,
@@ -55,46 +155,41 @@ class Joint(Owner):
         self._given = {name: self._checked(name, value) for name, value in law.items() if value is not None}
         self._check_together()
         self.rate: float | np.ndarray | None = None if rate is None else self._checked_rate(rate)
-        # What it was made without, a solve cannot give it.
+        # A solve can replace only the numbers with which the joint was made.
         self._replaceable = (
             *self._given,
             *(() if rate is None else ("rate",)),
-            *self._places,
+            *self._geometry,
         )
         self._in_time = tuple(name for name in type(self)._in_time if name in self._given)
+
+    @property
+    def _kind(self) -> str:
+        return self._spec.kind
+
+    def _unit(self, name: str) -> str:
+        return self._spec.unit(name)
 
     def __getattr__(self, name: str) -> Any:
         given = self.__dict__.get("_given", {})
         if name in given:
             return given[name]
-        if name in self._defaults:
+        if name in self._spec.defaults:
             return None
         raise AttributeError(f"{type(self).__name__} has no attribute {name!r}")
 
     def _checked_rate(self, value) -> float | np.ndarray:
-        return float(quantity("rate", f"{self._unit('')}/s", value, ()))
+        return float(quantity("rate", f"{self._spec.unit('')}/s", value, ()))
 
     def _checked(self, name: str, value) -> float | np.ndarray:
-        unit = self._unit(name)
-        if name in self._vectors:
+        unit = self._spec.unit(name)
+        if name in self._spec.vectors:
             return np.array(quantity(name, unit, value, (3,)))
         if name in ("servo_stiffness", "torque_limit", "force_limit", "limit_stiffness", "limit_smoothing"):
             return positive(name, unit, value)
         if name in ("spring_stiffness", "damping"):
             return not_negative(name, unit, value)
         return float(quantity(name, unit, value, ()))
-
-    def _unit(self, name: str) -> str:
-        slides = self._kind == "prismatic"
-        if name in self._vectors:
-            return self._vectors[name]
-        if name == "damping":
-            return "N s/m" if slides else "N m s/rad"
-        if name in ("spring_stiffness", "servo_stiffness", "limit_stiffness"):
-            return "N/m" if slides else "N m/rad"
-        if name in ("torque", "torque_limit", "force", "force_limit"):
-            return "N" if slides else "N m"
-        return "m" if slides else "rad"
 
     def _check_together(self) -> None:
         given, kind = self._given, type(self).__name__
@@ -106,41 +201,44 @@ class Joint(Owner):
         if "lower_limit" in given and not given["lower_limit"] < given.get("upper_limit", np.inf):
             raise ValueError(f"lower_limit of a {kind} must be below its upper_limit")
         if self._driven:
-            (motor,) = (name for name in given if name.startswith("motor_"))
+            motor = self._spec.motor
             if idle := [name for name in _UNDER_MOTOR if name in given]:
                 raise ValueError(
                     f"{motor} of a {kind} prescribes where it is: {', '.join(idle)} would do nothing"
                 )
-        target = [name for name in self._defaults if name.startswith("target_")]
+        target = [name for name in self._spec.defaults if name.startswith("target_")]
         if target and (target[0] in given) != ("servo_stiffness" in given):
             raise ValueError(
                 f"a {kind} that is to follow a target needs both {target[0]} and servo_stiffness"
             )
 
     @property
-    def _driven(self) -> bool:
-        """Whether a motor prescribes its coordinate."""
-        return any(name.startswith("motor_") for name in self._given)
+    def _driven(self) -> bool:  # plain-words: ok
+        """Return whether a motor prescribes its coordinate."""
+        return self._spec.motor in self._given
 
     @property
     def _acts(self) -> bool:
-        """Whether anything but the constraint itself is in it."""
+        """Return whether it has springs, torques, limits or a motor, besides the constraint itself."""
         return bool(self._given)
 
     @property
     def _resting(self) -> Joint:
-        """Itself without what pulls at rest: torques, springs and servos that want something else, limits beyond it."""
+        """Return the joint without the parts that act at rest.
+
+        These are torques, springs and servos with another rest value, and limits that the rest value exceeds.
+        """
         pulls = {name for name in self._given if name in _PULLS and np.any(self._given[name])}
         beyond = {"lower_limit": -1.0, "upper_limit": 1.0}
         pulls |= {name for name, way in beyond.items() if way * self._given.get(name, way) < 0}
-        return self.replaced(**{name: self._defaults[name] for name in pulls}) if pulls else self
+        return self.replaced(**{name: self._spec.defaults[name] for name in pulls}) if pulls else self
 
     def _has(self, name: str) -> bool:
-        """Whether it was made with this."""
+        """Return whether it was made with this number."""
         return name in self._given
 
     def replaced(self, **values: Any) -> Joint:
-        """The same joint with other numbers of what acts in it."""
+        """Return the same joint with other numbers. Raises ValueError for one with which it was not made."""
         for name in values:
             if name not in self._replaceable:
                 raise ValueError(f"the {type(self).__name__} was made without {name}: zero will do")
@@ -149,36 +247,36 @@ class Joint(Owner):
 
     @property
     def _has_axis(self) -> bool:
-        """Whether it was made with one."""
+        """Return whether it was made with an axis."""
         return bool(self.axis.any())
 
     @property
-    def _places(self) -> tuple[str, ...]:
-        """What of it says where it is at rest."""
+    def _geometry(self) -> tuple[str, ...]:
+        """The names of the numbers that say where it is at rest."""
         return ("origin", "axis") if self._has_axis else ("origin",)
 
     def _again(self, law: dict[Any, Any]) -> Joint:
-        own = {name: getattr(self, name) for name in self._places}
+        own = {name: getattr(self, name) for name in self._geometry}
         return type(self)(child=self.child, parent=self.parent, **{**own, **law})
 
     def _add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         if self._acts:
-            for name, default in self._defaults.items():
+            for name, default in self._spec.defaults.items():
                 numbers[label, name] = self._given.get(name, default)
-        for name in self._places:
+        for name in self._geometry:
             numbers[label, name] = getattr(self, name)
 
     def _gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
-        found = {name: gradient.value(label, name)[0] for name in (*self._given, *self._places)}
+        found = {name: gradient.value(label, name)[0] for name in (*self._given, *self._geometry)}
         if self.rate is not None:
             rows = gradient.others.get("own_velocities")
             found["rate"] = np.zeros(np.shape(self.rate))
             for place in values.moved_by(self) if rows is not None else ():
                 moved = rows[place.points]
                 found["rate"] = found["rate"] + self._rate_gradient(place.rest, moved)
-                if self._kind != "prismatic":
+                if not self._spec.slides:
                     found["origin"] = found["origin"] + np.cross(self._turning, moved).sum(axis=0)
-                if self._has_axis and self._kind != "ball":
+                if self._has_axis and self._spec.freedoms == 1:
                     found["axis"] = found["axis"] + self._axis_gradient(place.rest, moved)
         if self._has_axis:  # of a unit vector along what was given
             across = found["axis"] - self.axis * (self.axis @ found["axis"])
@@ -186,30 +284,29 @@ class Joint(Owner):
         return found
 
     def velocities(self, points: np.ndarray) -> np.ndarray:
-        """Of points (n, 3) m of what it carries at rest, as it starts: (n, 3) m/s."""
+        """Return the velocities at the start of points (n, 3) m of its child at rest, (n, 3) m/s."""
         return self.rate * self._directions(points)
 
     def _rate_gradient(self, points: np.ndarray, by_velocities: np.ndarray) -> np.ndarray:
         return (by_velocities * self._directions(points)).sum()
 
     def _axis_gradient(self, points: np.ndarray, by_velocities: np.ndarray) -> np.ndarray:
-        slides = self._kind == "prismatic"
-        arms = by_velocities if slides else np.cross(points - self.origin, by_velocities)
+        arms = by_velocities if self._spec.slides else np.cross(points - self.origin, by_velocities)
         return self.rate * arms.sum(axis=0)
 
     @property
     def _turning(self) -> np.ndarray:
-        """How fast it turns to start with: (3,) rad/s."""
-        return self.rate * self.axis if self._kind == "revolute" else self.rate
+        """Return the angular velocity with which it starts, (3,) rad/s."""
+        return self.rate * self.axis if self._spec.freedoms == 1 else self.rate
 
     def _directions(self, points: np.ndarray) -> np.ndarray:
-        """How points move as its coordinate does: (n, 3), m/rad or 1."""
-        if self._kind == "prismatic":
+        """Return the derivative of points (n, 3) m by its coordinate, (n, 3) m/rad or 1."""
+        if self._spec.slides:
             return np.broadcast_to(self.axis, points.shape)
         return np.cross(self.axis, points - self.origin)
 
     def __repr__(self) -> str:
-        law = "".join(f", {name} {_told(value)}" for name, value in self._given.items())
+        law = "".join(f", {name} {_format_number(value)}" for name, value in self._given.items())
         return f"{type(self).__name__}({'to the world' if self.parent is None else 'between two links'}{law})"
 
 
@@ -225,11 +322,8 @@ _PULLS = (
 _UNDER_MOTOR = ("torque", "force", "servo_stiffness", "lower_limit", "upper_limit", "cone_limit")
 
 
-def _told(value) -> str:
+def _format_number(value) -> str:
     return f"{value:g}" if np.ndim(value) == 0 else f"({', '.join(f'{each:g}' for each in value)})"
-
-
-_FAR = 1e300  # a limit that nothing reaches
 
 
 class Fixed(Joint):
@@ -247,8 +341,8 @@ class Fixed(Joint):
     Skeleton(2 links, 2 joints)
     """
 
-    _kind = "fixed"
-    _replaceable = ("origin",)
+    _spec = JOINTS["fixed"]
+    _replaceable = _spec.replaceable
 
     def __init__(self, child: RigidBody, parent: RigidBody | None = None, origin: Numbers = (0.0, 0.0, 0.0)):
         super().__init__(child, parent, origin)
@@ -284,23 +378,9 @@ class Revolute(Joint):
     True
     """
 
-    _kind = "revolute"
-    _defaults: ClassVar[dict[str, float]] = {
-        "spring_stiffness": 0.0,
-        "rest_angle": 0.0,
-        "damping": 0.0,
-        "torque": 0.0,
-        "motor_angle": 0.0,
-        "target_angle": 0.0,
-        "servo_stiffness": 0.0,
-        "torque_limit": _FAR,
-        "lower_limit": -_FAR,
-        "upper_limit": _FAR,
-        "limit_stiffness": 0.0,
-        "limit_smoothing": 1.0,
-    }
-    _in_time = tuple(_defaults)
-    _replaceable = (*_in_time, "rate", "origin", "axis")
+    _spec = JOINTS["revolute"]
+    _in_time = tuple(_spec.defaults)
+    _replaceable = _spec.replaceable
 
     def __init__(
         self,
@@ -323,7 +403,7 @@ class Revolute(Joint):
         limit_smoothing: Numbers | None = None,
         rate: Numbers | None = None,
     ):
-        law = {name: value for name, value in locals().items() if name in self._defaults}
+        law = {name: value for name, value in locals().items() if name in self._spec.defaults}
         super().__init__(child, parent, origin, axis, rate, **law)
 
 
@@ -343,23 +423,9 @@ class Prismatic(Joint):
     Skeleton(1 link, 1 joint)
     """
 
-    _kind = "prismatic"
-    _defaults: ClassVar[dict[str, float]] = {
-        "spring_stiffness": 0.0,
-        "rest_displacement": 0.0,
-        "damping": 0.0,
-        "force": 0.0,
-        "motor_displacement": 0.0,
-        "target_displacement": 0.0,
-        "servo_stiffness": 0.0,
-        "force_limit": _FAR,
-        "lower_limit": -_FAR,
-        "upper_limit": _FAR,
-        "limit_stiffness": 0.0,
-        "limit_smoothing": 1.0,
-    }
-    _in_time = tuple(_defaults)
-    _replaceable = (*_in_time, "rate", "origin", "axis")
+    _spec = JOINTS["prismatic"]
+    _in_time = tuple(_spec.defaults)
+    _replaceable = _spec.replaceable
 
     def __init__(
         self,
@@ -382,7 +448,7 @@ class Prismatic(Joint):
         limit_smoothing: Numbers | None = None,
         rate: Numbers | None = None,
     ):
-        law = {name: value for name, value in locals().items() if name in self._defaults}
+        law = {name: value for name, value in locals().items() if name in self._spec.defaults}
         super().__init__(child, parent, origin, axis, rate, **law)
 
 
@@ -411,23 +477,9 @@ class Ball(Joint):
     Skeleton(1 link, 1 joint)
     """
 
-    _kind = "ball"
-    _defaults: ClassVar[dict[str, Any]] = {
-        "spring_stiffness": 0.0,
-        "damping": 0.0,
-        "torque": np.zeros(3),
-        "motor_rotation": np.zeros(3),
-        "target_rotation": np.zeros(3),
-        "servo_stiffness": 0.0,
-        "torque_limit": _FAR,
-        "upper_limit": _FAR,
-        "cone_limit": _FAR,
-        "limit_stiffness": 0.0,
-        "limit_smoothing": 1.0,
-    }
-    _vectors: ClassVar[dict[str, str]] = {"torque": "N m", "motor_rotation": "rad", "target_rotation": "rad"}
-    _in_time = tuple(_defaults)
-    _replaceable = (*_in_time, "rate", "origin", "axis")
+    _spec = JOINTS["ball"]
+    _in_time = tuple(_spec.defaults)
+    _replaceable = _spec.replaceable
 
     def __init__(
         self,
@@ -449,7 +501,7 @@ class Ball(Joint):
         limit_smoothing: Numbers | None = None,
         rate: Numbers | None = None,
     ):
-        law = {name: value for name, value in locals().items() if name in self._defaults}
+        law = {name: value for name, value in locals().items() if name in self._spec.defaults}
         super().__init__(child, parent, origin, axis, rate, **law)
         if (axis is None) != (cone_limit is None):
             raise ValueError("a Ball that is to stay in a cone needs both axis and cone_limit")
@@ -485,9 +537,8 @@ class LoopClosure(Joint):
     Skeleton(2 links, 3 joints)
     """
 
-    _kind = "closure"
-    _defaults: ClassVar[dict[str, float]] = {"stiffness": 0.0}
-    _replaceable = (*_defaults, "origin")
+    _spec = JOINTS["closure"]
+    _replaceable = _spec.replaceable
 
     def __init__(
         self, child: RigidBody, parent: RigidBody | None = None, *, origin: Numbers, stiffness: Numbers

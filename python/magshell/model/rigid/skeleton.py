@@ -262,8 +262,8 @@ def _joint(joint: Joint | None, number: dict[int, int]) -> dict[Any, Any]:
         "axis": joint.axis,
         "driven": joint._driven,
         "damped": joint._has("damping"),
-        "twisted": joint._kind == "ball" and joint._has("torque"),
-        "served": joint._kind == "ball" and joint._has("servo_stiffness"),
+        "twisted": joint._spec.freedoms == 3 and joint._has("torque"),
+        "served": joint._spec.freedoms == 3 and joint._has("servo_stiffness"),
         "coned": joint._has("cone_limit"),
     }
 
@@ -278,5 +278,5 @@ def motor_rows(skeletons: Sequence[Skeleton], joint: Joint) -> int | slice:
         if each is joint:
             break
         if each is not None and each._driven:
-            first += 3 if each._kind == "ball" else 1
-    return slice(first, first + 3) if joint._kind == "ball" else first
+            first += each._spec.freedoms
+    return slice(first, first + joint._spec.freedoms) if joint._spec.freedoms > 1 else first
