@@ -17,14 +17,14 @@ py::dict contact_pair_stiffness(Model& model, const VectorXd& q, const VectorXd&
     {
         const py::gil_scoped_release unlocked;
         const std::lock_guard lock(model.in_use());
-        if (!model.has_body_contact()) throw InvalidInput("the scene has no contact of bodies");
+        if (!model.contacts().bodies()) throw InvalidInput("the scene has no contact of bodies");
         if (q.size() != model.size() || v.size() != model.size())
             throw InvalidInput("q and v must have one number per degree of freedom, " +
                                std::to_string(model.size()) + ", got " + std::to_string(q.size()) + " and " +
                                std::to_string(v.size()));
-        all = model.body_contact()->active_contacts(q.data());
+        all = model.contacts().bodies()->active_contacts(q.data());
         for (const BodyContactTerm::ActiveContact& touch : all)
-            laws.push_back(model.body_contact()->friction(touch));
+            laws.push_back(model.contacts().bodies()->friction(touch));
     }
     const py::ssize_t n = static_cast<py::ssize_t>(all.size());
     IndexArray contacts(n), vertices({n, py::ssize_t{4}});
@@ -74,10 +74,10 @@ py::dict contact_pair_stiffness(Model& model, const VectorXd& q, const VectorXd&
 
 std::pair<double, std::string> nearest_neighbours(Model& model, Index contact) {
     const std::lock_guard lock(model.in_use());
-    if (!model.has_body_contact() || contact < 0 ||
-        contact >= static_cast<Index>(model.body_contact()->n_contacts()))
+    if (!model.contacts().bodies() || contact < 0 ||
+        contact >= static_cast<Index>(model.contacts().bodies()->n_contacts()))
         throw InvalidInput("the scene has no such contact of bodies");
-    return model.body_contact()->nearest_neighbours(contact);
+    return model.contacts().bodies()->nearest_neighbours(contact);
 }
 
 }  // namespace

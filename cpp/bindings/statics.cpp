@@ -60,7 +60,7 @@ VectorXd moved(Model& model, const VectorXd& state, const VectorXd& step) {
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());
     model.linearize(state);
-    const double share = model.has_body_contact() ? 0.9 * model.max_step_length(state, step) : 1.0;
+    const double share = model.capabilities().has_barrier ? 0.9 * model.max_step_length(state, step) : 1.0;
     VectorXd there = state;
     model.dof_map().retract(there, share * step);
     return there;

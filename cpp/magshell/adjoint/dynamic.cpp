@@ -103,7 +103,7 @@ class Backward {
         by.dt -= (mass.dot(accelerated + moved / adt) + damping.dot(moved)) / dt;
         by.x_hat -= algebra.weights().cwiseProduct(lambda);
         by.v_hat -= mass.cwiseProduct(lambda) / adt;
-        if (!model_.has_forces()) return;  // - f(x, (x - x^)/(a dt), ...)
+        if (!model_.capabilities().has_velocity_forces) return;  // - f(x, (x - x^)/(a dt), ...)
         const VectorXd by_rate = by_forces.velocity + by_forces.acceleration / adt;
         by.x_hat += by_rate / adt;
         by.v_hat += by_forces.acceleration / adt;
@@ -191,7 +191,7 @@ class Backward {
             g_.viscosity.maxwell_modulus += strains.by_law.maxwell_modulus;
             g_.viscosity.maxwell_time += strains.by_law.maxwell_time;
         }
-        if (!model_.dampers().empty()) {
+        if (model_.capabilities().has_own_viscosity) {
             if (!input_.viscosity.any()) model_.evaluate(record.begin.q, model_.zero_load_parameters());
             g_.positions += model_.dampers().forces(viscous.joints.by_d_begin, model_.size());
             by_dt += viscous.joints.by_dt;
@@ -272,7 +272,7 @@ class Backward {
         const VectorXd& q = end.q();
         newton_.evaluate(q, load_parameters, proximal);
         model_.assemble(q, load_parameters, false);
-        if (model_.has_forces()) model_.assemble_forces(load_parameters);
+        model_.assemble_forces(load_parameters);
         const VectorXd motors = model_.dof_map().motor_motion(by_motor_forces);
         const VectorXd by_q = product(motors, algebra.weights());
         VectorXd by_free = by_q;
@@ -321,18 +321,20 @@ class Backward {
         scene_.load_parameters.setZero();
         model_.vjp(q, load_parameters, all, scene_);
         KinematicsGradient by_forces;
-        if (model_.has_forces()) by_forces = model_.forces_vjp(load_parameters, all, scene_);
+        if (model_.capabilities().has_velocity_forces)
+            by_forces = model_.forces_vjp(load_parameters, all, scene_);
         if (dof_map.has_values()) {
             // Assembles again, because the factorization has rotated the blocks of rotated nodes.
             model_.assemble(q, load_parameters, false);
-            if (model_.has_forces()) model_.assemble_forces(load_parameters);
+            model_.assemble_forces(load_parameters);
             const VectorXd reaction = product(lambda, *proximal.weights) + by_q;
             dof_map.vjp(reaction, lambda, newton_.gradient(q, proximal), load_parameters, scene_,
                         by_motor_forces);
         }
         model_.time_varying().move_gradient(scene_);
         add_by_load_parameters(step, fraction, scene_.load_parameters);
-        if (model_.has_forces()) add_by_load_parameters(step, substep.begin, by_forces.begin_load_parameters);
+        if (model_.capabilities().has_velocity_forces)
+            add_by_load_parameters(step, substep.begin, by_forces.begin_load_parameters);
         return by_forces;
     }
 

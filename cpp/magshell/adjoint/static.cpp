@@ -16,7 +16,8 @@ Gradient equilibrium_vjp(Model& model, const StaticsResult& equilibrium, const V
 
     model.set_angle_branches(equilibrium.angle_branches);
     model.evaluate(q, load_parameters);
-    if (model.has_follower_loads() || dof_map.has_values()) model.assemble(q, load_parameters, false);
+    if (model.capabilities().has_unsymmetric_tangent || dof_map.has_values())
+        model.assemble(q, load_parameters, false);
     const auto add_product = [&](const VectorXd& motion, VectorXd& forces) {
         VectorXd product(q.size());
         model.multiply(motion, product);

@@ -8,7 +8,6 @@
 #include "magshell/dofs/skeleton_coordinates.h"
 #include "magshell/linalg/low_rank_factor.h"
 #include "magshell/scene/scene_input.h"
-#include "magshell/terms/contact/body_contact_term.h"
 #include "magshell/terms/joint/damper_term.h"
 #include "magshell/terms/low_rank_term.h"
 
@@ -93,8 +92,11 @@ Model::Model(const SceneInput& input)
     add_terms(input);
     for (const std::unique_ptr<Term>& term : terms_) {
         if (term->body() >= 0) of_body_[term->body()].push_back(term.get());
-        if (term->has_infeasible_states()) restricting_terms_.push_back(term.get());
+        const Capabilities own = term->capabilities();
+        capabilities_ |= own;
+        if (own.has_infeasible_states) restricting_terms_.push_back(term.get());
     }
+    capabilities_.has_velocity_forces = !forces_.empty();
     assign_columns();
 }
 
@@ -346,10 +348,6 @@ double Model::max_step_length(const VectorXd& q, const VectorXd& p) const {
     return length;
 }
 
-bool Model::has_active_body_contact() const {
-    return body_contact_ && !body_contact_->evaluated_contacts().empty();
-}
-
 std::string Model::invalid_state_reason(const VectorXd& q) const {
     for (const Term* term : restricting_terms_)
         if (std::string reason = term->invalid_state_reason(q.data()); !reason.empty()) return reason;
@@ -360,7 +358,7 @@ double Model::admissible_step_length(const VectorXd& q, const VectorXd& p) const
     constexpr double safety =
         0.8;  // [-] part of the distance to the first invalid state; see test_ball_falls_onto_a_sheet_and_never_through
     constexpr double shortest = 1e-12;  // [-] see test_a_body_squeezed_until_it_cannot_move
-    if (!has_infeasible_states()) return 1.0;
+    if (!capabilities_.has_infeasible_states) return 1.0;
     double length = max_step_length(q, p / safety);
     if (!dof_map_.has_reduced_coordinates()) return length;
     for (; length > shortest; length *= 0.5) {  // reduced nodes move along curves
@@ -373,8 +371,7 @@ double Model::admissible_step_length(const VectorXd& q, const VectorXd& p) const
 
 std::string Model::describe_blocked_step(const VectorXd& q, const VectorXd& p) const {
     const double length = max_step_length(q, p);
-    if (body_contact_ && body_contact_->max_step_length(q.data(), p.data()) <= length)
-        return "bodies block each other: " + body_contact_->blocking(q.data(), p.data());
+    if (std::string reason = contacts_.describe_blocking(q, p, length); !reason.empty()) return reason;
     constexpr double beyond = 1.01;  // [-] just past the limit
     return "elements block the step: " + invalid_state_reason(q + beyond * length * p);
 }
@@ -417,7 +414,7 @@ std::size_t Model::bytes() const {
 void Model::collect_nonsymmetric_tangent(const VectorXd& q, const LoadParameters& load_parameters) {
     nonsymmetric_.clear();
     unsymmetric_ = false;
-    if (!follows_) return;
+    if (!capabilities_.has_unsymmetric_tangent) return;
     for (const std::unique_ptr<Term>& term : terms_)
         term->add_nonsymmetric_tangent(q.data(), load_parameters, nonsymmetric_);
     unsymmetric_ = skew_blocks_act(0);
@@ -453,8 +450,7 @@ void Model::begin_step(const VectorXd& q, const LoadParameters& load_parameters)
 
 std::string Model::crossing_reason(const VectorXd& q, const LoadParameters& load_parameters,
                                    const VectorXd& end, const LoadParameters& load_parameters_at_end) const {
-    const Index node =
-        contact_ ? contact_->passes_through(q, load_parameters, end, load_parameters_at_end) : -1;
+    const Index node = contacts_.first_crossing(q, load_parameters, end, load_parameters_at_end);
     if (node < 0) return {};
     return "vertex " + std::to_string(nodes().user_vertex(node)) +
            " passes through an obstacle within a step";
@@ -462,6 +458,7 @@ std::string Model::crossing_reason(const VectorXd& q, const LoadParameters& load
 
 void Model::evaluate_forces(const VectorXd& q, const LoadParameters& load_parameters,
                             const StageMotion& stage) {
+    if (forces_.empty()) return;
     const Index coordinates = n_coordinates();
     kinematics_.q = q;
     kinematics_.rate = 1.0 / stage.time;
@@ -475,16 +472,15 @@ void Model::evaluate_forces(const VectorXd& q, const LoadParameters& load_parame
 
 std::vector<PairStiffness> Model::contact_pair_stiffness() const {
     std::vector<PairStiffness> pairs;
-    if (!body_contact_) return pairs;
-    body_contact_->add_stiffness(pairs);
+    if (!capabilities_.has_barrier) return pairs;
+    contacts_.add_pair_stiffness(pairs);
     for (const std::unique_ptr<ForceTerm>& force : forces_) force->add_stiffness(kinematics_, pairs);
     return pairs;
 }
 
 void Model::add_cancelling_forces_here(bool in_motion, VectorXd& out) const {
     for (const LowRankTerm* term : borders_) term->add_cancelling_here(out);
-    if (contact_) contact_->add_cancelling_normal_forces(out);
-    if (body_contact_) body_contact_->add_cancelling_normal_forces(out);
+    contacts_.add_cancelling_normal_forces(out);
     if (!in_motion) return;
     for (const std::unique_ptr<ForceTerm>& force : forces_) force->add_cancelling_forces(kinematics_, out);
 }
@@ -494,6 +490,7 @@ void Model::freeze_normal_forces(bool held) {
 }
 
 void Model::assemble_forces(const LoadParameters& load_parameters, bool project_psd) {
+    if (forces_.empty()) return;
     const std::size_t before = nonsymmetric_.skew_blocks().size();
     for (const std::unique_ptr<ForceTerm>& force : forces_)
         force->assemble(kinematics_, load_parameters, project_psd, matrix_, nonsymmetric_);

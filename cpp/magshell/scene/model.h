@@ -18,7 +18,7 @@
 #include "magshell/linalg/multifrontal/factor_store.h"
 #include "magshell/scene/bodies.h"
 #include "magshell/scene/time_varying.h"
-#include "magshell/terms/contact/contact_term.h"
+#include "magshell/terms/contact/contacts.h"
 #include "magshell/terms/force_term.h"
 #include "magshell/terms/magnetic/field_sources.h"
 #include "magshell/terms/shell/viscous_terms.h"
@@ -26,7 +26,6 @@
 
 namespace magshell {
 
-class BodyContactTerm;
 class LowRankTerm;
 class DamperTerm;
 class MuscleTerm;
@@ -94,9 +93,8 @@ class Model {
     /// Assembles the Hessian at the last evaluated state. project_psd: contact between bodies and low-rank terms contribute positive semidefinite parts.
     void assemble(const VectorXd& q, const LoadParameters& load_parameters, bool extrapolated_stress,
                   bool project_psd = false);
-    /// Returns true if there are follower loads, which may make the Hessian nonsymmetric; and true if the Hessian assembled last is
-    /// nonsymmetric on the free dofs: it is then matrix() plus nonsymmetric_tangent(), and there is no energy.
-    bool has_follower_loads() const { return follows_; }
+    /// Returns true if the Hessian assembled last is nonsymmetric on the free dofs: it is then matrix() plus nonsymmetric_tangent(), and
+    /// there is no energy.
     bool unsymmetric() const { return unsymmetric_; }
     /// Throws InvalidInput with an explanation if the Hessian assembled last is nonsymmetric.
     void require_symmetric() const;
@@ -110,16 +108,9 @@ class Model {
 
     /// Forces without an energy act only within the stages of time steps. A step begins at q. At a stage they are added to the residual
     /// after evaluate(), and to matrix() and nonsymmetric_tangent() after assemble(), at the same q.
-    bool has_forces() const { return !forces_.empty(); }
     void begin_step(const VectorXd& q, const LoadParameters& load_parameters);
-    bool has_contact() const { return contact_ != nullptr; }
-    /// The contact with obstacles; nullptr if there is none.
-    ContactTerm* contact() const { return contact_; }
-    /// Returns true if there is contact between bodies or self-contact.
-    bool has_body_contact() const { return body_contact_ != nullptr; }
-    const BodyContactTerm* body_contact() const { return body_contact_; }
-    /// Returns true if a pair of faces or edges is in contact at the last evaluated state.
-    bool has_active_body_contact() const;
+    /// All contact with obstacles and between bodies.
+    const Contacts& contacts() const { return contacts_; }
     /// Returns why a step from q to `end` is impossible: a point would cross an obstacle. Empty if no point does.
     std::string crossing_reason(const VectorXd& q, const LoadParameters& load_parameters, const VectorXd& end,
                                 const LoadParameters& load_parameters_at_end) const;
@@ -145,9 +136,15 @@ class Model {
     StrainSet damper_rates(const VectorXd& q, const VectorXd& v) const;
     void damper_rates_vjp(const VectorXd& q, const VectorXd& v, const StrainSet& by_rates, VectorXd& by_q,
                           VectorXd& by_v, Gradient& out) const;
-    /// Returns true if some states have no energy, for example with inverted elements. max_step_length() is the largest step length along p up to
-    /// which there is an energy, at most 1; invalid_state_reason() describes what is wrong with a state, or returns an empty string.
-    bool has_infeasible_states() const { return !restricting_terms_.empty(); }
+    /// What a solver must know of the energy: the answers of all terms together.
+    const Capabilities& capabilities() const { return capabilities_; }
+    /// Returns true if the Hessian assembled with project_psd equals the exact one at that state.
+    bool projection_is_exact() const { return !capabilities_.has_psd_projection && low_rank_.empty(); }
+    /// Returns true if the stresses that a load step extrapolates are a good start of the next one. Those of solids are not, as their
+    /// elements are stretched at first, nor those of liquids, whose pressure belongs to another volume at first.
+    bool has_stress_prediction() const { return !capabilities_.has_transient_stresses && low_rank_.empty(); }
+    /// max_step_length() returns the largest step length along p up to which there is an energy, at most 1; invalid_state_reason() describes
+    /// what is wrong with a state, or returns an empty string.
     double max_step_length(const VectorXd& q, const VectorXd& p) const;
     std::string invalid_state_reason(const VectorXd& q) const;
     /// Returns the step length that may be taken along p: a safety factor times the distance to the first inverted element or the first
@@ -162,7 +159,6 @@ class Model {
     const SolidTerm& solid_term(Index solid) const { return *solid_terms_[solid]; }
 
     const MuscleTerm& muscle_term(Index muscle) const { return *muscle_terms_[muscle]; }
-    Index n_muscles() const { return static_cast<Index>(muscle_terms_.size()); }
 
     /// Returns the matrix of Projective Dynamics, which is constant while the parameters are. Throws InvalidInput, naming the term, if a
     /// term has none.
@@ -233,9 +229,9 @@ class Model {
     std::vector<const MuscleTerm*> muscle_terms_;
     std::vector<const Term*> restricting_terms_;
     std::vector<std::unique_ptr<ForceTerm>> forces_;
-    ContactTerm* contact_ = nullptr;
-    bool follows_ = false, unsymmetric_ = false;
-    BodyContactTerm* body_contact_ = nullptr;
+    Contacts contacts_;
+    Capabilities capabilities_;
+    bool unsymmetric_ = false;
     std::unique_ptr<ContactLayer> layer_;  // nullptr without contact between bodies
     std::int64_t coupled_ = 0;             // version of layer_ in the reduced pattern; 0: it has none
     // By block: ranges of matrix columns that this block is the first to add to, and therefore clears. Last entry: columns of no block.

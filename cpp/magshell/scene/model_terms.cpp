@@ -128,7 +128,6 @@ void Model::add_terms(const SceneInput& input) {
     }
     if (!input.pressures.empty()) {
         terms_.push_back(std::make_unique<PressureTerm>(input.pressures, nodes(), matrix_, registry_));
-        follows_ = true;
     }
     add_volumes(input);
     add_moments(input);
@@ -238,7 +237,6 @@ void Model::add_joints(const SceneInput& input) {
     }
     if (twisted.empty()) return;
     terms_.push_back(std::make_unique<BallTorqueTerm>(twisted, nodes().rest, registry_));
-    follows_ = true;
 }
 
 void Model::add_solids(const SceneInput& input) {
@@ -286,7 +284,8 @@ void Model::add_edge_moments(const SceneInput& input) {
 void Model::add_contacts(const SceneInput& input) {
     std::unique_ptr<ContactTerm> contact =
         std::make_unique<ContactTerm>(nodes(), matrix_, input.contacts, input.obstacles, registry_);
-    contact_ = contact.get();
+    const ContactTerm& touched = *contact;
+    contacts_.add(contact.get());
     terms_.push_back(std::move(contact));
     std::vector<bool> rubs, lagged;
     for (const ContactInput& each : input.contacts) {
@@ -294,14 +293,15 @@ void Model::add_contacts(const SceneInput& input) {
         lagged.push_back(each.lagged);
     }
     if (std::find(rubs.begin(), rubs.end(), true) != rubs.end())
-        forces_.push_back(std::make_unique<FrictionTerm>(*contact_, std::move(rubs), std::move(lagged)));
+        forces_.push_back(std::make_unique<FrictionTerm>(touched, std::move(rubs), std::move(lagged)));
 }
 
 void Model::add_body_contacts(const SceneInput& input) {
     layer_ = std::make_unique<ContactLayer>(matrix_.nodes(), matrix_.rotations());
     std::unique_ptr<BodyContactTerm> contact = std::make_unique<BodyContactTerm>(
         nodes(), input.contact_surfaces, input.body_contacts, *layer_, registry_);
-    body_contact_ = contact.get();
+    BodyContactTerm& touched = *contact;
+    contacts_.add(contact.get());
     terms_.push_back(std::move(contact));
     std::vector<bool> rubs, lagged;
     for (const BodyContactInput& each : input.body_contacts) {
@@ -309,8 +309,7 @@ void Model::add_body_contacts(const SceneInput& input) {
         lagged.push_back(each.lagged);
     }
     if (std::find(rubs.begin(), rubs.end(), true) != rubs.end())
-        forces_.push_back(
-            std::make_unique<BodyFrictionTerm>(*body_contact_, std::move(rubs), std::move(lagged)));
+        forces_.push_back(std::make_unique<BodyFrictionTerm>(touched, std::move(rubs), std::move(lagged)));
 }
 
 }  // namespace magshell

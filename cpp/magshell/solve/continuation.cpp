@@ -151,7 +151,7 @@ class Follower {
         double parameter = base.parameter + step * along.parameter;
         VectorXd increment = step * along.state;
         for (iterations = 0;; ++iterations, newton_.count_iteration()) {
-            if (model_.has_body_contact()) increment *= model_.admissible_step_length(q, increment);
+            if (model_.capabilities().has_barrier) increment *= model_.admissible_step_length(q, increment);
             if (newton_.options().mixed) model_.extrapolate(increment);
             model_.dof_map().retract(q, increment);
             const LoadParameters at = load_parameters(parameter);

@@ -128,7 +128,7 @@ VectorXd first_order_change(Model& model, const StaticsResult& equilibrium, cons
     VectorXd change = dof_map.prescribed_increment(q, to);
     VectorXd force = model.residual().gradient;
     const bool moves = !change.isZero(0.0);
-    if (moves || model.has_follower_loads()) model.assemble(q, to, false);
+    if (moves || model.capabilities().has_unsymmetric_tangent) model.assemble(q, to, false);
     if (moves) {
         VectorXd pull(q.size());
         model.multiply(change, pull);

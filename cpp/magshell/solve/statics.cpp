@@ -87,12 +87,13 @@ class Statics {
         return result_.stable || !options_.require_stable || relax_to_stable(1.0);
     }
 
-    // Returns true if load steps may stop on instability. Not with moving supports, which pass through saddles, nor with solids, whose
-    // iterations have negative pivots on the way to stable states.
+    // Returns true if load steps may stop on instability. Not with moving supports, which pass through saddles, nor where iterations
+    // have negative pivots on the way to stable states.
     bool can_stop_on_instability() const {
         const Model& model = newton_.model();
-        return options_.start_at_rest && options_.require_stable && !model.has_body_contact() &&
-               !model.has_follower_loads() && model.bodies().solids().empty() &&
+        const Capabilities& has = model.capabilities();
+        return options_.start_at_rest && options_.require_stable && !has.has_barrier &&
+               !has.has_unsymmetric_tangent && !has.has_transient_instability &&
                model.dof_map().prescribed_increment(result_.state, to_).isZero(0.0);
     }
 
@@ -175,7 +176,7 @@ class Statics {
     // Shortens a load step until obstacles and supports move through no contact point that stays where it is: beyond it, the
     // penalty would push the point out on the wrong side. Returns zero, and sets the reason, if no step is short enough.
     double clear_step(double step) {
-        if (!newton_.model().has_contact()) return step;
+        if (!newton_.model().capabilities().has_stiffness_jumps) return step;
         const double wanted = step;
         for (; step >= min_clear_step * std::min(1.0, wanted); step *= 0.5) {
             const LoadParameters there = load_parameters_at(std::min(1.0, result_.progress + step));
@@ -193,7 +194,7 @@ class Statics {
     NewtonReport solve_load_step(VectorXd& q, const LoadParameters& load_parameters, double step,
                                  bool on_the_way) {
         if (!allows_inexact_steps()) return newton_.solve(q, load_parameters);
-        LoadStep load{on_the_way, predicts_stresses() ? &last_ : nullptr};
+        LoadStep load{on_the_way, newton_.model().has_stress_prediction() ? &last_ : nullptr};
         if (!stop_on_instability_) return newton_.solve_load(q, load_parameters, load);
         load.correction = [&](const VectorXd& tangent) {
             return predictor_.correction(result_.state, tangent, step);
@@ -202,14 +203,7 @@ class Statics {
     }
 
     bool allows_inexact_steps() const {
-        return options_.start_at_rest && !newton_.model().has_body_contact();
-    }
-
-    // Returns true if the stresses of the last step may be extrapolated. Not with liquids, whose pressure belongs to another volume at
-    // first, nor with solids, whose elements are stretched at first.
-    bool predicts_stresses() const {
-        const Model& model = newton_.model();
-        return model.bodies().solids().empty() && model.low_rank().empty();
+        return options_.start_at_rest && !newton_.model().capabilities().has_barrier;
     }
 
     bool find_other_equilibrium() {
@@ -321,7 +315,7 @@ class Statics {
 
     // Takes one more step with the factorization at hand, if that reduces the residual.
     void refine_solution() {
-        if (newton_.model().has_body_contact()) return;
+        if (newton_.model().capabilities().has_barrier) return;
         const double before = newton_.relative_residual(result_.state, {}, false);
         const VectorXd p = newton_.solve_with_factor(-newton_.gradient(result_.state, {}));
         VectorXd trial = result_.state;

@@ -15,6 +15,7 @@
 #include "magshell/assembly/out_of_balance.h"
 #include "magshell/assembly/system_matrix.h"
 #include "magshell/core/parameters.h"
+#include "magshell/terms/capabilities.h"
 
 namespace magshell {
 
@@ -36,8 +37,9 @@ class Term {
     /// Returns a displacement [m] over which the Hessian changes noticeably, such as a shell's thickness.
     virtual double length_scale() const { return std::numeric_limits<double>::infinity(); }
 
-    /// Returns true if the term has no energy in some states, such as those with inverted elements.
-    virtual bool has_infeasible_states() const { return false; }
+    /// Returns what a solver must know of the energy. It does not change after construction.
+    virtual Capabilities capabilities() const { return {}; }
+
     /// Returns the largest fraction of the step p from q, at most 1, up to which the term has an energy.
     virtual double max_step_length(const double* /*q*/, const double* /*p*/) const { return 1.0; }
     /// Describes why the term has no energy at q; an empty string if it has one.

@@ -21,20 +21,20 @@ double equilibrium_depth(double pull, double w, const ContactLaw& law) {
 }  // namespace
 
 VectorXd predict_contact(const Model& model, const VectorXd& q, const LoadParameters& load_parameters,
-                         const VectorXd& weights, const std::vector<ContactTerm::ActiveContact>& expected) {
-    const ContactTerm& contact = *model.contact();
-    const auto before = [](const ContactTerm::ActiveContact* one, const ContactTerm::ActiveContact* other) {
-        const auto key = [](const ContactTerm::ActiveContact& touch) {
+                         const VectorXd& weights, const std::vector<Contacts::ObstaclePoint>& expected) {
+    const Contacts& contact = model.contacts();
+    const auto before = [](const Contacts::ObstaclePoint* one, const Contacts::ObstaclePoint* other) {
+        const auto key = [](const Contacts::ObstaclePoint& touch) {
             return std::tie(touch.contact, touch.obstacle, touch.point);
         };
         return key(*one) < key(*other);
     };
-    std::vector<const ContactTerm::ActiveContact*> sorted;
-    for (const ContactTerm::ActiveContact& touch : expected) sorted.push_back(&touch);
+    std::vector<const Contacts::ObstaclePoint*> sorted;
+    for (const Contacts::ObstaclePoint& touch : expected) sorted.push_back(&touch);
     if (!std::is_sorted(sorted.begin(), sorted.end(), before))
         std::sort(sorted.begin(), sorted.end(), before);
     VectorXd move;
-    for (const ContactTerm::ActiveContact& touch : contact.active_contacts(q.data(), load_parameters)) {
+    for (const Contacts::ObstaclePoint& touch : contact.obstacle_points(q, load_parameters)) {
         const auto same = std::lower_bound(sorted.begin(), sorted.end(), &touch, before);
         const double force = same != sorted.end() && !before(&touch, *same) ? (*same)->force : 0.0;
         const ContactPoint& point = contact.point(touch);
@@ -52,15 +52,6 @@ VectorXd predict_contact(const Model& model, const VectorXd& q, const LoadParame
     // The displacement must not cross another body, nor invert an element.
     if (const double share = model.admissible_step_length(q, move); share < 1.0) move *= share;
     return move;
-}
-
-std::vector<ContactTerm::ActiveContact> predicted_contacts(const Model& model, const VectorXd& p) {
-    const ContactTerm& contact = *model.contact();
-    std::vector<ContactTerm::ActiveContact> all = contact.evaluated_contacts();
-    for (ContactTerm::ActiveContact& touch : all)
-        touch.force = std::max(
-            0.0, touch.force - touch.stiffness * touch.at.normal.dot(contact.at_point(touch, p.data())));
-    return all;
 }
 
 }  // namespace magshell

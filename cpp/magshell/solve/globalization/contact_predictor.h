@@ -9,7 +9,6 @@
 #pragma once
 
 #include "magshell/scene/model.h"
-#include "magshell/terms/contact/contact_term.h"
 
 namespace magshell {
 
@@ -17,9 +16,6 @@ namespace magshell {
 /// is none. A vertex overshoots if its penalty force at q exceeds twice its balanced force.
 /// weights: those of the proximal term [N/m], per dof. expected: contacts with their predicted forces [N].
 VectorXd predict_contact(const Model& model, const VectorXd& q, const LoadParameters& load_parameters,
-                         const VectorXd& weights, const std::vector<ContactTerm::ActiveContact>& expected);
-
-/// Returns the active contacts of the last evaluated state, with the forces predicted linearly for a step p from there.
-std::vector<ContactTerm::ActiveContact> predicted_contacts(const Model& model, const VectorXd& p);
+                         const VectorXd& weights, const std::vector<Contacts::ObstaclePoint>& expected);
 
 }  // namespace magshell

@@ -22,7 +22,7 @@ EnergyDescent::EnergyDescent(Newton& newton, VectorXd& q, const LoadParameters& 
       load_parameters_(load_parameters),
       settled_(settled * model_.extent()) {
     const VectorXd move = model_.dof_map().prescribed_increment(q_, load_parameters);
-    if (model_.has_body_contact() && model_.max_step_length(q_, move) < 1.0)
+    if (model_.capabilities().has_barrier && model_.max_step_length(q_, move) < 1.0)
         report_.reason = model_.describe_blocked_step(q_, move);
     model_.dof_map().retract(q_, move);
     energy_ = model_.energy(q_, load_parameters);
@@ -87,7 +87,7 @@ double EnergyDescent::leave_saddle(const Mode& mode) {
         for (double amplitude = settled_; amplitude < model_.extent(); amplitude *= 2.0) {
             VectorXd trial = saddle;
             const VectorXd push = sign * amplitude * mode.shape;
-            if (model_.has_body_contact() && model_.max_step_length(saddle, push) < 1.0) break;
+            if (model_.capabilities().has_barrier && model_.max_step_length(saddle, push) < 1.0) break;
             model_.dof_map().retract(trial, push);
             if (!model_.crossing_reason(saddle, load_parameters_, trial, load_parameters_).empty()) break;
             const double energy = model_.energy(trial, load_parameters_);
@@ -100,7 +100,7 @@ double EnergyDescent::leave_saddle(const Mode& mode) {
     ++report_.saddles_escaped;
     const Side one = down(1.0);
     // Contact ends every displacement early on both sides, so that depths cannot be compared.
-    const Side other = model_.has_body_contact() ? one : down(-1.0);
+    const Side other = model_.capabilities().has_barrier ? one : down(-1.0);
     const bool deeper =
         one.energy - other.energy > deeper_share * (energy_ - one.energy) + round_off * std::abs(energy_);
     q_ = deeper ? other.q : one.q;

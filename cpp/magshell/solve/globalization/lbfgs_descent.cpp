@@ -91,7 +91,7 @@ class Descent {
         const double length = step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
         if (!std::isfinite(length)) return false;
         double max_alpha = std::min(max_step_factor_lbfgs, max_step_extent * model_.extent() / length);
-        if (model_.has_infeasible_states()) {
+        if (model_.capabilities().has_infeasible_states) {
             const double asked = std::max(1.0, max_alpha);
             max_alpha = std::min(max_alpha, asked * model_.admissible_step_length(here_.q, asked * step));
         }

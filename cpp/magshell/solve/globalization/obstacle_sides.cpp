@@ -5,15 +5,12 @@
 namespace magshell {
 
 void ObstacleSides::remember(const VectorXd& q, const LoadParameters& load_parameters) {
-    if (!model_.has_contact()) return;
-    places_ = model_.contact()->own_positions(q, load_parameters);
-    rotation_vectors_ = model_.contact()->rotation_vectors(load_parameters);
+    frames_ = model_.contacts().obstacle_frames(q, load_parameters);
 }
 
 std::string ObstacleSides::crossed(const VectorXd& q, const LoadParameters& load_parameters) const {
-    if (!model_.has_contact()) return {};
-    const Index node =
-        model_.contact()->passes_between(places_, model_.contact()->own_positions(q, load_parameters));
+    const Contacts& contacts = model_.contacts();
+    const Index node = contacts.first_crossing(frames_, contacts.obstacle_frames(q, load_parameters));
     if (node < 0) return {};
     return "vertex " + std::to_string(model_.nodes().user_vertex(node)) +
            " passes through an obstacle, however short the step";
@@ -21,11 +18,10 @@ std::string ObstacleSides::crossed(const VectorXd& q, const LoadParameters& load
 
 double ObstacleSides::turned(const LoadParameters& load_parameters) const {
     double largest = 0.0;
-    if (!model_.has_contact()) return largest;
-    const std::vector<Vec3> now = model_.contact()->rotation_vectors(load_parameters);
+    const std::vector<Vec3> now = model_.contacts().obstacle_rotations(load_parameters),
+                            &before = frames_.rotation_vectors;
     for (std::size_t k = 0; k + 1 < now.size(); k += 2)
-        largest = std::max(
-            largest, (now[k] - rotation_vectors_[k]).norm() + (now[k + 1] - rotation_vectors_[k + 1]).norm());
+        largest = std::max(largest, (now[k] - before[k]).norm() + (now[k + 1] - before[k + 1]).norm());
     return largest;
 }
 

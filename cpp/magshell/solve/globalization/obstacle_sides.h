@@ -27,7 +27,7 @@ class ObstacleSides {
 
   private:
     const Model& model_;
-    std::vector<Vec3> places_, rotation_vectors_;
+    Contacts::ObstacleFrames frames_;
 };
 
 }  // namespace magshell

@@ -5,7 +5,6 @@
 
 #include "magshell/solve/globalization/energy_descent.h"
 #include "magshell/solve/globalization/energy_descent_base.h"
-#include "magshell/terms/contact/body_contact_term.h"
 
 namespace magshell {
 namespace {
@@ -92,7 +91,8 @@ RelaxationReport relax(Newton& newton, VectorXd& q, const LoadParameters& load_p
                        bool from_rest) {
     const Model& model = newton.model();
     RelaxationReport report;
-    if (from_rest && !model.has_body_contact() && !model.has_follower_loads()) {
+    const Capabilities& has = model.capabilities();
+    if (from_rest && !has.has_barrier && !has.has_unsymmetric_tangent) {
         report = descend_to_stable(newton, q, load_parameters, max_steps);
         if (report.converged || report.neutral || report.steps >= max_steps) return report;
     }
@@ -100,11 +100,10 @@ RelaxationReport relax(Newton& newton, VectorXd& q, const LoadParameters& load_p
     report = PseudoTransient(newton, q, load_parameters).run(max_steps - steps);
     report.steps += steps;
     report.saddles_escaped += saddles_escaped;
-    if (report.converged || !model.has_body_contact() || !model.invalid_state_reason(q).empty())
-        return report;
+    if (report.converged || !has.has_barrier || !model.invalid_state_reason(q).empty()) return report;
     // Contact may be the cause whatever the reason was, so the largest contact force is named.
     newton.evaluate(q, load_parameters, {});
-    if (const std::string hardest = model.body_contact()->hardest(); !hardest.empty())
+    if (const std::string hardest = model.contacts().describe_largest_force(); !hardest.empty())
         report.reason += "; bodies touch: " + hardest;
     return report;
 }

@@ -7,7 +7,6 @@
 #include "magshell/core/errors.h"
 #include "magshell/solve/motion/edge_rotations.h"
 #include "magshell/solve/motion/energy_balance.h"
-#include "magshell/terms/contact/body_contact_term.h"
 
 namespace magshell {
 namespace {
@@ -254,7 +253,7 @@ MotionResult simulate(Model& model, const MotionInput& input, const AdjointStora
                       const MotionWatch& watch) {
     MotionResult result;
     result.last = input.start;
-    if (model.has_body_contact()) model.body_contact()->forget();
+    model.contacts().forget();
     const ScopedTimeVarying varying(model, input.varying);
     Newton newton(model, input.newton, [&](double residual) {
         if (watch) watch(static_cast<double>(result.steps_done) / static_cast<double>(input.steps), residual);

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "magshell/terms/contact/body_contact_term.h"
-
 namespace magshell {
 namespace {
 
@@ -31,14 +29,14 @@ EnergyBalance::StateEnergy EnergyBalance::state_energy(const MotionState& state,
         return end_;
     const double all = energy(state.q, state.angle_branches, load_parameters);
     return {state.q, state.angle_branches, load_parameters, all,
-            model_.body_contact()->energy(state.q.data(), load_parameters)};
+            model_.contacts().pair_energy(state.q, load_parameters)};
 }
 
 bool EnergyBalance::has_contact(const StepAlgebra& step, const SubstepRecord& record) const {
-    const BodyContactTerm& contact = *model_.body_contact();
+    const Contacts& contact = model_.contacts();
     for (const StageState& stage : record.stages)
-        if (contact.acts(stage.q.data())) return true;
-    return step.tableau().begins_explicitly && contact.acts(record.begin.q.data());
+        if (contact.has_active_pairs(stage.q)) return true;
+    return step.tableau().begins_explicitly && contact.has_active_pairs(record.begin.q);
 }
 
 bool EnergyBalance::gains_energy(const StepAlgebra& step, const SubstepRecord& record, const MotionState& end,

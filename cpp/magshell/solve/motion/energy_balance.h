@@ -21,7 +21,9 @@ class EnergyBalance {
     EnergyBalance(Model& model, const Inertia& inertia) : model_(model), mass_(inertia.mass) {}
 
     /// Returns true if the test applies: there is contact between bodies, and no load without potential.
-    bool applies() const { return model_.has_body_contact() && !model_.has_follower_loads(); }
+    bool applies() const {
+        return model_.capabilities().has_barrier && !model_.capabilities().has_unsymmetric_tangent;
+    }
     /// Returns true if a step to `end` gained energy; load_parameters: load parameters at its beginning and at its stages. Leaves the model
     /// evaluated at another state.
     bool gains_energy(const StepAlgebra& step, const SubstepRecord& record, const MotionState& end,

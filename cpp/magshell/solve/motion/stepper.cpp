@@ -53,12 +53,14 @@ NewtonReport Stepper::solve(VectorXd& q, const LoadParameters& load_parameters,
     const Model::AngleBranches angle_branches = model.angle_branches();
     NewtonReport report = newton_.solve(q, load_parameters, proximal);
     // After contact between bodies, Newton has used its line search already.
-    const bool searched = model.has_body_contact() && report.had_contact;
-    if (!report.converged && !searched && (model.has_contact() || newton_.options().mixed)) {
+    const bool searched = model.capabilities().has_barrier && report.had_contact;
+    if (!report.converged && !searched &&
+        (model.capabilities().has_stiffness_jumps || newton_.options().mixed)) {
         q = predicted;
         model.set_angle_branches(angle_branches);
-        report = model.has_contact() ? newton_.solve_damped(q, load_parameters, proximal)
-                                     : newton_.solve_standard(q, load_parameters, proximal);
+        report = model.capabilities().has_stiffness_jumps
+                     ? newton_.solve_damped(q, load_parameters, proximal)
+                     : newton_.solve_standard(q, load_parameters, proximal);
     }
     return report;
 }
@@ -103,7 +105,7 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative,
     model.set_angle_branches(state.angle_branches);
     model.begin_step(state.q, load_parameters.front());
     const ScopedStrainHistory elastic_afterwards(model);
-    const bool damped = !model.dampers().empty();
+    const bool damped = model.capabilities().has_own_viscosity;
     if (viscosity_.any()) model.set_time_varying(load_parameters.front());
     const StrainSet at_begin = viscosity_.any() ? model.elastic().strains(state.q) : StrainSet(),
                     joints_at_begin = model.dampers().strains(state.q);
@@ -119,20 +121,20 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative,
         // Predicts constant velocity; dofs without velocity begin where they were.
         q.head(coordinates) = x_hat.head(coordinates) +
                               step.stage_time() * (i == 0 ? state.v : rates.back().v).head(coordinates);
-        if (model.has_contact() && !projective_)
-            if (const VectorXd move = predict_contact(
-                    model, q, load_parameters[i + 1], step.weights(),
-                    model.contact()->active_contacts(state.q.data(), load_parameters.front()));
+        if (model.capabilities().has_stiffness_jumps && !projective_)
+            if (const VectorXd move =
+                    predict_contact(model, q, load_parameters[i + 1], step.weights(),
+                                    model.contacts().obstacle_points(state.q, load_parameters.front()));
                 move.size() > 0)
                 model.dof_map().retract(q, move);
-        if (model.dof_map().has_reduced_coordinates() || model.has_body_contact()) {
+        if (model.dof_map().has_reduced_coordinates() || model.capabilities().has_barrier) {
             VectorXd ahead = q - state.q;
             ahead.tail(q.size() - coordinates).setZero();
             const VectorXd others = q.tail(q.size() - coordinates);
             q = state.q;
             // The prediction ends well before a contact, as the barrier is too steep close to it. [-] see test_ball_falls_onto_a_sheet_and_never_through
             constexpr double before_contact = 0.25;
-            if (model.has_body_contact()) {
+            if (model.capabilities().has_barrier) {
                 const double alpha = model.admissible_step_length(q, ahead);
                 if (alpha < 1.0) ahead *= before_contact * alpha;
             }

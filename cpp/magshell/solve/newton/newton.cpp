@@ -123,13 +123,13 @@ double Newton::relative_residual(const VectorXd& q, const ProximalTerm& proximal
 void Newton::evaluate(const VectorXd& q, const LoadParameters& load_parameters,
                       const ProximalTerm& proximal) {
     model_.evaluate(q, load_parameters);
-    if (proximal.motion && model_.has_forces()) model_.evaluate_forces(q, load_parameters, *proximal.motion);
+    if (proximal.motion) model_.evaluate_forces(q, load_parameters, *proximal.motion);
 }
 
 void Newton::assemble(const VectorXd& q, const LoadParameters& load_parameters, bool extrapolated_stress,
                       const ProximalTerm& proximal, bool project_psd) {
     model_.assemble(q, load_parameters, extrapolated_stress, project_psd);
-    if (proximal.motion && model_.has_forces()) model_.assemble_forces(load_parameters, project_psd);
+    if (proximal.motion) model_.assemble_forces(load_parameters, project_psd);
     unsymmetric_ = model_.unsymmetric();
 }
 
@@ -151,7 +151,7 @@ NewtonReport Newton::solve(VectorXd& q, const LoadParameters& load_parameters, c
 
 NewtonReport Newton::solve(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
                            int max_iterations) {
-    if (!model_.has_body_contact())
+    if (!model_.capabilities().has_barrier)
         return iterate(q, load_parameters, proximal, max_iterations, options_.mixed, {});
     constexpr int searched = 5;  // times max_iterations; see test_strip_folds_onto_itself
     const VectorXd from = q;
@@ -199,22 +199,6 @@ bool Newton::can_reuse_factor(double contraction, double residual, double last_s
     return each < max_contraction && std::log(options_.tolerance / residual) >= worth * std::log(each);
 }
 
-double Newton::contact_matrix_change(const VectorXd& step) const {
-    if (!model_.has_contact()) return 0.0;
-    const ContactTerm& contact = *model_.contact();
-    VectorXd forces = VectorXd::Zero(step.size());
-    const auto add = [&](const std::vector<ContactTerm::ActiveContact>& touching, double sign) {
-        for (const ContactTerm::ActiveContact& touch : touching) {
-            const Vec3& n = touch.at.normal;
-            const double pushed = touch.stiffness * n.dot(contact.at_point(touch, step.data()));
-            contact.distribute(touch, Vec3(sign * pushed * n), forces);
-        }
-    };
-    add(contact.evaluated_contacts(), 1.0);
-    add(touched_, -1.0);
-    return forces.norm();
-}
-
 NewtonReport Newton::iterate(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
                              int max_iterations, bool mixed, const LoadStep& load, bool stop_on_instability) {
     NewtonReport report;
@@ -237,7 +221,7 @@ NewtonReport Newton::iterate(VectorXd& q, const LoadParameters& load_parameters,
     }
     evaluate(q, load_parameters, proximal);
     for (;; ++report.iterations, ++iterations_) {
-        report.had_contact |= model_.has_active_body_contact();
+        report.had_contact |= model_.contacts().has_active_pairs();
         report.residual = relative_residual(q, proximal);
         watch(report.residual);
         if (!std::isfinite(report.residual) || last_step > diverged_step * model_.extent())
@@ -270,23 +254,21 @@ NewtonReport Newton::iterate(VectorXd& q, const LoadParameters& load_parameters,
         last_residual = report.residual;
         // Factorizes at the current state. Returns false, with a reason in the report, if the iteration cannot go on.
         const auto refactorize = [&] {
-            // Before the first step the pressure of a liquid belongs to a volume that it will not keep, so the first matrix is projected.
-            // With muscles or contact between bodies the exact matrix is needed.
-            const bool begins =
-                mixed && !extrapolated && model_.n_muscles() == 0 && !model_.has_body_contact();
+            // Before the first step the pressure of a liquid belongs to a volume that it will not keep, so the first matrix is projected,
+            // unless that changes other terms too, whose exact matrix is needed.
+            const bool begins = mixed && !extrapolated && !model_.capabilities().has_psd_projection;
             const bool project_psd = begins || contraction > required_contraction;
             report.factor = factorize(q, load_parameters, mixed && extrapolated, proximal, pull, project_psd);
             report.reason = report.factor.reason;
             if (!report.factor.succeeded) return false;
             const Index negative_pivots = report.factor.negative_pivots;
             if (report.iterations == 0) first_negative_pivots = negative_pivots;
-            report.diverged = model_.bodies().solids().empty() &&
+            report.diverged = !model_.capabilities().has_transient_instability &&
                               negative_pivots > first_negative_pivots + most_new_negative_pivots;
             if (mixed && report.diverged) report.reason = "the Newton iteration diverged";
             if (mixed && report.diverged) return false;
             // The pivots of a projected matrix say nothing about stability.
-            const bool exact = !project_psd || (model_.n_muscles() == 0 && !model_.has_body_contact() &&
-                                                model_.low_rank().empty());
+            const bool exact = !project_psd || model_.projection_is_exact();
             moved = exact && last_step <= small_move * model_.length_scale()
                         ? 0.0
                         : std::numeric_limits<double>::infinity();
@@ -304,11 +286,12 @@ NewtonReport Newton::iterate(VectorXd& q, const LoadParameters& load_parameters,
                                : solve_with_factor(force));
         };
         VectorXd step = solved();
-        if (reused && in_place && contact_matrix_change(step) > stale_contact * force.norm()) {
+        if (reused && in_place &&
+            model_.contacts().force_change(touched_, step) > stale_contact * force.norm()) {
             if (!refactorize()) return report;
             step = solved();
         }
-        const VectorXd from = model_.has_body_contact() && in_place ? q : VectorXd();
+        const VectorXd from = model_.capabilities().has_barrier && in_place ? q : VectorXd();
         if (load.inexact) last.from = q;
         const bool corrects = load.correction && report.iterations == 0 && in_place;
         if (corrects) report.tangent = step;
@@ -328,9 +311,9 @@ NewtonReport Newton::iterate(VectorXd& q, const LoadParameters& load_parameters,
                 model_.dof_map().retract(q, step);
             }
         }
-        if (proximal.motion && model_.has_contact())
+        if (proximal.motion && model_.capabilities().has_stiffness_jumps)
             if (const VectorXd more = predict_contact(model_, q, load_parameters, *proximal.weights,
-                                                      predicted_contacts(model_, step));
+                                                      model_.contacts().predicted_points(step));
                 more.size() > 0) {
                 model_.dof_map().retract(q, more);
                 step += more;
@@ -372,7 +355,7 @@ FactorReport Newton::factorize_assembled(const VectorXd& q, const ProximalTerm& 
         model_.store_spare_factor(std::exchange(factor_, nullptr));
         factor_ = model_.new_factor([this] { watch(watched_); });
     }
-    if (model_.has_contact()) touched_ = model_.contact()->evaluated_contacts();
+    touched_ = model_.contacts().obstacle_points();
     model_.reduce_matrix(*factor_);
     LargeVector<double>& values = factor_->values();
     if (proximal.weights) model_.dof_map().add_weights(*proximal.weights, values);

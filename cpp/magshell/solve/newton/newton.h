@@ -18,7 +18,6 @@
 #include "magshell/linalg/factor.h"
 #include "magshell/linalg/krylov/gmres.h"
 #include "magshell/scene/model.h"
-#include "magshell/terms/contact/contact_term.h"
 
 namespace magshell {
 
@@ -192,9 +191,6 @@ class Newton {
                   const ProximalTerm& proximal, bool project_psd = false);
     /// Returns true if the expected iterations with the last factorization are cheaper than a new one.
     bool can_reuse_factor(double contraction, double residual, double last_step) const;
-    /// Returns the norm of the change of obstacle contact forces [N] along a step, between the contacts now and those of the last
-    /// factorization.
-    double contact_matrix_change(const VectorXd& step) const;
     void check_effort() const;
     FactorReport factorize_assembled(const VectorXd& q, const ProximalTerm& proximal);
 
@@ -203,8 +199,8 @@ class Newton {
     Watch watch_;
     mutable double watched_ = 1.0;  // the residual last reported to the watch
     std::shared_ptr<Factor> factor_;
-    std::vector<ContactTerm::ActiveContact> touched_;  // contacts with obstacles at the last factorization
-    bool unsymmetric_ = false;                         // whether the matrix assembled last is
+    std::vector<Contacts::ObstaclePoint> touched_;  // contacts with obstacles at the last factorization
+    bool unsymmetric_ = false;                      // whether the matrix assembled last is
     int factorizations_ = 0, failed_factorizations_ = 0, iterations_ = 0;
     int max_factorizations_ = 0;
     mutable double linear_time_ = 0.0;

@@ -4,7 +4,6 @@
 #include <limits>
 
 #include "magshell/solve/newton/newton.h"
-#include "magshell/terms/contact/body_contact_term.h"
 
 namespace magshell {
 namespace {
@@ -38,7 +37,7 @@ double Newton::apply_increment(VectorXd& q, VectorXd& step, double shortest, New
         report.reason = model_.describe_blocked_step(q, step);
         return -1.0;
     }
-    if (model_.has_body_contact()) {
+    if (model_.capabilities().has_barrier) {
         report.had_contact |= alpha < 1.0;
         report.blocked_by =
             alpha < blocked_step_length ? model_.describe_blocked_step(q, step) : std::string();
@@ -60,13 +59,13 @@ double Newton::contact_step_length(const VectorXd& q, const VectorXd& step, doub
     // [-] Longest step, and remaining slope below which a longer one is not tried; see test_block_on_a_slope_sticks_or_slides.
     constexpr double longest = 8.0, remaining_slope = 0.2;
     if (!(slope > 0.0)) return 1.0;
-    const BodyContactTerm& contact = *model_.body_contact();
+    const Contacts& contact = model_.contacts();
     const auto pushed_back = [&](double alpha_contact) {
         VectorXd there = q;
         model_.dof_map().retract(there, alpha_contact * step);
-        return contact.slope(there.data(), step.data());
+        return contact.slope(there, step);
     };
-    const double at_begin = contact.slope(step.data()), stiffness = contact.curvature(step.data());
+    const double at_begin = contact.slope(step), stiffness = contact.curvature(step);
     const auto slope_at = [&](double alpha_contact) {
         return (alpha * alpha_contact - 1.0) * slope + pushed_back(alpha_contact) - at_begin -
                alpha_contact * stiffness;
@@ -103,7 +102,7 @@ double Newton::contact_step_length(const VectorXd& q, const VectorXd& step, doub
 void Newton::describe_contact(NewtonReport& report) const {
     if (!report.blocked_by.empty())
         report.reason += "; " + report.blocked_by;
-    else if (const std::string hardest = model_.body_contact()->hardest(); !hardest.empty())
+    else if (const std::string hardest = model_.contacts().describe_largest_force(); !hardest.empty())
         report.reason += "; bodies touch: " + hardest;
 }
 
@@ -245,7 +244,7 @@ bool Newton::damped_iterations(VectorXd& q, const LoadParameters& load_parameter
             return std::sqrt(p.dot(proximal.weights->cwiseProduct(p)));
         };
         const double whole = length(step);
-        for (double alpha = model_.has_body_contact() ? model_.admissible_step_length(q, step) : 1.0;;
+        for (double alpha = model_.capabilities().has_barrier ? model_.admissible_step_length(q, step) : 1.0;;
              alpha *= 0.5) {
             q = from;
             model_.dof_map().retract(q, alpha * step);

@@ -18,8 +18,7 @@ ScopedContactOff::ScopedContactOff(const Model& model) : model_(model) {
 }
 
 void ScopedContactOff::stand(bool aside) const {
-    if (model_.contact()) model_.contact()->set_switched_off(aside);
-    if (model_.body_contact()) model_.body_contact()->set_switched_off(aside);
+    model_.contacts().set_switched_off(aside);
 }
 
 CoulombContact::CoulombContact(const Model& model, const ConstantMatrix& matrix,
@@ -31,11 +30,9 @@ CoulombContact::CoulombContact(const Model& model, const ConstantMatrix& matrix,
       negligible_(negligible_gap * model.extent()),
       forces_(VectorXd::Zero(model.size())) {
     matrix.require_isotropic();
-    if (model.body_contact()) model.body_contact()->require_one_coefficient();
-    if (!model.contact()) return;
-    for (const ContactTerm::HardContact& keeping : model.contact()->hard_contacts()) {
+    for (const ContactTerm::HardContact& keeping : model.contacts().hard_points()) {
         if (!matrix.solves(keeping.node)) continue;
-        obstacles_.push_back({keeping, model.contact()->obstacle_state(keeping.obstacle, load_parameters)});
+        obstacles_.push_back({keeping, model.contacts().obstacle_state(keeping.obstacle, load_parameters)});
         pairs_.push_back({{keeping.node, -1, -1, -1}, 1, {1.0, 0.0, 0.0, 0.0}, keeping.friction});
     }
 }
@@ -65,7 +62,6 @@ void CoulombContact::update_obstacle_pairs(const VectorXd& q) {
 
 // Finds the pairs that are near at q. Pairs that were near before keep their forces.
 void CoulombContact::update_body_pairs(const VectorXd& q) {
-    if (!model_.body_contact()) return;
     using Key = std::array<Index, 6>;
     const auto key = [](const NearPair& near) {
         const std::array<Index, 4>& n = near.pair.nodes;
@@ -75,7 +71,7 @@ void CoulombContact::update_body_pairs(const VectorXd& q) {
     for (std::size_t k = 0; k < between_.size(); ++k)
         if (const Pair& pair = pairs_[obstacles_.size() + k]; !pair.force.isZero(0.0))
             pushed[key(between_[k].near)] = pair.force;
-    between_ = model_.body_contact()->hard_contact_pairs(q.data());
+    between_ = model_.contacts().hard_pairs(q);
     std::erase_if(between_, [&](const BodyContactTerm::HardContactPair& each) {
         return std::none_of(each.near.pair.nodes.begin(), each.near.pair.nodes.end(),
                             [&](Index node) { return node >= 0 && matrix_.solves(node); });

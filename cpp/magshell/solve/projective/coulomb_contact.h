@@ -21,8 +21,7 @@
 
 #include "magshell/solve/newton/newton.h"
 #include "magshell/solve/projective/constant_matrix.h"
-#include "magshell/terms/contact/body_contact_term.h"
-#include "magshell/terms/contact/contact_term.h"
+#include "magshell/terms/contact/contacts.h"
 
 namespace magshell {
 

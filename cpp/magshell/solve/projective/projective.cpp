@@ -44,7 +44,7 @@ VectorXd ProjectiveSolver::reduced_gradient(const VectorXd& q, const ProximalTer
 }
 
 bool ProjectiveSolver::contact_stiffness_changed(const ProximalTerm& proximal, VectorXd& before) const {
-    if (!model_.has_contact()) return false;
+    if (!model_.capabilities().has_stiffness_jumps) return false;
     VectorXd now = model_.contact_stiffness_diagonal();
     bool changed = false;
     for (Index node = 0; node < now.size() && !changed; ++node)
@@ -64,7 +64,8 @@ void ProjectiveSolver::prepare(const VectorXd& q, const ProximalTerm& proximal, 
 
 NewtonReport ProjectiveSolver::solve(VectorXd& q, const LoadParameters& load_parameters,
                                      const ProximalTerm& proximal, double scale) {
-    const bool touches = options_.coulomb && (model_.has_contact() || model_.has_body_contact());
+    const Capabilities& has = model_.capabilities();
+    const bool touches = options_.coulomb && (has.has_stiffness_jumps || has.has_barrier);
     return touches ? solve_with_coulomb(q, load_parameters, proximal, scale)
                    : solve_smooth(q, load_parameters, proximal, scale);
 }
@@ -85,7 +86,7 @@ NewtonReport ProjectiveSolver::solve_smooth(VectorXd& q, const LoadParameters& l
     VectorXd touched = model_.contact_stiffness_diagonal(), between;
     // Updates the contact pairs in the matrix if they have changed by much: a dense matrix of many pairs costs more than an iteration.
     const auto take_pairs = [&] {
-        if (!model_.has_body_contact()) return;
+        if (!model_.capabilities().has_barrier) return;
         const std::vector<PairStiffness> pairs = model_.contact_pair_stiffness();
         VectorXd now = diagonal_of(pairs, model_.nodes().n_nodes());
         bool changed = between.size() == 0;

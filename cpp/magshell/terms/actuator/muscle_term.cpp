@@ -25,6 +25,7 @@ class MuscleEnergy final : public MuscleTerm {
     Index body() const override { return body_; }
     bool depends_on_loads() const override { return false; }
     bool varies() const override { return true; }
+    Capabilities capabilities() const override { return {.has_psd_projection = true}; }
     void set_psd_projection(bool project_psd) override { psd_projection_ = project_psd; }
 
     bool set_values(const Values& values) override {

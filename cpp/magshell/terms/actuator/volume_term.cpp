@@ -119,8 +119,9 @@ bool VolumeTerm::set_values(const Values& values) {
     return false;  // its round-off depends on the state only
 }
 
-bool VolumeTerm::has_infeasible_states() const {
-    return std::any_of(volumes_.begin(), volumes_.end(), [](const Volume& each) { return each.stays_open; });
+Capabilities VolumeTerm::capabilities() const {
+    return {.has_infeasible_states = std::any_of(volumes_.begin(), volumes_.end(),
+                                                 [](const Volume& each) { return each.stays_open; })};
 }
 
 // Along a straight path the volume is a cubic: V(q) + s V'(q) p + s^2 V'(p) q + s^3 V(p).

@@ -43,7 +43,7 @@ class VolumeTerm final : public LowRankTerm {
 
     std::string_view name() const override { return "volume"; }
     bool set_values(const Values& values) override;
-    bool has_infeasible_states() const override;
+    Capabilities capabilities() const override;
     double max_step_length(const double* q, const double* p) const override;
     std::string invalid_state_reason(const double* q) const override;
     double energy(const double* q, const LoadParameters& load_parameters) const override;

@@ -102,7 +102,9 @@ class BodyContactTerm final : public Term {
 
     std::string_view name() const override { return "body contact"; }
     bool set_values(const Values& values) override;
-    bool has_infeasible_states() const override { return true; }
+    Capabilities capabilities() const override {
+        return {.has_infeasible_states = true, .has_barrier = true, .has_psd_projection = true};
+    }
     double max_step_length(const double* q, const double* p) const override;
     std::string invalid_state_reason(const double* q) const override;
     bool depends_on_loads() const override { return false; }

@@ -102,6 +102,7 @@ class ContactTerm final : public Term {
     void add_cancelling_normal_forces(VectorXd& out) const;
 
     std::string_view name() const override { return "contact"; }
+    Capabilities capabilities() const override { return {.has_stiffness_jumps = true}; }
     bool depends_on_loads() const override { return false; }
     double energy(const double* q, const LoadParameters& load_parameters) const override;
     void evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) override;

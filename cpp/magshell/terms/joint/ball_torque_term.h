@@ -28,6 +28,7 @@ class BallTorqueTerm final : public Term {
     BallTorqueTerm(const std::vector<Input>& joints, const std::vector<Vec3>& rest, Registry& registry);
 
     std::string_view name() const override { return "joints"; }
+    Capabilities capabilities() const override { return {.has_unsymmetric_tangent = true}; }
     bool set_values(const Values& values) override;
     bool depends_on_loads() const override { return false; }
     double energy(const double*, const LoadParameters&) const override { return 0.0; }

@@ -31,6 +31,7 @@ class DamperTerm final : public ElasticTerm {
                Registry& registry);
 
     std::string_view name() const override { return "joints"; }
+    Capabilities capabilities() const override { return {.has_own_viscosity = true}; }
     bool set_values(const Values& values) override;
     double energy(const double*, const LoadParameters&) const override { return 0.0; }
     void evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) override;

@@ -32,6 +32,7 @@ class PressureTerm final : public Term {
                  Registry& registry);
 
     std::string_view name() const override { return "pressure"; }
+    Capabilities capabilities() const override { return {.has_unsymmetric_tangent = true}; }
     bool set_values(const Values& values) override;
     double energy(const double* q, const LoadParameters& load_parameters) const override;
     void evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) override;

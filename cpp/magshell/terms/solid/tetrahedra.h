@@ -103,7 +103,11 @@ class Tetrahedra : public SolidTerm {
         return true;
     }
 
-    bool has_infeasible_states() const override { return Material::refuses_inversion; }
+    Capabilities capabilities() const override {
+        return {.has_infeasible_states = Material::refuses_inversion,
+                .has_transient_instability = true,
+                .has_transient_stresses = true};
+    }
 
     double max_step_length(const double* q, const double* step) const override {
         std::vector<double> of_groups(loop_.groups(), 1.0);
