@@ -193,13 +193,16 @@ class Statics {
     // Solves one load step; intermediate states need not be exact.
     NewtonReport solve_load_step(VectorXd& q, const LoadParameters& load_parameters, double step,
                                  bool on_the_way) {
-        if (!allows_inexact_steps()) return newton_.solve(q, load_parameters);
-        LoadStep load{on_the_way, newton_.model().has_stress_prediction() ? &last_ : nullptr};
-        if (!stop_on_instability_) return newton_.solve_load(q, load_parameters, load);
-        load.correction = [&](const VectorXd& tangent) {
-            return predictor_.correction(result_.state, tangent, step);
-        };
-        return newton_.solve_until_unstable(q, load_parameters, load);
+        NewtonPolicy policy;
+        if (!allows_inexact_steps()) return newton_.solve(q, load_parameters, policy);
+        policy.inexact = on_the_way;
+        if (newton_.model().has_stress_prediction()) policy.stress_predictor = &last_;
+        policy.stop_on_instability = stop_on_instability_;
+        if (stop_on_instability_)
+            policy.correction = [&](const VectorXd& tangent) {
+                return predictor_.correction(result_.state, tangent, step);
+            };
+        return newton_.solve(q, load_parameters, policy);
     }
 
     bool allows_inexact_steps() const {
@@ -234,7 +237,8 @@ class Statics {
         if (!newton_.options().mixed) return false;
         VectorXd trial = result_.state;
         const LoadParameters load_parameters = load_parameters_at(target);
-        const NewtonReport report = newton_.solve_standard(trial, load_parameters);
+        const NewtonReport report =
+            newton_.solve(trial, load_parameters, {.mixed = false, .search_at_barrier = false});
         const bool found = report.converged && sides_.crossed(trial, load_parameters).empty();
         if (found)
             accept(trial, load_parameters, target, report.residual);

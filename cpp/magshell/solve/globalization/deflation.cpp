@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
+
+#include "magshell/solve/newton/newton_iteration.h"
 
 namespace magshell {
 namespace {
@@ -52,45 +53,51 @@ class Deflation {
     const double scale_;
 };
 
+// Newton's method with deflated steps.
+class DeflatedSteps final : public NewtonIteration {
+  public:
+    DeflatedSteps(Newton& newton, VectorXd& q, const LoadParameters& load_parameters,
+                  const KnownEquilibria& known, int max_iterations)
+        : NewtonIteration(newton, q, load_parameters, no_proximal_, max_iterations),
+          deflation_(newton.model(), known) {}
+
+  private:
+    bool is_done() override {
+        if (report_.residual > newton_.options().tolerance ||
+            last_step_ > last_step_tolerance * model_.extent())
+            return false;
+        report_.converged = !deflation_.is_known(q_, same_distance * model_.extent());
+        if (!report_.converged) fail("the search converged to an equilibrium that is known");
+        return true;
+    }
+
+    bool step() override {
+        const bool mixed = newton_.options().mixed;
+        Eigen::MatrixXd no_moves(q_.size(), 0);
+        report_.factor =
+            newton_.factorize(q_, load_parameters_, mixed && report_.iterations > 0, proximal_, no_moves);
+        if (!report_.factor.succeeded) return fail(report_.factor.reason);
+        VectorXd step = newton_.solve_with_factor(-newton_.gradient(q_, proximal_));
+        step *= deflation_.factor(q_, step);
+        const double length = step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
+        if (length > longest_step * model_.extent()) step *= longest_step * model_.extent() / length;
+        if (newton_.apply_increment(q_, step, min_deflated_step, report_) < 0.0) return false;
+        if (mixed) model_.extrapolate(step);
+        last_step_ = step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
+        evaluate();
+        return true;
+    }
+
+    const ProximalTerm no_proximal_;
+    const Deflation deflation_;
+    double last_step_ = 0.0;  // [m]
+};
+
 }  // namespace
 
 NewtonReport solve_away_from(Newton& newton, VectorXd& q, const LoadParameters& load_parameters,
                              const KnownEquilibria& known, int max_iterations) {
-    Model& model = newton.model();
-    const Deflation deflation(model, known);
-    const bool mixed = newton.options().mixed;
-    NewtonReport report;
-    const auto fail = [&](std::string reason) {
-        report.reason = std::move(reason);
-        return report;
-    };
-    if (std::string reason = model.invalid_state_reason(q); !reason.empty()) return fail(std::move(reason));
-    double last_step = 0.0;
-    newton.evaluate(q, load_parameters, {});
-    for (;; ++report.iterations, newton.count_iteration()) {
-        report.residual = newton.relative_residual(q, {});
-        newton.watch(report.residual);
-        if (!std::isfinite(report.residual)) return fail("the iteration diverged");
-        if (report.residual <= newton.options().tolerance &&
-            last_step <= last_step_tolerance * model.extent()) {
-            report.converged = !deflation.is_known(q, same_distance * model.extent());
-            if (!report.converged) report.reason = "the search converged to an equilibrium that is known";
-            return report;
-        }
-        if (report.iterations == max_iterations)
-            return fail("no convergence in " + std::to_string(max_iterations) + " iterations");
-        Eigen::MatrixXd no_moves(q.size(), 0);
-        report.factor = newton.factorize(q, load_parameters, mixed && report.iterations > 0, {}, no_moves);
-        if (!report.factor.succeeded) return fail(report.factor.reason);
-        VectorXd step = newton.solve_with_factor(-newton.gradient(q, {}));
-        step *= deflation.factor(q, step);
-        const double length = step.head(model.n_coordinates()).lpNorm<Eigen::Infinity>();
-        if (length > longest_step * model.extent()) step *= longest_step * model.extent() / length;
-        if (newton.apply_increment(q, step, min_deflated_step, report) < 0.0) return report;
-        if (mixed) model.extrapolate(step);
-        last_step = step.head(model.n_coordinates()).lpNorm<Eigen::Infinity>();
-        newton.evaluate(q, load_parameters, {});
-    }
+    return DeflatedSteps(newton, q, load_parameters, known, max_iterations).run();
 }
 
 }  // namespace magshell

@@ -126,7 +126,8 @@ class PostBucklingDescent : private EnergyDescent {
     bool finish_from_here(double expected) {
         return finish_with_newton(
             [&](VectorXd& trial) {
-                return newton_.solve_until_unstable(trial, load_parameters_, {.factor = &factor_});
+                return newton_.solve(trial, load_parameters_,
+                                     {.stop_on_instability = true, .factor = &factor_});
             },
             [&](const NewtonReport& report, const VectorXd& trial) {
                 const bool there =

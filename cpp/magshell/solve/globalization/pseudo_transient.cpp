@@ -68,7 +68,8 @@ class PseudoTransient : private EnergyDescent {
         const Model::AngleBranches angle_branches = model_.angle_branches();
         const VectorXd weights = rate_ * model_.metric();
         const NewtonReport report =
-            newton_.solve(trial, load_parameters_, {&weights, &proximal}, max_step_iterations);
+            newton_.solve(trial, load_parameters_,
+                          {.proximal = {&weights, &proximal}, .max_iterations = max_step_iterations});
         const VectorXd moved = trial - proximal;
         const double energy = report.converged ? model_.energy(trial, load_parameters_) : 0.0;
         const double pull = 0.5 * moved.dot(weights.cwiseProduct(moved));

@@ -45,7 +45,7 @@ bool MotorReactions::solve(const LoadParameters& load_parameters) {
     }
     q_ = from;
     model.set_angle_branches(angle_branches);
-    return newton_.solve(q_, load_parameters, proximal).converged;
+    return newton_.solve(q_, load_parameters, {.proximal = proximal}).converged;
 }
 
 // Returns the motor forces. At large stiffness the residual that is left exceeds what positions can resolve, so its effect on the

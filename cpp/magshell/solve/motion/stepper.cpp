@@ -51,18 +51,16 @@ NewtonReport Stepper::solve(VectorXd& q, const LoadParameters& load_parameters,
     }
     const VectorXd predicted = q;
     const Model::AngleBranches angle_branches = model.angle_branches();
-    NewtonReport report = newton_.solve(q, load_parameters, proximal);
+    NewtonReport report = newton_.solve(q, load_parameters, {.proximal = proximal});
     // After contact between bodies, Newton has used its line search already.
-    const bool searched = model.capabilities().has_barrier && report.had_contact;
-    if (!report.converged && !searched &&
-        (model.capabilities().has_stiffness_jumps || newton_.options().mixed)) {
-        q = predicted;
-        model.set_angle_branches(angle_branches);
-        report = model.capabilities().has_stiffness_jumps
-                     ? newton_.solve_damped(q, load_parameters, proximal)
-                     : newton_.solve_standard(q, load_parameters, proximal);
-    }
-    return report;
+    const Capabilities& has = model.capabilities();
+    const bool searched = has.has_barrier && report.had_contact;
+    if (report.converged || searched || !(has.has_stiffness_jumps || newton_.options().mixed)) return report;
+    q = predicted;
+    model.set_angle_branches(angle_branches);
+    NewtonPolicy standard{.proximal = proximal, .mixed = false, .search_at_barrier = false};
+    if (has.has_stiffness_jumps) standard.steps = NewtonPolicy::Steps::contracting;
+    return newton_.solve(q, load_parameters, standard);
 }
 
 const Tableau& Stepper::tableau_from(const MotionState& state, bool dissipative) const {

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "magshell/core/errors.h"
-#include "magshell/solve/globalization/contact_predictor.h"
 #include "magshell/solve/newton/unsymmetric.h"
 
 namespace magshell {
@@ -26,49 +25,18 @@ double relative(const VectorXd& contact_alpha, const VectorXd& magnitude, const 
     return scale > 0.0 ? length / scale : length > 0.0 ? 1.0 : 0.0;
 }
 
-// [-] Last step of a converged iteration, and one below the floor of round-off, over the extent; see test_fine_roof_takes_small_steps.
-constexpr double settled_step = 1e-3, last_under_floor = 1e-5;
-// New negative pivots above which a shell has diverged (a solid that a first step overstretches has many more for one iteration); see
-// test_a_flat_strip_far_beyond_where_it_buckles.
-constexpr Index most_new_negative_pivots = 10;
-// Iteration from which on steps must shrink, and the largest ratio of successive steps [-]; see test_a_thin_strip_rolled_up.
-constexpr int settling_iterations = 6;
-constexpr double max_step_ratio = 0.7;  // [-] see test_a_thin_strip_rolled_up
-// [-] Ratio of steps below which an iteration may pass an unstable state (in-plane corrections do); see test_a_semi_cylinder_pulled_and_pushed.
-constexpr double settling_ratio = 0.3;
-// [-] Growth of the second step that is allowed, as in the plane of a flat shell; see test_a_flat_strip_far_beyond_where_it_buckles.
-constexpr double max_second_growth = 4.0;
-// [-] Remaining displacement at which an inexact load step ends, over the first step; see test_state_of_an_early_end_is_an_equilibrium.
-constexpr double inexact_remainder = 1e-3;
-// [-] The same over the thickness, as a displacement stretches the shell; see test_state_of_an_early_end_is_an_equilibrium.
-constexpr double inexact_thickness = 0.1;
-// [-] Reduction of the residual below which the next matrix is not projected; see test_strip_folds_onto_itself.
-constexpr double required_contraction = 0.5;
-// [-] Step over the extent beyond which the iteration has diverged; see test_fields_beyond_all_bounds_end_a_solve.
-constexpr double diverged_step = 1e3;
-
-// [-] Change of contact forces, over the residual, that makes a new factorization necessary; see test_an_impact_takes_few_factorizations.
-constexpr double stale_contact = 0.1;
-
-// [-] Shortest admissible step length; see test_landing_solid_is_not_inverted.
-constexpr double min_step_length = 1e-4;
-
-// Returns the tolerance of the linear solve with a nonsymmetric matrix (inexact Newton, N&W 7.1): the forcing term that keeps quadratic
-// convergence, and no less than the tolerance of the residual needs.
-double forcing_term(double residual, double tolerance) {
-    // [-] Largest forcing term, and safety factor at the end; see test_methods_of_second_order_stick.
-    constexpr double max_forcing = 1e-2, final_safety = 0.1;
-    return std::max(final_safety * tolerance / residual, std::min(max_forcing, residual));
-}
-
-// [-] Displacement over the thickness up to which a factorization stays valid, and up to which the errors of extrapolated stresses, the
-// square of the step, are negligible; see test_going_on_gives_the_same_bits.
-constexpr double negligible_move = 1e-7, small_move = 1e-4;
+// [-] Displacement over the thickness up to which a factorization stays valid; see test_going_on_gives_the_same_bits.
+constexpr double negligible_move = 1e-7;
 
 // Relative residual and number of vectors of GMRES for gradients with a nearby factorization: the solution of a soft shell has up to
 // four digits less than its residual. See test_over_200_steps_against_differences.
 constexpr double nearby_gradient_tolerance = 1e-14;  // [-] see test_over_200_steps_against_differences
 constexpr int nearby_gradient_vectors = 30;          // see test_over_200_steps_against_differences
+
+// [-] Step length below which the report names the elements or faces that limit it; see test_relaxation_that_ends_early_reports_contacts.
+constexpr double blocked_step_length = 0.1;
+// [-] Distance of a trial from the ends of its bracket, over its width; see test_strip_folds_onto_itself.
+constexpr double bracket_margin = 0.1;
 
 // Adds the time it exists to a sum [s].
 class Stopwatch {
@@ -139,204 +107,125 @@ VectorXd Newton::remaining_motion(const VectorXd& move, double alpha, const Vect
     return model_.dof_map().prescribed_increment(q, load_parameters);  // along the curved paths of motors
 }
 
+double Newton::apply_increment(VectorXd& q, VectorXd& step, double shortest, NewtonReport& report) {
+    const double alpha = model_.admissible_step_length(q, step);
+    if (alpha < shortest) {
+        report.reason = model_.describe_blocked_step(q, step);
+        return -1.0;
+    }
+    if (model_.capabilities().has_barrier) {
+        report.had_contact |= alpha < 1.0;
+        report.blocked_by =
+            alpha < blocked_step_length ? model_.describe_blocked_step(q, step) : std::string();
+    }
+    if (alpha < 1.0) step *= alpha;
+    model_.dof_map().retract(q, step);
+    return alpha;
+}
+
+// Finds a step length at which the slope of the energy is less than half of its initial size, evaluating contact forces only. The
+// rest of the energy is taken from its quadratic model, whose slope vanishes at the full step. If the energy still falls fast at
+// the full step (the pair was closer than it will stay), the length is doubled, up to 8 steps; if it rises, the zero of the slope
+// is bracketed and found by regula falsi (Illinois variant).
+double Newton::contact_step_length(const VectorXd& q, const VectorXd& step, double alpha,
+                                   double slope) const {
+    // [-] Slopes between which the search ends, over the initial slope; see test_strip_folds_onto_itself.
+    constexpr double max_rise = 0.5, max_fall = 0.5;
+    constexpr int max_trials = 6;  // see test_strip_folds_onto_itself
+    // [-] Longest step, and remaining slope below which a longer one is not tried; see test_block_on_a_slope_sticks_or_slides.
+    constexpr double longest = 8.0, remaining_slope = 0.2;
+    if (!(slope > 0.0)) return 1.0;
+    const Contacts& contact = model_.contacts();
+    const auto pushed_back = [&](double alpha_contact) {
+        VectorXd there = q;
+        model_.dof_map().retract(there, alpha_contact * step);
+        return contact.slope(there, step);
+    };
+    const double at_begin = contact.slope(step), stiffness = contact.curvature(step);
+    const auto slope_at = [&](double alpha_contact) {
+        return (alpha * alpha_contact - 1.0) * slope + pushed_back(alpha_contact) - at_begin -
+               alpha_contact * stiffness;
+    };
+    double lower = 0.0, upper = 1.0, slope_lower = -slope, slope_upper = slope_at(1.0);
+    while (alpha == 1.0 && slope_upper < -remaining_slope * slope && upper < longest) {
+        lower = upper;
+        slope_lower = slope_upper;
+        upper *= 2.0;
+        slope_upper = slope_at(upper);
+    }
+    if (slope_upper <= max_rise * slope) return upper;
+    for (int trial = 0; trial < max_trials; ++trial) {
+        // Contact forces grow faster than linearly, so a secant falls short; the Illinois rule halves the slope of the end that stays.
+        const double alpha_contact =
+            std::clamp(lower + (upper - lower) * slope_lower / (slope_lower - slope_upper),
+                       lower + bracket_margin * (upper - lower), upper - bracket_margin * (upper - lower));
+        const double there = slope_at(alpha_contact);
+        if (there > max_rise * slope) {
+            upper = alpha_contact;
+            slope_upper = there;
+            slope_lower *= trial > 0 ? 0.5 : 1.0;
+        } else if (there < -max_fall * slope) {
+            lower = alpha_contact;
+            slope_lower = there;
+            slope_upper *= 0.5;
+        } else {
+            return alpha_contact;
+        }
+    }
+    return lower > 0.0 ? lower : upper;
+}
+
+void Newton::describe_contact(NewtonReport& report) const {
+    if (!report.blocked_by.empty())
+        report.reason += "; " + report.blocked_by;
+    else if (const std::string hardest = model_.contacts().describe_largest_force(); !hardest.empty())
+        report.reason += "; bodies touch: " + hardest;
+}
+
+double Newton::line_search(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
+                           const VectorXd& from, const VectorXd& step, double slope) {
+    constexpr double enough =
+        0.5;  // [-] slope at the end over the initial one; see test_strip_folds_onto_itself
+    constexpr int max_trials = 12;  // see test_strip_folds_onto_itself
+    const auto slope_here = [&] { return gradient(q, proximal).dot(step); };
+    double alpha_contact = 1.0, lower = 0.0, upper = 1.0, slope_lower = -slope, slope_upper = slope_here();
+    if (slope_upper <= enough * slope) return alpha_contact;
+    for (int trial = 0; trial < max_trials; ++trial) {
+        // The contact force grows faster than linearly: the Illinois rule halves the slope of the end that stays.
+        alpha_contact =
+            std::clamp(lower + (upper - lower) * slope_lower / (slope_lower - slope_upper),
+                       lower + bracket_margin * (upper - lower), upper - bracket_margin * (upper - lower));
+        q = from;
+        model_.dof_map().retract(q, alpha_contact * step);
+        evaluate(q, load_parameters, proximal);
+        const double there = slope_here();
+        if (there > enough * slope) {
+            upper = alpha_contact;
+            slope_upper = there;
+            slope_lower *= trial > 0 ? 0.5 : 1.0;
+        } else if (there < -enough * slope) {
+            lower = alpha_contact;
+            slope_lower = there;
+            slope_upper *= trial > 0 ? 0.5 : 1.0;
+        } else {
+            break;
+        }
+    }
+    return alpha_contact;
+}
+
 bool Newton::is_equilibrium(const VectorXd& q, const LoadParameters& load_parameters) {
     evaluate(q, load_parameters, {});
     const bool in_place = model_.dof_map().prescribed_increment(q, load_parameters).isZero(0.0);
     return in_place && relative_residual(q, {}) <= options_.tolerance;
 }
 
-NewtonReport Newton::solve(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal) {
-    return solve(q, load_parameters, proximal, options_.max_iterations);
-}
-
-NewtonReport Newton::solve(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
-                           int max_iterations) {
-    if (!model_.capabilities().has_barrier)
-        return iterate(q, load_parameters, proximal, max_iterations, options_.mixed, {});
-    constexpr int searched = 5;  // times max_iterations; see test_strip_folds_onto_itself
-    const VectorXd from = q;
-    const Model::AngleBranches angle_branches = model_.angle_branches();
-    NewtonReport report = iterate(q, load_parameters, proximal, max_iterations, options_.mixed, {});
-    if (report.converged || !report.had_contact) return report;
-    const int iterations = report.iterations;
-    // If a step was blocked, the line search continues from there; otherwise the iteration may have led anywhere and starts again.
-    if (report.blocked_by.empty()) {
-        q = from;
-        model_.set_angle_branches(angle_branches);
-    }
-    report = solve_with_line_search(q, load_parameters, proximal, searched * max_iterations);
-    report.iterations += iterations;
-    if (!report.converged) describe_contact(report);
-    return report;
-}
-
-NewtonReport Newton::solve_standard(VectorXd& q, const LoadParameters& load_parameters,
-                                    const ProximalTerm& proximal) {
-    return iterate(q, load_parameters, proximal, options_.max_iterations, false, {});
+bool Newton::is_negligible(double displacement) const {
+    return displacement <= negligible_move * model_.length_scale();
 }
 
 bool Newton::is_negligible(const VectorXd& step) const {
-    return step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>() <=
-           negligible_move * model_.length_scale();
-}
-
-NewtonReport Newton::solve_until_unstable(VectorXd& q, const LoadParameters& load_parameters,
-                                          const LoadStep& load) {
-    return iterate(q, load_parameters, {}, options_.max_iterations, options_.mixed, load, true);
-}
-
-NewtonReport Newton::solve_load(VectorXd& q, const LoadParameters& load_parameters, const LoadStep& load) {
-    return iterate(q, load_parameters, {}, options_.max_iterations, options_.mixed, load);
-}
-
-bool Newton::can_reuse_factor(double contraction, double residual, double last_step) const {
-    constexpr double worth =
-        4.0;  // [-] cost of a factorization in iterations; see test_kept_factors_serve_all_the_way_back
-    // The error of an iteration with an old factorization is at most twice the last contraction or, in bending, the displacement since
-    // then over the thickness.
-    constexpr double max_contraction = 0.1;  // [-] see test_kept_factors_serve_all_the_way_back
-    const double each = std::max(2.0 * contraction, last_step / model_.length_scale());
-    return each < max_contraction && std::log(options_.tolerance / residual) >= worth * std::log(each);
-}
-
-NewtonReport Newton::iterate(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
-                             int max_iterations, bool mixed, const LoadStep& load, bool stop_on_instability) {
-    NewtonReport report;
-    if (load.factor) report.factor = *load.factor;
-    Index first_negative_pivots = report.factor.negative_pivots;
-    VectorXd move = model_.dof_map().prescribed_increment(q, load_parameters);
-    bool extrapolated = false;
-    double last_step = 0.0, step_before = 0.0, last_residual = std::numeric_limits<double>::infinity();
-    double moved = std::numeric_limits<double>::infinity();  // displacement since the last factorization [m]
-    StressPredictor last;
-    const auto fail = [&](std::string reason) {
-        report.reason = std::move(reason);
-        return report;
-    };
-    if (std::string reason = model_.invalid_state_reason(q); !reason.empty()) return fail(std::move(reason));
-    if (mixed && load.stress_predictor && load.stress_predictor->step.size() > 0) {
-        evaluate(load.stress_predictor->from, load_parameters, proximal);
-        model_.extrapolate(load.stress_predictor->step);
-        extrapolated = true;
-    }
-    evaluate(q, load_parameters, proximal);
-    for (;; ++report.iterations, ++iterations_) {
-        report.had_contact |= model_.contacts().has_active_pairs();
-        report.residual = relative_residual(q, proximal);
-        watch(report.residual);
-        if (!std::isfinite(report.residual) || last_step > diverged_step * model_.extent())
-            return fail("the iteration diverged");
-        const bool in_place = move.isZero(0.0);
-        const bool settled =
-            report.residual <= options_.tolerance && last_step <= settled_step * model_.extent();
-        // Below the floor of round-off, small forces that move a thin shell far vanish in larger ones: the last step decides.
-        if (in_place && settled &&
-            ((report.iterations > 0 && last_step <= last_under_floor * model_.extent()) ||
-             relative_residual(q, proximal, false) <= options_.tolerance)) {
-            report.converged = true;
-            report.factor_is_current = moved <= negligible_move * model_.length_scale();
-            return report;
-        }
-        // Quadratic convergence predicts the remaining displacement. It must be small compared with the thickness, as it stretches the shell.
-        if (load.inexact && in_place && report.iterations > 1 && last_step <= settling_ratio * step_before &&
-            last_step * last_step * last_step <=
-                std::min(inexact_remainder * report.first_length, inexact_thickness * model_.length_scale()) *
-                    step_before * step_before &&
-            report.factor.negative_pivots <= first_negative_pivots) {
-            report.converged = report.inexact = true;
-            report.stress_predictor = std::move(last);
-            return report;
-        }
-        if (report.iterations == max_iterations)
-            return fail("no convergence in " + std::to_string(max_iterations) + " iterations");
-        Eigen::MatrixXd pull = move;
-        const double contraction = report.residual / last_residual;
-        last_residual = report.residual;
-        // Factorizes at the current state. Returns false, with a reason in the report, if the iteration cannot go on.
-        const auto refactorize = [&] {
-            // Before the first step the pressure of a liquid belongs to a volume that it will not keep, so the first matrix is projected,
-            // unless that changes other terms too, whose exact matrix is needed.
-            const bool begins = mixed && !extrapolated && !model_.capabilities().has_psd_projection;
-            const bool project_psd = begins || contraction > required_contraction;
-            report.factor = factorize(q, load_parameters, mixed && extrapolated, proximal, pull, project_psd);
-            report.reason = report.factor.reason;
-            if (!report.factor.succeeded) return false;
-            const Index negative_pivots = report.factor.negative_pivots;
-            if (report.iterations == 0) first_negative_pivots = negative_pivots;
-            report.diverged = !model_.capabilities().has_transient_instability &&
-                              negative_pivots > first_negative_pivots + most_new_negative_pivots;
-            if (mixed && report.diverged) report.reason = "the Newton iteration diverged";
-            if (mixed && report.diverged) return false;
-            // The pivots of a projected matrix say nothing about stability.
-            const bool exact = !project_psd || model_.projection_is_exact();
-            moved = exact && last_step <= small_move * model_.length_scale()
-                        ? 0.0
-                        : std::numeric_limits<double>::infinity();
-            return true;
-        };
-        const bool reused = report.iterations == 0
-                                ? load.factor && in_place
-                                : can_reuse_factor(contraction, report.residual, last_step);
-        if (!reused && !refactorize()) return report;
-        // Loads without potential act on few nodes, so GMRES takes few vectors and solves to the usual tolerance.
-        const VectorXd force = -gradient(q, proximal) - pull.col(0);
-        const auto solved = [&]() -> VectorXd {
-            return move + (proximal.motion
-                               ? solve_with_factor(force, forcing_term(report.residual, options_.tolerance))
-                               : solve_with_factor(force));
-        };
-        VectorXd step = solved();
-        if (reused && in_place &&
-            model_.contacts().force_change(touched_, step) > stale_contact * force.norm()) {
-            if (!refactorize()) return report;
-            step = solved();
-        }
-        const VectorXd from = model_.capabilities().has_barrier && in_place ? q : VectorXd();
-        if (load.inexact) last.from = q;
-        const bool corrects = load.correction && report.iterations == 0 && in_place;
-        if (corrects) report.tangent = step;
-        if (const VectorXd more = corrects ? load.correction(step) : VectorXd(); more.size() > 0)
-            step += more;
-        double alpha = apply_increment(q, step, min_step_length, report);
-        if (alpha < 0.0) return report;
-        if (from.size() > 0) {
-            double contact_alpha = contact_step_length(from, step, alpha, force.dot(step));
-            if (contact_alpha > 1.0)
-                contact_alpha =
-                    std::max(1.0, contact_alpha * model_.admissible_step_length(from, contact_alpha * step));
-            if (contact_alpha != 1.0) {
-                alpha *= contact_alpha;
-                step *= contact_alpha;
-                q = from;
-                model_.dof_map().retract(q, step);
-            }
-        }
-        if (proximal.motion && model_.capabilities().has_stiffness_jumps)
-            if (const VectorXd more = predict_contact(model_, q, load_parameters, *proximal.weights,
-                                                      model_.contacts().predicted_points(step));
-                more.size() > 0) {
-                model_.dof_map().retract(q, more);
-                step += more;
-            }
-        move = remaining_motion(move, alpha, q, load_parameters);
-        const double length = step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
-        if (report.iterations == 0) report.first_length = length;
-        if (stop_on_instability && report.iterations > 0 &&
-            length > std::max(settling_ratio * last_step, settled_step * model_.extent()) &&
-            (report.factor.negative_pivots > first_negative_pivots ||
-             (report.iterations == 1 && length > max_second_growth * std::max(last_step, model_.extent()))))
-            return fail("the iteration leaves the stable states");
-        if (mixed && report.iterations >= settling_iterations && length > max_step_ratio * last_step &&
-            length > settled_step * model_.extent())
-            return fail("the steps of the iteration do not get shorter");
-        if (mixed) model_.extrapolate(corrects ? report.tangent : step);
-        extrapolated = true;
-        if (load.inexact) last.step = step;
-        step_before = last_step;
-        last_step = length;
-        moved += length;
-        evaluate(q, load_parameters, proximal);
-    }
+    return is_negligible(step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>());
 }
 
 void Newton::check_effort() const {

@@ -32,11 +32,37 @@ struct StressPredictor {
     VectorXd from, step;  // empty: the stresses follow from the strains of the state
 };
 
-/// How a load step begins and when it may end.
-struct LoadStep {
+/// The proximal (quadratic) term 1/2 sum w_i (q_i - target_i)^2 added to the energy: the inertia of a time stage, or of an implicit
+/// Euler step of a gradient flow. Of all dofs; the weights [N/m] are the same along the three axes of a node. Weights of nodes of rigid
+/// bodies may be negative as long as their sum over the body is positive.
+struct ProximalTerm {
+    const VectorXd* weights = nullptr;
+    const VectorXd* target = nullptr;
+    const StageMotion* motion =
+        nullptr;  // kinematics of a time stage, in which forces without potential act as well
+};
+
+/// How one solve iterates. The defaults solve for a stationary point of the energy, as exactly as the options say.
+struct NewtonPolicy {
+    /// full: full steps, shortened only where states have no energy. contracting: standard steps that are shortened until they contract
+    /// (natural monotonicity test [Deuflhard]), in rounds with fixed normal forces of friction; slower, and robust if contacts open and
+    /// close, stick and slip. It needs a proximal term.
+    enum class Steps { full, contracting };
+
+    ProximalTerm proximal = {};
+    Steps steps = Steps::full;
+    bool mixed = true;       // false: standard steps, whatever the options say
+    int max_iterations = 0;  // 0: as the options say
+    /// Near a barrier full steps may fail; standard steps with a line search on the slope of the energy follow, with matrices
+    /// projected to be positive semidefinite.
+    bool search_at_barrier = true;
+    /// Stops as soon as the matrix has negative pivots that it had not at the beginning while the steps do not get much shorter, or if
+    /// the second step grows too long (early termination on loss of stability; Crisfield 9.5).
+    bool stop_on_instability = false;
     bool inexact = false;  // may end once the remaining displacement is small beside the first step
     const StressPredictor* stress_predictor = nullptr;  // of the previous load step
-    const FactorReport* factor = nullptr;  // of the last factorization, if it was made where the step begins
+    const FactorReport* factor =
+        nullptr;  // of the last factorization, if it was made at the state where the solve begins
     std::function<VectorXd(const VectorXd&)> correction =
         {};  // returns what to add to the first step, or an empty vector
 };
@@ -58,16 +84,6 @@ struct NewtonReport {
     std::string reason;         // why it did not converge
 };
 
-/// The proximal (quadratic) term 1/2 sum w_i (q_i - target_i)^2 added to the energy: the inertia of a time stage, or of an implicit
-/// Euler step of a gradient flow. Of all dofs; the weights [N/m] are the same along the three axes of a node. Weights of nodes of rigid
-/// bodies may be negative as long as their sum over the body is positive.
-struct ProximalTerm {
-    const VectorXd* weights = nullptr;
-    const VectorXd* target = nullptr;
-    const StageMotion* motion =
-        nullptr;  // kinematics of a time stage, in which forces without potential act as well
-};
-
 /// Thrown if a solve would exceed its budget of factorizations.
 struct EffortSpent : std::runtime_error {
     EffortSpent() : std::runtime_error("the budget of factorizations is spent") {}
@@ -85,33 +101,12 @@ class Newton {
     ~Newton() { model_.store_spare_factor(std::move(factor_)); }
 
     /// Solves from q for a stationary point at these load parameters; leaves q at the last state if it fails. Prescribed nodes are moved to
-    /// their target in the first iteration, with its linearization. If bodies come into contact and the iteration fails,
-    /// solve_with_line_search() follows.
-    NewtonReport solve(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal = {});
+    /// their target in the first iteration, with its linearization.
+    NewtonReport solve(VectorXd& q, const LoadParameters& load_parameters, const NewtonPolicy& policy = {});
 
-    /// Returns true if a step is so short that a factorization made before it is valid after it, for gradients too.
+    /// Returns true if a step or displacement [m] is so short that a factorization made before it is valid after it, for gradients too.
     bool is_negligible(const VectorXd& step) const;
-
-    /// Solves like the above, with another limit on the iterations.
-    NewtonReport solve(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
-                       int max_iterations);
-    /// Solves a load step, and stops as soon as the matrix has negative pivots that it had not at the beginning while the steps
-    /// do not get much shorter, or if the second step grows too long (early termination on loss of stability; Crisfield 9.5).
-    NewtonReport solve_until_unstable(VectorXd& q, const LoadParameters& load_parameters,
-                                      const LoadStep& load);
-    /// Solves a load step without stopping on loss of stability.
-    NewtonReport solve_load(VectorXd& q, const LoadParameters& load_parameters, const LoadStep& load);
-    /// Solves by standard instead of mixed Newton steps.
-    NewtonReport solve_standard(VectorXd& q, const LoadParameters& load_parameters,
-                                const ProximalTerm& proximal = {});
-    /// Solves by standard Newton steps that are shortened until they contract (natural monotonicity test [Deuflhard]), in rounds
-    /// with fixed normal forces of friction. It is slower, and robust if contacts open and close, stick and slip.
-    NewtonReport solve_damped(VectorXd& q, const LoadParameters& load_parameters,
-                              const ProximalTerm& proximal);
-    /// Solves by standard Newton steps with a line search on the slope of the energy, with matrices projected to be
-    /// positive semidefinite where bodies are in contact. Contact between bodies requires it far from the solution.
-    NewtonReport solve_with_line_search(VectorXd& q, const LoadParameters& load_parameters,
-                                        const ProximalTerm& proximal, int max_iterations);
+    bool is_negligible(double displacement) const;
 
     /// Evaluates the residual at q, with the forces of a time stage.
     void evaluate(const VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal);
@@ -145,6 +140,19 @@ class Newton {
     double line_search(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
                        const VectorXd& from, const VectorXd& step, double slope);
 
+    /// Returns the length, in units of `step`, at which bodies in contact do not push back by more than the step predicts; more than 1 if the
+    /// predicted force is not reached. alpha: length of `step` over the full Newton step. slope: initial decrease of the energy along
+    /// it [J], at q, the last evaluated state.
+    double contact_step_length(const VectorXd& q, const VectorXd& step, double alpha, double slope) const;
+    /// Returns the norm of the change of obstacle contact forces [N] along a step, between the contacts now and those of the last
+    /// factorization.
+    double contact_force_change(const VectorXd& step) const {
+        return model_.contacts().force_change(touched_, step);
+    }
+    /// Returns the rest of a prescribed motion of supports and motors after a step of this length.
+    VectorXd remaining_motion(const VectorXd& move, double alpha, const VectorXd& q,
+                              const LoadParameters& load_parameters) const;
+
     /// Returns the residual at the last evaluated state, relative to the forces that cancel in it and, with_floor, to their round-off.
     double relative_residual(const VectorXd& q, const ProximalTerm& proximal, bool with_floor = true) const;
     /// Returns true if q, found at these load parameters before, is still an equilibrium.
@@ -171,26 +179,12 @@ class Newton {
     }
 
   private:
-    NewtonReport iterate(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
-                         int max_iterations, bool mixed, const LoadStep& load,
-                         bool stop_on_instability = false);
-    /// Returns the rest of a prescribed motion of supports and motors after a step of this length.
-    VectorXd remaining_motion(const VectorXd& move, double share, const VectorXd& q,
-                              const LoadParameters& load_parameters) const;
-    /// Returns the length, in units of `step`, at which bodies in contact do not push back by more than the step predicts; more than 1 if the
-    /// predicted force is not reached. alpha: length of `step` over the full Newton step. slope: initial decrease of the energy along
-    /// it [J], at q, the last evaluated state.
-    double contact_step_length(const VectorXd& q, const VectorXd& step, double share, double slope) const;
+    NewtonReport solve_in_rounds(VectorXd& q, const LoadParameters& load_parameters,
+                                 const NewtonPolicy& policy);
     /// Appends the blocking faces, or those with the largest contact force, to the reason of a report.
     void describe_contact(NewtonReport& report) const;
-    /// Takes damped steps with fixed normal forces of friction from the last evaluated state, until the residual is below `enough` or
-    /// most_steps are done. Returns false, with a reason in the report, if no step can be taken.
-    bool damped_iterations(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
-                           double enough, int most_steps, NewtonReport& report);
     void assemble(const VectorXd& q, const LoadParameters& load_parameters, bool extrapolated_stress,
                   const ProximalTerm& proximal, bool project_psd = false);
-    /// Returns true if the expected iterations with the last factorization are cheaper than a new one.
-    bool can_reuse_factor(double contraction, double residual, double last_step) const;
     void check_effort() const;
     FactorReport factorize_assembled(const VectorXd& q, const ProximalTerm& proximal);
 

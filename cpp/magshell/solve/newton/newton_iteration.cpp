@@ -1,0 +1,418 @@
+#include "magshell/solve/newton/newton_iteration.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "magshell/solve/globalization/contact_predictor.h"
+
+namespace magshell {
+
+NewtonReport NewtonIteration::run() {
+    if (!begin()) return report_;
+    for (;; ++report_.iterations, newton_.count_iteration()) {
+        report_.residual = newton_.relative_residual(q_, proximal_);
+        newton_.watch(report_.residual);
+        if (!std::isfinite(report_.residual)) {
+            fail("the iteration diverged");
+            return report_;
+        }
+        if (is_done()) return report_;
+        if (report_.iterations == max_iterations_) {
+            fail("no convergence in " + std::to_string(max_iterations_) + " iterations");
+            return report_;
+        }
+        if (!step()) return report_;
+    }
+}
+
+bool NewtonIteration::begin() {
+    if (std::string reason = model_.invalid_state_reason(q_); !reason.empty()) return fail(std::move(reason));
+    evaluate();
+    return true;
+}
+
+namespace {
+
+// [-] Last step of a converged iteration, and one below the floor of round-off, over the extent; see test_fine_roof_takes_small_steps.
+constexpr double settled_step = 1e-3, last_under_floor = 1e-5;
+// New negative pivots above which a shell has diverged (a solid that a first step overstretches has many more for one iteration); see
+// test_a_flat_strip_far_beyond_where_it_buckles.
+constexpr Index most_new_negative_pivots = 10;
+// Iteration from which on steps must shrink, and the largest ratio of successive steps [-]; see test_a_thin_strip_rolled_up.
+constexpr int settling_iterations = 6;
+constexpr double max_step_ratio = 0.7;  // [-] see test_a_thin_strip_rolled_up
+// [-] Ratio of steps below which an iteration may pass an unstable state (in-plane corrections do); see test_a_semi_cylinder_pulled_and_pushed.
+constexpr double settling_ratio = 0.3;
+// [-] Growth of the second step that is allowed, as in the plane of a flat shell; see test_a_flat_strip_far_beyond_where_it_buckles.
+constexpr double max_second_growth = 4.0;
+// [-] Remaining displacement at which an inexact load step ends, over the first step; see test_state_of_an_early_end_is_an_equilibrium.
+constexpr double inexact_remainder = 1e-3;
+// [-] The same over the thickness, as a displacement stretches the shell; see test_state_of_an_early_end_is_an_equilibrium.
+constexpr double inexact_thickness = 0.1;
+// [-] Reduction of the residual below which the next matrix is not projected; see test_strip_folds_onto_itself.
+constexpr double required_contraction = 0.5;
+// [-] Step over the extent beyond which the iteration has diverged; see test_fields_beyond_all_bounds_end_a_solve.
+constexpr double diverged_step = 1e3;
+// [-] Change of contact forces, over the residual, that makes a new factorization necessary; see test_an_impact_takes_few_factorizations.
+constexpr double stale_contact = 0.1;
+// [-] Shortest admissible length of a full step; see test_landing_solid_is_not_inverted.
+constexpr double min_step_length = 1e-4;
+// [-] Shortest admissible length of a step with a line search; see test_sheets_pressed_together_by_a_thousand_times_their_weight.
+constexpr double min_search_length = 1e-9;
+// [-] Displacement over the thickness up to which the errors of extrapolated stresses, the square of the step, are negligible; see
+// test_going_on_gives_the_same_bits.
+constexpr double small_move = 1e-4;
+
+// Returns the tolerance of the linear solve with a nonsymmetric matrix (inexact Newton, N&W 7.1): the forcing term that keeps quadratic
+// convergence, and no less than the tolerance of the residual needs.
+double forcing_term(double residual, double tolerance) {
+    // [-] Largest forcing term, and safety factor at the end; see test_methods_of_second_order_stick.
+    constexpr double max_forcing = 1e-2, final_safety = 0.1;
+    return std::max(final_safety * tolerance / residual, std::min(max_forcing, residual));
+}
+
+// RAII guard that keeps the normal forces of friction fixed, also if an interruption ends its scope.
+class ScopedFrozenForces {
+  public:
+    explicit ScopedFrozenForces(Model& model) : model_(model) { model_.freeze_normal_forces(true); }
+    ScopedFrozenForces(const ScopedFrozenForces&) = delete;
+    ScopedFrozenForces& operator=(const ScopedFrozenForces&) = delete;
+    ~ScopedFrozenForces() { model_.freeze_normal_forces(false); }
+
+  private:
+    Model& model_;
+};
+
+// Full steps, mixed or standard, that stop early where a load step allows or asks for it.
+class FullSteps final : public NewtonIteration {
+  public:
+    FullSteps(Newton& newton, VectorXd& q, const LoadParameters& load_parameters, const NewtonPolicy& policy,
+              int max_iterations)
+        : NewtonIteration(newton, q, load_parameters, policy.proximal, max_iterations),
+          policy_(policy),
+          mixed_(policy.mixed && newton.options().mixed),
+          tolerance_(newton.options().tolerance) {}
+
+  private:
+    bool begin() override {
+        if (policy_.factor) report_.factor = *policy_.factor;
+        first_negative_pivots_ = report_.factor.negative_pivots;
+        move_ = model_.dof_map().prescribed_increment(q_, load_parameters_);
+        if (std::string reason = model_.invalid_state_reason(q_); !reason.empty())
+            return fail(std::move(reason));
+        if (mixed_ && policy_.stress_predictor && policy_.stress_predictor->step.size() > 0) {
+            newton_.evaluate(policy_.stress_predictor->from, load_parameters_, proximal_);
+            model_.extrapolate(policy_.stress_predictor->step);
+            extrapolated_ = true;
+        }
+        evaluate_with_contact();
+        return true;
+    }
+
+    void evaluate_with_contact() {
+        evaluate();
+        report_.had_contact |= model_.contacts().has_active_pairs();
+    }
+
+    bool is_done() override {
+        if (last_step_ > diverged_step * model_.extent()) return !fail("the iteration diverged");
+        in_place_ = move_.isZero(0.0);
+        const bool settled = report_.residual <= tolerance_ && last_step_ <= settled_step * model_.extent();
+        // Below the floor of round-off, small forces that move a thin shell far vanish in larger ones: the last step decides.
+        if (in_place_ && settled &&
+            ((report_.iterations > 0 && last_step_ <= last_under_floor * model_.extent()) ||
+             newton_.relative_residual(q_, proximal_, false) <= tolerance_)) {
+            report_.converged = true;
+            report_.factor_is_current = newton_.is_negligible(moved_);
+            return true;
+        }
+        if (!may_end_inexactly()) return false;
+        report_.converged = report_.inexact = true;
+        report_.stress_predictor = std::move(last_);
+        return true;
+    }
+
+    // Quadratic convergence predicts the remaining displacement. It must be small compared with the thickness, as it stretches the shell.
+    bool may_end_inexactly() const {
+        return policy_.inexact && in_place_ && report_.iterations > 1 &&
+               last_step_ <= settling_ratio * step_before_ &&
+               last_step_ * last_step_ * last_step_ <= std::min(inexact_remainder * report_.first_length,
+                                                                inexact_thickness * model_.length_scale()) *
+                                                           step_before_ * step_before_ &&
+               report_.factor.negative_pivots <= first_negative_pivots_;
+    }
+
+    // Factorizes at the current state. Returns false, with a reason in the report, if the iteration cannot go on.
+    bool refactorize(double contraction) {
+        // Before the first step the pressure of a liquid belongs to a volume that it will not keep, so the first matrix is projected,
+        // unless that changes other terms too, whose exact matrix is needed.
+        const bool begins = mixed_ && !extrapolated_ && !model_.capabilities().has_psd_projection;
+        const bool project_psd = begins || contraction > required_contraction;
+        report_.factor =
+            newton_.factorize(q_, load_parameters_, mixed_ && extrapolated_, proximal_, pull_, project_psd);
+        report_.reason = report_.factor.reason;
+        if (!report_.factor.succeeded) return false;
+        const Index negative_pivots = report_.factor.negative_pivots;
+        if (report_.iterations == 0) first_negative_pivots_ = negative_pivots;
+        report_.diverged = !model_.capabilities().has_transient_instability &&
+                           negative_pivots > first_negative_pivots_ + most_new_negative_pivots;
+        if (mixed_ && report_.diverged) return fail("the Newton iteration diverged");
+        // The pivots of a projected matrix say nothing about stability.
+        const bool exact = !project_psd || model_.projection_is_exact();
+        moved_ = exact && last_step_ <= small_move * model_.length_scale()
+                     ? 0.0
+                     : std::numeric_limits<double>::infinity();
+        return true;
+    }
+
+    // Returns true if the expected iterations with the last factorization are cheaper than a new one.
+    bool can_reuse_factor(double contraction) const {
+        if (report_.iterations == 0) return policy_.factor && in_place_;
+        constexpr double worth =
+            4.0;  // [-] cost of a factorization in iterations; see test_kept_factors_serve_all_the_way_back
+        // The error of an iteration with an old factorization is at most twice the last contraction or, in bending, the displacement
+        // since then over the thickness.
+        constexpr double max_contraction = 0.1;  // [-] see test_kept_factors_serve_all_the_way_back
+        const double each = std::max(2.0 * contraction, last_step_ / model_.length_scale());
+        return each < max_contraction && std::log(tolerance_ / report_.residual) >= worth * std::log(each);
+    }
+
+    // Loads without potential act on few nodes, so GMRES takes few vectors and solves to the usual tolerance.
+    VectorXd solve(const VectorXd& force) const {
+        return move_ + (proximal_.motion
+                            ? newton_.solve_with_factor(force, forcing_term(report_.residual, tolerance_))
+                            : newton_.solve_with_factor(force));
+    }
+
+    bool step() override {
+        pull_ = move_;
+        const double contraction = report_.residual / last_residual_;
+        last_residual_ = report_.residual;
+        const bool reused = can_reuse_factor(contraction);
+        if (!reused && !refactorize(contraction)) return false;
+        const VectorXd force = -newton_.gradient(q_, proximal_) - pull_.col(0);
+        VectorXd step = solve(force);
+        if (reused && in_place_ && newton_.contact_force_change(step) > stale_contact * force.norm()) {
+            if (!refactorize(contraction)) return false;
+            step = solve(force);
+        }
+        const VectorXd from = model_.capabilities().has_barrier && in_place_ ? q_ : VectorXd();
+        if (policy_.inexact) last_.from = q_;
+        const bool corrects = policy_.correction && report_.iterations == 0 && in_place_;
+        if (corrects) report_.tangent = step;
+        if (const VectorXd more = corrects ? policy_.correction(step) : VectorXd(); more.size() > 0)
+            step += more;
+        double alpha = newton_.apply_increment(q_, step, min_step_length, report_);
+        if (alpha < 0.0) return false;
+        if (from.size() > 0) {
+            double contact_alpha = newton_.contact_step_length(from, step, alpha, force.dot(step));
+            if (contact_alpha > 1.0)
+                contact_alpha =
+                    std::max(1.0, contact_alpha * model_.admissible_step_length(from, contact_alpha * step));
+            if (contact_alpha != 1.0) {
+                alpha *= contact_alpha;
+                step *= contact_alpha;
+                q_ = from;
+                model_.dof_map().retract(q_, step);
+            }
+        }
+        if (proximal_.motion && model_.capabilities().has_stiffness_jumps)
+            if (const VectorXd more = predict_contact(model_, q_, load_parameters_, *proximal_.weights,
+                                                      model_.contacts().predicted_points(step));
+                more.size() > 0) {
+                model_.dof_map().retract(q_, more);
+                step += more;
+            }
+        move_ = newton_.remaining_motion(move_, alpha, q_, load_parameters_);
+        if (!is_useful(step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>())) return false;
+        if (mixed_) model_.extrapolate(corrects ? report_.tangent : step);
+        extrapolated_ = true;
+        if (policy_.inexact) last_.step = std::move(step);
+        evaluate_with_contact();
+        return true;
+    }
+
+    // Takes note of the length of a step [m]. Returns false, with a reason in the report, if the iteration should stop after it.
+    bool is_useful(double length) {
+        if (report_.iterations == 0) report_.first_length = length;
+        if (policy_.stop_on_instability && report_.iterations > 0 &&
+            length > std::max(settling_ratio * last_step_, settled_step * model_.extent()) &&
+            (report_.factor.negative_pivots > first_negative_pivots_ ||
+             (report_.iterations == 1 && length > max_second_growth * std::max(last_step_, model_.extent()))))
+            return fail("the iteration leaves the stable states");
+        if (mixed_ && report_.iterations >= settling_iterations && length > max_step_ratio * last_step_ &&
+            length > settled_step * model_.extent())
+            return fail("the steps of the iteration do not get shorter");
+        step_before_ = last_step_;
+        last_step_ = length;
+        moved_ += length;
+        return true;
+    }
+
+    const NewtonPolicy& policy_;
+    const bool mixed_;
+    const double tolerance_;
+    VectorXd move_;         // what is left of the prescribed motion
+    Eigen::MatrixXd pull_;  // the forces that it causes, once the matrix is factorized
+    bool in_place_ = false, extrapolated_ = false;
+    Index first_negative_pivots_ = 0;
+    double last_step_ = 0.0, step_before_ = 0.0;              // [m]
+    double moved_ = std::numeric_limits<double>::infinity();  // [m] displacement since the last factorization
+    double last_residual_ = std::numeric_limits<double>::infinity();
+    StressPredictor last_;
+};
+
+// Standard steps with a line search on the slope of the energy, with matrices projected to be positive semidefinite far from the
+// solution. A barrier requires it.
+class SearchedSteps final : public NewtonIteration {
+  public:
+    SearchedSteps(Newton& newton, VectorXd& q, const LoadParameters& load_parameters,
+                  const ProximalTerm& proximal, int max_iterations)
+        : NewtonIteration(newton, q, load_parameters, proximal, max_iterations),
+          move_(model_.dof_map().prescribed_increment(q, load_parameters)) {}
+
+  private:
+    bool is_done() override {
+        report_.converged = move_.isZero(0.0) && report_.residual <= newton_.options().tolerance;
+        return report_.converged;
+    }
+
+    bool step() override {
+        const bool in_place = move_.isZero(0.0);
+        // After a projected matrix and a full step, the exact matrix may do; its step shows whether it does.
+        bool project_psd =
+            alpha_ < 1.0 || (!was_projected_ && report_.residual > required_contraction * last_residual_);
+        last_residual_ = report_.residual;
+        const VectorXd force = -newton_.gradient(q_, proximal_), from = q_;
+        VectorXd step;
+        double slope = 0.0;
+        for (;; project_psd = true) {
+            Eigen::MatrixXd pull = move_;
+            report_.factor = newton_.factorize(q_, load_parameters_, false, proximal_, pull, project_psd);
+            if (!report_.factor.succeeded) return fail(report_.factor.reason);
+            step = move_ + newton_.solve_with_factor(force - pull.col(0));
+            slope = force.dot(step);
+            if (!in_place || slope > 0.0) break;
+            if (project_psd) return fail("the energy does not fall along the step");
+        }
+        was_projected_ = project_psd;
+        alpha_ = newton_.apply_increment(q_, step, min_search_length, report_);
+        if (alpha_ < 0.0) return false;
+        move_ = newton_.remaining_motion(move_, alpha_, q_, load_parameters_);
+        evaluate();
+        if (in_place)
+            alpha_ *= newton_.line_search(q_, load_parameters_, proximal_, from, step, alpha_ * slope);
+        return true;
+    }
+
+    VectorXd move_;  // what is left of the prescribed motion
+    double last_residual_ = std::numeric_limits<double>::infinity(), alpha_ = 1.0;
+    bool was_projected_ = false;
+};
+
+// Standard steps that are shortened until they contract, with fixed normal forces of friction, until the residual is below `enough`.
+class ContractingSteps final : public NewtonIteration {
+  public:
+    ContractingSteps(Newton& newton, VectorXd& q, const LoadParameters& load_parameters,
+                     const ProximalTerm& proximal, int max_iterations, double enough)
+        : NewtonIteration(newton, q, load_parameters, proximal, max_iterations),
+          enough_(enough),
+          frozen_(newton.model()) {}
+
+  private:
+    bool begin() override { return true; }
+    bool is_done() override { return report_.residual <= enough_ || report_.iterations == max_iterations_; }
+
+    bool step() override {
+        constexpr double shortest = 1.0 / 4096.0;  // [-] of a step; see test_sticks_at_050
+        Eigen::MatrixXd no_moves(q_.size(), 0);
+        const bool project_psd = report_.residual > required_contraction * last_residual_;
+        last_residual_ = report_.residual;
+        const FactorReport factor =
+            newton_.factorize(q_, load_parameters_, false, proximal_, no_moves, project_psd);
+        if (!factor.succeeded) return fail(factor.reason);
+        const VectorXd step = newton_.solve_with_factor(-newton_.gradient(q_, proximal_)), from = q_;
+        const auto length = [&](const VectorXd& p) {
+            return std::sqrt(p.dot(proximal_.weights->cwiseProduct(p)));
+        };
+        const double whole = length(step);
+        const bool limited = model_.capabilities().has_barrier;
+        for (double alpha = limited ? model_.admissible_step_length(q_, step) : 1.0;; alpha *= 0.5) {
+            q_ = from;
+            model_.dof_map().retract(q_, alpha * step);
+            evaluate();
+            if (alpha <= shortest || newton_.relative_residual(q_, proximal_) <= enough_) break;
+            const VectorXd next = newton_.solve_with_factor(-newton_.gradient(q_, proximal_));
+            if (length(next) <= (1.0 - 0.25 * alpha) * whole) break;
+        }
+        return true;
+    }
+
+    const double enough_;
+    const ScopedFrozenForces frozen_;
+    double last_residual_ = std::numeric_limits<double>::infinity();
+};
+
+}  // namespace
+
+NewtonReport Newton::solve(VectorXd& q, const LoadParameters& load_parameters, const NewtonPolicy& policy) {
+    if (policy.steps == NewtonPolicy::Steps::contracting) return solve_in_rounds(q, load_parameters, policy);
+    const int max_iterations = policy.max_iterations > 0 ? policy.max_iterations : options_.max_iterations;
+    const bool may_search = policy.search_at_barrier && model_.capabilities().has_barrier;
+    const VectorXd from = may_search ? q : VectorXd();
+    const Model::AngleBranches angle_branches = may_search ? model_.angle_branches() : Model::AngleBranches();
+    NewtonReport report = FullSteps(*this, q, load_parameters, policy, max_iterations).run();
+    if (!may_search || report.converged || !report.had_contact) return report;
+    constexpr int searched = 5;  // times max_iterations; see test_strip_folds_onto_itself
+    const int iterations = report.iterations;
+    // If a step was blocked, the line search continues from there; otherwise the iteration may have led anywhere and starts again.
+    if (report.blocked_by.empty()) {
+        q = from;
+        model_.set_angle_branches(angle_branches);
+    }
+    report = SearchedSteps(*this, q, load_parameters, policy.proximal, searched * max_iterations).run();
+    report.iterations += iterations;
+    if (!report.converged) describe_contact(report);
+    return report;
+}
+
+// With fixed normal forces the stage is a minimization, in which shortened steps converge. The normal forces are updated between the
+// rounds, until standard Newton converges.
+NewtonReport Newton::solve_in_rounds(VectorXd& q, const LoadParameters& load_parameters,
+                                     const NewtonPolicy& policy) {
+    // Rounds, damped steps per round, and standard Newton iterations after each; see test_sticks_at_050.
+    constexpr int most_rounds = 12, most_steps = 20, last_steps = 8;
+    constexpr double least_gain = 1e-2;  // [-] reduction of the residual in a round; see test_sticks_at_050
+    const ProximalTerm& proximal = policy.proximal;
+    NewtonReport report;
+    VectorXd move = model_.dof_map().prescribed_increment(q, load_parameters);
+    if (!move.isZero(0.0) && apply_increment(q, move, 1.0, report) < 0.0) return report;
+    evaluate(q, load_parameters, proximal);
+    for (int round = 0; round < most_rounds; ++round) {
+        const double enough = std::max(options_.tolerance, least_gain * relative_residual(q, proximal));
+        const NewtonReport damped =
+            ContractingSteps(*this, q, load_parameters, proximal, most_steps, enough).run();
+        report.iterations += damped.iterations;
+        report.residual = damped.residual;
+        report.reason = damped.reason;
+        if (!report.reason.empty()) return report;
+        VectorXd end = q;
+        const NewtonPolicy standard{.proximal = proximal, .mixed = false};
+        const NewtonReport last = FullSteps(*this, end, load_parameters, standard, last_steps).run();
+        report.iterations += last.iterations;
+        if (last.converged) {
+            q = std::move(end);
+            report.converged = true;
+            report.residual = last.residual;
+            return report;
+        }
+        evaluate(q, load_parameters, proximal);
+    }
+    report.residual = relative_residual(q, proximal);
+    report.reason = "no convergence in " + std::to_string(most_rounds) + " rounds of shortened steps";
+    return report;
+}
+
+}  // namespace magshell
