@@ -25,10 +25,10 @@ VectorXd by_values(Model& model, const VectorXd& q, const LoadParameters& load_p
                    const VectorXd& lambda) {
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());
-    Gradient gradient(model.registry());
+    Gradient gradient(model.parameters().registry());
     model.evaluate(q, load_parameters);
-    model.vjp(q, load_parameters, lambda, gradient);
-    return model.registry().values.to_user(gradient.values);
+    model.parameters().vjp(q, load_parameters, lambda, gradient);
+    return model.parameters().registry().values.to_user(gradient.values);
 }
 
 }  // namespace

@@ -12,7 +12,7 @@ namespace {
 PathResult follow(Model& model, const VectorXd& start, const Model::AngleBranches& turns,
                   const LoadParameters& from, const LoadParameters& to, const PathOptions& options,
                   const std::vector<Index>& entries, const py::object& until, const py::object& progress) {
-    const TimeVaryingParameters varying(model.registry(), entries);
+    const TimeVaryingParameters varying(model.parameters().registry(), entries);
     check_load_parameters(model, varying, from, to);
     const Watch watch(progress);
     Until ends;

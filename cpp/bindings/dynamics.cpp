@@ -26,7 +26,7 @@ using Knots = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMa
 
 std::vector<LoadParameters> load_parameters_of(const Model& model, const TimeVaryingParameters& varying,
                                                const Array& rows) {
-    const Index width = model.registry().load_parameters.size() + varying.size();
+    const Index width = model.parameters().registry().load_parameters.size() + varying.size();
     if (rows.ndim() != 2 || rows.shape(1) != width)
         throw InvalidInput("controls must have one row per time point, of " + std::to_string(width) +
                            " numbers");
@@ -87,7 +87,8 @@ MotionInput input_of(Model& model, const py::dict& given) {
     input.tableau = tableau_of(given["integrator"].cast<std::string>());
     input.time_step = given["time_step"].cast<double>();
     input.steps = given["steps"].cast<Index>();
-    input.varying = TimeVaryingParameters(model.registry(), given["varying"].cast<std::vector<Index>>());
+    input.varying =
+        TimeVaryingParameters(model.parameters().registry(), given["varying"].cast<std::vector<Index>>());
     input.load_parameters = load_parameters_of(model, input.varying, array("controls"));
     input.newton = given["newton"].cast<NewtonOptions>();
     if (const py::object projective = given["projective"]; !projective.is_none()) {

@@ -7,7 +7,7 @@
 namespace magshell::bindings {
 
 inline VectorXd values_to_user(const Model& model, const VectorXd& by_values) {
-    return model.registry().values.to_user(by_values);
+    return model.parameters().registry().values.to_user(by_values);
 }
 
 }  // namespace magshell::bindings

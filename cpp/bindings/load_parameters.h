@@ -12,7 +12,7 @@ namespace magshell::bindings {
 /// varying parameters.
 inline void check_load_parameters(const Model& model, const TimeVaryingParameters& varying,
                                   const LoadParameters& from, const LoadParameters& to) {
-    const Index width = model.registry().load_parameters.size() + varying.size();
+    const Index width = model.parameters().registry().load_parameters.size() + varying.size();
     if (from.size() != width || to.size() != width)
         throw InvalidInput("controls must have shape (" + std::to_string(width) + ",)");
 }

@@ -90,7 +90,7 @@ std::vector<Index> recut_faces(const Model& model) {
     for (Index body = 0; body < static_cast<Index>(model.bodies().shells().size()); ++body) {
         const Shell& sheet = *model.bodies().shells()[body];
         for (Index f = 0; f < sheet.n_faces(); ++f)
-            if (model.membrane_faces(body).parts(f)[1].part > 0.0)
+            if (model.terms().membrane_faces[body]->parts(f)[1].part > 0.0)
                 faces.push_back(first + sheet.faces.user[f]);
         first += sheet.n_faces();
     }
@@ -120,22 +120,23 @@ void register_model(py::module_& module) {
     py::class_<Model>(module, "Model")
         .def(py::init(&make_model))
         .def_property_readonly(
-            "parameters", [](const Model& m) { return entries_of(m.registry().values); },
+            "parameters", [](const Model& m) { return entries_of(m.parameters().registry().values); },
             "(owner, name, unit, first, rows, width) of each, in the flat vector of set_values.")
         .def_property_readonly(
-            "controls", [](const Model& m) { return entries_of(m.registry().load_parameters); },
+            "controls", [](const Model& m) { return entries_of(m.parameters().registry().load_parameters); },
             "Likewise, in the flat vectors of controls.")
         .def(
             "set_values",
             [](Model& model, const Array& values) {
                 const VectorXd given = to_vector(values);
-                if (given.size() != model.registry().values.size())
-                    throw InvalidInput("the scene has " + std::to_string(model.registry().values.size()) +
+                if (given.size() != model.parameters().registry().values.size())
+                    throw InvalidInput("the scene has " +
+                                       std::to_string(model.parameters().registry().values.size()) +
                                        " values, got " + std::to_string(given.size()));
                 const py::gil_scoped_release
                     unlocked;  // a solve that holds the lock may be waiting for the GIL
                 const std::lock_guard lock(model.in_use());
-                model.set_values(given);
+                model.parameters().set_values(given);
             },
             "All of them, rows in the caller's order.")
         .def_property_readonly("size", &Model::size)
@@ -226,9 +227,13 @@ void register_model(py::module_& module) {
         .def("energies", &energies)
         .def("term_energies", &term_energies, "[(name, J)] of each term, at a state with these turns.",
              py::arg("q"), py::arg("turns"), py::arg("controls"))
-        .def("refusal", &Model::invalid_state_reason,
-             "What is wrong with a state, in words; empty where nothing is.",
-             py::call_guard<py::gil_scoped_release>())
+        .def(
+            "refusal",
+            [](const Model& model, const VectorXd& q) {
+                return model.capabilities().invalid_state_reason(q);
+            },
+            "What is wrong with a state, in words; empty where nothing is.",
+            py::call_guard<py::gil_scoped_release>())
         .def(
             "gradient",
             [](Model& model, const VectorXd& q, const LoadParameters& load_parameters) {

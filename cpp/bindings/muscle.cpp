@@ -40,7 +40,7 @@ py::tuple fibre_states(const Model& model, Index muscle, const VectorXd& q,
     FibreStates states;
     {
         const py::gil_scoped_release unlocked;
-        states = model.muscle_term(muscle).states(q.data(), v ? v->data() : nullptr);
+        states = model.terms().muscles[muscle]->states(q.data(), v ? v->data() : nullptr);
     }
     return py::make_tuple(muscle_rows_of(states.stretches, states.points),
                           muscle_rows_of(states.tensions, states.points),

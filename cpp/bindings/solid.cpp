@@ -15,7 +15,7 @@ py::tuple point_states(const Model& model, Index solid, const VectorXd& q) {
     PointStates states;
     {
         const py::gil_scoped_release unlocked;
-        states = model.solid_term(solid).point_states(q.data());
+        states = model.terms().solids[solid]->point_states(q.data());
     }
     const Index elements = model.bodies().solids()[solid]->n_elements();
     py::array_t<double> volumes(

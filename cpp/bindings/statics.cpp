@@ -14,7 +14,7 @@ StaticsResult solve(Model& model, const VectorXd& start, const Model::AngleBranc
                     const LoadParameters& from, const LoadParameters& to, const StaticsOptions& options,
                     const py::object& progress, const std::vector<Index>& entries) {
     const Watch watch(progress);
-    const TimeVaryingParameters varying(model.registry(), entries);
+    const TimeVaryingParameters varying(model.parameters().registry(), entries);
     check_load_parameters(model, varying, from, to);
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());
@@ -60,7 +60,8 @@ VectorXd moved(Model& model, const VectorXd& state, const VectorXd& step) {
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());
     model.linearize(state);
-    const double share = model.capabilities().has_barrier ? 0.9 * model.max_step_length(state, step) : 1.0;
+    const double share =
+        model.capabilities().has_barrier ? 0.9 * model.capabilities().max_step_length(state, step) : 1.0;
     VectorXd there = state;
     model.dof_map().retract(there, share * step);
     return there;

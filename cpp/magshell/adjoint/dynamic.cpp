@@ -26,10 +26,10 @@ class Backward {
           motion_(motion),
           by_(by),
           stepper_(newton, input.tableau, input.inertia, input.viscosity, input.projective),
-          scene_(model_.registry()) {
-        scene_.load_parameters = model_.zero_load_parameters();
+          scene_(model_.parameters().registry()) {
+        scene_.load_parameters = model_.parameters().zero_load_parameters();
         g_.positions = g_.velocities = g_.mass = g_.damping = VectorXd::Zero(model_.size());
-        g_.load_parameters.assign(input.load_parameters.size(), model_.zero_load_parameters());
+        g_.load_parameters.assign(input.load_parameters.size(), model_.parameters().zero_load_parameters());
     }
 
     MotionGradient run() {
@@ -177,13 +177,13 @@ class Backward {
             by_w_ = std::move(by_w.front());
         }
         if (input_.viscosity.any()) {
-            model_.set_time_varying(load_parameters.front());
-            model_.evaluate(record.begin.q, model_.zero_load_parameters());
+            model_.parameters().set_time_varying(load_parameters.front());
+            model_.evaluate(record.begin.q, model_.parameters().zero_load_parameters());
             ViscousAdjoint& strains = viscous.strains;
             g_.positions += model_.elastic().forces(strains.by_d_begin, model_.size());
             scene_.load_parameters.setZero();
             model_.elastic().strains_vjp(strains.by_d_begin, scene_);
-            model_.time_varying().move_gradient(scene_);
+            model_.parameters().time_varying().move_gradient(scene_);
             add_by_load_parameters(step, substep.begin, scene_.load_parameters);
             by_strains_ = std::move(strains.by_begin);
             by_dt += strains.by_dt;
@@ -192,12 +192,14 @@ class Backward {
             g_.viscosity.maxwell_time += strains.by_law.maxwell_time;
         }
         if (model_.capabilities().has_own_viscosity) {
-            if (!input_.viscosity.any()) model_.evaluate(record.begin.q, model_.zero_load_parameters());
+            if (!input_.viscosity.any())
+                model_.evaluate(record.begin.q, model_.parameters().zero_load_parameters());
             g_.positions += model_.dampers().forces(viscous.joints.by_d_begin, model_.size());
             by_dt += viscous.joints.by_dt;
             if (tableau.begins_explicitly)
-                model_.damper_rates_vjp(record.begin.q, record.begin.v, viscous.joints.by_begin.d_rate,
-                                        g_.positions, g_.velocities, scene_);
+                model_.parameters().damper_rates_vjp(record.begin.q, record.begin.v,
+                                                     viscous.joints.by_begin.d_rate, g_.positions,
+                                                     g_.velocities, scene_);
         }
         g_.time_step += fraction * by_dt;
         if (by_earlier.size() > 0) g_.velocities += by_earlier;
@@ -220,7 +222,7 @@ class Backward {
     // Sets the model to the conditions under which a stage was solved.
     void set_stage(const SubstepRecord& record, int i, Index step, const Substep& substep,
                    const LoadParameters& load_parameters, const Viscous& viscous) {
-        model_.set_time_varying(load_parameters);
+        model_.parameters().set_time_varying(load_parameters);
         model_.set_angle_branches(record.stages[i].angle_branches);
         model_.begin_step(record.begin.q, input_.load_parameters_at(step, substep.begin));
         viscous.strains.set_history(i);
@@ -319,10 +321,10 @@ class Backward {
         const VectorXd all =
             by_motor_forces.size() > 0 ? VectorXd(lambda + dof_map.motor_motion(by_motor_forces)) : lambda;
         scene_.load_parameters.setZero();
-        model_.vjp(q, load_parameters, all, scene_);
+        model_.parameters().vjp(q, load_parameters, all, scene_);
         KinematicsGradient by_forces;
         if (model_.capabilities().has_velocity_forces)
-            by_forces = model_.forces_vjp(load_parameters, all, scene_);
+            by_forces = model_.parameters().forces_vjp(model_.kinematics(), load_parameters, all, scene_);
         if (dof_map.has_values()) {
             // Assembles again, because the factorization has rotated the blocks of rotated nodes.
             model_.assemble(q, load_parameters, false);
@@ -331,7 +333,7 @@ class Backward {
             dof_map.vjp(reaction, lambda, newton_.gradient(q, proximal), load_parameters, scene_,
                         by_motor_forces);
         }
-        model_.time_varying().move_gradient(scene_);
+        model_.parameters().time_varying().move_gradient(scene_);
         add_by_load_parameters(step, fraction, scene_.load_parameters);
         if (model_.capabilities().has_velocity_forces)
             add_by_load_parameters(step, substep.begin, by_forces.begin_load_parameters);
@@ -348,13 +350,13 @@ class Backward {
     // Continues to the inputs of the start: edge rotations in equilibrium depend on all others.
     void back_to_start() {
         const VectorXd& q = motion_.start.q;
-        model_.set_time_varying(input_.load_parameters_at(0, 0.0));
+        model_.parameters().set_time_varying(input_.load_parameters_at(0, 0.0));
         if (input_.viscosity.maxwell() && input_.start.e.empty()) {
             model_.evaluate(q, input_.load_parameters_at(0, 0.0));
             g_.positions += model_.elastic().forces(by_strains_.e, model_.size());
             scene_.load_parameters.setZero();
             model_.elastic().strains_vjp(by_strains_.e, scene_);
-            model_.time_varying().move_gradient(scene_);
+            model_.parameters().time_varying().move_gradient(scene_);
             g_.load_parameters[0] += scene_.load_parameters;
         }
         if (input_.rotations_given) return;
@@ -365,8 +367,8 @@ class Backward {
         model_.multiply(lambda, reaction);
         g_.positions += reaction;
         scene_.load_parameters.setZero();
-        model_.vjp(q, load_parameters, lambda, scene_);
-        model_.time_varying().move_gradient(scene_);
+        model_.parameters().vjp(q, load_parameters, lambda, scene_);
+        model_.parameters().time_varying().move_gradient(scene_);
         g_.load_parameters[0] += scene_.load_parameters;
     }
 
@@ -400,7 +402,7 @@ MotionGradient motion_vjp(Model& model, const MotionInput& input, const MotionRe
                           const GradientsByStates& by, const MotionWatch& watch) {
     if (motion.keep == AdjointStorage::nothing)
         throw InvalidInput("the motion has no stored states: it was computed without gradients");
-    const ScopedTimeVarying varying(model, input.varying);
+    const ScopedTimeVarying varying(model.parameters(), input.varying);
     const Backward* running = nullptr;
     Newton newton(model, input.newton, [&](double residual) {
         if (watch) watch(running ? running->progress() : 0.0, residual);

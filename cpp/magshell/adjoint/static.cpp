@@ -35,8 +35,8 @@ Gradient equilibrium_vjp(Model& model, const StaticsResult& equilibrium, const V
     VectorXd reduced = -dof_map.vector(by_free);
     solve_at_equilibrium(model, *equilibrium.factor, true, reduced);
     const VectorXd lambda = dof_map.expand(reduced);
-    Gradient gradient(model.registry());
-    model.vjp(q, load_parameters, lambda + motors, gradient);
+    Gradient gradient(model.parameters().registry());
+    model.parameters().vjp(q, load_parameters, lambda + motors, gradient);
     if (dof_map.has_values()) {
         add_product(lambda, by_q);
         dof_map.vjp(by_q, lambda, model.residual().gradient, load_parameters, gradient,

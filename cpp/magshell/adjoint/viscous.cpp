@@ -8,7 +8,7 @@ ViscousAdjoint::ViscousAdjoint(Model& model, ViscousTerms& terms, const Viscosit
     : terms_(terms), unknowns_(model.size()), law_(law), kind_(kind), step_(step) {
     if (!law.any() || terms.empty()) return;
     model.set_angle_branches(substep.begin.angle_branches);
-    model.set_time_varying(load_parameters.front());
+    model.parameters().set_time_varying(load_parameters.front());
     const StrainSet d_begin = terms.strains(substep.begin.q), zero = d_begin.times(0.0);
     rates_ = first_rates(model, step.tableau(), substep.begin);
     first_ = rates_.size();
@@ -16,7 +16,7 @@ ViscousAdjoint::ViscousAdjoint(Model& model, ViscousTerms& terms, const Viscosit
         stages_.push_back(ViscousStage(law, step.stage_time(), step.dt(), step.tableau().a[i], rates_, kind,
                                        d_begin, substep.begin.e));
         model.set_angle_branches(substep.stages[i].angle_branches);
-        model.set_time_varying(load_parameters[i + 1]);
+        model.parameters().set_time_varying(load_parameters[i + 1]);
         stages_.back().finish(law, step.stage_time(), terms.strains(substep.stages[i].q),
                               rates_.emplace_back().*kind);
     }

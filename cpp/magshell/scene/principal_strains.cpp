@@ -65,10 +65,12 @@ struct FlatFace {
 void add_shell(const Model& model, Index body, const VectorXd& q, const VectorXd& thickness, Index first_row,
                PrincipalStrains& out) {
     const Shell& shell = *model.bodies().shells()[body];
-    const MembraneFaces& membrane = model.membrane_faces(body);
+    const MembraneFaces& membrane = *model.terms().membrane_faces[body];
     const Index first_scalar = model.nodes().first_scalar();
-    const MembraneTerm& stretching = dynamic_cast<const MembraneTerm&>(model.elastic_term(body, "membrane"));
-    const BendingTerm& bending = dynamic_cast<const BendingTerm&>(model.elastic_term(body, "bending"));
+    const MembraneTerm& stretching =
+        dynamic_cast<const MembraneTerm&>(model.terms().elastic_term(body, "membrane"));
+    const BendingTerm& bending =
+        dynamic_cast<const BendingTerm&>(model.terms().elastic_term(body, "bending"));
     const std::vector<double> changes = angle_changes(shell, q.data());
     const auto change_of = [&](Index dihedral) { return changes[dihedral]; };
     const double* rotations = q.data() + first_scalar;

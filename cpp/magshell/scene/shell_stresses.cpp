@@ -59,13 +59,14 @@ std::vector<FaceStress> shell_stresses(const Model& model, Index number, const V
     const Index flat = static_cast<Index>(model.bodies().shells().size());
     if (number >= flat) return six_node_stresses(model, number - flat, q);
     const Shell& shell = *model.bodies().shells()[number];
-    const MembraneFaces& membrane = model.membrane_faces(number);
+    const MembraneFaces& membrane = *model.terms().membrane_faces[number];
     const std::vector<double> changes = shell_loops::angle_changes(shell, q.data());
     const auto change_of = [&](Index dihedral) { return changes[dihedral]; };
     const double* rotations = q.data() + model.nodes().first_scalar();
     const MembraneTerm& stretching =
-        dynamic_cast<const MembraneTerm&>(model.elastic_term(number, "membrane"));
-    const BendingTerm& bending = dynamic_cast<const BendingTerm&>(model.elastic_term(number, "bending"));
+        dynamic_cast<const MembraneTerm&>(model.terms().elastic_term(number, "membrane"));
+    const BendingTerm& bending =
+        dynamic_cast<const BendingTerm&>(model.terms().elastic_term(number, "bending"));
 
     Strains stretches(shell.n_faces()), bends(shell.n_faces());
     for (Index f = 0; f < shell.n_faces(); ++f) {

@@ -86,9 +86,9 @@ struct Terms {
     Terms(const Model& model, Index number)
         : shell(*model.bodies().six_node_shells()[number]),
           membrane(dynamic_cast<const MembraneSixTerm&>(
-              model.elastic_term(model.bodies().six_node_bodies()[number], "membrane"))),
+              model.terms().elastic_term(model.bodies().six_node_bodies()[number], "membrane"))),
           bending(dynamic_cast<const BendingSixTerm&>(
-              model.elastic_term(model.bodies().six_node_bodies()[number], "bending"))) {}
+              model.terms().elastic_term(model.bodies().six_node_bodies()[number], "bending"))) {}
 
     /// Calls take(row, face, tangents, point, Green's strain) for all rows.
     template <class Take>

@@ -92,7 +92,7 @@ class Follower {
     /// Returns the load parameters at a path parameter and applies the values that vary with them to the model.
     LoadParameters load_parameters(double parameter) const {
         LoadParameters there = interpolate(from_, to_, parameter);
-        model_.set_time_varying(there);
+        model_.parameters().set_time_varying(there);
         return there;
     }
 
@@ -124,7 +124,7 @@ class Follower {
     // K dq = -(dR/dlambda + K held). pull: K held.
     VectorXd response(const VectorXd& q, const LoadParameters& at, const VectorXd& held,
                       const VectorXd& pull) const {
-        return held + newton_.solve_with_factor(-model_.gradient_rate(q, at, rate_) - pull);
+        return held + newton_.solve_with_factor(-model_.parameters().gradient_rate(q, at, rate_) - pull);
     }
 
     // Factorizes the Hessian at a point of the path. Sets its tangent, not normalized, and its number of unstable directions. Returns false
@@ -132,7 +132,7 @@ class Follower {
     bool find_tangent(PathPoint& point, Tangent& tangent) {
         const LoadParameters at = load_parameters(point.parameter);
         model_.evaluate(point.state, at);
-        const VectorXd held = model_.prescribed_rate(point.state, at, rate_);
+        const VectorXd held = model_.parameters().prescribed_rate(point.state, at, rate_);
         Eigen::MatrixXd pull = held;
         const FactorReport factor = newton_.factorize(point.state, at, false, {}, pull);
         model_.require_symmetric();  // for an unsymmetric matrix the pivots are no measure of stability
@@ -151,7 +151,8 @@ class Follower {
         double parameter = base.parameter + step * along.parameter;
         VectorXd increment = step * along.state;
         for (iterations = 0;; ++iterations, newton_.count_iteration()) {
-            if (model_.capabilities().has_barrier) increment *= model_.admissible_step_length(q, increment);
+            if (model_.capabilities().has_barrier)
+                increment *= model_.capabilities().admissible_step_length(q, increment);
             if (newton_.options().mixed) model_.extrapolate(increment);
             model_.dof_map().retract(q, increment);
             const LoadParameters at = load_parameters(parameter);
@@ -165,7 +166,7 @@ class Follower {
                 return true;
             }
             if (!std::isfinite(residual) || iterations == max_corrector_iterations) return false;
-            const VectorXd held = model_.prescribed_rate(q, at, rate_);
+            const VectorXd held = model_.parameters().prescribed_rate(q, at, rate_);
             Eigen::MatrixXd pulls(q.size(), 2);
             pulls << gap, held;
             if (!newton_.factorize(q, at, newton_.options().mixed, {}, pulls).succeeded) return false;
@@ -298,7 +299,8 @@ class Follower {
                 side = -1;
             }
         }
-        const VectorXd drive = model_.gradient_rate(best.state, load_parameters(best.parameter), rate_);
+        const VectorXd drive =
+            model_.parameters().gradient_rate(best.state, load_parameters(best.parameter), rate_);
         const VectorXd free_drive = model_.dof_map().vector(drive), free_mode = model_.dof_map().vector(mode);
         const double alignment =
             std::abs(free_drive.dot(free_mode)) / (free_drive.norm() * free_mode.norm() + no_norm);
@@ -324,7 +326,7 @@ class Follower {
 PathResult follow_path(Model& model, const VectorXd& start, const Model::AngleBranches& angle_branches,
                        const LoadParameters& from, const LoadParameters& to, const PathOptions& options,
                        const Until& until, const StaticsWatch& watch, const TimeVaryingParameters& varying) {
-    const ScopedTimeVarying while_varying(model, varying);
+    const ScopedTimeVarying while_varying(model.parameters(), varying);
     model.set_angle_branches(angle_branches);
     PathResult result;
     Newton newton(model, options.newton, [&](double residual) {

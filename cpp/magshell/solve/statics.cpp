@@ -81,7 +81,7 @@ class Statics {
         load_parameters_at(0.0);
         project_onto_joints(newton_.model(), result_.state);
         sides_.remember(result_.state, from_);
-        result_.reason = newton_.model().invalid_state_reason(result_.state);
+        result_.reason = newton_.model().capabilities().invalid_state_reason(result_.state);
         if (!result_.reason.empty() || !(options_.away_from.empty() ? load() : find_other_equilibrium()))
             return false;
         return result_.stable || !options_.require_stable || relax_to_stable(1.0);
@@ -100,7 +100,7 @@ class Statics {
     // Returns the load parameters at a fraction of the load path, and applies the values that vary to the model.
     LoadParameters load_parameters_at(double progress) {
         LoadParameters there = interpolate(from_, to_, progress);
-        newton_.model().set_time_varying(there);
+        newton_.model().parameters().set_time_varying(there);
         return there;
     }
 
@@ -196,7 +196,7 @@ class Statics {
         NewtonPolicy policy;
         if (!allows_inexact_steps()) return newton_.solve(q, load_parameters, policy);
         policy.inexact = on_the_way;
-        if (newton_.model().has_stress_prediction()) policy.stress_predictor = &last_;
+        if (newton_.model().capabilities().has_stress_prediction()) policy.stress_predictor = &last_;
         policy.stop_on_instability = stop_on_instability_;
         if (stop_on_instability_)
             policy.correction = [&](const VectorXd& tangent) {
@@ -358,7 +358,7 @@ StaticsResult find_equilibrium(Model& model, const VectorXd& start,
                                const Model::AngleBranches& angle_branches, const LoadParameters& from,
                                const LoadParameters& to, const StaticsOptions& options,
                                const StaticsWatch& watch, const TimeVaryingParameters& varying) {
-    const ScopedTimeVarying while_varying(model, varying);
+    const ScopedTimeVarying while_varying(model.parameters(), varying);
     model.set_angle_branches(angle_branches);
     StaticsResult result;
     result.state = start;

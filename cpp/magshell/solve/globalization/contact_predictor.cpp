@@ -50,7 +50,7 @@ VectorXd predict_contact(const Model& model, const VectorXd& q, const LoadParame
     if (move.size() == 0) return move;
     move = model.dof_map().project(move);
     // The displacement must not cross another body, nor invert an element.
-    if (const double share = model.admissible_step_length(q, move); share < 1.0) move *= share;
+    if (const double share = model.capabilities().admissible_step_length(q, move); share < 1.0) move *= share;
     return move;
 }
 

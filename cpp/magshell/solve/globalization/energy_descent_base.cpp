@@ -22,11 +22,11 @@ EnergyDescent::EnergyDescent(Newton& newton, VectorXd& q, const LoadParameters& 
       load_parameters_(load_parameters),
       settled_(settled * model_.extent()) {
     const VectorXd move = model_.dof_map().prescribed_increment(q_, load_parameters);
-    if (model_.capabilities().has_barrier && model_.max_step_length(q_, move) < 1.0)
-        report_.reason = model_.describe_blocked_step(q_, move);
+    if (model_.capabilities().has_barrier && model_.capabilities().max_step_length(q_, move) < 1.0)
+        report_.reason = model_.capabilities().describe_blocked_step(q_, move);
     model_.dof_map().retract(q_, move);
     energy_ = model_.energy(q_, load_parameters);
-    if (report_.reason.empty()) report_.reason = model_.invalid_state_reason(q_);
+    if (report_.reason.empty()) report_.reason = model_.capabilities().invalid_state_reason(q_);
 }
 
 bool EnergyDescent::continue_without_factor(const FactorReport& factor, bool at_rest) {
@@ -40,7 +40,7 @@ bool EnergyDescent::continue_without_factor(const FactorReport& factor, bool at_
 }
 
 bool EnergyDescent::crosses_obstacle(const VectorXd& trial) {
-    crossing_reason_ = model_.crossing_reason(q_, load_parameters_, trial, load_parameters_);
+    crossing_reason_ = model_.capabilities().crossing_reason(q_, load_parameters_, trial, load_parameters_);
     return !crossing_reason_.empty();
 }
 
@@ -87,9 +87,14 @@ double EnergyDescent::leave_saddle(const Mode& mode) {
         for (double amplitude = settled_; amplitude < model_.extent(); amplitude *= 2.0) {
             VectorXd trial = saddle;
             const VectorXd push = sign * amplitude * mode.shape;
-            if (model_.capabilities().has_barrier && model_.max_step_length(saddle, push) < 1.0) break;
+            if (model_.capabilities().has_barrier &&
+                model_.capabilities().max_step_length(saddle, push) < 1.0)
+                break;
             model_.dof_map().retract(trial, push);
-            if (!model_.crossing_reason(saddle, load_parameters_, trial, load_parameters_).empty()) break;
+            if (!model_.capabilities()
+                     .crossing_reason(saddle, load_parameters_, trial, load_parameters_)
+                     .empty())
+                break;
             const double energy = model_.energy(trial, load_parameters_);
             // The first displacement may be too small to change the energy, but must be made.
             if (amplitude > settled_ && !(energy < side.energy)) break;

@@ -93,7 +93,8 @@ class Descent {
         double max_alpha = std::min(max_step_factor_lbfgs, max_step_extent * model_.extent() / length);
         if (model_.capabilities().has_infeasible_states) {
             const double asked = std::max(1.0, max_alpha);
-            max_alpha = std::min(max_alpha, asked * model_.admissible_step_length(here_.q, asked * step));
+            max_alpha = std::min(max_alpha,
+                                 asked * model_.capabilities().admissible_step_length(here_.q, asked * step));
         }
         const double allowed = energy_round_off * std::abs(here_.energy);
         double alpha = std::min(1.0, max_alpha), last = 0.0, last_slope = slope, accepted_alpha = 0.0;
@@ -103,8 +104,9 @@ class Descent {
             VectorXd there = here_.q;
             model_.dof_map().retract(there, alpha * step);
             const double energy = model_.energy(there, load_parameters_), change = energy - here_.energy;
-            const bool crosses =
-                !model_.crossing_reason(here_.q, load_parameters_, there, load_parameters_).empty();
+            const bool crosses = !model_.capabilities()
+                                      .crossing_reason(here_.q, load_parameters_, there, load_parameters_)
+                                      .empty();
             if (crosses || !(change <= armijo_c1 * alpha * slope + allowed)) {
                 if (accepted_alpha > 0.0) break;
                 too_far = true;

@@ -101,7 +101,8 @@ RelaxationReport relax(Newton& newton, VectorXd& q, const LoadParameters& load_p
     report = PseudoTransient(newton, q, load_parameters).run(max_steps - steps);
     report.steps += steps;
     report.saddles_escaped += saddles_escaped;
-    if (report.converged || !has.has_barrier || !model.invalid_state_reason(q).empty()) return report;
+    if (report.converged || !has.has_barrier || !model.capabilities().invalid_state_reason(q).empty())
+        return report;
     // Contact may be the cause whatever the reason was, so the largest contact force is named.
     newton.evaluate(q, load_parameters, {});
     if (const std::string hardest = model.contacts().describe_largest_force(); !hardest.empty())

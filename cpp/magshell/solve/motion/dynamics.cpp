@@ -29,7 +29,7 @@ std::size_t bytes_of(const SubstepRecord& substep) {
 MotionState beginning(Model& model, const MotionInput& input) {
     MotionState start = input.start;
     model.set_angle_branches(start.angle_branches);
-    model.set_time_varying(input.load_parameters_at(0, 0.0));
+    model.parameters().set_time_varying(input.load_parameters_at(0, 0.0));
     if (!input.rotations_given)
         start.q += EdgeRotationEquilibrium(model, start.q, input.load_parameters_at(0, 0.0)).correction();
     if (input.viscosity.maxwell() && start.e.empty()) start.e = model.elastic().strains(start.q);
@@ -176,7 +176,7 @@ class Run {
             done == 0 ? input_.load_parameters_at(0, 0.0) : input_.load_parameters_at(done - 1, 1.0);
         const MotionState& state = result_.last;
         model_.set_angle_branches(state.angle_branches);
-        model_.set_time_varying(now);
+        model_.parameters().set_time_varying(now);
         std::vector<double>& of_terms = result_.energies.back();
         std::size_t term = 0;
         for (const auto& [name, energy] : model_.energies(state.q, now)) of_terms[term++] = energy;
@@ -254,7 +254,7 @@ MotionResult simulate(Model& model, const MotionInput& input, const AdjointStora
     MotionResult result;
     result.last = input.start;
     model.contacts().forget();
-    const ScopedTimeVarying varying(model, input.varying);
+    const ScopedTimeVarying varying(model.parameters(), input.varying);
     Newton newton(model, input.newton, [&](double residual) {
         if (watch) watch(static_cast<double>(result.steps_done) / static_cast<double>(input.steps), residual);
     });

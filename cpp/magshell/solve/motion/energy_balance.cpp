@@ -18,7 +18,7 @@ constexpr double balance_round_off = 1e-11;
 double EnergyBalance::energy(const VectorXd& q, const Model::AngleBranches& angle_branches,
                              const LoadParameters& load_parameters) {
     model_.set_angle_branches(angle_branches);
-    model_.set_time_varying(load_parameters);
+    model_.parameters().set_time_varying(load_parameters);
     return model_.energy(q, load_parameters);
 }
 
@@ -72,7 +72,7 @@ double EnergyBalance::work(const StepAlgebra& step, const SubstepRecord& record,
         model_.set_angle_branches(begins ? record.begin.angle_branches
                                          : record.stages[j - first].angle_branches);
         const LoadParameters& now = load_parameters[begins ? 0 : j - first + 1];
-        model_.set_time_varying(now);
+        model_.parameters().set_time_varying(now);
         model_.evaluate(q, now);
         const StageRates& rates = at.all[j];
         sum += tableau.a[tableau.stages - 1][j] *

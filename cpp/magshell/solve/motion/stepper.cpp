@@ -104,7 +104,7 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative,
     model.begin_step(state.q, load_parameters.front());
     const ScopedStrainHistory elastic_afterwards(model);
     const bool damped = model.capabilities().has_own_viscosity;
-    if (viscosity_.any()) model.set_time_varying(load_parameters.front());
+    if (viscosity_.any()) model.parameters().set_time_varying(load_parameters.front());
     const StrainSet at_begin = viscosity_.any() ? model.elastic().strains(state.q) : StrainSet(),
                     joints_at_begin = model.dampers().strains(state.q);
     std::vector<StageRates> rates = first_rates(model, tableau, state);
@@ -114,7 +114,7 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative,
     VectorXd motor_forces, held;
     for (int i = 0; i < tableau.stages; ++i) {
         step.start_of_stage(i, state, rates, x_hat, v_hat);
-        model.set_time_varying(load_parameters[i + 1]);
+        model.parameters().set_time_varying(load_parameters[i + 1]);
         const VectorXd target = step.target(x_hat, v_hat);
         // Predicts constant velocity; dofs without velocity begin where they were.
         q.head(coordinates) = x_hat.head(coordinates) +
@@ -133,7 +133,7 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative,
             // The prediction ends well before a contact, as the barrier is too steep close to it. [-] see test_ball_falls_onto_a_sheet_and_never_through
             constexpr double before_contact = 0.25;
             if (model.capabilities().has_barrier) {
-                const double alpha = model.admissible_step_length(q, ahead);
+                const double alpha = model.capabilities().admissible_step_length(q, ahead);
                 if (alpha < 1.0) ahead *= before_contact * alpha;
             }
             model.dof_map().retract(q, ahead);
@@ -180,7 +180,8 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative,
             stages.push_back({q, model.angle_branches(), factorized ? newton_.release_factor() : nullptr});
         }
     }
-    reason = model.crossing_reason(state.q, load_parameters.front(), q, load_parameters.back());
+    reason =
+        model.capabilities().crossing_reason(state.q, load_parameters.front(), q, load_parameters.back());
     if (!reason.empty()) {
         model.set_angle_branches(state.angle_branches);
         return false;

@@ -108,15 +108,15 @@ VectorXd Newton::remaining_motion(const VectorXd& move, double alpha, const Vect
 }
 
 double Newton::apply_increment(VectorXd& q, VectorXd& step, double shortest, NewtonReport& report) {
-    const double alpha = model_.admissible_step_length(q, step);
+    const double alpha = model_.capabilities().admissible_step_length(q, step);
     if (alpha < shortest) {
-        report.reason = model_.describe_blocked_step(q, step);
+        report.reason = model_.capabilities().describe_blocked_step(q, step);
         return -1.0;
     }
     if (model_.capabilities().has_barrier) {
         report.had_contact |= alpha < 1.0;
-        report.blocked_by =
-            alpha < blocked_step_length ? model_.describe_blocked_step(q, step) : std::string();
+        report.blocked_by = alpha < blocked_step_length ? model_.capabilities().describe_blocked_step(q, step)
+                                                        : std::string();
     }
     if (alpha < 1.0) step *= alpha;
     model_.dof_map().retract(q, step);

@@ -28,7 +28,8 @@ NewtonReport NewtonIteration::run() {
 }
 
 bool NewtonIteration::begin() {
-    if (std::string reason = model_.invalid_state_reason(q_); !reason.empty()) return fail(std::move(reason));
+    if (std::string reason = model_.capabilities().invalid_state_reason(q_); !reason.empty())
+        return fail(std::move(reason));
     evaluate();
     return true;
 }
@@ -100,7 +101,7 @@ class FullSteps final : public NewtonIteration {
         if (policy_.factor) report_.factor = *policy_.factor;
         first_negative_pivots_ = report_.factor.negative_pivots;
         move_ = model_.dof_map().prescribed_increment(q_, load_parameters_);
-        if (std::string reason = model_.invalid_state_reason(q_); !reason.empty())
+        if (std::string reason = model_.capabilities().invalid_state_reason(q_); !reason.empty())
             return fail(std::move(reason));
         if (mixed_ && policy_.stress_predictor && policy_.stress_predictor->step.size() > 0) {
             newton_.evaluate(policy_.stress_predictor->from, load_parameters_, proximal_);
@@ -160,7 +161,7 @@ class FullSteps final : public NewtonIteration {
                            negative_pivots > first_negative_pivots_ + most_new_negative_pivots;
         if (mixed_ && report_.diverged) return fail("the Newton iteration diverged");
         // The pivots of a projected matrix say nothing about stability.
-        const bool exact = !project_psd || model_.projection_is_exact();
+        const bool exact = !project_psd || model_.capabilities().projection_is_exact();
         moved_ = exact && last_step_ <= small_move * model_.length_scale()
                      ? 0.0
                      : std::numeric_limits<double>::infinity();
@@ -209,8 +210,8 @@ class FullSteps final : public NewtonIteration {
         if (from.size() > 0) {
             double contact_alpha = newton_.contact_step_length(from, step, alpha, force.dot(step));
             if (contact_alpha > 1.0)
-                contact_alpha =
-                    std::max(1.0, contact_alpha * model_.admissible_step_length(from, contact_alpha * step));
+                contact_alpha = std::max(1.0, contact_alpha * model_.capabilities().admissible_step_length(
+                                                                  from, contact_alpha * step));
             if (contact_alpha != 1.0) {
                 alpha *= contact_alpha;
                 step *= contact_alpha;
@@ -339,7 +340,8 @@ class ContractingSteps final : public NewtonIteration {
         };
         const double whole = length(step);
         const bool limited = model_.capabilities().has_barrier;
-        for (double alpha = limited ? model_.admissible_step_length(q_, step) : 1.0;; alpha *= 0.5) {
+        for (double alpha = limited ? model_.capabilities().admissible_step_length(q_, step) : 1.0;;
+             alpha *= 0.5) {
             q_ = from;
             model_.dof_map().retract(q_, alpha * step);
             evaluate();

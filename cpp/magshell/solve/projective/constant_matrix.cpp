@@ -15,7 +15,7 @@ constexpr std::size_t max_special_dofs = 2000;
 
 ConstantMatrix::ConstantMatrix(const Model& model)
     : model_(model),
-      version_(model.values_version()),
+      version_(model.parameters().version()),
       stiffness_(model.projective_stiffness()),
       normals_(stiffness_.scalars(), Vec3::UnitZ()) {
     const DofMap& dof_map = model.dof_map();
@@ -105,8 +105,9 @@ void ConstantMatrix::set(double scale, const VectorXd& weights, const VectorXd& 
     VectorXd sum = VectorXd::Zero(stiffness_.points());
     for (Index node = 0; node < of_nodes.size(); ++node) sum[node] = of_nodes[node] + weights[3 * node];
     bool same = scale == scale_ && sum == weights_;
-    if (version_ != model_.values_version()) {  // the change may concern parameters that L does not depend on
-        version_ = model_.values_version();
+    if (version_ !=
+        model_.parameters().version()) {  // the change may concern parameters that L does not depend on
+        version_ = model_.parameters().version();
         NodeMatrix now = model_.projective_stiffness();
         same &= now.values() == stiffness_.values();
         stiffness_ = std::move(now);

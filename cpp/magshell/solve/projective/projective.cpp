@@ -77,7 +77,8 @@ NewtonReport ProjectiveSolver::solve_smooth(VectorXd& q, const LoadParameters& l
         report.reason = std::move(reason);
         return report;
     };
-    if (std::string reason = model_.invalid_state_reason(q); !reason.empty()) return fail(std::move(reason));
+    if (std::string reason = model_.capabilities().invalid_state_reason(q); !reason.empty())
+        return fail(std::move(reason));
     const DofMap& dof_map = model_.dof_map();
     VectorXd move = dof_map.prescribed_increment(q, load_parameters);
     newton_.evaluate(q, load_parameters, proximal);
@@ -156,7 +157,8 @@ NewtonReport ProjectiveSolver::solve_with_coulomb(VectorXd& q, const LoadParamet
     if (const double alpha = newton_.apply_increment(q, first_move, min_projective_step, report); alpha < 1.0)
         return fail(alpha < 0.0 ? report.reason
                                 : "a prescribed support motion pushes two bodies into each other");
-    if (std::string reason = model_.invalid_state_reason(q); !reason.empty()) return fail(std::move(reason));
+    if (std::string reason = model_.capabilities().invalid_state_reason(q); !reason.empty())
+        return fail(std::move(reason));
     newton_.evaluate(q, load_parameters, proximal);
     prepare(q, proximal, scale);
     CoulombContact contact(model_, matrix_, load_parameters, *proximal.motion->x_hat, proximal.motion->time);

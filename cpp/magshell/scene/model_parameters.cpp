@@ -1,0 +1,133 @@
+#include "magshell/scene/model_parameters.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "magshell/terms/joint/damper_term.h"
+
+namespace magshell {
+namespace {
+
+constexpr double difference =
+    1e-3;  // [-] step of the differences, over the load path; see test_a_path_goes_through_the_closing_of_a_contact
+
+}  // namespace
+
+ModelParameters::ModelParameters(const Registry& registry, const Bodies& bodies, DofMap& dof_map,
+                                 SceneTerms& terms)
+    : registry_(registry), bodies_(bodies), dof_map_(dof_map), terms_(terms) {}
+
+LoadParameters ModelParameters::zero_load_parameters() const {
+    return LoadParameters::Zero(registry_.load_parameters.size() + varying_.size());
+}
+
+void ModelParameters::set_values(const VectorXd& in_user_order) {
+    values_.set(registry_.values, registry_.values.to_core(in_user_order));
+    distribute_values();
+}
+
+void ModelParameters::vary(TimeVaryingParameters time_varying) {
+    if (varying_.empty()) base_values_ = values_.numbers();
+    varying_ = std::move(time_varying);
+    values_.set(registry_.values, base_values_);
+    distribute_values();
+}
+
+void ModelParameters::set_time_varying(const LoadParameters& load_parameters) {
+    if (varying_.empty()) return;
+    VectorXd numbers = values_.numbers();
+    if (!varying_.update(load_parameters, numbers)) return;
+    values_.set(registry_.values, std::move(numbers));
+    distribute_values();
+}
+
+void ModelParameters::distribute_values() {
+    dof_map_.set_values(values_);
+    terms_.field_sources.set_values(values_);
+    bool cancels_otherwise = false;
+    length_scale_ = bodies_.rigid_length();
+    for (const std::unique_ptr<Term>& term : terms_.energies) {
+        cancels_otherwise |= term->set_values(values_);
+        length_scale_ = std::min(length_scale_, term->length_scale());
+    }
+    for (const std::unique_ptr<ForceTerm>& force : terms_.forces) force->set_values(values_);
+    if (cancels_otherwise) ++cancelling_version_;
+    ++version_;
+}
+
+void ModelParameters::vjp(const VectorXd& q, const LoadParameters& load_parameters, const VectorXd& lambda,
+                          Gradient& out) const {
+    for (const std::unique_ptr<Term>& term : terms_.energies)
+        term->vjp(q.data(), load_parameters, lambda.data(), out);
+}
+
+KinematicsGradient ModelParameters::forces_vjp(const Kinematics& at, const LoadParameters& load_parameters,
+                                               const VectorXd& lambda, Gradient& out) const {
+    KinematicsGradient by{VectorXd::Zero(bodies_.nodes().n_dofs()), VectorXd::Zero(bodies_.nodes().n_dofs()),
+                          VectorXd::Zero(bodies_.nodes().n_dofs()), zero_load_parameters()};
+    for (const std::unique_ptr<ForceTerm>& force : terms_.forces)
+        force->vjp(at, load_parameters, lambda, by, out);
+    return by;
+}
+
+void ModelParameters::damper_rates_vjp(const VectorXd& q, const VectorXd& v, const StrainSet& by_rates,
+                                       VectorXd& by_q, VectorXd& by_v, Gradient& out) const {
+    if (terms_.damper)
+        terms_.damper->rates_vjp(q.data(), v.data(), by_rates.of_terms.front(), by_q, by_v, out);
+}
+
+// Parameters may enter in any way, for example as the position of a magnet. Fourth-order differences lose no more digits than a gradient
+// has lost already, and continuation uses them only as a predictor.
+template <class Function>
+VectorXd ModelParameters::rate_by_varying(const LoadParameters& at, const LoadParameters& rate,
+                                          const Function& function) {
+    const Index n = varying_.size();
+    VectorXd sum = VectorXd::Zero(bodies_.nodes().n_dofs());
+    if (rate.tail(n).isZero(0.0)) return sum;
+    const auto beside = [&](double way) {
+        LoadParameters there = at;
+        there.tail(n) += way * rate.tail(n);
+        set_time_varying(there);
+        return function(there);
+    };
+    for (const double steps : {1.0, 2.0}) {
+        const double weight = (steps == 1.0 ? 8.0 : -1.0) / (12.0 * difference);
+        sum += weight * (beside(steps * difference) - beside(-steps * difference));
+    }
+    set_time_varying(at);
+    return sum;
+}
+
+VectorXd ModelParameters::gradient_rate(const VectorXd& q, const LoadParameters& at,
+                                        const LoadParameters& rate) {
+    // The difference removes the part that does not depend on the load parameters, such as that of target volumes.
+    const LoadParameters none = LoadParameters::Zero(rate.size());
+    Residual change, constant, dropped;
+    for (Residual* each : {&change, &constant, &dropped}) each->reset(bodies_.nodes().n_dofs());
+    for (const std::unique_ptr<Term>& term : terms_.energies) {
+        if (!term->depends_on_loads()) continue;
+        term->evaluate(q.data(), rate, change);
+        term->evaluate(q.data(), none, constant);
+        term->evaluate(q.data(), at, dropped);  // restores the state of the term
+    }
+    change.gradient -= constant.gradient;
+    if (varying_.empty()) return change.gradient;
+    return change.gradient + rate_by_varying(at, rate, [&](const LoadParameters& there) {
+               Residual gradient;
+               gradient.reset(bodies_.nodes().n_dofs());
+               for (const std::unique_ptr<Term>& term : terms_.energies)
+                   if (term->varies()) term->evaluate(q.data(), there, gradient);
+               return gradient.gradient;
+           });
+}
+
+VectorXd ModelParameters::prescribed_rate(const VectorXd& q, const LoadParameters& at,
+                                          const LoadParameters& rate) {
+    const VectorXd held = dof_map_.support_factor(rate) * dof_map_.prescribed_rate(at);
+    if (varying_.empty()) return held;
+    return held + rate_by_varying(at, rate, [&](const LoadParameters& there) {
+               return dof_map_.prescribed_increment(q, there);
+           });
+}
+
+}  // namespace magshell
