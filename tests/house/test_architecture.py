@@ -1,5 +1,5 @@
 """The shape of the code: floors of the C++ core, rooms of the Python package, who may see which library, file lengths,
-light imports."""
+light imports, and solvers that ask for no kind of body."""
 
 import ast
 import graphlib
@@ -90,6 +90,15 @@ UPWARD_IMPORTS = {
 }
 # Libraries that one folder hides from the others: a pattern of the include, and the folder.
 HIDDEN_HEADERS = {r"pybind11/|Python\.h": "bindings", r"(?i)cholmod": "magshell/linalg"}
+# Solvers ask what a scene is capable of (scene/model_capabilities.h), never what it is made of.
+SOLVERS = ("magshell/solve", "magshell/adjoint")
+KIND_QUESTIONS = re.compile(
+    r"\bmodel(?:_|\(\))?(?:\.|->)(?:terms|n_muscles|has_\w+|(?:body_)?contact|solid_term|muscle_term|elastic_term)\("
+    r"|\bbodies\(\)\.(?:shells|solids|six_node_\w+|fibres|faces|rigid_\w+)\("
+    r"|\b(?:low_rank|elastic|dampers)\(\)\.empty\("
+    r"|\bdynamic_cast\b|\btypeid\b|\bname\(\)\s*[!=]="
+)
+TERMS_OF_SOLVERS = {"magshell/terms/contact/contacts.h", "magshell/terms/contact/pair_stiffness.h"}
 # Modules that some rooms or files of the package hide from the others.
 HIDDEN_MODULES = {
     "torch.autograd": ("solve/adjoint/autograd.py",),
@@ -136,6 +145,19 @@ def include_violations(root: Path) -> Iterator[str]:
             for pattern, owner in HIDDEN_HEADERS.items():
                 if re.search(pattern, name) and folder_of(file) != owner and folder_of(name) not in FLOORS:
                     yield f"{file} includes {name}, which only {owner}/ may"
+
+
+def kind_violations(root: Path) -> Iterator[str]:
+    for path in cpp_files(root):
+        file = path.relative_to(root / "cpp").as_posix()
+        if not file.startswith(SOLVERS):
+            continue
+        for number, line in enumerate(path.read_text().splitlines(), 1):
+            if question := KIND_QUESTIONS.search(line.split("//")[0]):
+                yield f"{file}:{number} asks for a kind of body or term: {question[0]}"
+        for _, name in includes(path):
+            if name.startswith("magshell/terms/") and name not in TERMS_OF_SOLVERS:
+                yield f"{file} includes {name}: a solver asks for no kind of body or term"
 
 
 def imported_names(path: Path) -> Iterator[str]:
@@ -268,6 +290,7 @@ def spelling_violations(root: Path) -> Iterator[str]:
 
 RULES = [
     include_violations,
+    kind_violations,
     import_violations,
     room_violations,
     circle_violations,
@@ -304,6 +327,26 @@ def test_the_rules_look_at_files() -> None:
             "cpp/magshell/solve/a.cpp",
             "#  include <Eigen/CholmodSupport>\n",
             "only magshell/linalg/",
+        ),
+        (kind_violations, "cpp/magshell/solve/a.cpp", "if (model_.n_muscles() == 0) {}\n", "kind of body"),
+        (
+            kind_violations,
+            "cpp/magshell/solve/a.h",
+            "return model.bodies().solids().empty();\n",
+            "kind of body",
+        ),
+        (
+            kind_violations,
+            "cpp/magshell/adjoint/a.cpp",
+            "newton.model().has_body_contact();\n",
+            "kind of body",
+        ),
+        (kind_violations, "cpp/magshell/solve/a.cpp", "model.low_rank().empty();\n", "kind of body"),
+        (
+            kind_violations,
+            "cpp/magshell/solve/a.cpp",
+            '#include "magshell/terms/solid/solid_term.h"\n',
+            "kind of body",
         ),
         (
             import_violations,
@@ -375,6 +418,10 @@ def test_rule_sees_a_violation(tmp_path: Path, rule, file: str, text: str, compl
         (
             "cpp/magshell/mesh/a.h",
             '#include <vector>\n#include "magshell/core/types.h"\n#include "magshell/linalg/b.h"\n',
+        ),
+        (
+            "cpp/magshell/solve/a.cpp",
+            "if (model_.capabilities().has_barrier) {}  // not model_.n_muscles()\n",
         ),
         ("cpp/magshell/linalg/cholmod.cpp", '#include <cholmod.h>\n#include "magshell/linalg/cholmod.h"\n'),
         ("cpp/bindings/solve.cpp", '#include <pybind11/stl.h>\n#include "magshell/linalg/cholmod.h"\n'),

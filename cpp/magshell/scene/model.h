@@ -27,7 +27,7 @@ class Model {
     /// The parameters: their layout, their values, and derivatives by them.
     ModelParameters& parameters() { return parameters_; }
     const ModelParameters& parameters() const { return parameters_; }
-    /// What a solver must know of the energy, and how far a step may go.
+    /// Properties of the energy that solvers must know, and how far a step may go.
     const ModelCapabilities& capabilities() const { return capabilities_; }
     /// The terms by kind, for results.
     const SceneTerms& terms() const { return terms_; }
@@ -79,11 +79,12 @@ class Model {
     void require_symmetric() const;
     /// Extrapolates the stresses of the last evaluated state by a step p (mixed iterations).
     void extrapolate(const VectorXd& p);
+
+    /// All contact with obstacles and between bodies.
+    const Contacts& contacts() const { return terms_.contacts; }
     /// Forces without an energy act only within the stages of time steps. A step begins at q. At a stage they are added to the residual
     /// after evaluate(), and to matrix() and nonsymmetric_tangent() after assemble(), at the same q.
     void begin_step(const VectorXd& q, const LoadParameters& load_parameters);
-    /// All contact with obstacles and between bodies.
-    const Contacts& contacts() const { return terms_.contacts; }
     void evaluate_forces(const VectorXd& q, const LoadParameters& load_parameters, const StageMotion& stage);
     void assemble_forces(const LoadParameters& load_parameters, bool project_psd = false);
     /// Freezes the normal forces of friction, or releases them.
@@ -99,6 +100,7 @@ class Model {
     const ViscousTerms& dampers() const { return terms_.dampers; }
     /// Returns the strain rates of joint dampers at q for velocities v.
     StrainSet damper_rates(const VectorXd& q, const VectorXd& v) const;
+
     /// Returns the matrix of Projective Dynamics, which is constant while the parameters are. Throws InvalidInput, naming the term, if a
     /// term has none.
     NodeMatrix projective_stiffness() const;
@@ -106,6 +108,7 @@ class Model {
     VectorXd contact_stiffness_diagonal() const;
     /// Returns the stiffness of active contact pairs of bodies at that state, within a time step.
     std::vector<PairStiffness> contact_pair_stiffness() const;
+
     /// Returns a factorization object for the reduced Hessian, whose pattern is analysed once for all. `watch` is called from time to time
     /// during the analysis and may throw.
     std::shared_ptr<Factor> new_factor(const std::function<void()>& watch = [] {});
