@@ -149,7 +149,7 @@ def _motions() -> Iterator[Counted]:
 
 def _projective() -> Iterator[Counted]:
     """Yield falling beams whose rounds of Projective Dynamics are counted, to a residual of 1e-6."""
-    for name, history in projective_motions.WAYS.items():
+    for name, history in projective_motions.HISTORIES.items():
         method = ms.ProjectiveDynamics(tolerance=1e-6, history=history)
         scene = projective_motions.beam(projective_motions.MATERIALS["Projective"], (12, 3, 3))
         yield "projective", name, lambda m=method, s=scene: projective_motions._drive(s, m, 4)
