@@ -243,9 +243,7 @@ void Builder::add_moments(const SceneInput& input) {
 }
 
 void Builder::add_joints(const SceneInput& input) {
-    const auto corners = [&](Index part) {
-        return part < 0 ? nullptr : bodies_.rigid_nodes()[part].data();
-    };
+    const auto corners = [&](Index part) { return part < 0 ? nullptr : bodies_.rigid_nodes()[part].data(); };
     std::vector<JointTerm::Input> joints;
     std::vector<DamperTerm::Input> damped;
     std::vector<BallTorqueTerm::Input> twisted;
