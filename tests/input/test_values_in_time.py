@@ -28,7 +28,7 @@ def as_function(value: np.ndarray, duration: float):
 
 def values_that_go(name: str) -> dict:
     every = kind(name).of_objects.items()
-    return {key: straight(value) for key, value in every if kind(name).goes(*key)}
+    return {key: straight(value) for key, value in every if kind(name).varies_in_time(*key)}
 
 
 @pytest.mark.parametrize(

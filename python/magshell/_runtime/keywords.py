@@ -6,15 +6,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+from .solve_keywords import names_of
+
 FLUX_DENSITY = "applied_flux_density"
-FACTORS = ("load_factor", "gravity_factor", "field_factor", "support_factor")
-CONTROLS = (FLUX_DENSITY, *FACTORS)
-OF_MOTION = (
-    "damping",
-    "stiffness_damping",
-    "maxwell_modulus",
-    "maxwell_time",
-)  # keywords of ms.simulate only
+CONTROLS = names_of("load parameter")
+FACTORS = tuple(name for name in CONTROLS if name != FLUX_DENSITY)
+OF_MOTION = names_of("damping")  # keywords of ms.simulate only
 
 
 def controls_of(owner, scene) -> tuple[str, ...]:

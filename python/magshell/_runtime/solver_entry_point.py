@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 from ..errors import Interrupted
 from .keywords import as_keywords, check_known
+from .solve_keywords import with_keywords
 
 F = TypeVar("F", bound=Callable)
 
@@ -43,9 +44,10 @@ def solve_entry(function: F) -> F:
 
     Ctrl-C before there is a result, also in a function of the caller's, raises Interrupted without a `last_good`.
     Within torch.compile the solve runs uncompiled, between the graphs. Load parameters among `values` become the
-    keywords of the same names.
+    keywords of the same names. A line "{keywords}" of its docstring is replaced by the texts of solve_keywords.py.
     """
     known = set(inspect.signature(function).parameters)
+    function.__doc__ = with_keywords(function.__name__, function.__doc__)
 
     @functools.wraps(function)
     def called(*arguments, **named):

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ..._input.keyword_value import keyword_value
 from ..._input.quantity import quantity
 from ..._runtime.keywords import controls_of, meant, nearest_first
+from ..._runtime.solve_keywords import SOLVE_KEYWORDS
 from ..loads.loads import DeadLoad
 from ..shells.shell import Shell
 from .time_series import refuse_functions
@@ -13,12 +15,6 @@ from .time_series import refuse_functions
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
     from .scene import Scene
-
-
-# Values of a shell that a solve of a scene with one body takes as keywords of their own.
-SHELL_NAMES = tuple(
-    name for name in Shell._replaceable if name not in ("remanent_magnetization", *Shell._in_time)
-)
 
 
 def requested(
@@ -61,8 +57,9 @@ def checked(scene: Scene, owner: Any, name: str, value: Any) -> Any:
     """Return a value of the scene itself after a check of its shape; constructors check those of other objects."""
     if owner is not scene:
         return value
-    unit, shape = {"gravity": ("m/s2", (3,)), "vertex_loads": ("N", (scene.mesh.n_vertices, 3))}[name]
-    return quantity(name, unit, value, shape)
+    if name == "gravity":
+        return quantity("gravity", "m/s2", value, (3,))
+    return keyword_value(SOLVE_KEYWORDS[name], value, {"n_v": scene.mesh.n_vertices})
 
 
 def _add(asked: dict[Any, Any], owner, name: str, value) -> None:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..._input.quantity import quantity
+from ..._input.keyword_value import keyword_value
 from ..._input.tensors import detached, is_tensor, requires_gradient, to_array
+from ..._runtime.solve_keywords import SOLVE_KEYWORDS
 from ..shells.shell import magnetization_of
 from .magnetization import check_given_once, check_on_skins, of_all_bodies
 from .plausible import warn_of_field, warn_of_units
@@ -82,13 +83,10 @@ class Inputs:
         self.magnetization: np.ndarray | None = (
             None if numbers is None else magnetization_of(numbers, scene._bodies.n_magnetized)
         )
-        flux_density = self._flux_density(self._numbers("applied_flux_density", applied_flux_density))
+        flux_density = self._flux_density(applied_flux_density)
         if numbers is not None:
             check_on_skins(scene, np.asarray(numbers))
-        controls = {
-            ("scene", key): float(quantity(key, "1", self._numbers(key, value), ()))
-            for key, value in factors.items()
-        }
+        controls = {("scene", name): float(self.keyword(name, value)) for name, value in factors.items()}
         controls["scene", "applied_flux_density"] = flux_density
         self.controls: np.ndarray = scene._control_layout.packed(controls, scene._control_layout.zeros())
         self.values: Values = self._values(replaced)
@@ -104,6 +102,17 @@ class Inputs:
     def take(self, name: str, value: Any, owner: Any = None) -> Any:
         """Return the numbers of a further input; it joins the leaves if it requires a gradient."""
         return self._numbers(name, value, owner)
+
+    def keyword(self, name: str, value: Any) -> np.ndarray:
+        """Return the checked numbers of a keyword of the solve, by its row in the table of solve_keywords.py.
+
+        A tensor that requires a gradient joins the leaves. Raises ValueError.
+        """
+        row = SOLVE_KEYWORDS[name]
+        numbers = keyword_value(row, self._numbers(name, value), {"n_v": self.scene.mesh.n_vertices})
+        if row.no_gradient:
+            self.refuse(name, value, row.no_gradient)
+        return numbers
 
     def refuse(self, name: str, tensor: torch.Tensor, why: str) -> None:
         """Record that a tensor has no gradient by this input, and why: NoGradient says so when the gradient is asked
@@ -145,7 +154,7 @@ class Inputs:
             return np.zeros(3)
         if not self.scene.has_uniform_field:
             raise ValueError("applied_flux_density was given, but the scene has no UniformField")
-        flux_density = quantity("applied_flux_density", "T", given, (3,))
+        flux_density = self.keyword("applied_flux_density", given)
         warn_of_field(self.scene, flux_density)
         return flux_density
 

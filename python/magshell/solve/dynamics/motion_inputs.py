@@ -9,10 +9,10 @@ import numpy as np
 
 from ... import _core
 from ..._input.arrays import count
-from ..._input.quantity import quantity, shape_of
-from ..._input.scalars import not_negative, positive
+from ..._input.quantity import quantity
 from ..._input.tensors import detached, is_tensor, requires_gradient
 from ..._runtime.memory import check_memory
+from ..._runtime.solve_keywords import SOLVE_KEYWORDS
 from ...model.contact.contacts_to_core import check_outside, poses
 from ...model.rigid.equimomental_points import check_joints, check_rigid, own_velocities
 from ...model.scene.plausible import warn_of_field
@@ -30,17 +30,11 @@ if TYPE_CHECKING:
     from ..options import AdjointStorage
 
 
-_CONTROLS = {  # load parameters: (unit, shape at one time)
-    "applied_flux_density": ("T", (3,)),
-    "field_factor": ("1", ()),
-    "load_factor": ("1", ()),
-    "gravity_factor": ("1", ()),
-    "support_factor": ("1", ()),
-}
-
-
 class MotionInputs:
-    """The inputs of one motion, checked. Tensors among them that require a gradient join the leaves of `inputs`."""
+    """The inputs of one motion, checked. Tensors among them that require a gradient join the leaves of `inputs`.
+
+    arguments: the keywords of ms.simulate that are in the table of solve_keywords.py, but those of `inputs`.
+    """
 
     inputs: Inputs
     integrator: Integrator
@@ -53,21 +47,15 @@ class MotionInputs:
     def __init__(
         self,
         inputs: Inputs,
+        arguments: dict[str, Any],
         *,
         steps: int,
-        time_step: Numbers,
         record_every: int,
         adjoint_storage: AdjointStorage,
         start: Any,
-        velocities: Numbers,
-        damping: Numbers,
-        stiffness_damping: Numbers,
-        maxwell_modulus: Numbers,
-        maxwell_time: Numbers,
         integrator: Integrator,
         solver: Newton,
         time_series: Iterable[TimeSeries] = (),
-        **controls: Any,
     ):
         self.inputs, self.integrator = inputs, integrator
         self.steps, self.record_every = count("steps", steps), count("record_every", record_every)
@@ -81,15 +69,19 @@ class MotionInputs:
             getattr(_core.Keep, adjoint_storage.what or "nothing"),
             int(adjoint_storage.memory_budget),
         )
-        self.given_time_step, self._outside = time_step, None
-        self.time_step: float = positive("time_step", "s", inputs.take("time_step", time_step))
+        self.given_time_step, self._outside = arguments["time_step"], None
+        self.time_step: float = float(inputs.keyword("time_step", arguments["time_step"]))
         self._mass = inputs.values.masses
-        self._damping = self._checked_damping(inputs.take("damping", damping))
-        law = self._viscosity(stiffness_damping, maxwell_modulus, maxwell_time)
-        self.start: MotionState = self._begin(start, velocities)
+        self._damping = self._damping_of_points(arguments["damping"])
+        law = self._viscosity(arguments)
+        self.start: MotionState = self._begin(start, arguments["velocities"])
         self.clock: Clock = clock_of(self.start).going_on(self.time_step)
         self.n_time_points: int = self.steps * (len(integrator._times) + 1)
-        self._load_parameters = {name: self._controls(name, value) for name, value in controls.items()}
+        self._load_parameters = {
+            name: self._controls(name, value)
+            for name, value in arguments.items()
+            if name in SOLVE_KEYWORDS and SOLVE_KEYWORDS[name].varies
+        }
         self._in_time = InTime(self, list(time_series))
         if self._outside is not None:
             check_outside(inputs.scene, inputs.values, self._outside, 0.0)
@@ -147,7 +139,7 @@ class MotionInputs:
         return {k: poses(each, times) for k, each in moving.items()}
 
     def _controls(self, name: str, value) -> np.ndarray:
-        unit, row = _CONTROLS[name]
+        unit, (row,) = SOLVE_KEYWORDS[name].unit, SOLVE_KEYWORDS[name].shapes
         if name == "applied_flux_density" and value is None:
             if self.inputs.scene.has_uniform_field:
                 raise ValueError("the scene has a UniformField, so applied_flux_density [T] is needed")
@@ -172,15 +164,10 @@ class MotionInputs:
             self.inputs.refuse("time_step", time_step, why)
         return numbers
 
-    def _checked_damping(self, given) -> np.ndarray:
+    def _damping_of_points(self, given) -> np.ndarray:
+        """Return the damping of all vertices, zero for the points of rigid bodies, (n,) N s/m."""
         n_v = self.inputs.scene.mesh.n_vertices
-        shape = shape_of("damping [N s/m]", given)
-        if shape not in ((), (n_v,)):
-            raise ValueError(f"damping [N s/m] must be a number or have shape (n_v,) = ({n_v},), got {shape}")
-        damping = quantity("damping", "N s/m", given, shape)
-        if (np.asarray(damping) < 0).any():
-            raise ValueError(f"damping [N s/m] must not be negative, but the smallest is {np.min(damping):g}")
-        on_vertices = np.broadcast_to(damping, (n_v,))
+        on_vertices = np.broadcast_to(self.inputs.keyword("damping", given), (n_v,))
         if not self.inputs.scene.rigid_parts:
             return on_vertices
         return np.concatenate([on_vertices, np.zeros(len(self._mass) - n_v)])
@@ -199,17 +186,15 @@ class MotionInputs:
             "maxwell_strain_rates": start.maxwell_strain_rates,
         }
 
-    def _viscosity(self, stiffness_damping, maxwell_modulus, maxwell_time) -> dict[str, float]:
-        given = {"stiffness_damping": ("s", stiffness_damping), "maxwell_modulus": ("1", maxwell_modulus)}
-        if maxwell_time is not None:
-            given["maxwell_time"] = ("s", maxwell_time)
+    def _viscosity(self, arguments: dict[str, Any]) -> dict[str, float]:
+        """Return the numbers of the viscous stresses: stiffness damping and the Maxwell branch."""
+        names = ("stiffness_damping", "maxwell_modulus", "maxwell_time")
         law = {
-            name: (positive if name == "maxwell_time" else not_negative)(
-                name, unit, self.inputs.take(name, value)
-            )
-            for name, (unit, value) in given.items()
+            name: float(self.inputs.keyword(name, arguments[name]))
+            for name in names
+            if arguments[name] is not None or SOLVE_KEYWORDS[name].default is not None
         }
-        if law["maxwell_modulus"] and maxwell_time is None:
+        if law["maxwell_modulus"] and arguments["maxwell_time"] is None:
             raise ValueError("maxwell_modulus needs the relaxation time of the branch, maxwell_time [s]")
         return {"maxwell_time": 1.0, **law}
 
@@ -227,11 +212,8 @@ class MotionInputs:
         if velocities is None and (goes_on or not own.any()):
             return origin
         n_v = inputs.scene.mesh.n_vertices
-        given = inputs.take("velocities", np.zeros((n_v, 3)) if velocities is None else velocities)
-        shape = shape_of("velocities [m/s]", given)
-        if shape not in ((3,), (n_v, 3)):
-            raise ValueError(f"velocities [m/s] must have shape (n_v, 3) = ({n_v}, 3) or (3,), got {shape}")
-        rows = np.broadcast_to(quantity("velocities", "m/s", given, shape), (n_v, 3))
+        given = np.zeros((n_v, 3)) if velocities is None else velocities
+        rows = np.broadcast_to(inputs.keyword("velocities", given), (n_v, 3))
         inputs.scene._bodies.check_welded("velocities", "m/s", rows)
         velocity = model.full_vector(np.concatenate([rows, own]))
         if inputs.scene.rigid_parts:

@@ -12,6 +12,7 @@ from ... import _core
 from ..._input.tensors import detached, dtype_like, like
 from ..._runtime.log import log
 from ..._runtime.progress import SolveBar
+from ..._runtime.solve_keywords import given_to, names_of
 from ..._runtime.solver_entry_point import grouped, solve_entry
 from ...errors import Interrupted, NotConverged
 from ...model.contact.contacts_to_core import check_apart
@@ -78,21 +79,12 @@ def simulate(
 ) -> Trajectory:
     """Simulate the motion of a scene in time.
 
-    steps, time_step: how many, and s.
-    applied_flux_density: T: constant (3,), one a step (steps, 3), at the ends of all steps (steps + 1, 3) with straight
-        lines between them, or a function of the time [s] that returns (3,). The time is the motion's own, as in `times`: 0
-        at its beginning, and where `start` is a motion it goes on. Arrays begin with the first step taken here.
-    load_factor, gravity_factor, field_factor, support_factor: as in ms.equilibrium; numbers, or in time as above.
-    damping: N s/m, viscous, on every vertex or (n_v,).
-    stiffness_damping: s. The rate of the strains adds as much stress as this time of it would: for small motions the
-        damping matrix is this time the stiffness matrix.
-    maxwell_modulus, maxwell_time: a Maxwell branch beside the elastic stiffness: its modulus over the elastic one, and
-        its relaxation time, s. It begins relaxed.
+    steps: how many.
+    {keywords}
     start: positions (n_v, 3) m, an Equilibrium of this scene, a Trajectory or MotionState to go on from with the same
         bits. By default the rest shape.
-    velocities: m/s, (n_v, 3), or (3,) for all; by default those of the motion that `start` is, or none.
-    remanent_magnetization, thickness, ..., values: as in ms.equilibrium. The shell needs a mass density. Controls, and the
-        damping, may stand in values={scene: {name: value}} as well: keywords are their short forms.
+    values: as in ms.equilibrium. Load parameters and damping may stand in values={scene: {name: value}} as well:
+        keywords are their short forms. Every shell needs a mass density.
     values in time: positions and moments of Dipoles, center and rotation of a PlacedField, an obstacle or a magnet, and
         its magnetization, displacement, rotation and center of a Clamp or Pin that has one of them: a function of the time
         [s], or an array with one more axis in front, at the ends of all steps (steps + 1, ...). As everything that is given
@@ -131,6 +123,7 @@ def simulate(
     >>> move.positions.shape, bool(move.positions[-1, :, 2].max() > 1e-4)
     ((21, 33, 3), True)
     """
+    arguments = given_to("simulate", locals())
     solver = MixedNewton() if solver is None else solver
     if integrator is not None and not isinstance(integrator, Integrator):
         what = (
@@ -146,15 +139,11 @@ def simulate(
         raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
     replaced = requested(
         scene,
-        vertex_loads,
-        values,
+        arguments.pop("vertex_loads"),
+        arguments.pop("values"),
         moving=True,
         in_time=True,
-        thickness=thickness,
-        young_modulus=young_modulus,
-        poisson_ratio=poisson_ratio,
-        mass_density=mass_density,
-        curvature_scale=curvature_scale,
+        **{name: arguments.pop(name) for name in names_of("shell")},
     )
     replaced, time_series = split_time_series(scene, replaced)
     uniform = np.zeros(3) if scene.has_uniform_field else None
@@ -166,28 +155,23 @@ def simulate(
             "only: take TRBDF2(), which keeps the second, or ImplicitEuler()"
         )
     inputs = Inputs(
-        scene, remanent_magnetization, uniform, replaced=replaced, differentiable=True, moving=True
+        scene,
+        arguments.pop("remanent_magnetization"),
+        uniform,
+        replaced=replaced,
+        differentiable=True,
+        moving=True,
     )
     asked = MotionInputs(
         inputs,
+        arguments,
         steps=steps,
-        time_step=time_step,
         record_every=record_every,
         adjoint_storage=as_adjoint_storage(adjoint_storage),
         start=start,
-        velocities=velocities,
-        damping=damping,
-        stiffness_damping=stiffness_damping,
-        maxwell_modulus=maxwell_modulus,
-        maxwell_time=maxwell_time,
         integrator=integrator,
         solver=solver,
         time_series=time_series,
-        applied_flux_density=applied_flux_density,
-        load_factor=load_factor,
-        gravity_factor=gravity_factor,
-        field_factor=field_factor,
-        support_factor=support_factor,
     )
     began = time.perf_counter()
     with inputs.in_core(), SolveBar("simulate", progress) as bar:

@@ -57,25 +57,15 @@ def inputs_about(
 
 
 def asked_inputs(
-    function: str,
-    scene: Scene,
-    equilibrium: Equilibrium | None,
-    remanent_magnetization: Any,
-    applied_flux_density: Any,
-    values: dict[Any, Any] | None,
-    **factors: Any,
+    function: str, scene: Scene, equilibrium: Equilibrium | None, arguments: dict[str, Any]
 ) -> Inputs:
-    """Return the inputs of a linear solve, at rest or about an equilibrium. Raises ValueError for what does not fit."""
+    """Return the inputs of a linear solve, at rest or about an equilibrium, from its keywords in the table.
+
+    Raises ValueError for what does not fit.
+    """
     if equilibrium is None:
-        return plain_inputs(scene, remanent_magnetization, applied_flux_density, values, **factors)
-    inputs = inputs_about(
-        scene,
-        equilibrium,
-        remanent_magnetization=remanent_magnetization,
-        applied_flux_density=applied_flux_density,
-        values=values,
-        **factors,
-    )
+        return plain_inputs(scene, **arguments)
+    inputs = inputs_about(scene, equilibrium, **arguments)
     refuse_what_cannot_be(function, equilibrium, inputs)
     return inputs
 

@@ -11,6 +11,7 @@ import scipy
 
 from ..._input.arrays import count
 from ..._runtime.frozen import immutable
+from ..._runtime.solve_keywords import given_to
 from ..._runtime.solver_entry_point import solve_entry
 from ...errors import NotConverged
 from ...model.scene.scene import Scene
@@ -78,8 +79,11 @@ def linear_buckling(
 
     so the state before buckling is assumed proportional to lambda, and K to change linearly along it. Exact
     in the limit of small displacements before buckling: columns, plates loaded in their plane, closed shells.
-    A shallow arch that softens on its way needs ms.follow_path. Load parameters and values as in ms.equilibrium; a field's
-    own stiffness counts.
+    A shallow arch that softens on its way needs ms.follow_path. The stiffness of a field
+    counts.
+
+    {keywords}
+    values: as in ms.equilibrium.
 
     equilibrium: of this scene, a stable one: a grown or loaded sheet, one in a field. K is then that of the equilibrium, u
         the response to load parameters that go from its own to those given here (`ms.linear_response`), and the factors are
@@ -105,19 +109,9 @@ def linear_buckling(
     >>> round(float(ms.linear_buckling(scene).factors[0]), 3)  # pi^2 E h^3 / (48 L^2) = 0.0206 N/m
     0.021
     """
+    arguments = given_to("linear_buckling", locals())
     modes = count("modes", modes)
-    inputs = asked_inputs(
-        "linear_buckling",
-        scene,
-        equilibrium,
-        remanent_magnetization,
-        applied_flux_density,
-        values,
-        load_factor=load_factor,
-        gravity_factor=gravity_factor,
-        field_factor=field_factor,
-        support_factor=support_factor,
-    )
+    inputs = asked_inputs("linear_buckling", scene, equilibrium, arguments)
     refuse_springs(inputs)
     if scene._body_contacts:
         raise ValueError(

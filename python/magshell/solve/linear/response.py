@@ -11,6 +11,7 @@ import numpy as np
 from ..._input.tensors import detached, like
 from ..._runtime.frozen import immutable
 from ..._runtime.mixins import PlotMixin
+from ..._runtime.solve_keywords import given_to
 from ..._runtime.solver_entry_point import solve_entry
 from ...model.scene.scene import Scene
 from ..statics.equilibrium import Equilibrium
@@ -68,7 +69,7 @@ def linear_response(
 
     The stiffness is that of the unloaded sheet: loads and fields act as the forces they are at rest, without
     the stiffness they add; supports that move do so at the rate they start with. Torques, springs, servos and limits that
-    pull in joints at rest are loads too, and motors move. Load parameters and values as in ms.equilibrium.
+    pull in joints at rest are loads too, and motors move.
 
     equilibrium: of this scene, a stable one: a grown or loaded sheet, one in a field. The deflection is then that from there
         as the load parameters go from its own to those given here, to first order: the tangent of ms.follow_path(...,
@@ -82,8 +83,8 @@ def linear_response(
     without a potential, or one that requires a gradient, as there is none here; and where the supports leave a motion
     without stiffness to what is loaded; Interrupted.
 
-    remanent_magnetization, applied_flux_density, load_factor, gravity_factor, field_factor, support_factor: as in
-    `equilibrium`.
+    {keywords}
+    values: as in ms.equilibrium.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(20, 4))
@@ -94,19 +95,9 @@ def linear_response(
     >>> round(float(tip), 3)  # p L^3 / (3 E I) = 0.04
     0.04
     """
+    arguments = given_to("linear_response", locals())
     began = time.perf_counter()
-    inputs = asked_inputs(
-        "linear_response",
-        scene,
-        equilibrium,
-        remanent_magnetization,
-        applied_flux_density,
-        values,
-        load_factor=load_factor,
-        gravity_factor=gravity_factor,
-        field_factor=field_factor,
-        support_factor=support_factor,
-    )
+    inputs = asked_inputs("linear_response", scene, equilibrium, arguments)
     given = inputs.given if equilibrium is None else [*inputs.given, equilibrium.positions]
     at_rest = forces_at_rest(inputs) if equilibrium is None else None
     with inputs.in_core():

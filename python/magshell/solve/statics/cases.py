@@ -8,14 +8,15 @@ from numbers import Number
 from typing import Any
 
 from ..._input.quantity import shape_of
-from ..._runtime.keywords import FACTORS, FLUX_DENSITY
+from ..._runtime.keywords import CONTROLS, FLUX_DENSITY
+from ..._runtime.solve_keywords import SOLVE_KEYWORDS
 from ...errors import DesignRejected, Interrupted, NotConverged
 from ...model.scene.scene import Scene
 from .equilibria import EquilibriumSet
 from .equilibrium import Equilibrium
 from .single_solve import Search, find
 
-_DIMENSIONS = {FLUX_DENSITY: 1, **dict.fromkeys(FACTORS, 0)}  # of one case
+_DIMENSIONS = {name: len(SOLVE_KEYWORDS[name].shapes[0]) for name in CONTROLS}  # of one case
 
 
 def _check_shape(name: str, shape: tuple[int, ...]) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..._input.quantity import quantity
 from ..._input.tensors import requires_gradient, to_array
+from ..._runtime.solve_keywords import given_to
 from ..._runtime.solver_entry_point import solve_entry
 from ...model.bodies.bodies import checked_body
 from ...model.shells.shell import Shell
@@ -50,8 +51,11 @@ def energies(
         none, which leaves the normals across edges half-way between those of their faces.
     body: of the scene: its elastic energies alone, "membrane" and "bending" of a Shell, "solid" of a Solid.
 
-    The others are as in ms.equilibrium, whose `energies` these are where it found the positions; of what supports prescribe
-    only the directions of clamps are asked. Energies have no gradients here: those of an equilibrium do.
+    {keywords}
+    values: as in ms.equilibrium.
+
+    At the positions of an equilibrium these are its `energies`. The directions that clamps prescribe are used; other
+    prescribed displacements are not. Energies have no gradients here: those of an equilibrium do.
 
     Raises ValueError on bad input, and where there is no energy: bodies in contact intersect or are nearer than
     they may be, or elements are inside out whose material does not bear it.
@@ -64,26 +68,9 @@ def energies(
     >>> round(stretched["membrane"], 9)  # E h A/2 by the square of a strain of (1.01^2 - 1)/2
     0.000101002
     """
+    arguments = given_to("energies", locals())
     given = {"positions": positions, "edge_rotations": edge_rotations}
-    inputs = inputs_of(
-        scene,
-        {
-            "remanent_magnetization": remanent_magnetization,
-            "applied_flux_density": applied_flux_density,
-            "load_factor": load_factor,
-            "gravity_factor": gravity_factor,
-            "field_factor": field_factor,
-            "support_factor": support_factor,
-            "thickness": thickness,
-            "young_modulus": young_modulus,
-            "poisson_ratio": poisson_ratio,
-            "mass_density": mass_density,
-            "curvature_scale": curvature_scale,
-            "vertex_loads": vertex_loads,
-            "values": values,
-        },
-        ignore_velocity_forces=True,
-    )
+    inputs = inputs_of(scene, arguments, ignore_velocity_forces=True)
     if inputs.leaves or any(map(requires_gradient, given.values())):
         raise ValueError("energies have no gradients: give tensors detached")
     mesh, model = scene.mesh, scene._model

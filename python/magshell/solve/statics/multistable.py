@@ -13,6 +13,7 @@ from ..._input.arrays import count
 from ..._input.scalars import flag, positive
 from ..._runtime.log import log
 from ..._runtime.progress import solve_progress
+from ..._runtime.solve_keywords import given_to
 from ..._runtime.solver_entry_point import grouped, solve_entry
 from ...errors import Interrupted, NotConverged
 from ...model.scene.scene import Scene
@@ -71,7 +72,8 @@ def find_equilibria(
     downhill on both sides of each saddle; and downhill from large pushes along the modes and at random. The result is no
     proof that there are no others: more `attempts` find more. Far beyond its first instability a thin sheet has very many.
 
-    Load parameters, values and ignore_velocity_forces as in ms.equilibrium, for one load case.
+    {keywords}
+    values, ignore_velocity_forces: as in ms.equilibrium, for one load case.
 
     start: an equilibrium, EquilibriumSet, positions (n_v, 3) m, or a list of these: where to look as well, for saddles too
         if they are asked for.
@@ -97,26 +99,12 @@ def find_equilibria(
     >>> len(found), [bool(each.positions[mesh.nearest_vertex((0.05, 0.01, 0)), 2] > 0) for each in found].count(True)
     (2, 1)
     """
+    design = given_to("find_equilibria", locals())
     flag("include_unstable", include_unstable)
     attempts = count("attempts", attempts)
     tolerance = (
         None if distinct_tolerance is None else positive("distinct_tolerance", "m", distinct_tolerance)
     )
-    design = {
-        "remanent_magnetization": remanent_magnetization,
-        "applied_flux_density": applied_flux_density,
-        "load_factor": load_factor,
-        "gravity_factor": gravity_factor,
-        "field_factor": field_factor,
-        "support_factor": support_factor,
-        "thickness": thickness,
-        "young_modulus": young_modulus,
-        "poisson_ratio": poisson_ratio,
-        "mass_density": mass_density,
-        "curvature_scale": curvature_scale,
-        "vertex_loads": vertex_loads,
-        "values": values,
-    }
     with solve_progress("equilibria", progress) as (advance, note):
         search = Search(
             MixedNewton() if solver is None else solver, True, advance, ignore_velocity_forces, note

@@ -16,6 +16,7 @@ from ..._runtime.frozen import immutable
 from ..._runtime.log import log
 from ..._runtime.mixins import AnimateMixin
 from ..._runtime.progress import SolveBar
+from ..._runtime.solve_keywords import given_to
 from ..._runtime.solver_entry_point import grouped, solve_entry
 from ...errors import Interrupted, NotConverged
 from ...mesh.triangles.self_intersections import describe_self_intersections
@@ -213,9 +214,9 @@ def follow_path(
 
     The path parameter is 0 at the load parameters of `start` (an Equilibrium of this scene; by default the rest shape,
     unloaded) and 1 at those given here; it may turn back on the way, and the path with it. The path ends where the
-    parameter passes 1 or `min_parameter`, or where until(parameter, positions) says so. Load parameters as in
-    ms.equilibrium.
+    parameter passes 1 or `min_parameter`, or where until(parameter, positions) says so.
 
+    {keywords}
     values: as in ms.equilibrium. Where `start` was found with other places of field sources, obstacles or supports, or with
         other activations of muscles, those move along the path, on straight lines from the start's to these; everything
         else has to be the same.
@@ -237,6 +238,7 @@ def follow_path(
     >>> path.critical[0].kind
     'bifurcation'
     """
+    arguments = given_to("follow_path", locals())
     solver = MixedNewton() if solver is None else solver
     if not isinstance(solver, Newton):
         raise ValueError(f"solver must be a MixedNewton or a Newton, got {type(solver).__name__}")
@@ -252,16 +254,7 @@ def follow_path(
         raise ValueError(f"until must be a function of (parameter, positions), got {until!r}")
     if start is not None and not isinstance(start, Equilibrium):
         raise ValueError(f"start must be an Equilibrium of this scene, got {type(start).__name__}")
-    inputs = plain_inputs(
-        scene,
-        remanent_magnetization,
-        applied_flux_density,
-        values,
-        load_factor=load_factor,
-        gravity_factor=gravity_factor,
-        field_factor=field_factor,
-        support_factor=support_factor,
-    )
+    inputs = plain_inputs(scene, **arguments)
     state, angle_branches, from_, _ = starting_point(scene, start, inputs)
     moving = AlongPath(inputs, start)
     options = _core.PathOptions()

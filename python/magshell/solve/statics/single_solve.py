@@ -14,10 +14,11 @@ from ..._input.scalars import flag
 from ..._input.tensors import dtype_like, is_tensor, like
 from ..._runtime.keywords import FACTORS
 from ..._runtime.log import log
+from ..._runtime.solve_keywords import names_of
 from ...errors import Interrupted, NotConverged
 from ...model.contact.contacts_to_core import check_apart
 from ...model.scene.field_sampling import warn_of_sampling
-from ...model.scene.replacements import SHELL_NAMES, requested
+from ...model.scene.replacements import requested
 from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs
 from ...model.shells.obtuse_faces import warn_of_obtuse_faces
@@ -104,7 +105,7 @@ def find(
 def inputs_of(scene: Scene, arguments: dict[Any, Any], ignore_velocity_forces: bool = False) -> Inputs:
     """Check the arguments of ms.equilibrium against the scene and return them as Inputs."""
     given = dict(arguments)
-    shell = {name: given.pop(name, None) for name in SHELL_NAMES}
+    shell = {name: given.pop(name, None) for name in names_of("shell")}
     vertex_loads, values = given.pop("vertex_loads", None), given.pop("values", None)
     replaced = requested(scene, vertex_loads, values, **shell) if isinstance(scene, Scene) else None
     magnetization = given.pop("remanent_magnetization", None)

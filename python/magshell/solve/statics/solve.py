@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._runtime.progress import solve_progress
+from ..._runtime.solve_keywords import given_to
 from ..._runtime.solver_entry_point import grouped, solve_entry
 from ...model.scene.scene import Scene
 from ..options import MixedNewton, Newton
@@ -46,12 +47,7 @@ def equilibrium(
 ) -> Equilibrium | Any:  # Equilibria where there are load cases
     """Find a stable equilibrium of a scene, or one for each of several load cases.
 
-    remanent_magnetization: A/m, rest frame, world axes: (n_f, 3), or (3,) on every face. Needed in a scene with a field.
-    applied_flux_density: T, (3,): the value of the scene's UniformField. (k, 3): k load cases, and so many equilibria.
-    load_factor, gravity_factor, field_factor, support_factor: on the loads, gravity, the field sources, and on how far
-        supports with a prescribed motion have gone; (k,) with load cases.
-    thickness, young_modulus, poisson_ratio, mass_density, curvature_scale: stand in for the shell's own in this solve.
-    vertex_loads: N, (n_v, 3): stand in for all forces of the scene's loads.
+    {keywords}
     values: {object of the scene: {name: value}}, stand in for what the objects were made with: the values of loads, the
         displacement, rotation and center of supports that move, positions and moments of Dipoles, the sizes,
         magnetization, center and rotation of a magnet, the flux_density of a SampledField, the center and rotation of a
@@ -85,21 +81,7 @@ def equilibrium(
     >>> rest.stable, bool(rest.positions[:, 2].max() > 0.01)
     (True, True)
     """
-    arguments = {
-        "remanent_magnetization": remanent_magnetization,
-        "applied_flux_density": applied_flux_density,
-        "load_factor": load_factor,
-        "gravity_factor": gravity_factor,
-        "field_factor": field_factor,
-        "support_factor": support_factor,
-        "thickness": thickness,
-        "young_modulus": young_modulus,
-        "poisson_ratio": poisson_ratio,
-        "mass_density": mass_density,
-        "curvature_scale": curvature_scale,
-        "vertex_loads": vertex_loads,
-        "values": values,
-    }
+    arguments = given_to("equilibrium", locals())
     with solve_progress("equilibrium", progress) as (advance, note):
         search = Search(
             MixedNewton() if solver is None else solver, require_stable, advance, ignore_velocity_forces, note
