@@ -34,10 +34,10 @@ def solid_calls(s: Sample) -> Iterator[Call]:
     yield Call(
         "QuadraticTriangleMesh.from_triangles",
         ms.QuadraticTriangleMesh.from_triangles,
-        {"mesh": flat, "place": lambda points: points},
+        {"mesh": flat, "project": lambda points: points},
     )
     yield Call("QuadraticTriangleMesh.fitted", ms.QuadraticTriangleMesh.fitted, {"mesh": flat, "to": flat})
-    yield Call("QuadraticTriangleMesh.refined", six.refined, {"place": lambda points: points})
+    yield Call("QuadraticTriangleMesh.refined", six.refined, {"project": lambda points: points})
     yield Call(
         "QuadraticTriangleMesh.transformed",
         six.transformed,

@@ -145,7 +145,7 @@ def _controls(s: Sample) -> Iterator[Call]:
         {"pieces": [line, control.Polyline([(1, 0, 0), (2, 0, 0)])]},
     )
     yield Call("Polyline.nearest", line.nearest, {"points": track})
-    yield Call("Polyline.at", line.at, {"shares": (0.0, 0.5)})
+    yield Call("Polyline.at", line.at, {"fractions": (0.0, 0.5)})
     yield Call("Curve.squared_distance", line.squared_distance, {"points": track})
     yield Call(
         "control.curve_distance", control.curve_distance, {"track": track, "curve": line, "smoothing": 1e-3}
@@ -202,7 +202,7 @@ def _controls(s: Sample) -> Iterator[Call]:
         "lower": -1.0,
         "upper": (1.0, 2.0),
     }
-    receding |= {"trials": 2, "spread": (0.1, 0.2), "periods": (2, 3), "max_iterations": 2, "tolerance": 1e-3}
+    receding |= {"trials": 2, "trial_amplitude": (0.1, 0.2), "trial_periods": (2, 3), "max_iterations": 2, "tolerance": 1e-3}
     yield Call(
         "control.receding_horizon",
         lambda **a: control.receding_horizon(
