@@ -9,13 +9,13 @@ from . import envs
 from ._core import __version__
 from ._runtime.threads import num_threads, set_num_threads, show_config
 from .design import control, objectives, optim, parametrize
-from .design.ink import PrintableSet
 from .design.minimize import minimize
 from .design.minimum import MinimizeResult
 from .design.multistart.multistart import multistart
 from .design.multistart.sampling import random_starts
 from .design.multistart.starts import MultistartResult
 from .design.printable_minimum import PrintableMinimum, PrintableStage
+from .design.printable_set import PrintableSet
 from .design.printing import minimize_printable
 from .errors import (
     DesignRejected,

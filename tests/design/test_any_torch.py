@@ -87,7 +87,7 @@ def test_ends_once_the_objective_has_settled():
 
 def test_constraints_are_refused():
     x = design(1.0, 2.0)
-    with pytest.raises(ms.ObjectiveFailed, match=r"Adam knows no constraints: use ms\.optim\.MMA"):
+    with pytest.raises(ms.ObjectiveFailed, match=r"Adam cannot handle constraints: use ms\.optim\.MMA"):
         quiet(lambda x: (x.sum(), x - 3), [x], MAKERS["Adam"])
     assert x.tolist() == [1.0, 2.0]
 

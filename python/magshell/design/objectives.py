@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from .._input.quantity import quantity
 from .._input.tensors import detached, positive_number, real_tensor, require_torch, tensor_of
-from .ink import PrintableSet
+from .printable_set import PrintableSet
 
 if TYPE_CHECKING:
     import torch

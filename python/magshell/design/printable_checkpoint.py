@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from .configuration import as_stored, changes, decoded, encoded, load, save
-from .ink import PrintableSet
+from .printable_set import PrintableSet
 
 _PARTS = ("configuration", "faces", "stateful", "history", "search", "exchanges")
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .._runtime.frozen import immutable
-from .ink import PrintableSet
+from .printable_set import PrintableSet
 
 
 @immutable

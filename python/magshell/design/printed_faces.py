@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .ink import PrintableSet
+from .printable_set import PrintableSet
 
 if TYPE_CHECKING:
     import torch

@@ -12,11 +12,11 @@ from .._input.scalars import not_negative
 from .._input.tensors import detached, require_torch
 from .._runtime.progress import progress_bar
 from ..errors import Interrupted, ObjectiveFailed
-from .ink import PrintableSet
 from .jump_policies import checked_stateful
 from .printable_checkpoint import PrintableCheckpoint
 from .printable_minimum import PrintableMinimum, PrintableStage
 from .printable_search import PrintableSearch, Stopped
+from .printable_set import PrintableSet
 from .printed_faces import PrintedFaces
 
 if TYPE_CHECKING:

@@ -24,7 +24,7 @@ from .resume import check_objective, check_same
 if TYPE_CHECKING:
     from .._input.kinds import Optimizing
     from .optim.base import BoxOptimizer
-    from .optim.torch_adapter import AnyTorch
+    from .optim.torch_adapter import TorchAdapter
 
 PARTS = (
     "method",
@@ -72,7 +72,7 @@ class Run:
         if not callable(objective):
             raise ValueError(f"objective must be a function of the parameters, got {objective!r:.60}")
         self.parameters: list[Any] = _checked_parameters(parameters)
-        self.optimizer: BoxOptimizer | AnyTorch = _adapted(
+        self.optimizer: BoxOptimizer | TorchAdapter = _adapted(
             optimizer(self.parameters) if callable(optimizer) else optimizer
         )
         if {id(p) for p in self.parameters} != {id(p) for p in self.optimizer.parameters}:
@@ -103,7 +103,7 @@ class Run:
     @property
     def method(self) -> str:
         """The class name of the optimizer."""
-        return _name(getattr(self.optimizer, "optimizer", self.optimizer))  # AnyTorch wraps an optimizer
+        return _name(getattr(self.optimizer, "optimizer", self.optimizer))  # TorchAdapter wraps an optimizer
 
     @property
     def rejected(self) -> int:
@@ -272,12 +272,12 @@ class Run:
 def _adapted(optimizer):
     """Return the optimizer with the interface of BoxOptimizer; one of torch.optim is wrapped."""
     from .optim.base import BoxOptimizer
-    from .optim.torch_adapter import AnyTorch
+    from .optim.torch_adapter import TorchAdapter
 
     if isinstance(optimizer, BoxOptimizer):
         return optimizer
     if isinstance(optimizer, require_torch("minimize").optim.Optimizer):
-        return AnyTorch(optimizer)
+        return TorchAdapter(optimizer)
     raise ValueError(
         "optimizer must be one of ms.optim or torch.optim, or a function that makes one from the parameters, "
         f"got {optimizer!r:.60}"

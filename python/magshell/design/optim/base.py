@@ -1,4 +1,4 @@
-"""Base class of the optimizers: bounds of each parameter group, and a state that survives a restart."""
+"""Base class of the optimizers in `ms.optim`: torch optimizers with bounds, whose state can be saved and resumed."""
 
 from __future__ import annotations
 
@@ -19,39 +19,42 @@ from .stagnation import STAGNATION
 
 
 class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
-    """A torch optimizer whose groups have bounds. `step(closure)` moves the parameters and returns the new objective.
+    """A torch optimizer whose parameter groups have bounds (the box) and typical sizes (`scale`).
 
-    The closure returns the objective (or the objective and constraints) at the current parameters and does not call
-    backward. Its result at the end of a step is stored for the next step; with another closure object, or parameters
-    that were changed in between, the next step calls the closure again.
+    `step(closure)` moves the parameters and returns the new objective. The closure returns the objective, or the objective
+    and constraints, at the current parameters; unlike torch's closures it does not call backward. Its result at the end of a
+    step is stored for the next step. The next step calls the closure again only if it gets another closure object, or if the
+    parameters were changed in between.
 
-    A closure may raise `ms.DesignRejected`: the step is then shortened, up to `max_backtracks` times, before the last
-    rejection is raised. A step that raises leaves parameters and state as they were.
+    A closure may raise `ms.DesignRejected` for a design that it cannot evaluate. The step is then shortened and repeated, up
+    to `max_backtracks` times; after that the last DesignRejected is raised. If a step raises an error, parameters and state
+    remain as they were before it.
+
+    A subclass defines `_advance` and `_full_step`.
     """
 
-    _copied = (
-        "_run",
-        "_sample",
-        "_sample_x",
-        "max_backtracks",
-    )  # attributes that a copy takes along, beyond torch's own
+    # Attributes that a copy or pickle contains, in addition to those of torch's optimizer.
+    _copied_attributes = ("_run", "_sample", "_sample_x", "max_backtracks")
 
-    stagnation = STAGNATION  # the reason to give if a step changes nothing
+    stagnation = STAGNATION  # why a search ends if a step changes nothing, in words
 
     def __init__(self, params: Iterable[Any], defaults: dict[Any, Any], max_backtracks: int):
         if not (isinstance(max_backtracks, int) and max_backtracks >= 0):
             raise ValueError(f"max_backtracks must be an integer, 0 or more, got {max_backtracks!r}")
         self.max_backtracks = max_backtracks
-        self._run: dict[Any, Any] = {}
+        self._run: dict[
+            Any, Any
+        ] = {}  # state of the method, such as its history; empty before the first step
         Iterate.__init__(self)
         torch.optim.Optimizer.__init__(self, listed("params", params, is_tensor), defaults)
 
     def step(self, closure: Callable[..., Any]) -> float:
-        """Move the parameters by one step, within their box, and return the objective there.
+        """Move the parameters by one step within their bounds, and return the objective at the new parameters.
 
         closure: a function without arguments that returns the objective at the current parameters, a scalar tensor, or
-        (objective, constraints), with constraints <= 0 if satisfied; it does not call backward. Its errors are raised with
-        parameters and state as they were; ValueError if it returns anything else.
+        (objective, constraints), with constraints <= 0 if satisfied; it does not call backward.
+
+        Raises ValueError or TypeError if the closure returns anything else, and passes on the errors that it raises.
         """
         sample = self.evaluate(closure)
         self._check_sample(sample)
@@ -60,9 +63,10 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
         return self._sample.objective
 
     def full_step(self, closure: Callable[..., Any]) -> float:
-        """Take the step that `step` would try first, whatever the objective is there, and return the objective.
+        """Take the first step that `step` would try, even if the objective grows, and return the new objective.
 
-        It reaches a design beyond a jump of the equilibrium, which no shorter step reaches.
+        It serves to pass a jump of the equilibrium, at which the objective is discontinuous: `step` would shorten the step
+        until it ends before the jump.
         """
         sample = self.evaluate(closure)
         self._check_sample(sample)
@@ -76,7 +80,7 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
         Raises ValueError after the first step, and for unknown options.
         """
         if self._run:
-            raise ValueError("a parameter group cannot join a run that has begun: make a new optimizer")
+            raise ValueError("a parameter group cannot be added after the first step: make a new optimizer")
         unknown = set(param_group) - {"params", "param_names", *self.defaults}
         if unknown:
             raise ValueError(
@@ -96,12 +100,15 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
             raise
 
     def state_dict(self) -> dict[Any, Any]:
-        """Return torch's state dict, with the state of the run under "run"; safe to load with `weights_only`."""
+        """Return torch's state dict, with the state of the method and the stored sample under "run".
+
+        Saved by `torch.save`, it can be loaded with `weights_only=True`.
+        """
         run = {name: as_tensor(value) for name, value in self._run.items()}
         return {**super().state_dict(), "run": {**run, **self._sample_state()}}
 
     def load_state_dict(self, state_dict: dict[Any, Any]) -> None:
-        """Continue from the `state_dict` of another optimizer, with the same steps to the bit.
+        """Continue from a `state_dict`. The next steps are bitwise identical to those of the optimizer that made it.
 
         Raises ValueError for the state of another kind of optimizer, or of other parameters.
         """
@@ -114,32 +121,31 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
         self._run = {name: as_array(value) for name, value in state_dict["run"].items() if name not in sample}
 
     def configuration(self) -> dict[Any, Any]:
-        """Return {name: number or array} of all options: the box, the groups' options and the method's."""
+        """Return {name: number or array} of all options: bounds and scales, those of the method and of each group."""
         box = self._box()
-        options = {
-            name: getattr(box, name) + 0.0 for name in ("lower", "upper", "scale")
-        }  # adding 0.0 turns -0.0, which is the same bound, into 0.0
-        options |= {name: getattr(self, name) for name in self._copied if not name.startswith("_")}
+        # -0.0 and 0.0 are the same bound: adding 0.0 turns -0.0 into 0.0.
+        options = {name: getattr(box, name) + 0.0 for name in ("lower", "upper", "scale")}
+        options |= {name: getattr(self, name) for name in self._copied_attributes if not name.startswith("_")}
         return options | group_options(self.param_groups, set(options))
 
     def __getstate__(self) -> dict[Any, Any]:
-        """Return what a copy or pickle takes along, all but the closure."""
-        copied = {name: getattr(self, name) for name in self._copied}
+        """Return the attributes that a copy or pickle contains. The closure is left out."""
+        copied = {name: getattr(self, name) for name in self._copied_attributes}
         return {**super().__getstate__(), **copied, "_closure": None}
 
     @abstractmethod
     def _advance(self, sample: Sample, box: Box, x: np.ndarray) -> None:
-        """Take one step from the design x."""
+        """Take one step from the design x (n,), at which the closure returned `sample`."""
 
     @abstractmethod
     def _full_step(self, sample: Sample, box: Box, x: np.ndarray) -> None:
-        """Take the first step that `_advance` would try, whatever its objective is."""
+        """Take the first step that `_advance` would try, even if the objective grows."""
 
     def _check_group(self, group: dict[Any, Any], box: Box) -> None:
-        """Check a group's options beyond its bounds. Raises ValueError."""
+        """Check the options of a group other than bounds and scale. Raises ValueError."""
 
     def _check_sample(self, sample: Sample) -> None:
-        """Check the closure's return value for this method. Raises ValueError."""
+        """Check that the method can handle what the closure returned, such as constraints. Raises ValueError."""
 
     def _check_design(self, x: np.ndarray) -> None:
         self._box().check_inside(x)
@@ -148,13 +154,16 @@ class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):
         return boxes.join([boxes.group_box(number, group) for number, group in enumerate(self.param_groups)])
 
     def _option(self, name: str) -> np.ndarray:
-        """Return a group's option, (n,): one entry for each entry of its parameters."""
+        """Return an option of the groups for each entry of the design, (n,)."""
         sizes = [sum(parameter.numel() for parameter in group["params"]) for group in self.param_groups]
         return np.repeat([float(group[name]) for group in self.param_groups], sizes)
 
 
 def group_options(groups: list[dict[Any, Any]], without: set[str]) -> dict[Any, Any]:
-    """Return the options of parameter groups, {"name of group number": value}."""
+    """Return the options of parameter groups as {"<name> of group <number>": value}.
+
+    without: names of options to leave out.
+    """
     left_out = {"params", "param_names", *without}
     return {
         f"{name} of group {number}": value
@@ -172,7 +181,7 @@ def require_range(group: dict[Any, Any], name: str, low: float, high: float) -> 
 
 
 def check_parameter(parameter: torch.Tensor) -> None:
-    """Check that a parameter is real and requires a gradient. Raises ValueError."""
+    """Check that a parameter has a floating-point dtype and requires a gradient. Raises ValueError."""
     if not parameter.is_floating_point():
         raise ValueError(f"a parameter must be real, got dtype {parameter.dtype}")
     if not parameter.requires_grad:

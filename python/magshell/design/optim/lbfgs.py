@@ -56,7 +56,7 @@ class LBFGS(BoxOptimizer):
     max_evaluations: int
     memory: int
 
-    _copied = (*BoxOptimizer._copied, "memory", "first_step", "max_evaluations")
+    _copied_attributes = (*BoxOptimizer._copied_attributes, "memory", "first_step", "max_evaluations")
 
     @grouped()
     def __init__(

@@ -51,7 +51,7 @@ class MMA(BoxOptimizer):
     7.9365
     """
 
-    _copied = (*BoxOptimizer._copied, "penalty")
+    _copied_attributes = (*BoxOptimizer._copied_attributes, "penalty")
 
     @grouped()
     def __init__(

@@ -1,4 +1,4 @@
-"""Gives other torch optimizers the interface that `ms.minimize` uses."""
+"""Adapter of the optimizers of torch.optim to the interface that `ms.minimize` uses."""
 
 from __future__ import annotations
 
@@ -15,14 +15,16 @@ from .iterate import Iterate, Restoring
 from .sample import Sample
 
 
-class AnyTorch(Iterate):
-    """A torch optimizer that is asked for one step after the other, and knows the objective at the current design.
+class TorchAdapter(Iterate):
+    """An optimizer of torch.optim with the interface of BoxOptimizer, without bounds and constraints.
 
-    Each step gets a closure, which returns the stored sample if the design is known; an optimizer whose step takes
-    no closure finds the parameters' gradients. There are no constraints and no bounds. A step that leads to a
-    rejected design, or meets one on its way, is undone and repeated with half the learning rate, up to
-    `max_backtracks` times; a line search of torch's own, which extends steps, may meet it again each time. A step
-    that raises leaves parameters and the optimizer's state as they were.
+    The objective and its gradient at the current design are stored, and not computed again for the next step. They are
+    passed to torch in the closure of its step and in the `.grad` of the parameters, because some optimizers take no closure.
+
+    If a step ends at a design that the user's closure rejects (`ms.DesignRejected`), or evaluates one on the way, the step
+    is undone and repeated with half the learning rate, up to `max_backtracks` times. This may not help an optimizer with a
+    line search, which can extend the shorter step to a rejected design again. If a step raises an error, parameters and
+    optimizer state remain as they were before it.
     """
 
     max_backtracks: int
@@ -40,17 +42,19 @@ class AnyTorch(Iterate):
         return self.optimizer.param_groups
 
     def step(self, closure: Callable[..., Any]) -> float:
-        """Move the parameters by one step, with the learning rate halved after each rejection, and return the
-        objective there."""
-        for shortening in range(self.max_backtracks + 1):
+        """Move the parameters by one step, with the learning rate halved after each rejection.
+
+        Returns the objective at the new parameters. Raises the last DesignRejected after `max_backtracks` halvings.
+        """
+        for halvings in range(self.max_backtracks + 1):
             try:
-                return self._step(closure, factor=0.5**shortening)
+                return self._step(closure, factor=0.5**halvings)
             except DesignRejected:
-                if shortening == self.max_backtracks:
+                if halvings == self.max_backtracks:
                     raise
 
     def full_step(self, closure: Callable[..., Any]) -> float:
-        """Take the step at the full learning rate, whatever the objective is there."""
+        """Take a step at the full learning rate, without repetition after a rejection, and return the objective."""
         return self._step(closure, factor=1.0)
 
     def state_dict(self) -> dict[Any, Any]:
@@ -61,11 +65,14 @@ class AnyTorch(Iterate):
         self._load_sample(state_dict["sample"])
 
     def configuration(self) -> dict[Any, Any]:
-        """Return {name: value} of the groups' options."""
+        """Return {name: value} of `max_backtracks` and of the options of all parameter groups."""
         return {"max_backtracks": self.max_backtracks, **group_options(self.param_groups, set())}
 
     def _step(self, closure: Callable[..., Any], factor: float) -> float:
-        """Take a step with the learning rates times a factor, and return the objective there."""
+        """Take a step with all learning rates multiplied by a factor, and return the objective at the new parameters.
+
+        If it raises, parameters, gradients and optimizer state are restored. The learning rates are restored in any case.
+        """
         begin = self.evaluate(closure)
         self._refuse_constraints(begin)
         x, state = self._sample_x, copy.deepcopy(self.optimizer.state_dict())
@@ -76,7 +83,7 @@ class AnyTorch(Iterate):
                 for group, rate in zip(self.param_groups, rates, strict=True):
                     if rate is not None:
                         group["lr"] = factor * rate
-                self._move(closure)
+                self._take_torch_step(closure)
                 reached = self.evaluate(closure)
         except BaseException:
             self.optimizer.load_state_dict(state)
@@ -88,21 +95,24 @@ class AnyTorch(Iterate):
                     group["lr"] = rate
         return reached.objective
 
-    def _move(self, closure: Callable[..., Any]) -> None:
-        def answer() -> torch.Tensor:
+    def _take_torch_step(self, closure: Callable[..., Any]) -> None:
+        """Call torch's `step`, with a closure that computes objective and gradients if torch takes one."""
+
+        def torch_closure() -> torch.Tensor:
             sample = self.evaluate(closure)
             self._refuse_constraints(sample)
             self._leave_gradients(sample.gradient)
             return torch.tensor(sample.objective, dtype=torch.float64)
 
         if self._takes_closure:
-            self.optimizer.step(answer)
+            self.optimizer.step(torch_closure)
         else:
             self.optimizer.step()
 
     def _refuse_constraints(self, sample: Sample) -> None:
+        """Raise ValueError if the closure returned constraints."""
         if len(sample.constraints):
             raise ValueError(
-                f"{type(self.optimizer).__name__} knows no constraints: "
+                f"{type(self.optimizer).__name__} cannot handle constraints: "
                 "use ms.optim.MMA or GCMMA, or add them to the objective as a penalty"
             )
