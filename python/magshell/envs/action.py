@@ -9,7 +9,7 @@ import numpy as np
 from .._input.quantity import quantity
 from .._runtime.frozen import Frozen
 from .._runtime.keywords import CONTROLS, FLUX_DENSITY, controls_of, nearest_first
-from ..model.scene.time_series import may_jump, names_in_time, row_in_time
+from ..model.scene.time_varying import may_jump, names_in_time, row_in_time
 
 if TYPE_CHECKING:
     from .._input.kinds import Numbers

@@ -10,7 +10,7 @@ from ..._runtime.keywords import controls_of, meant, nearest_first
 from ..._runtime.solve_keywords import SOLVE_KEYWORDS
 from ..loads.loads import DeadLoad
 from ..shells.shell import Shell
-from .time_series import refuse_functions
+from .time_varying import refuse_functions
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..._input.scalars import positive
-from ...model.scene.time_series import names_in_time, values_between
+from ...model.scene.time_varying import names_in_time, values_between
 from ..results.state import State
 from ..results.units import clock
 from .limits import check_frames

@@ -20,13 +20,12 @@ from ...model.scene.solve_inputs import Inputs
 from ..options import Clock, Integrator, Newton, clock_of
 from ..statics.equilibrium import Equilibrium
 from ..statics.start import check_faces
-from .in_time import InTime
-from .schedule import scheduled
+from .schedule import Schedule, TimePoints
+from .scheduled_values import ScheduledValues
 from .trajectory import MotionState, Trajectory
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
-    from ...model.scene.time_series import TimeSeries
     from ..options import AdjointStorage
 
 
@@ -55,7 +54,7 @@ class MotionInputs:
         start: Any,
         integrator: Integrator,
         solver: Newton,
-        time_series: Iterable[TimeSeries] = (),
+        schedules: Iterable[Schedule] = (),
     ):
         self.inputs, self.integrator = inputs, integrator
         self.steps, self.record_every = count("steps", steps), count("record_every", record_every)
@@ -76,13 +75,15 @@ class MotionInputs:
         law = self._viscosity(arguments)
         self.start: MotionState = self._begin(start, arguments["velocities"])
         self.clock: Clock = clock_of(self.start).going_on(self.time_step)
-        self.n_time_points: int = self.steps * (len(integrator._times) + 1)
+        self.time_points: TimePoints = TimePoints(
+            self.steps, integrator._times, self.clock, self.given_time_step
+        )
         self._load_parameters = {
             name: self._controls(name, value)
             for name, value in arguments.items()
             if name in SOLVE_KEYWORDS and SOLVE_KEYWORDS[name].varies
         }
-        self._in_time = InTime(self, list(time_series))
+        self._scheduled = ScheduledValues(self, list(schedules))
         if self._outside is not None:
             check_outside(inputs.scene, inputs.values, self._outside, 0.0)
         self.core: _core.MotionInput = _core.MotionInput(
@@ -100,7 +101,7 @@ class MotionInputs:
                 "time_step": self.time_step,
                 "steps": self.steps,
                 "controls": self._all_controls(),
-                "varying": self._in_time.entries,
+                "varying": self._scheduled.entries,
                 "newton": solver._newton_options(),
                 "projective": getattr(integrator, "_projective", None),
                 "record_every": self.record_every,
@@ -109,24 +110,19 @@ class MotionInputs:
 
     def recorded(self, name: str, count: int) -> np.ndarray:
         """Return a load parameter at the first `count` recorded states, the start among them, (count, *row)."""
-        return self._load_parameters[name][self._recorded_points(count)]
+        return self._load_parameters[name][self.time_points.recorded(count, self.record_every)]
 
     def varied(self, count: int) -> dict[tuple[Any, ...], np.ndarray]:
         """Return the varying values of objects at the first `count` recorded states, {(object, name): (count, ...)}."""
-        at = self._recorded_points(count)
-        return {key: rows[at] for key, rows in self._in_time.varied.items()}
-
-    def _recorded_points(self, count: int) -> np.ndarray:
-        a_step = len(self.integrator._times) + 1
-        ends = a_step * self.record_every * np.arange(1, count) - 1
-        return np.concatenate([[0], ends])
+        at = self.time_points.recorded(count, self.record_every)
+        return {key: rows[at] for key, rows in self._scheduled.varied.items()}
 
     def _all_controls(self) -> np.ndarray:
         """Return all load parameters at all time points in the core's layout, (time points, m)."""
-        layout, moving = self.inputs.scene._control_layout, {**self._poses(), **self._in_time.poses}
+        layout, moving = self.inputs.scene._control_layout, {**self._poses(), **self._scheduled.poses}
         rows = {("scene", name): array for name, array in self._load_parameters.items()}
         rows |= {(f"obstacle {k}", "pose"): array for k, array in moving.items()}
-        return np.concatenate([layout.rows(rows, self.n_time_points), self._in_time.rows], axis=1)
+        return np.concatenate([layout.rows(rows, len(self.time_points)), self._scheduled.rows], axis=1)
 
     def _poses(self) -> dict[int, np.ndarray]:
         """Return the poses at all time points of obstacles that have a `motion`, {number: (time points, 4, 3)}."""
@@ -134,8 +130,7 @@ class MotionInputs:
         moving = {k: values.current(each) for k, each in enumerate(obstacles) if each.motion is not None}
         if moving:
             self.inputs.refuse("time_step", self.given_time_step, "obstacles move by a function of the time")
-        fractions = np.array((0.0, *self.integrator._times))
-        times = self.clock.at(np.arange(self.steps)[:, None], fractions).ravel()
+        times = self.time_points.times
         return {k: poses(each, times) for k, each in moving.items()}
 
     def _controls(self, name: str, value) -> np.ndarray:
@@ -146,21 +141,24 @@ class MotionInputs:
             value = np.zeros(3)
         elif name == "applied_flux_density" and not self.inputs.scene.has_uniform_field:
             raise ValueError("applied_flux_density was given, but the scene has no UniformField")
-        numbers = self.at_time_points(name, unit, value, row)
+        numbers = self.at_time_points(Schedule(self.inputs.scene, name, unit, row, value))
         if name == "applied_flux_density":
             warn_of_field(self.inputs.scene, np.asarray(detached(numbers)))
         return np.ascontiguousarray(self.inputs.take(name, numbers), dtype=np.float64)
 
-    def at_time_points(self, name: str, unit: str, value: Any, row: tuple[int, ...]) -> Any:
-        """Return a value at all time points, given in one of the forms of `scheduled`; a tensor stays in its graph."""
+    def at_time_points(self, schedule: Schedule) -> Any:
+        """Return a value at all time points; a tensor stays in its graph."""
         time_step = self.given_time_step
-        numbers = scheduled(name, unit, value, row, self.steps, self.integrator._times, self.clock, time_step)
+        numbers = schedule.at(self.time_points)
         if (
-            callable(value)
+            callable(schedule.value)
             and requires_gradient(time_step)
             and not _differentiable_in_time(numbers, time_step)
         ):
-            why = f"{name} is a function of the time that torch cannot follow; make its values from the time by torch"
+            why = (
+                f"{schedule.name} is a function of the time that torch cannot follow; make its values from the time by "
+                "torch"
+            )
             self.inputs.refuse("time_step", time_step, why)
         return numbers
 

@@ -12,7 +12,7 @@ from ..._input.quantity import shape_of
 from ..._input.tensors import detached, is_tensor, require_torch
 from ...model.contact.obstacles._motion import CENTRAL, FORWARD, STEP
 from ...model.supports import constraints
-from .schedule import scheduled
+from .schedule import Schedule
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
@@ -38,9 +38,8 @@ class ObstaclePath:
         }
         rows = []
         for (name, value), unit in zip(self._given.items(), ("m", "rad"), strict=True):
-            rows.append(
-                (asked.at_time_points(name, unit, value, (3,)), self._rates(asked, name, unit, value))
-            )
+            schedule = Schedule(obstacle, name, unit, (3,), value)
+            rows.append((asked.at_time_points(schedule), self._rates(asked, schedule)))
         xp, ((center, velocity), (rotation, rate)) = alike(rows)
         self.poses: Any = xp.stack((center, rotation, velocity, spin(xp, rotation, rate)), 1)
 
@@ -62,18 +61,18 @@ class ObstaclePath:
         return self._time_step.new_tensor(time).double() if is_tensor(self._time_step) else time
 
     @staticmethod
-    def _rates(asked, name: str, unit: str, value):
+    def _rates(asked: MotionInputs, schedule: Schedule):
         """Return the rate of a value at all time points, (time points, 3)."""
+        name, unit, value = schedule.name, schedule.unit, schedule.value
         if callable(value):
-            return asked.at_time_points(
-                f"the rate of {name}", f"{unit}/s", lambda time: _slope(value, time), (3,)
+            rate = Schedule(
+                schedule.owner, f"the rate of {name}", f"{unit}/s", (3,), lambda t: _slope(value, t)
             )
+            return asked.at_time_points(rate)
         if len(shape_of(name, value)) == 1:
-            return np.zeros((asked.n_time_points, 3))
+            return np.zeros((len(asked.time_points), 3))
         slopes = _slopes(value, asked.given_time_step)
-        return scheduled(
-            name, unit, slopes, (3,), asked.steps, asked.integrator._times, asked.clock, asked.given_time_step
-        )
+        return Schedule(schedule.owner, name, unit, (3,), slopes).at(asked.time_points)
 
 
 @dataclass(frozen=True)
@@ -169,7 +168,7 @@ def _mapped(values, change):
 def check_supports(asked: MotionInputs, prescribed: list[Any]) -> None:
     """Raises ValueError where a support is moved, at the end of a step, against another that holds the same vertex.
 
-    prescribed: (time series of a support, its value at all time points).
+    prescribed: (schedule of a value of a support, its value at all time points).
     """
     scene, values = asked.inputs.scene, asked.inputs.values
     moving = {id(each.owner) for each, _ in prescribed}
@@ -188,10 +187,10 @@ def check_supports(asked: MotionInputs, prescribed: list[Any]) -> None:
     if not any(np.isin(vertices, shared).any() for key, vertices in held.items() if key in moving):
         return
     a_step = len(asked.integrator._times) + 1
-    for k in (0, *range(a_step - 1, asked.n_time_points, a_step)):
+    for k in (0, *range(a_step - 1, len(asked.time_points), a_step)):
         now: dict[Any, Any] = {}
-        for series, numbers in prescribed:
-            now.setdefault(series.owner, {})[series.name] = np.asarray(detached(numbers))[k]
+        for schedule, numbers in prescribed:
+            now.setdefault(schedule.owner, {})[schedule.name] = np.asarray(detached(numbers))[k]
         supports = [values.current(each) for each in scene.supports]
         supports = [
             there.replaced(**now[each]) if each in now else there

@@ -21,7 +21,6 @@ from ...model.scene.field_sampling import warn_of_sampling
 from ...model.scene.replacements import requested
 from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs
-from ...model.scene.time_series import split_time_series
 from ...model.shells.obtuse_faces import warn_of_obtuse_faces
 from ...model.shells.shell import Shell
 from ...model.shells.strains import StrainHistory, warn_if_large
@@ -38,6 +37,7 @@ from ..options import (
     as_adjoint_storage,
 )
 from .motion_inputs import MotionInputs
+from .schedule import split_schedules
 from .trajectory import MotionState, Trajectory
 
 if TYPE_CHECKING:
@@ -145,7 +145,7 @@ def simulate(
         in_time=True,
         **{name: arguments.pop(name) for name in names_of("shell")},
     )
-    replaced, time_series = split_time_series(scene, replaced)
+    replaced, schedules = split_schedules(scene, replaced)
     uniform = np.zeros(3) if scene.has_uniform_field else None
     if integrator is None:
         integrator = ImplicitEuler() if scene.contacts else TRBDF2()
@@ -171,7 +171,7 @@ def simulate(
         start=start,
         integrator=integrator,
         solver=solver,
-        time_series=time_series,
+        schedules=schedules,
     )
     began = time.perf_counter()
     with inputs.in_core(), SolveBar("simulate", progress) as bar:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...model.contact.obstacles import Obstacle
 from ...model.scene.solve_inputs import Inputs
-from ...model.scene.time_series import names_in_time, values_between
+from ...model.scene.time_varying import names_in_time, values_between
 from ...model.scene.values import Values
 from ...model.supports.supports import Support
 

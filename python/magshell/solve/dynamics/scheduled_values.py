@@ -9,16 +9,16 @@ import numpy as np
 from ...model.actuators.actuator import Actuator
 from ...model.contact.obstacles import Obstacle
 from ...model.fields.field import AppliedField
-from ...model.scene.time_series import TimeSeries
 from ...model.shells.shell import Shell
 from ...model.supports.supports import Support
 from .obstacle_paths import ObstaclePath, check_supports
+from .schedule import Schedule
 
 if TYPE_CHECKING:
     from .motion_inputs import MotionInputs
 
 
-class InTime:
+class ScheduledValues:
     """The values of a scene that change during one motion, at all its time points.
 
     entries: indices of these values in the core's vector of values; rows: (time points, m), the numbers, which follow the
@@ -26,36 +26,36 @@ class InTime:
     name): (time points, ...)}.
     """
 
-    def __init__(self, asked: MotionInputs, time_series: list[TimeSeries]):
+    def __init__(self, asked: MotionInputs, schedules: list[Schedule]):
         self._asked = asked
         self._layout = list(asked.inputs.scene._value_layout)
         self._slices: dict[tuple[int, str], list[slice]] = {}
         self.entries: list[int] = []
         self.poses: dict[int, np.ndarray] = {}
         self.varied: dict[tuple[Actuator | Shell | AppliedField, str], np.ndarray] = {}
-        for each in time_series:
+        for each in schedules:
             each.check(asked.steps)
-        of_values = [each for each in time_series if not isinstance(each.owner, Obstacle)]
-        numbers_of = [asked.at_time_points(each.name, each.unit, each.value, each.row) for each in of_values]
+        of_values = [each for each in schedules if not isinstance(each.owner, Obstacle)]
+        numbers_of = [asked.at_time_points(each) for each in of_values]
         check_supports(
             asked,
             [(c, k) for c, k in zip(of_values, numbers_of, strict=True) if isinstance(c.owner, Support)],
         )
-        rows = [np.zeros((asked.n_time_points, 0))]
+        rows = [np.zeros((len(asked.time_points), 0))]
         for each, given in zip(of_values, numbers_of, strict=True):
             numbers = np.reshape(
-                asked.inputs.take(each.name, given, _Values(self, each)), (asked.n_time_points, -1)
+                asked.inputs.take(each.name, given, _Values(self, each)), (len(asked.time_points), -1)
             )
             if isinstance(each.owner, Actuator | Shell | AppliedField):
                 now = self.varied[each.owner, each.name] = numbers.reshape(-1, *each.row)
                 each.owner._check_in_time(each.name, now)
             rows += [numbers] * self._add(each, numbers.shape[1])
         self.rows: np.ndarray = np.concatenate(rows, axis=1)
-        self._add_obstacles([each for each in time_series if isinstance(each.owner, Obstacle)])
+        self._add_obstacles([each for each in schedules if isinstance(each.owner, Obstacle)])
 
-    def _add(self, each: TimeSeries, width: int) -> int:
+    def _add(self, schedule: Schedule, width: int) -> int:
         """Find the slices of a value in the core's vectors and return how many there are."""
-        owner, values = each.owner, self._asked.inputs.values
+        owner, values = schedule.owner, self._asked.inputs.values
         labels = [label for each, label in self._asked.inputs.scene._labels if each is owner]
         if isinstance(owner, Support):
             labels = [label for label, _ in owner._moves(values)]
@@ -65,27 +65,27 @@ class InTime:
                 )
         end = self._asked.inputs.scene._control_layout.size
         end += sum(part.stop - part.start for slices in self._slices.values() for part in slices)
-        slices = self._slices[id(owner), each.name] = []
+        slices = self._slices[id(owner), schedule.name] = []
         for label in labels:
-            self.entries.append(self._layout.index((label, each.name)))
+            self.entries.append(self._layout.index((label, schedule.name)))
             slices.append(slice(end, end + width))
             end += width
         return len(labels)
 
-    def _add_obstacles(self, time_series: list[TimeSeries]) -> None:
+    def _add_obstacles(self, schedules: list[Schedule]) -> None:
         values, obstacles = self._asked.inputs.values, self._asked.inputs.scene.obstacles
         for k, obstacle in enumerate(obstacles):
-            if its_own := {each.name: each.value for each in time_series if each.owner is obstacle}:
+            if its_own := {each.name: each.value for each in schedules if each.owner is obstacle}:
                 path = ObstaclePath(self._asked, obstacle, its_own)
                 self.poses[k] = self._asked.inputs.take("center", path.poses, _Pose(k))
                 values.move(obstacle, path)
 
 
 class _Values:
-    """The owner of one time series as a leaf: gives its gradient at all time points."""
+    """The owner of one schedule as a leaf: gives its gradient at all time points."""
 
-    def __init__(self, in_time: InTime, each: TimeSeries):
-        self._slices, self._key = in_time._slices, (id(each.owner), each.name)
+    def __init__(self, scheduled: ScheduledValues, schedule: Schedule):
+        self._slices, self._key = scheduled._slices, (id(schedule.owner), schedule.name)
 
     def by_time_points(self, gradient: Any) -> np.ndarray:
         return sum(gradient.of_controls(part) for part in self._slices[self._key])
