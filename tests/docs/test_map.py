@@ -72,3 +72,12 @@ def test_files_that_a_page_names_exist(page):
     named = PATH.findall(page.read_text())
     assert [name for name in named if not (ROOT / name).exists()] == []
     assert named or page is not MAP
+
+
+def test_functions_on_the_way_of_the_magnetization_exist_in_their_files():
+    stays = rows("One input there and back: `remanent_magnetization`")
+    assert len(stays) == 5
+    for _, there, back, files in stays:
+        sources = "".join((ROOT / each).read_text() for each in names(files))
+        for function in (names(there)[0], names(back)[0]):
+            assert re.search(rf"\b(?:def|void) {function}\(", sources), function

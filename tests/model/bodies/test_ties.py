@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import magshell as ms
+from magshell.model.contact.contacts_to_core import contact_points
 
 LENGTH, WIDTH = 0.04, 0.01
 FULL = ms.meshes.rectangle(LENGTH, WIDTH, cells=(8, 2))
@@ -108,10 +109,10 @@ def test_coinciding_vertices_of_tied_bodies_are_counted_once():
     scene = ms.Scene(
         [left, right], ties=[tie], contacts=[floor], gravity=(0, 0, -1.0), allow_rigid_motions=True
     )
-    vertices = scene._bodies.contact_points(floor)[0]
+    vertices = contact_points(scene._bodies, floor)[0]
     assert len(np.unique(scene._bodies.original[vertices[:, 0]])) == len(vertices) == scene._bodies.n_vertices
     only = ms.Contact(ms.obstacles.Plane((0, 0, 1.0)), contact_stiffness=5.0, body=right)
-    assert len(scene._bodies.contact_points(only)[0]) == right.mesh.n_vertices
+    assert len(contact_points(scene._bodies, only)[0]) == right.mesh.n_vertices
 
 
 def test_copies_and_scenes_of_three():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import cached_property
 from itertools import takewhile
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -23,9 +23,6 @@ from .body_ranges import Span, magnetized_rows, rotations_of, turning_edges
 from .joined_mesh import JoinedMesh, NoMesh
 from .ties import Tie, first_of_welded, joined_components
 
-if TYPE_CHECKING:
-    from ..contact.contact import Contact
-
 BODIES = (Shell, Solid)
 
 
@@ -33,7 +30,7 @@ class Bodies:
     """The bodies of a scene, and the numbers of their vertices, edges and faces among those of all.
 
     shells: all Shells and Solids. rigid: the rigid bodies, links among them, whose points come after all vertices.
-    rigid_in_contact: those rigid bodies whose own shape is in a contact; its vertices come after the points of all.
+    with_surface_nodes: rigid bodies whose shapes have nodes of their own, after the points of all (`add_surface_nodes`).
     original: (n_v of all,), the first of the vertices that each is welded to, or itself.
 
     Raises ValueError if a body is no Shell, Solid, RigidBody or Skeleton, or is given twice, or if a tie is impossible.
@@ -43,9 +40,8 @@ class Bodies:
         self,
         bodies: Shell | Solid | RigidBody | Skeleton | Iterable[Shell | Solid | RigidBody | Skeleton],
         ties: Iterable[Tie] = (),
-        rigid_in_contact: Iterable[RigidBody] = (),
     ):
-        self.rigid_in_contact: tuple[RigidBody, ...] = tuple(rigid_in_contact)
+        self.with_surface_nodes: tuple[RigidBody, ...] = ()
         listed = checked_list("bodies", bodies, (*BODIES, RigidBody, Skeleton), repeats=True)
         self.skeletons: tuple[Skeleton, ...] = tuple(body for body in listed if isinstance(body, Skeleton))
         self.listed: tuple[Any, ...] = tuple(listed)
@@ -257,15 +253,18 @@ class Bodies:
     def n_rows(self) -> int:
         """The number of rows of an array over all points as a caller counts them.
 
-        These are the vertices of all bodies, the points of rigid bodies, and the vertices of rigid bodies' shapes in
-        contact.
+        These are the vertices of all bodies, the points of rigid bodies, and the nodes on the shapes of rigid bodies.
         """
         return len(self.original) + 10 * len(self.rigid) + self.n_on_surfaces
 
+    def add_surface_nodes(self, parts: Iterable[RigidBody]) -> None:
+        """Number the vertices of the shapes of these rigid bodies as nodes, after the points of all rigid bodies."""
+        self.with_surface_nodes = tuple(parts)
+
     @property
     def n_on_surfaces(self) -> int:
-        """The number of vertices of rigid bodies' shapes in contact."""
-        return sum(part.shape.n_vertices for part in self.rigid_in_contact)
+        """The number of nodes on the shapes of rigid bodies."""
+        return sum(part.shape.n_vertices for part in self.with_surface_nodes)
 
     def first_on_surface(self, part: RigidBody) -> int:
         """Return the number of the first vertex of a rigid body's shape, in the order of `n_rows`."""
@@ -273,7 +272,7 @@ class Bodies:
         for each in self.rigid:
             if each is part:
                 break
-            before += each.shape.n_vertices if any(each is other for other in self.rigid_in_contact) else 0
+            before += each.shape.n_vertices if any(each is other for other in self.with_surface_nodes) else 0
         return len(self.original) + 10 * len(self.rigid) + before
 
     def of(self, item: Any) -> Span:
@@ -294,23 +293,6 @@ class Bodies:
             return self.spans[self.number(item.body)]
         except ValueError:
             raise ValueError(f"a {kind} is about a body that is not in the scene: {item.body!r}") from None
-
-    def contact_points(self, contact: Contact) -> tuple[np.ndarray, np.ndarray]:
-        """Return the vertices (k, 3) of the points of a contact and their weights (k, 3).
-
-        Vertices are numbered as in the scene; points of fewer than three vertices are padded with -1. Points of welded
-        vertices are returned once.
-        """
-        span = self.of(contact)
-        vertices, weights = contact.points(span.mesh)
-        numbers = np.where(vertices < 0, vertices, vertices + np.int32(span.first_vertex))
-        if not self.ties:
-            return numbers, weights
-        repeated = (vertices[:, 1] < 0) & np.isin(
-            self.original[numbers[:, 0]], numbers[~self.copies[numbers[:, 0]], 0]
-        )
-        chosen = ~(repeated & self.copies[numbers[:, 0]])
-        return numbers[chosen], weights[chosen]
 
     def split(self, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the body of each of the scene's edges, (k,), and the number of the edge in that body, (k,)."""

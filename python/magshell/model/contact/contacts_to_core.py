@@ -66,6 +66,24 @@ def _check_each_pair_once(contacts) -> None:
             )
 
 
+def contact_points(bodies: Bodies, contact: Contact) -> tuple[np.ndarray, np.ndarray]:
+    """Return the vertices (k, 3) of the points of a contact and their weights (k, 3).
+
+    Vertices are numbered as in the scene; points of fewer than three vertices are padded with -1. Points of welded
+    vertices are returned once.
+    """
+    span = bodies.of(contact)
+    vertices, weights = contact.points(span.mesh)
+    numbers = np.where(vertices < 0, vertices, vertices + np.int32(span.first_vertex))
+    if not bodies.ties:
+        return numbers, weights
+    repeated = (vertices[:, 1] < 0) & np.isin(
+        bodies.original[numbers[:, 0]], numbers[~bodies.copies[numbers[:, 0]], 0]
+    )
+    chosen = ~(repeated & bodies.copies[numbers[:, 0]])
+    return numbers[chosen], weights[chosen]
+
+
 def rigid_bodies_in_contact(contacts: Sequence[Contact | BodyContact]) -> tuple[RigidBody, ...]:
     """Return the rigid bodies whose shapes are in contacts, each once."""
     sides = [side for contact in contacts for side in contact._sides if has_contact_shape(side)]
@@ -166,7 +184,7 @@ def contact_inputs(contacts: Sequence[Contact | BodyContact], bodies: Bodies) ->
     numbers = {id(each): k for k, each in enumerate(obstacles_of(contacts))}
     inputs = []
     for contact in contacts:
-        vertices, weights = bodies.contact_points(contact)
+        vertices, weights = contact_points(bodies, contact)
         if not len(vertices):
             raise ValueError(
                 f"{contact!r} is about nothing: the scene has no vertices that obstacles could keep out"
@@ -207,7 +225,7 @@ def near_kinks(
 
     sheets: the bodies in contact, as they are in this solve.
     """
-    vertices, weights = bodies.contact_points(contact)
+    vertices, weights = contact_points(bodies, contact)
     points = np.einsum("pk,pkc->pc", weights, positions[vertices])
     offsets = contact._law(*sheets)[1] * np.concatenate([np.eye(3), -np.eye(3)])
     found = [np.zeros(0, dtype=vertices.dtype)]
@@ -233,7 +251,7 @@ def check_outside(scene: Scene, values: Any, positions: np.ndarray, time: float)
         solid = isinstance(sheet, Solid)
         allowed[span.vertices] = 0.01 * sheet.mesh.size if solid else 0.5 * np.max(sheet.thickness)
     for contact in scene._obstacle_contacts:
-        vertices, weights = scene._bodies.contact_points(contact)
+        vertices, weights = contact_points(scene._bodies, contact)
         where = np.einsum("pk,pkc->pc", weights, positions[vertices])
         offset = values.current(contact).offset
         for obstacle in contact.obstacles:

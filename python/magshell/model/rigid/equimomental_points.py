@@ -114,7 +114,7 @@ def rigid_body_points(bodies: Bodies) -> list[RigidBodyPoints]:
             of_part[vertex] = k
         skeleton = bodies.skeleton_of(part)
         points = _points(part, skeleton, bodies.mesh.rest_positions[vertices], vertices, n_v + 10 * k)
-        has_contact = any(each is part for each in bodies.rigid_in_contact)
+        has_contact = any(each is part for each in bodies.with_surface_nodes)
         found.append(points._replace(surface=part.shape.rest_positions) if has_contact else points)
     return found
 

@@ -11,6 +11,7 @@ from ... import _core
 from ..._runtime.frozen import immutable, variant
 from ..contact.body_contact import BodyContact
 from ..contact.contact import Contact
+from ..contact.contacts_to_core import contact_points
 from ..contact.obstacles import Obstacle
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ def pairs_with_obstacles(
 
     positions, velocities: (n_v, 3). time: s; None in an equilibrium.
     """
-    vertices, weights = scene._bodies.contact_points(contact)
+    vertices, weights = contact_points(scene._bodies, contact)
     numbers = values.current(contact)._law(*values.contact_bodies(contact))
     stiffness, smoothing, offset, coefficient, sticking_speed = numbers
     corners = np.where(weights != 0.0, vertices, 0)

@@ -30,7 +30,7 @@ def near_body_kinks(
     if not len(pairs):
         return np.zeros(0, dtype=np.int32)
     bodies, n = scene._bodies, len(positions)
-    surfaces = [part.shape.faces + bodies.first_on_surface(part) for part in bodies.rigid_in_contact]
+    surfaces = [part.shape.faces + bodies.first_on_surface(part) for part in bodies.with_surface_nodes]
     faces = np.concatenate([bodies.original[scene.mesh.faces], *surfaces])
     sharp = _sharp_edges(faces, positions)
     on_face = np.isin(_keys(np.sort(pairs[:, 1:], axis=1), n), _keys(np.sort(faces, axis=1), n))
