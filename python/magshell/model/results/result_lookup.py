@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..actuators.muscle import Muscle, MuscleResult
 from ..rigid.joints import Joint
 from ..rigid.rigid import RigidBody, RigidBodyResult
@@ -30,6 +32,14 @@ def result_of(
     if isinstance(body, RigidBody):
         return RigidBodyResult(result, body)
     return SolidResult(result, body) if isinstance(body, Solid) else BodyResult(result, body)
+
+
+def displacements_of(result: Any) -> Any:
+    """Return the displacements of a result from the rest shape, m: an array, or a tensor if its positions are one."""
+    rest = result.scene.mesh.rest_positions
+    if isinstance(result.positions, np.ndarray):
+        return result.positions - rest
+    return result.positions - result.positions.new_tensor(np.array(rest))
 
 
 class OfOneBody:

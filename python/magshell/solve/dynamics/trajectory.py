@@ -22,7 +22,7 @@ from ...model.contact.body_contact import BodyContact
 from ...model.contact.contact import Contact
 from ...model.contact.contacts_to_core import near_kinks
 from ...model.fields.field import AppliedField
-from ...model.results.result_lookup import OfOneBody, result_of
+from ...model.results.result_lookup import OfOneBody, displacements_of, result_of
 from ...model.results.solid_result import describe_strains
 from ...model.scene.contact_state import ContactState, compute_contact_state
 from ...model.scene.nonsmooth_contacts import near_body_kinks
@@ -195,10 +195,7 @@ class Trajectory(AnimateMixin, OfOneBody):
     @property
     def displacements(self) -> Computed:
         """The displacements from the rest shape, (n, n_v, 3) m."""
-        rest = self.scene.mesh.rest_positions
-        if isinstance(self.positions, np.ndarray):
-            return self.positions - rest
-        return self.positions - self.positions.new_tensor(np.array(rest))
+        return displacements_of(self)
 
     def _values_at(self, index: int):
         """Return the values of a recorded state, with actuators, growth and field sources as they were then."""

@@ -13,7 +13,7 @@ from ..._runtime.mixins import SaveMixin
 from ...mesh.triangles.self_intersections import describe_self_intersections
 from ...model.contact.body_contact import BodyContact
 from ...model.contact.contact import Contact
-from ...model.results.result_lookup import OfOneBody, result_of
+from ...model.results.result_lookup import OfOneBody, displacements_of, result_of
 from ...model.results.solid_result import describe_strains
 from ...model.scene.contact_state import ContactState, compute_contact_state
 from ...model.scene.reactions import Reaction, reaction_in
@@ -90,10 +90,7 @@ class Equilibrium(SaveMixin, OfOneBody):
     @property
     def displacements(self) -> Computed:
         """The displacements from the rest shape, (n_v, 3) m."""
-        rest = self.scene.mesh.rest_positions
-        if isinstance(self.positions, np.ndarray):
-            return self.positions - rest
-        return self.positions - self.positions.new_tensor(np.array(rest))
+        return displacements_of(self)
 
     def _values_at(self, index: int):
         return self._values
