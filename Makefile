@@ -77,14 +77,14 @@ $(VENV)/.created: scripts/setup.sh
 	$(PIP) install --quiet 'scikit-build-core>=0.10' 'pybind11>=2.13' cmake ninja
 	touch $@
 
-# A wheel of the package, as anybody gets it, and that one installed. build/make is kept for the next time; a plain
-# `pip install .` builds in a directory of its own, so that its options do not end up in this one's cache.
+# A wheel of the package, with the kernels that tests and benchmarks call, and that one installed. build/make is kept for the
+# next time; a plain `pip install .` builds in a directory of its own, so that its options do not end up in this one's cache.
 $(VENV)/.wheel: $(sources) $(VENV)/.created
 	rm -rf build/wheels
 	@echo "Building magshell (some minutes the first time; all that is said goes into build/make.log):"
 	@$(VENV)/bin/python scripts/build_progress.py build/make.log \
 	    $(PIP) wheel --verbose --no-deps --no-build-isolation --check-build-dependencies \
-	    --config-settings=build-dir=build/make --wheel-dir build/wheels .
+	    --config-settings=build-dir=build/make --config-settings=cmake.define.MAGSHELL_TESTING=ON --wheel-dir build/wheels .
 	$(PIP) install --quiet --no-deps --force-reinstall build/wheels/*.whl
 	touch $@
 

@@ -51,7 +51,7 @@ compiled_for() {
     local build=build/$1
     mkdir -p build
     if [ ! -f "$build/CMakeCache.txt" ]; then
-        cmake -G Ninja -S . -B "$build" -DMAGSHELL_NATIVE=OFF -DMAGSHELL_BASELINE="$1" -DPython_EXECUTABLE="$python" \
+        cmake -G Ninja -S . -B "$build" -DMAGSHELL_TESTING=ON -DMAGSHELL_NATIVE=OFF -DMAGSHELL_BASELINE="$1" -DPython_EXECUTABLE="$python" \
             -Dpybind11_DIR="$("$python" -m pybind11 --cmakedir)" ${CMAKE_ARGS:-} >"$build.log" ||
             { cat "$build.log"; rm -f "$build/CMakeCache.txt"; return 1; }
     fi

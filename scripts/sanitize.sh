@@ -15,7 +15,7 @@ build=build/sanitize-${sanitizers%%,*}
 PATH=$(dirname "$python"):$PATH  # where pip puts cmake and ninja
 
 if [ ! -f "$build/CMakeCache.txt" ]; then
-    cmake -S . -B "$build" -DMAGSHELL_SANITIZE="$sanitizers" -DPython_EXECUTABLE="$python" \
+    cmake -S . -B "$build" -DMAGSHELL_TESTING=ON -DMAGSHELL_SANITIZE="$sanitizers" -DPython_EXECUTABLE="$python" \
         -Dpybind11_DIR="$("$python" -m pybind11 --cmakedir)" ${CMAKE_ARGS:-} ||
         { rm -f "$build/CMakeCache.txt"; exit 1; }
 fi

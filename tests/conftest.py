@@ -31,6 +31,15 @@ from parallel import (  # noqa: E402, F401 - pytest finds hooks by their names
 )
 
 
+def pytest_report_header() -> str | None:
+    """Warn of a build without the kernels that the tests of the core call."""
+    from magshell import _core
+
+    if not hasattr(_core, "pair_energies"):
+        return "magshell was built without MAGSHELL_TESTING: tests of single kernels will fail; `make test` builds with it"
+    return None
+
+
 @pytest.fixture
 def rng() -> np.random.Generator:
     """Return a generator with a fixed seed, new for each test, so that no test depends on another's draws."""

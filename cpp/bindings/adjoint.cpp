@@ -20,17 +20,6 @@ py::tuple pull_back_to_inputs(Model& model, const StaticsResult& equilibrium, co
     return py::make_tuple(values_to_user(model, gradient.values), gradient.load_parameters);
 }
 
-// Returns lambda . dg/dk at a state for all parameters, in the caller's order.
-VectorXd by_values(Model& model, const VectorXd& q, const LoadParameters& load_parameters,
-                   const VectorXd& lambda) {
-    const py::gil_scoped_release unlocked;
-    const std::lock_guard lock(model.in_use());
-    Gradient gradient(model.parameters().registry());
-    model.evaluate(q, load_parameters);
-    model.parameters().vjp(q, load_parameters, lambda, gradient);
-    return model.parameters().registry().values.to_user(gradient.values);
-}
-
 }  // namespace
 
 void register_adjoint(py::module_& module) {
@@ -39,8 +28,6 @@ void register_adjoint(py::module_& module) {
         py::arg("by_edge_rotations"), py::arg("by_driving") = VectorXd(),
         "The gradients by everything a solve takes, of a function of positions (n_v, 3), edge rotations "
         "(n_e,) and what motors do (m,) with these gradients. The model must hold the values of that solve.");
-    module.def("vjp", &by_values, py::arg("model"), py::arg("q"), py::arg("controls"), py::arg("adjoint"),
-               "adjoint . dg/dk at a state q, g the gradient of the energy and k every value, (n,).");
 }
 
 }  // namespace magshell::bindings

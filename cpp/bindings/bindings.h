@@ -22,7 +22,6 @@ using IndexArray = py::array_t<std::int32_t, py::array::c_style | py::array::for
 void register_adjoint(py::module_& module);
 void register_errors(py::module_& module);
 void register_mesh(py::module_& module);
-void register_contact(py::module_& module);
 void register_continuation(py::module_& module);
 void register_dynamics(py::module_& module);
 void register_face_energies(py::module_& module);

@@ -1,5 +1,8 @@
 // Defines the extension module: errors first, then one register function per family.
 #include "bindings/bindings.h"
+#ifdef MAGSHELL_TESTING
+#include "bindings/testing/testing.h"
+#endif
 
 namespace magshell::bindings {
 void register_body_contact(py::module_& module);
@@ -15,7 +18,6 @@ PYBIND11_MODULE(_core, module) {
     b::register_field(module);
     b::register_obstacle(module);  // MeshObstacle takes a mesh
     b::register_force(module);
-    b::register_contact(module);
     b::register_face_energies(module);
     b::register_model(module);
     b::register_sheet(module);
@@ -26,4 +28,8 @@ PYBIND11_MODULE(_core, module) {
     b::register_adjoint(module);       // takes results of solves
     b::register_continuation(module);  // shares options with statics
     b::register_dynamics(module);
+#ifdef MAGSHELL_TESTING
+    b::register_contact_pairs(module);
+    b::register_kernels(module);
+#endif
 }

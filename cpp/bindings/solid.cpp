@@ -4,7 +4,6 @@
 #include <map>
 
 #include "bindings/arrays.h"
-#include "magshell/core/simd_functions.h"
 #include "magshell/scene/model.h"
 
 namespace magshell::bindings {
@@ -57,28 +56,11 @@ std::vector<SkinInput> skins_of(const py::list& given) {
     return skins;
 }
 
-// Returns the logarithms of numbers as the SIMD function computes them; the last SIMD vector is filled up with ones.
-py::array_t<double> lane_logarithms(const Array& numbers) {
-    py::array_t<double> out(numbers.size());
-    const double* from = numbers.data();
-    double* to = out.mutable_data();
-    for (py::ssize_t first = 0; first < numbers.size(); first += SimdDouble::width) {
-        SimdDouble group(1.0);
-        const int lanes = static_cast<int>(std::min<py::ssize_t>(SimdDouble::width, numbers.size() - first));
-        for (int lane = 0; lane < lanes; ++lane) group.set(lane, from[first + lane]);
-        group = log(group);
-        for (int lane = 0; lane < lanes; ++lane) to[first + lane] = group[lane];
-    }
-    return out;
-}
-
 void register_solid(py::module_& module) {
     module.def(
         "solid_point_states", &point_states, py::arg("model"), py::arg("solid"), py::arg("q"),
         "(F, Cauchy stress [Pa], rest volumes [m3]) at the points of integration of a solid's elements: "
         "(n_t, p, 3, 3) twice and (n_t, p).");
-    module.def("lane_logarithms", &lane_logarithms, py::arg("numbers"),
-               "ln of an array's numbers as the element kernels take it, to be tested.");
 }
 
 std::vector<VolumeInput> volumes_of(const py::list& given) {

@@ -47,6 +47,7 @@ FLOORS = {
     "magshell/solve/projective": 7,
     "magshell/adjoint": 8,
     "bindings": 9,
+    "bindings/testing": 9,
 }
 # Rooms of the Python package from the lowest up, with the modules that stand beside them; a room within a room has a
 # dot. A file imports its own room and lower ones, within functions too. `__init__` is the package as users see it.

@@ -1,9 +1,21 @@
 // EigenFactor: Eigen's SimplicialLDLT, without supernodes and pivoting. It needs nothing but Eigen, and is the
-// reference that the others are tested against.
+// reference that the others are tested against, in builds with MAGSHELL_TESTING.
+#include "magshell/linalg/backends.h"
+
+#ifndef MAGSHELL_TESTING
+#include "magshell/core/errors.h"
+
+namespace magshell {
+
+std::unique_ptr<Factor> make_eigen_factor(std::shared_ptr<const SparsePattern>) {
+    throw InvalidInput("magshell was built without MAGSHELL_TESTING; use the backend \"supernodal\"");
+}
+
+}  // namespace magshell
+#else
 #include <Eigen/SparseCholesky>
 #include <string>
 
-#include "magshell/linalg/backends.h"
 #include "magshell/linalg/pattern_checks.h"
 
 namespace magshell {
@@ -86,3 +98,4 @@ std::unique_ptr<Factor> make_eigen_factor(std::shared_ptr<const SparsePattern> p
 }
 
 }  // namespace magshell
+#endif

@@ -32,7 +32,7 @@ VectorXd product(const SparsePattern& pattern, const double* values, const Vecto
 enum class Backend {
     supernodal,  // magshell's own multifrontal L D L^T; definite and indefinite at the same speed
     cholmod,     // CHOLMOD's supernodal L L^T; positive definite only
-    eigen,       // Eigen's simplicial L D L^T; always there
+    eigen,       // Eigen's simplicial L D L^T; builds with MAGSHELL_TESTING
 };
 
 enum class Ordering {

@@ -1,8 +1,9 @@
-// Binds the contact of surfaces pair by pair, for tests. Scenes use the whole terms.
+// Binds the contact of surfaces pair by pair. Scenes evaluate whole terms instead.
 #include <limits>
 #include <string>
 
 #include "bindings/arrays.h"
+#include "bindings/testing/testing.h"
 #include "magshell/contact/broad_phase.h"
 #include "magshell/contact/continuous.h"
 #include "magshell/contact/pair_friction.h"
@@ -263,7 +264,7 @@ py::dict unlocked(const Find& find) {
 
 }  // namespace
 
-void register_contact(py::module_& module) {
+void register_contact_pairs(py::module_& module) {
     module.def("pair_proximities", &proximities, py::arg("kind"), py::arg("places"),
                "(distances (n,), weights (n, 4), normals (n, 3), free places (n,)) of pairs with nodes at "
                "(n, 4, 3) [m].");

@@ -1,0 +1,77 @@
+// Binds single functions of the core: logarithms in SIMD lanes, the loaded part of a matrix, derivatives by values.
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "bindings/arrays.h"
+#include "bindings/given_away.h"
+#include "bindings/gradients.h"
+#include "bindings/testing/testing.h"
+#include "magshell/core/errors.h"
+#include "magshell/core/simd_functions.h"
+#include "magshell/linalg/loaded_part.h"
+#include "magshell/linalg/pattern_checks.h"
+
+namespace magshell::bindings {
+namespace {
+
+// Returns the logarithms of numbers as the SIMD function computes them; the last SIMD vector is filled up with ones.
+py::array_t<double> lane_logarithms(const Array& numbers) {
+    py::array_t<double> out(numbers.size());
+    const double* from = numbers.data();
+    double* to = out.mutable_data();
+    for (py::ssize_t first = 0; first < numbers.size(); first += SimdDouble::width) {
+        SimdDouble group(1.0);
+        const int lanes = static_cast<int>(std::min<py::ssize_t>(SimdDouble::width, numbers.size() - first));
+        for (int lane = 0; lane < lanes; ++lane) group.set(lane, from[first + lane]);
+        group = log(group);
+        for (int lane = 0; lane < lanes; ++lane) to[first + lane] = group[lane];
+    }
+    return out;
+}
+
+// Returns lambda . dg/dk at a state for all parameters, in the caller's order.
+VectorXd by_values(Model& model, const VectorXd& q, const LoadParameters& load_parameters,
+                   const VectorXd& lambda) {
+    const py::gil_scoped_release unlocked;
+    const std::lock_guard lock(model.in_use());
+    Gradient gradient(model.parameters().registry());
+    model.evaluate(q, load_parameters);
+    model.parameters().vjp(q, load_parameters, lambda, gradient);
+    return model.parameters().registry().values.to_user(gradient.values);
+}
+
+py::tuple loaded(Index size, const IndexArray& column_starts, const IndexArray& rows, const Array& values,
+                 const VectorXd& forces) {
+    const SparsePattern pattern{size, to_indices(column_starts, "column_starts"), to_indices(rows, "rows")};
+    check_pattern(pattern);
+    if (values.ndim() != 1 || values.size() != rows.size() || forces.size() != size)
+        throw InvalidInput("values must have " + std::to_string(rows.size()) +
+                           " entries, one per row index, and " + "forces " + std::to_string(size) +
+                           ", one per row of the matrix");
+    LoadedPart part;
+    {
+        const py::gil_scoped_release release;
+        part = loaded_part(pattern, {values.data(), static_cast<std::size_t>(values.size())}, forces);
+    }
+    return py::make_tuple(given_away(std::move(part.unknowns)),
+                          given_away(std::move(part.pattern.column_starts)),
+                          given_away(std::move(part.pattern.rows)), given_away(std::move(part.values)));
+}
+
+}  // namespace
+
+void register_kernels(py::module_& module) {
+    module.def("lane_logarithms", &lane_logarithms, py::arg("numbers"),
+               "ln of an array's numbers as the element kernels take it, to be tested.");
+    module.def("vjp", &by_values, py::arg("model"), py::arg("q"), py::arg("controls"), py::arg("adjoint"),
+               "adjoint . dg/dk at a state q, g the gradient of the energy and k every value, (n,).");
+    module.def("loaded_part", &loaded, py::arg("size"), py::arg("column_starts"), py::arg("rows"),
+               py::arg("values"), py::arg("forces"),
+               "Of a symmetric matrix, given as to analyze(), the part that forces (n,) act on: its "
+               "unknowns, column_starts, "
+               "rows and values, without zeros off its diagonal. Nothing couples it with the rest. All of "
+               "the matrix where no force acts.");
+}
+
+}  // namespace magshell::bindings
