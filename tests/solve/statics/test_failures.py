@@ -80,7 +80,7 @@ def test_a_neutral_equilibrium_is_no_stable_one():
     assert not caught.value.last_good.stable
 
 
-def bent_far(mesh):
+def bent_far(mesh, max_relaxation_steps=20):
     """Solve a thin strip in a field that makes beta = 300."""
     shell = ms.Shell(mesh, thickness=LENGTH / 400, young_modulus=YOUNG, poisson_ratio=0.0)
     scene = ms.Scene(shell, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
@@ -89,7 +89,7 @@ def bent_far(mesh):
         scene,
         remanent_magnetization=(1e5, 0, 0),
         applied_flux_density=(-0.87 * flux_density, 0, 0.5 * flux_density),
-        solver=ms.MixedNewton(max_relaxation_steps=20),
+        solver=ms.MixedNewton(max_relaxation_steps=max_relaxation_steps),
     )
 
 
@@ -134,9 +134,9 @@ def test_a_failure_says_where_and_what_was_tried():
 
 def test_a_failure_beside_flat_faces_names_them():
     """Use faces so flat that shorter load steps do not help."""
-    mesh = crossed(LENGTH, WIDTH, (20, 2), [0.0003, 0.5])
+    mesh = crossed(LENGTH, WIDTH, (20, 2), [0.0002, 0.5])
     with pytest.raises(ms.NotConverged) as caught:
-        bent_far(mesh)
+        bent_far(mesh, max_relaxation_steps=2)  # with 20 the round-off of these faces decides whether the solve succeeds
     text = str(caught.value)
     named = re.search(
         r"(?:faces, namely|Face) (\d+) \(largest angle 179\.\d+ deg, height .* of the thickness\).* almost flat",
