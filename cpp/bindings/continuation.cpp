@@ -45,7 +45,8 @@ void register_continuation(py::module_& module) {
         .def_readonly("state", &PathPoint::state)
         .def_readonly("parameter", &PathPoint::parameter)
         .def_readonly("turns", &PathPoint::angle_branches)
-        .def_readonly("n_negative_eigenvalues", &PathPoint::unstable_directions);
+        .def_readonly("n_negative_eigenvalues", &PathPoint::unstable_directions)
+        .def_readonly("field_sampling_error", &PathPoint::field_sampling_error);
 
     py::enum_<CriticalKind>(module, "CriticalKind")
         .value("limit", CriticalKind::limit)

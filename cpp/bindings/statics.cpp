@@ -133,6 +133,7 @@ void register_statics(py::module_& module) {
         py::arg("controls"), py::arg("count"), py::arg("progress") = py::none(),
         "Eigenvalues, shapes of all unknowns (largest displacement 1) nearest to zero, and the number of "
         "unstable directions of an equilibrium; none where it is neutral.");
+        .def_readonly("field_sampling_error", &StaticsResult::field_sampling_error)
     module.def("moved", &moved, py::arg("model"), py::arg("state"), py::arg("step"),
                "A state after a step of all unknowns, as far as bodies in contact let it.");
     module.def("first_order_change", &change, py::arg("model"), py::arg("equilibrium"), py::arg("to"),

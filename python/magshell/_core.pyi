@@ -732,6 +732,8 @@ class PathOptions:
     def first_step(self) -> float: ...
     @first_step.setter
     def first_step(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def field_sampling_error(self) -> float: ...
+    @property
     @property
     def highest_parameter(self) -> float: ...
     @highest_parameter.setter
@@ -768,6 +770,8 @@ class CriticalKind:
       bifurcation
     """
 
+    def field_sampling_error(self) -> float: ...
+    @property
     __members__: typing.ClassVar[dict[str, CriticalKind]]
     bifurcation: typing.ClassVar[CriticalKind]
     limit: typing.ClassVar[CriticalKind]

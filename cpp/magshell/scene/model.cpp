@@ -156,6 +156,16 @@ std::vector<std::pair<std::string_view, double>> Model::energies(
     return of_terms;
 }
 
+double Model::field_sampling_error(const VectorXd& q, const LoadParameters& load_parameters) {
+    double largest = 0.0;
+    for (const std::unique_ptr<Term>& term : terms_) {
+        const double error = term->field_sampling_error(q.data(), load_parameters, extent_);
+        if (!(error <= largest)) largest = error;
+        if (std::isnan(largest)) break;
+    }
+    return largest;
+}
+
 void Model::evaluate(const VectorXd& q, const LoadParameters& load_parameters) {
     dof_map_.linearize(q);
     residual_.reset(size());

@@ -60,6 +60,8 @@ class Model {
     void add_cancelling_forces_here(bool in_motion, VectorXd& out) const;
 
     double energy(const VectorXd& q, const LoadParameters& load_parameters) const;
+    /// Returns the largest Term::field_sampling_error of all terms; NaN if that of one is.
+    double field_sampling_error(const VectorXd& q, const LoadParameters& load_parameters);
     /// Returns the names of the terms in the order of energies(); terms with the same name, of several bodies, follow each other.
     std::vector<std::string_view> term_names() const;
     std::vector<std::pair<std::string_view, double>> energies(const VectorXd& q,

@@ -71,6 +71,7 @@ class Follower {
         if (!at_rest.converged) return fail("the start is not an equilibrium: " + at_rest.reason);
         here.angle_branches = model_.angle_branches();
         Tangent tangent;
+        here.field_sampling_error = model_.field_sampling_error(here.state, load_parameters(here.parameter));
         if (!find_tangent(here, tangent)) return fail("the tangent does not exist at the start");
         psi_ = std::max(length(tangent.state), min_movement * options_.largest_step);
         normalize(tangent);
@@ -199,6 +200,7 @@ class Follower {
             const LoadParameters at = load_parameters(next.parameter);
             through = sides_.crossed(next.state, at);
             if (!through.empty() || sides_.turned(at) > max_obstacle_rotation || !find_tangent(next, there))
+            next.field_sampling_error = model_.field_sampling_error(next.state, at);
                 continue;
             normalize(there);
             double turn = cosine(tangent, there);

@@ -33,6 +33,7 @@ struct PathPoint {
     Model::AngleBranches angle_branches;
     Index unstable_directions = 0;  // number of negative eigenvalues of the Hessian
 };
+    double field_sampling_error = 0.0;  // [-] as Term::field_sampling_error
 
 enum class CriticalKind { limit, bifurcation };
 

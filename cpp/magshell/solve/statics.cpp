@@ -370,6 +370,8 @@ StaticsResult find_equilibrium(Model& model, const VectorXd& start,
     try {
         Statics statics(newton, from, to, options, result);
         result.outcome = statics.run() ? Outcome::converged : Outcome::failed;
+        if (result.outcome == Outcome::converged)
+            result.field_sampling_error = model.field_sampling_error(result.state, result.load_parameters);
     } catch (const Interrupted&) {
         model.set_angle_branches(result.angle_branches);
         result.outcome = Outcome::interrupted;

@@ -49,6 +49,7 @@ struct StaticsResult {
     bool stable = false;
     Index unstable_directions = 0;
     double linear_time = 0.0;              // [s] in factorizations and solves
+    double field_sampling_error = 0.0;  // [-] as Term::field_sampling_error, at the end of a search that succeeded
     std::size_t bytes = 0;                 // of the model and the factorization
     std::string factorization;             // name of the factorization
     std::shared_ptr<const Factor> factor;  // of the Hessian at a stable `state`, if it was to be kept

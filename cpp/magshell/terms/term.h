@@ -104,6 +104,11 @@ class Term {
     /// Adds to each node the stiffness [N/m] of the contacts that are active at the last evaluated state.
     virtual void add_contact_stiffness(VectorXd& /*of_nodes*/) const {}
 
+    /// Estimates how far the force of the applied field is off because each element samples the field at one point, relative to
+    /// that force or to the couples over the extent [m] of the bodies, from the samples of the last assembly, at about q. NaN if it
+    /// cannot be told from them.
+    virtual double field_sampling_error(const double* /*q*/, const LoadParameters&, double /*extent*/) { return 0.0; }
+
     virtual std::size_t bytes() const = 0;
 };
 

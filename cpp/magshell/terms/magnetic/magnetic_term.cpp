@@ -1,7 +1,9 @@
 #include "magshell/terms/magnetic/magnetic_term.h"
 
 #include <Eigen/LU>
+#include <limits>
 
+#include "magshell/mesh/half_edges.h"
 #include "magshell/terms/magnetic/field_groups.h"
 
 namespace magshell {
@@ -176,8 +178,92 @@ void MagneticTerm::vjp(const double* q, const LoadParameters& load_parameters, c
     field_.add_vjp(points, probe, samples, load_parameters, out);
 }
 
+void MagneticTerm::find_neighbours() {
+    const Index n = surface_.n_faces();
+    if (static_cast<Index>(neighbours_.size()) == n) return;
+    Rows3i faces(n, 3);
+    for (Index f = 0; f < n; ++f)
+        for (int i = 0; i < 3; ++i) faces(f, i) = surface_.corners[f][i];
+    neighbours_.assign(n, {-1, -1, -1});
+    const std::vector<HalfEdge> sorted = sorted_half_edges(faces, faces.maxCoeff() + 1);
+    for (std::size_t k = 0; k + 1 < sorted.size(); ++k) {
+        const HalfEdge &a = sorted[k], &b = sorted[k + 1];
+        if (a.low != b.low || a.high != b.high) continue;
+        neighbours_[a.face][a.corner] = b.face;
+        neighbours_[b.face][b.corner] = a.face;
+    }
+}
+
+// A face with moment m = V M feels the force F(x_b) = G^T m, G = dB/dx. Its mean over the face is, to second order,
+//
+//   F + 1/2 F'' : S,   S = 1/12 sum_i d_i d_i^T,   d_i from the barycenter to corner i.
+//
+// The neighbour across the edge opposite corner i has its barycenter at e_i, along - d_i, so that 1/2 F''(d_i, d_i) is about
+//
+//   (|d_i| / |e_i|)^2 (G(x_b + e_i)^T m - F - F' e_i).
+//
+// Across an edge of the border it is taken as the mean of the others.
+double MagneticTerm::field_sampling_error(const double* q, const LoadParameters& load_parameters, double extent) {
+    constexpr double cancelling = 0.1;  // [-] of the sum of the forces, as in field_sampling.py
+    constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+    if (!field_.varies(load_parameters)) return 0.0;
+    if (fields_.empty()) return unknown;
+    find_neighbours();
+    const Index n = surface_.n_faces();
+    struct Sample {
+        Vec3 point, moment;
+        Mat3 gradient;
+    };
+    std::vector<Sample> samples(n);
+    std::vector<Mat3> rates(n);  // F' [N/m]
+    Vec3 force = Vec3::Zero(), error = Vec3::Zero();
+    double forces = 0.0, couples = 0.0;
+    loop_.each_group([&](Index group) {
+        SimdVec3 x[3];
+        loop_.gather(group, q, x);
+        const SimdVec3 center = SimdDouble(1.0 / 3.0) * (x[0] + x[1] + x[2]);
+        const Magnetic::Element& e = elements_[group];
+        const SimdVec3 moment = e.volume * Magnetic(x).magnetization(e);
+        for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+            const Index f = loop_.face(group, lane);
+            Sample& here = samples[f];
+            here.point = lane_of(center, lane);
+            here.moment = lane_of(moment, lane);
+            for (int k = 0; k < 9; ++k) {
+                here.gradient(k / 3, k % 3) = fields_[group].gradient.at[k][lane];
+                rates[f](k / 3, k % 3) = e.volume[lane] * fields_[group].curvature.at[k][lane];
+            }
+            const Vec3 pull = here.gradient.transpose() * here.moment;
+            force += pull;
+            forces += pull.norm();
+            couples += here.moment.cross(lane_of(fields_[group].flux, lane)).norm();
+        }
+    });
+    for (Index f = 0; f < n; ++f) {
+        const Sample& here = samples[f];
+        if (here.moment.isZero(0.0)) continue;
+        Vec3 sum = Vec3::Zero();
+        int count = 0;
+        for (int i = 0; i < 3; ++i) {
+            if (neighbours_[f][i] < 0) continue;
+            const Sample& there = samples[neighbours_[f][i]];
+            const Vec3 step = there.point - here.point,
+                       corner = Eigen::Map<const Vec3>(q + 3 * surface_.corners[f][i]) - here.point;
+            const Vec3 beyond =
+                (there.gradient - here.gradient).transpose() * here.moment - rates[f] * step;
+            sum += (corner.squaredNorm() / step.squaredNorm()) * beyond;
+            ++count;
+        }
+        if (count == 0) return unknown;
+        error += sum * (3.0 / (12.0 * count));
+    }
+    const double total = std::max({(force + error).norm(), cancelling * forces, couples / extent});
+    if (!(total > 0.0)) return total == 0.0 ? 0.0 : unknown;
+    return error.norm() / total;
+}
+
 std::size_t MagneticTerm::bytes() const {
-    return bytes_of(elements_) + bytes_of(thicknesses_) + bytes_of(fields_);
+    return bytes_of(elements_) + bytes_of(thicknesses_) + bytes_of(fields_) + bytes_of(neighbours_);
 }
 
 }  // namespace magshell

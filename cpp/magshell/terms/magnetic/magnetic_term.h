@@ -29,9 +29,12 @@ class MagneticTerm final : public Term {
                   bool, SystemMatrix& out) const override;
     void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
              Gradient& out) override;
+    double field_sampling_error(const double* q, const LoadParameters& load_parameters, double extent) override;
     std::size_t bytes() const override;
 
   private:
+    /// Finds the face across each edge of every face, if it is not known yet.
+    void find_neighbours();
     /// Computes the barycenters [m] of all faces and the magnetizations [A/m] there.
     void find_points(const double* q, std::vector<Vec3>& points, std::vector<Vec3>& magnetizations) const;
     /// Returns the applied field at every barycenter in SIMD vectors; empty in a uniform field. Order as in
@@ -47,6 +50,7 @@ class MagneticTerm final : public Term {
     std::vector<double> thicknesses_;
     LargeVector<Magnetic::Element> elements_;
     std::vector<Magnetic::Field> fields_;  // sampled for the current assembly; empty in a uniform field
+    std::vector<std::array<Index, 3>> neighbours_;  // across the edge opposite each corner, -1 for none; see find_neighbours
     bool normal_magnetization_ = false;
 };
 

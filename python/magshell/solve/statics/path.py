@@ -23,6 +23,7 @@ from ...mesh.triangles.self_intersections import describe_self_intersections
 from ...model.results.result_lookup import OfOneBody, result_of
 from ...model.results.solid_result import describe_strains
 from ...model.scene.scene import Scene
+from ...model.scene.field_sampling import is_suspect, warn_of_sampling
 from ...model.scene.solve_inputs import Inputs, plain_inputs
 from ...model.scene.values import Values
 from ...model.shells.obtuse_faces import warn_of_obtuse_faces
@@ -296,9 +297,29 @@ def follow_path(
     warn_if_large(path, strain.at(k), f"the path, at point {k}, parameter {path.parameters[k]:.4g}", (k,))
     return path
 
+    try:  # a field may be a function of the caller's, in which Ctrl-C can come
+        _warn_of_fields(path)
+    except KeyboardInterrupt as stopped:
+        raise Interrupted("interrupted while the sampling of the field was checked", path) from stopped
 
 def _bending_energies(scene: Scene, found, controls) -> list[float]:
     """Return the bending energies of the points if the mesh has obtuse faces, to which they matter; else none."""
+def _warn_of_fields(path: EquilibriumPath) -> None:
+    """Warn of the point at which the magnetic force is off most, if it is by too much."""
+    if not len(path):
+        return
+    errors = np.array([point.field_sampling_error for point in path._points])
+    k = int(np.argmax(np.where(np.isnan(errors), np.inf, errors)))
+    if is_suspect(errors[k]):
+        warn_of_sampling(
+            path._values_at(k),
+            path.positions[k],
+            float(path._control("field_factor")[k, 0]),
+            path._control("applied_flux_density")[k, 0],
+            f"the path, at point {k}, parameter {path.parameters[k]:.4g}",
+        )
+
+
     if not scene._bodies.flat_sheets_alone or not scene._obtuse_faces.faces.size:
         return []
     return [scene._model.energies(point.state, controls).get("bending", 0.0) for point in found.points]

@@ -17,7 +17,8 @@ from ..._runtime.log import log
 from ..._runtime.solve_keywords import names_of
 from ...errors import Interrupted, NotConverged
 from ...model.contact.contacts_to_core import check_apart
-from ...model.scene.field_sampling import warn_of_sampling
+from ...model.contact.watched_obstacles import watched_obstacles
+from ...model.scene.field_sampling import is_suspect, warn_of_sampling
 from ...model.scene.replacements import requested
 from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs
@@ -177,7 +178,8 @@ def solve(
     field_factor = float(layout.of(found.controls, "scene", "field_factor")[0])
     flux_density = layout.of(found.controls, "scene", "applied_flux_density")[0]
     try:  # a field may be a function of the caller's, in which Ctrl-C can come
-        warn_of_sampling(inputs.values, positions, field_factor, flux_density, "this equilibrium")
+        if is_suspect(found.field_sampling_error):
+            warn_of_sampling(inputs.values, positions, field_factor, flux_density, "this equilibrium")
     except KeyboardInterrupt as stopped:
         raise Interrupted("interrupted while the sampling of the field was checked", result) from stopped
     return Solution(result, found, inputs)
