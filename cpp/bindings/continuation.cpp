@@ -39,7 +39,8 @@ void register_continuation(py::module_& module) {
         .def_readwrite("max_points", &PathOptions::max_points)
         .def_readwrite("min_parameter", &PathOptions::lowest_parameter)
         .def_readwrite("highest_parameter", &PathOptions::highest_parameter)
-        .def_readwrite("locate_critical", &PathOptions::locate_critical);
+        .def_readwrite("locate_critical", &PathOptions::locate_critical)
+        .def_readwrite("watched", &PathOptions::watched);
 
     py::class_<PathPoint>(module, "PathPoint")
         .def_readonly("state", &PathPoint::state)

@@ -23,6 +23,15 @@ StaticsResult solve(Model& model, const VectorXd& start, const Model::AngleBranc
         varying);
 }
 
+// Makes an obstacle, by its number, from points on its middle (k, 3) and faces (m, 3) of the caller's vertices.
+WatchedObstacle watched_obstacle(Index obstacle, const Array& middles, const IndexArray& faces) {
+    WatchedObstacle watched{obstacle, {}, {}};
+    for (py::ssize_t k = 0; k < middles.shape(0); ++k) watched.middles.emplace_back(middles.data(k, 0));
+    for (py::ssize_t f = 0; f < faces.shape(0); ++f)
+        watched.faces.push_back({faces.at(f, 0), faces.at(f, 1), faces.at(f, 2)});
+    return watched;
+}
+
 VectorXd change(Model& model, const StaticsResult& equilibrium, const LoadParameters& to) {
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());
@@ -77,6 +86,9 @@ void register_statics(py::module_& module) {
              py::kw_only(), py::arg("mixed") = true, py::arg("tolerance") = 1e-10,
              py::arg("max_iterations") = 20);
 
+    py::class_<WatchedObstacle>(module, "WatchedObstacle")
+        .def(py::init(&watched_obstacle), py::arg("obstacle"), py::arg("middles"), py::arg("faces"));
+
     py::class_<StaticsOptions>(module, "StaticsOptions")
         .def(py::init<>())
         .def_readwrite("newton", &StaticsOptions::newton)
@@ -86,6 +98,7 @@ void register_statics(py::module_& module) {
         .def_readwrite("keep_factor", &StaticsOptions::keep_factor)
         .def_readwrite("away_from", &StaticsOptions::away_from)
         .def_readwrite("away_length", &StaticsOptions::away_length)
+        .def_readwrite("watched", &StaticsOptions::watched)
         .def_readwrite("start_at_rest", &StaticsOptions::start_at_rest)
         .def_readwrite("max_relaxation_steps", &StaticsOptions::max_relaxation_steps)
         .def_readwrite("max_factorizations", &StaticsOptions::max_factorizations);
@@ -120,6 +133,7 @@ void register_statics(py::module_& module) {
         .def_readonly("residual", &StaticsResult::residual)
         .def_readonly("at_roundoff", &StaticsResult::at_roundoff)
         .def_readonly("stable", &StaticsResult::stable)
+        .def_readonly("field_sampling_error", &StaticsResult::field_sampling_error)
         .def_readonly("n_negative_eigenvalues", &StaticsResult::unstable_directions)
         .def_readonly("linear_time", &StaticsResult::linear_time)
         .def_readonly("bytes", &StaticsResult::bytes)
@@ -133,7 +147,6 @@ void register_statics(py::module_& module) {
         py::arg("controls"), py::arg("count"), py::arg("progress") = py::none(),
         "Eigenvalues, shapes of all unknowns (largest displacement 1) nearest to zero, and the number of "
         "unstable directions of an equilibrium; none where it is neutral.");
-        .def_readonly("field_sampling_error", &StaticsResult::field_sampling_error)
     module.def("moved", &moved, py::arg("model"), py::arg("state"), py::arg("step"),
                "A state after a step of all unknowns, as far as bodies in contact let it.");
     module.def("first_order_change", &change, py::arg("model"), py::arg("equilibrium"), py::arg("to"),

@@ -41,6 +41,7 @@ __all__: list[str] = [
     "StaticsResult",
     "SurfaceTension",
     "TriangleMesh",
+    "WatchedObstacle",
     "Water",
     "analyze",
     "build_info",
@@ -596,11 +597,20 @@ class NewtonOptions:
         max_iterations: typing.SupportsInt | typing.SupportsIndex = 20,
     ) -> None: ...
 
+class WatchedObstacle:
+    def __init__(
+        self,
+        obstacle: typing.SupportsInt | typing.SupportsIndex,
+        middles: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+    ) -> None: ...
+
 class StaticsOptions:
     keep_factor: bool
     newton: NewtonOptions
     require_stable: bool
     start_at_rest: bool
+    watched: list[WatchedObstacle]
     def __init__(self) -> None: ...
     @property
     def away_from(
@@ -722,18 +732,19 @@ class StaticsResult:
     @property
     def turns(self) -> list[list[float]]: ...
     @property
+    def field_sampling_error(self) -> float: ...
+    @property
     def n_negative_eigenvalues(self) -> int: ...
 
 class PathOptions:
     locate_critical: bool
     newton: NewtonOptions
+    watched: list[WatchedObstacle]
     def __init__(self) -> None: ...
     @property
     def first_step(self) -> float: ...
     @first_step.setter
     def first_step(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
-    def field_sampling_error(self) -> float: ...
-    @property
     @property
     def highest_parameter(self) -> float: ...
     @highest_parameter.setter
@@ -759,6 +770,8 @@ class PathPoint:
     @property
     def turns(self) -> list[list[float]]: ...
     @property
+    def field_sampling_error(self) -> float: ...
+    @property
     def n_negative_eigenvalues(self) -> int: ...
 
 class CriticalKind:
@@ -770,8 +783,6 @@ class CriticalKind:
       bifurcation
     """
 
-    def field_sampling_error(self) -> float: ...
-    @property
     __members__: typing.ClassVar[dict[str, CriticalKind]]
     bifurcation: typing.ClassVar[CriticalKind]
     limit: typing.ClassVar[CriticalKind]

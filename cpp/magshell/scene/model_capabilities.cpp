@@ -42,9 +42,8 @@ std::string ModelCapabilities::describe_blocked_step(const VectorXd& q, const Ve
 std::string ModelCapabilities::crossing_reason(const VectorXd& q, const LoadParameters& load_parameters,
                                                const VectorXd& end,
                                                const LoadParameters& load_parameters_at_end) const {
-    const Index node = terms_.contacts.first_crossing(q, load_parameters, end, load_parameters_at_end);
-    if (node < 0) return {};
-    return "vertex " + std::to_string(nodes_.user_vertex(node)) + " passes through an obstacle within a step";
+    const Passage passage = terms_.contacts.first_crossing(q, load_parameters, end, load_parameters_at_end);
+    return passage ? passage.describe(nodes_) + " within a step" : std::string();
 }
 
 }  // namespace magshell

@@ -5,7 +5,6 @@
 #include <optional>
 
 #include "magshell/core/errors.h"
-#include "magshell/solve/globalization/obstacle_sides.h"
 #include "magshell/solve/modes.h"
 
 namespace magshell {
@@ -71,8 +70,8 @@ class Follower {
         if (!at_rest.converged) return fail("the start is not an equilibrium: " + at_rest.reason);
         here.angle_branches = model_.angle_branches();
         Tangent tangent;
-        here.field_sampling_error = model_.field_sampling_error(here.state, load_parameters(here.parameter));
         if (!find_tangent(here, tangent)) return fail("the tangent does not exist at the start");
+        here.field_sampling_error = model_.field_sampling_error(here.state, load_parameters(here.parameter));
         psi_ = std::max(length(tangent.state), min_movement * options_.largest_step);
         normalize(tangent);
         if (tangent.parameter < 0.0) flip(tangent);
@@ -200,8 +199,8 @@ class Follower {
             const LoadParameters at = load_parameters(next.parameter);
             through = sides_.crossed(next.state, at);
             if (!through.empty() || sides_.turned(at) > max_obstacle_rotation || !find_tangent(next, there))
-            next.field_sampling_error = model_.field_sampling_error(next.state, at);
                 continue;
+            next.field_sampling_error = model_.field_sampling_error(next.state, at);
             normalize(there);
             double turn = cosine(tangent, there);
             if (turn < 0.0) {
@@ -329,6 +328,7 @@ PathResult follow_path(Model& model, const VectorXd& start, const Model::AngleBr
                        const LoadParameters& from, const LoadParameters& to, const PathOptions& options,
                        const Until& until, const StaticsWatch& watch, const TimeVaryingParameters& varying) {
     const ScopedTimeVarying while_varying(model.parameters(), varying);
+    const ScopedWatch while_watching(model, options.watched);
     model.set_angle_branches(angle_branches);
     PathResult result;
     Newton newton(model, options.newton, [&](double residual) {

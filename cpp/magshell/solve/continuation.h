@@ -25,6 +25,7 @@ struct PathOptions {
     int max_points = 1000;
     double lowest_parameter = -1e300, highest_parameter = 1.0;  // [-] the path ends at either
     bool locate_critical = true;  // whether to compute the critical points between path points
+    std::vector<WatchedObstacle> watched = {};  // those that move
 };
 
 struct PathPoint {
@@ -32,8 +33,8 @@ struct PathPoint {
     double parameter = 0.0;
     Model::AngleBranches angle_branches;
     Index unstable_directions = 0;  // number of negative eigenvalues of the Hessian
-};
     double field_sampling_error = 0.0;  // [-] as Term::field_sampling_error
+};
 
 enum class CriticalKind { limit, bifurcation };
 

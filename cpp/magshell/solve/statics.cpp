@@ -6,7 +6,6 @@
 
 #include "magshell/core/errors.h"
 #include "magshell/solve/globalization/deflation.h"
-#include "magshell/solve/globalization/obstacle_sides.h"
 #include "magshell/solve/globalization/pseudo_transient.h"
 #include "magshell/solve/newton/load_control.h"
 
@@ -359,6 +358,7 @@ StaticsResult find_equilibrium(Model& model, const VectorXd& start,
                                const LoadParameters& to, const StaticsOptions& options,
                                const StaticsWatch& watch, const TimeVaryingParameters& varying) {
     const ScopedTimeVarying while_varying(model.parameters(), varying);
+    const ScopedWatch while_watching(model, options.watched);
     model.set_angle_branches(angle_branches);
     StaticsResult result;
     result.state = start;

@@ -1,6 +1,7 @@
 // Finds a stable equilibrium: mixed Newton in adaptive load steps, escape from saddles, and energy descent if it does not converge.
 #pragma once
 
+#include "magshell/solve/globalization/obstacle_sides.h"
 #include "magshell/solve/newton/newton.h"
 
 namespace magshell {
@@ -19,6 +20,7 @@ struct StaticsOptions {
     std::vector<VectorXd> away_from =
         {};  // known equilibria at the new load parameters, which the result must differ from
     double away_length = 0.0;  // [m] rms deflection of these, the length scale of the deflation
+    std::vector<WatchedObstacle> watched = {};  // those that move
 };
 
 enum class Outcome { converged, failed, interrupted };
@@ -47,9 +49,9 @@ struct StaticsResult {
     bool at_roundoff =
         false;  // the residual is within round-off, but not within the tolerance relative to the forces that cancel
     bool stable = false;
+    double field_sampling_error = 0.0;  // [-] as Term::field_sampling_error, at the end of a search that succeeded
     Index unstable_directions = 0;
     double linear_time = 0.0;              // [s] in factorizations and solves
-    double field_sampling_error = 0.0;  // [-] as Term::field_sampling_error, at the end of a search that succeeded
     std::size_t bytes = 0;                 // of the model and the factorization
     std::string factorization;             // name of the factorization
     std::shared_ptr<const Factor> factor;  // of the Hessian at a stable `state`, if it was to be kept

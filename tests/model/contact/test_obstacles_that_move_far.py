@@ -3,6 +3,7 @@
 Load steps, relaxation and paths keep every point on its side of an obstacle, or raise an error.
 """
 
+import warnings
 from functools import cache
 
 import numpy as np
@@ -195,3 +196,83 @@ def test_gradients_by_the_center_of_an_obstacle_that_moved_far_are_those_of_the_
     step = np.array([0.0, 0.0, 1e-5])
     ends = [height(center.detach().numpy() + sign * step, there) for sign in (1, -1)]
     assert center.grad[2].item() == pytest.approx((ends[0] - ends[1]) / 2e-5, rel=1e-4)
+
+
+def pressed(scene, ball, depth):
+    """Move a ball down in one solve; return the equilibrium, or None if an error says that the ball passed through."""
+    try:
+        return ms.equilibrium(scene, values=moved(ball, depth), start=ms.equilibrium(scene))
+    except ms.NotConverged as error:
+        assert "passes" in str(error) and "contact_stiffness" in str(error)
+        return None
+
+
+@pytest.mark.parametrize("radius", [0.01, 0.02])
+@pytest.mark.parametrize("face_samples", [0, 3])
+@pytest.mark.parametrize("stiffness", [1e3, 1e4])
+@pytest.mark.parametrize("offset", [(0.0, 0.0), (0.006, 0.003)], ids=["vertex", "face"])
+def test_a_small_ball_that_would_slip_between_contact_points_is_an_error(
+    radius, face_samples, stiffness, offset
+):
+    """Edges are 12.5 mm long: balls of 10 and 20 mm came out on the other side, without a force and without an error."""
+    ball = ob.Sphere(radius, center=(*offset, radius + TOUCHING))
+    scene = over_a_sheet(ball, contact_stiffness=stiffness, face_samples=face_samples)
+    found = pressed(scene, ball, 0.05)
+    if found is not None:
+        assert found.stable and found.positions[:, 2].min() < -0.03
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda **pose: ob.Capsule(
+            ends=((-0.03, 0.0, 0.0), (0.03, 0.0, 0.0)), radius=0.006, **raised(pose, 0.006)
+        ),
+        lambda **pose: ob.Tube(SPAN, 0.006, inside=False, **raised(pose, 0.006)),
+    ],
+    ids=["capsule", "tube"],
+)
+def test_no_thin_obstacle_comes_out_on_the_other_side_without_an_error(make):
+    obstacle = make(center=(0.006, 0.003, TOUCHING))
+    scene = over_a_sheet(obstacle, contact_stiffness=1e4, face_samples=0)
+    found = pressed(scene, obstacle, 0.05)
+    if found is not None:
+        assert found.stable and found.positions[:, 2].min() < -0.03
+
+
+def test_a_ball_that_slips_between_contact_points_slowly_is_an_error():
+    ball = ob.Sphere(0.01, center=(0.006, 0.003, 0.01 + TOUCHING))
+    scene = over_a_sheet(ball, contact_stiffness=1e4, face_samples=0)
+    with pytest.raises(ms.NotConverged, match=r"passes between the points in contact.*face_samples=3"):
+        in_small_steps(scene, ball, 0.05, 25)
+
+
+@pytest.mark.parametrize(
+    "radius, face_samples, small", [(6e-3, 0, True), (6e-3, 3, False), (3e-3, 3, True), (8e-3, 0, False)]
+)
+def test_a_ball_that_fits_between_the_contact_points_is_warned_of(radius, face_samples, small):
+    """Between vertices that are 12 mm apart fits a ball of 7 mm radius, between three points on each face one of 3.5 mm."""
+    ball = ob.Sphere(radius, center=(0.0, 0.0, radius + TOUCHING))
+    scene = over_a_sheet(ball, face_samples=face_samples)
+    rest = ms.equilibrium(scene)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        ms.equilibrium(scene, values=moved(ball, 1e-3), start=rest)
+        told = [each for each in caught if "between the points in contact" in str(each.message)]
+        ms.equilibrium(scene, values=moved(ball, 0.0), start=rest)  # where nothing moves, nothing is said
+    assert len(told) == len(caught) == small
+    assert all(each.category is ms.MeshQualityWarning and each.filename == __file__ for each in told)
+
+
+def test_nothing_is_watched_where_no_obstacle_moves(monkeypatch):
+    """A scene without moving obstacles pays nothing for faces between the points in contact."""
+    made = []
+    watched = ms._core.WatchedObstacle
+    monkeypatch.setattr(ms._core, "WatchedObstacle", lambda *each: made.append(each) or watched(*each))
+    ball = above("sphere")
+    scene = over_a_sheet(ball)
+    rest = ms.equilibrium(scene)
+    ms.equilibrium(scene, values={sheet(): {"young_modulus": 2e6}}, start=rest)
+    assert not made
+    ms.equilibrium(scene, values=moved(ball, 1e-3), start=rest)
+    assert len(made) == 1

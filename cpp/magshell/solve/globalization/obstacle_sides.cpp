@@ -10,10 +10,8 @@ void ObstacleSides::remember(const VectorXd& q, const LoadParameters& load_param
 
 std::string ObstacleSides::crossed(const VectorXd& q, const LoadParameters& load_parameters) const {
     const Contacts& contacts = model_.contacts();
-    const Index node = contacts.first_crossing(frames_, contacts.obstacle_frames(q, load_parameters));
-    if (node < 0) return {};
-    return "vertex " + std::to_string(model_.nodes().user_vertex(node)) +
-           " passes through an obstacle, however short the step";
+    const Passage passage = contacts.first_crossing(frames_, contacts.obstacle_frames(q, load_parameters));
+    return passage ? passage.describe(model_.nodes()) + ", however short the step" : std::string();
 }
 
 double ObstacleSides::turned(const LoadParameters& load_parameters) const {

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 
 #include "magshell/core/errors.h"
 #include "magshell/core/parallel.h"
+#include "magshell/obstacle/passage.h"
 
 namespace magshell {
 namespace {
@@ -16,34 +18,6 @@ Vec3 weighted(const ContactPoint& point, const double* all) {
     for (int k = 0; k < 3; ++k)
         if (point.nodes[k] >= 0) sum += point.weights[k] * Eigen::Map<const Vec3>(all + 3 * point.nodes[k]);
     return sum;
-}
-
-// Finds where the straight way from a point to another, `length` long, enters a body: steps of the distance's own length
-// cannot miss a surface. False where it stays outside.
-bool enters(const Obstacle& shape, const Vec3& from, const Vec3& to, double length, Distance& at) {
-    constexpr double least_advance = 1e-3;  // [-] of the way, where it runs along the surface
-    at = shape.distance(from);
-    if (!(at.value > 0.0)) return true;
-    if (length <= at.value) return false;
-    double travelled = at.value / length;
-    while (at.value > 0.0) {
-        if (travelled >= 1.0) return false;
-        at = shape.distance(from + travelled * (to - from));
-        travelled += std::max(at.value / length, least_advance);
-    }
-    return true;
-}
-
-// Whether the way leads through the body's middle surface, where the normal jumps from one side to the other. The sides are
-// those where it enters, where it leaves and where it ends: the ends tell of a thin body, the exit of one that is hollow.
-bool passes(const Obstacle& shape, const Vec3& from, const Vec3& to) {
-    constexpr double opposite =
-        -1e-6;  // [-] cosine between normals of opposite faces; an edge of a box is none
-    const double length = (to - from).norm();
-    Distance in, out;
-    if (!enters(shape, from, to, length, in)) return false;
-    if (in.normal.dot(shape.distance(to).normal) < opposite) return true;
-    return enters(shape, to, from, length, out) && in.normal.dot(out.normal) < opposite;
 }
 
 }  // namespace
@@ -158,8 +132,24 @@ std::vector<ContactTerm::ActiveContact> ContactTerm::active_contacts(
     return all;
 }
 
-Index ContactTerm::passes_through(const VectorXd& q, const LoadParameters& load_parameters,
-                                  const VectorXd& end, const LoadParameters& load_parameters_at_end) const {
+std::string Passage::describe(const Nodes& all) const {
+    if (nodes[1] < 0)
+        return "vertex " + std::to_string(all.user_vertex(nodes[0])) + " passes through an obstacle";
+    std::string vertices;
+    for (const Index node : nodes)
+        vertices += (vertices.empty() ? "" : ", ") + std::to_string(all.user_vertex(node));
+    return "an obstacle passes between the points in contact through the face of vertices " + vertices;
+}
+
+void ContactTerm::watch(const Nodes& nodes, std::vector<WatchedObstacle> watched) {
+    watched_ = std::move(watched);
+    for (WatchedObstacle& each : watched_)
+        for (std::array<Index, 3>& face : each.faces)
+            for (Index& vertex : face) vertex = nodes.vertices.core[vertex];
+}
+
+Passage ContactTerm::passes_through(const VectorXd& q, const LoadParameters& load_parameters,
+                                    const VectorXd& end, const LoadParameters& load_parameters_at_end) const {
     return passes_between(own_positions(q, load_parameters), own_positions(end, load_parameters_at_end));
 }
 
@@ -171,18 +161,32 @@ std::vector<Vec3> ContactTerm::own_positions(const VectorXd& q, const LoadParame
             for (const ContactPoint& point : contact.points)
                 places.push_back(obstacle.own(weighted(point, q.data())));
         }
+    for (const WatchedObstacle& each : watched_) {
+        const ObstacleState obstacle = obstacle_state(each.obstacle, load_parameters);
+        for (const std::array<Index, 3>& face : each.faces)
+            for (const Index node : face) places.push_back(obstacle.own(q.segment<3>(3 * node)));
+    }
     return places;
 }
 
-Index ContactTerm::passes_between(const std::vector<Vec3>& before, const std::vector<Vec3>& after) const {
+Passage ContactTerm::passes_between(const std::vector<Vec3>& before, const std::vector<Vec3>& after) const {
     std::size_t k = 0;
     for (const Contact& contact : contacts_)
         for (const Index o : contact.obstacles)
             for (const ContactPoint& point : contact.points) {
-                if (passes(*obstacles_[o].shape, before[k], after[k])) return point.nodes[0];
+                if (magshell::passes_through(*obstacles_[o].shape, before[k], after[k]))
+                    return {{point.nodes[0], -1, -1}};
                 ++k;
             }
-    return -1;
+    for (const WatchedObstacle& each : watched_)
+        for (const std::array<Index, 3>& face : each.faces) {
+            const std::array<Vec3, 3> from{before[k], before[k + 1], before[k + 2]},
+                to{after[k], after[k + 1], after[k + 2]};
+            k += 3;
+            for (const Vec3& middle : each.middles)
+                if (sweeps_over(from, to, middle)) return {face};
+        }
+    return {};
 }
 
 std::vector<Vec3> ContactTerm::rotation_vectors(const LoadParameters& load_parameters) const {

@@ -27,6 +27,22 @@ struct ContactInput {
          lagged = false;  // lagged: friction uses the normal forces of the beginning of the step
 };
 
+/// An obstacle that may not slip through faces, between the points on them that it acts on: no face may sweep over a point on the
+/// obstacle's middle.
+struct WatchedObstacle {
+    Index obstacle = 0;
+    std::vector<Vec3> middles;                // in its own frame [m]
+    std::vector<std::array<Index, 3>> faces;  // in the caller's numbering of vertices
+};
+
+/// A passage through an obstacle: of a point, the first of whose nodes is given, or of a face.
+struct Passage {
+    std::array<Index, 3> nodes{-1, -1, -1};
+
+    explicit operator bool() const { return nodes[0] >= 0; }
+    std::string describe(const Nodes& nodes) const;
+};
+
 /// Returns a SIMD vector that holds the same 3x3 block in every lane.
 SimdMat3 to_simd(const Mat3& block);
 
@@ -62,17 +78,20 @@ class ContactTerm final : public Term {
     /// Returns the points in contact at the last evaluated state.
     const std::vector<ActiveContact>& evaluated_contacts() const { return evaluated_contacts_; }
 
-    /// Returns the first vertex of a point that passes through an obstacle: on its straight path from q to
-    /// `end`, in the frame of the obstacle, it enters on one side and leaves on another. Returns -1 if there is
-    /// none.
-    Index passes_through(const VectorXd& q, const LoadParameters& load_parameters, const VectorXd& end,
-                         const LoadParameters& load_parameters_at_end) const;
+    /// Watches these obstacles from now on, and no others.
+    void watch(const Nodes& nodes, std::vector<WatchedObstacle> watched);
 
-    /// Returns every point of every contact in the own frame of each of its obstacles, where these stand now [m].
+    /// Returns the first point that passes through an obstacle: on its straight path from q to `end`, in the
+    /// frame of the obstacle, it enters on one side and leaves on another; or the first face that sweeps over the
+    /// middle of a watched obstacle.
+    Passage passes_through(const VectorXd& q, const LoadParameters& load_parameters, const VectorXd& end,
+                           const LoadParameters& load_parameters_at_end) const;
+
+    /// Returns every point of every contact in the own frame of each of its obstacles, where these stand now [m], and the corners
+    /// of the faces that are watched.
     std::vector<Vec3> own_positions(const VectorXd& q, const LoadParameters& load_parameters) const;
-    /// Returns the first vertex of a point that comes out on another side of an obstacle than it went in, on its straight way
-    /// between two such places; -1 where none does.
-    Index passes_between(const std::vector<Vec3>& before, const std::vector<Vec3>& after) const;
+    /// Returns the first passage as passes_through() does, on the straight way between two such places.
+    Passage passes_between(const std::vector<Vec3>& before, const std::vector<Vec3>& after) const;
     /// Returns the rotation vectors of each obstacle, by its placement and by its pose [rad].
     std::vector<Vec3> rotation_vectors(const LoadParameters& load_parameters) const;
 
@@ -130,6 +149,7 @@ class ContactTerm final : public Term {
     std::vector<PositionedObstacle> obstacles_;
     std::vector<ObstacleSlices> obstacle_slices_;
     std::vector<ActiveContact> evaluated_contacts_;
+    std::vector<WatchedObstacle> watched_;  // with faces in the core's numbering of nodes
     bool switched_off_ = false;
 };
 

@@ -46,13 +46,18 @@ std::vector<Vec3> Contacts::obstacle_rotations(const LoadParameters& load_parame
     return obstacles_ ? obstacles_->rotation_vectors(load_parameters) : std::vector<Vec3>();
 }
 
-Index Contacts::first_crossing(const ObstacleFrames& before, const ObstacleFrames& after) const {
-    return obstacles_ ? obstacles_->passes_between(before.positions, after.positions) : -1;
+void Contacts::watch(const Nodes& nodes, const std::vector<WatchedObstacle>& watched) const {
+    if (obstacles_) obstacles_->watch(nodes, watched);
 }
 
-Index Contacts::first_crossing(const VectorXd& q, const LoadParameters& load_parameters, const VectorXd& end,
-                               const LoadParameters& load_parameters_at_end) const {
-    return obstacles_ ? obstacles_->passes_through(q, load_parameters, end, load_parameters_at_end) : -1;
+Passage Contacts::first_crossing(const ObstacleFrames& before, const ObstacleFrames& after) const {
+    return obstacles_ ? obstacles_->passes_between(before.positions, after.positions) : Passage();
+}
+
+Passage Contacts::first_crossing(const VectorXd& q, const LoadParameters& load_parameters,
+                                 const VectorXd& end, const LoadParameters& load_parameters_at_end) const {
+    return obstacles_ ? obstacles_->passes_through(q, load_parameters, end, load_parameters_at_end)
+                      : Passage();
 }
 
 std::string Contacts::describe_blocking(const VectorXd& q, const VectorXd& p, double length) const {

@@ -36,11 +36,14 @@ class Contacts {
     };
     ObstacleFrames obstacle_frames(const VectorXd& q, const LoadParameters& load_parameters) const;
     std::vector<Vec3> obstacle_rotations(const LoadParameters& load_parameters) const;
-    /// Returns the first vertex that passes through an obstacle between two such sets of positions; -1 if none does.
-    Index first_crossing(const ObstacleFrames& before, const ObstacleFrames& after) const;
-    /// Returns the first vertex that passes through an obstacle on the straight path from q to `end`; -1 if none does.
-    Index first_crossing(const VectorXd& q, const LoadParameters& load_parameters, const VectorXd& end,
-                         const LoadParameters& load_parameters_at_end) const;
+    /// Watches these obstacles from now on, and no others: their middles may not pass through faces.
+    void watch(const Nodes& nodes, const std::vector<WatchedObstacle>& watched) const;
+    /// Returns the first passage of a point through an obstacle, or of a watched obstacle through a face, between two such sets of
+    /// positions.
+    Passage first_crossing(const ObstacleFrames& before, const ObstacleFrames& after) const;
+    /// Returns the same on the straight path from q to `end`.
+    Passage first_crossing(const VectorXd& q, const LoadParameters& load_parameters, const VectorXd& end,
+                           const LoadParameters& load_parameters_at_end) const;
 
     /// Returns true if a pair of faces or edges is in contact at the last evaluated state; with q, at q.
     bool has_active_pairs() const { return bodies_ && !bodies_->evaluated_contacts().empty(); }

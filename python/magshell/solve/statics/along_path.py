@@ -51,6 +51,12 @@ class AlongPath:
             for values in (self._before, self._after)
         )
 
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """Return the obstacles that move along the path, or all if supports move."""
+        if any(isinstance(owner, Support) for owner in self._owners.values()):
+            return self._after.scene.obstacles
+        return tuple(owner for owner in self._owners.values() if isinstance(owner, Obstacle))
+
     def values(self, parameter: float) -> Values:
         """Return the values of the scene at a parameter of the path, 0 to 1."""
         if not self.entries or parameter == 1.0:

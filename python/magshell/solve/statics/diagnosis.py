@@ -171,6 +171,11 @@ def _general_advice(inputs, found, at_rest: bool) -> str:
             f"What acts on the bodies at rest would strain them by about {strain:.2g}: is a modulus [Pa], a thickness [m] "
             "or a load in another unit?"
         )
+    if "between the points in contact" in found.reason:
+        return (
+            "No force keeps an obstacle out there, and the mesh is too coarse for it: take shorter edges, face_samples=3 or "
+            "a larger contact_stiffness [N/m] of the Contact, or move the obstacle less in a solve."
+        )
     if "through an obstacle" in found.reason:
         return (
             "What presses a body onto an obstacle presses it through: take a larger contact_stiffness [N/m] of the Contact, "

@@ -20,10 +20,11 @@ from ..._runtime.solve_keywords import given_to
 from ..._runtime.solver_entry_point import grouped, solve_entry
 from ...errors import Interrupted, NotConverged
 from ...mesh.triangles.self_intersections import describe_self_intersections
+from ...model.contact.watched_obstacles import watched_obstacles
 from ...model.results.result_lookup import OfOneBody, result_of
 from ...model.results.solid_result import describe_strains
-from ...model.scene.scene import Scene
 from ...model.scene.field_sampling import is_suspect, warn_of_sampling
+from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs, plain_inputs
 from ...model.scene.values import Values
 from ...model.shells.obtuse_faces import warn_of_obtuse_faces
@@ -263,6 +264,7 @@ def follow_path(
     options.first_step, options.max_step = first_step, max_step
     options.min_parameter, options.max_points = max(min_parameter, -1e300), max_points
     options.locate_critical = locate_critical
+    options.watched = watched_obstacles(scene, moving.obstacles())
 
     began = time.perf_counter()
     with inputs.in_core(), SolveBar("path", progress) as bar:
@@ -295,15 +297,13 @@ def follow_path(
     strain = StrainHistory(path.largest_membrane_strain, path.largest_bending_strain)
     k = strain.worst
     warn_if_large(path, strain.at(k), f"the path, at point {k}, parameter {path.parameters[k]:.4g}", (k,))
-    return path
-
     try:  # a field may be a function of the caller's, in which Ctrl-C can come
         _warn_of_fields(path)
     except KeyboardInterrupt as stopped:
         raise Interrupted("interrupted while the sampling of the field was checked", path) from stopped
+    return path
 
-def _bending_energies(scene: Scene, found, controls) -> list[float]:
-    """Return the bending energies of the points if the mesh has obtuse faces, to which they matter; else none."""
+
 def _warn_of_fields(path: EquilibriumPath) -> None:
     """Warn of the point at which the magnetic force is off most, if it is by too much."""
     if not len(path):
@@ -320,6 +320,8 @@ def _warn_of_fields(path: EquilibriumPath) -> None:
         )
 
 
+def _bending_energies(scene: Scene, found, controls) -> list[float]:
+    """Return the bending energies of the points if the mesh has obtuse faces, to which they matter; else none."""
     if not scene._bodies.flat_sheets_alone or not scene._obtuse_faces.faces.size:
         return []
     return [scene._model.energies(point.state, controls).get("bending", 0.0) for point in found.points]

@@ -143,6 +143,7 @@ def solve(
     if moving is not None:
         from_, to = np.concatenate([from_, moving.before]), np.concatenate([to, moving.after])
         entries = moving.entries
+        options.watched = watched_obstacles(scene, moving.obstacles())
     options.keep_factor = options.keep_factor or bool(inputs.leaves)
     began = time.perf_counter()
     with inputs.in_core():

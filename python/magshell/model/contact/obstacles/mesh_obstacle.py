@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,7 @@ import scipy
 from .... import _core as core
 from ....mesh.io.read_write import read_mesh
 from ....mesh.triangles.triangle_mesh import TriangleMesh
-from .obstacle import Obstacle, Surface
+from .obstacle import NO_MIDDLE, Obstacle, Surface
 
 if TYPE_CHECKING:
     from ...._input.kinds import Numbers
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
 
 MOST_CELLS = 256  # largest resolution; 140 MB of samples
 SAME_PLACE = 1e-9  # [-] of the mesh's size: vertices nearer to each other have the same position
+
+
+_GRID = 7  # points along each axis among which the deepest is sought
 
 
 class MeshObstacle(Obstacle):
@@ -75,6 +79,17 @@ class MeshObstacle(Obstacle):
 
     def _surface(self, extent: float, around: np.ndarray) -> Surface:
         return self.mesh.rest_positions, self.mesh.faces
+
+    @cached_property
+    def _middle(self) -> tuple[np.ndarray, float]:
+        """The deepest point of a coarse grid."""
+        places = self.mesh.rest_positions
+        axes = np.linspace(places.min(axis=0), places.max(axis=0), _GRID).T
+        grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        distances, _, _ = core.distances(self._core, grid)
+        deepest = int(np.argmin(distances))
+        radius = float(np.sort(np.ptp(places, axis=0))[1]) / 2
+        return (grid[deepest : deepest + 1], radius) if distances[deepest] < 0.0 else NO_MIDDLE
 
     def _summary(self) -> str:
         size = " x ".join(f"{length:.4g}" for length in np.ptp(self.mesh.rest_positions, axis=0))

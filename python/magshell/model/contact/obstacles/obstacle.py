@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 
 Surface = tuple[np.ndarray, np.ndarray]
+NO_MIDDLE = np.zeros((0, 3)), np.inf  # of a body that is open, or that surrounds the sheet
 
 
 class Obstacle(Owner, ABC):
@@ -128,6 +129,11 @@ class Obstacle(Owner, ABC):
         vertices, faces = self._surface(side, (middle - origin) @ rotation)
         return vertices @ rotation.T + origin, faces
 
+    @property
+    def _middle(self) -> tuple[np.ndarray, float]:
+        """Points on the middle of a closed body, (k, 3) m in its own frame, and its smallest radius there, m."""
+        return NO_MIDDLE
+
     @abstractmethod
     def _surface(self, extent: float, around: np.ndarray) -> Surface:
         """Return the mesh of `surface` in the body's own frame."""
@@ -156,3 +162,9 @@ class Obstacle(Owner, ABC):
     @abstractmethod
     def _summary(self) -> str:
         """Return the shape in a few words."""
+
+
+def points_between(first: np.ndarray, last: np.ndarray, spacing: float) -> np.ndarray:
+    """Return points (k, 3) m on a straight line with its ends, at most `spacing` [m] apart."""
+    parts = int(np.ceil(np.linalg.norm(last - first) / spacing))
+    return np.linspace(first, last, parts + 1)

@@ -11,7 +11,7 @@ from .... import _core as core
 from ...._input.quantity import quantity, shape_of
 from ...._input.scalars import all_positive, flag, positive
 from ._surfaces import box_surface, sphere_surface, swept_surface
-from .obstacle import Obstacle, Surface
+from .obstacle import NO_MIDDLE, Obstacle, Surface, points_between
 
 if TYPE_CHECKING:
     from ...._input.kinds import Numbers
@@ -45,6 +45,10 @@ class Sphere(Obstacle):
 
     def _surface(self, extent: float, around: np.ndarray) -> Surface:
         return sphere_surface(self.radius)
+
+    @property
+    def _middle(self) -> tuple[np.ndarray, float]:
+        return NO_MIDDLE if self.inside else (np.zeros((1, 3)), self.radius)
 
     def _summary(self) -> str:
         return f"radius {self.radius:g} m{_side(self.inside)}"
@@ -91,6 +95,15 @@ class Box(Obstacle):
     def _surface(self, extent: float, around: np.ndarray) -> Surface:
         return box_surface(self.size, self.rounding)
 
+    @property
+    def _middle(self) -> tuple[np.ndarray, float]:
+        if self.inside:
+            return NO_MIDDLE
+        _, across, along = np.argsort(self.size, kind="stable")
+        radius = float(self.size[across]) / 2
+        end = (float(self.size[along]) / 2 - radius) * np.eye(3)[along]
+        return points_between(-end, end, radius), radius
+
     def _summary(self) -> str:
         rounded = f", edges rounded by {self.rounding:g} m" if self.rounding else ""
         return f"{' x '.join(f'{x:g}' for x in self.size)} m{rounded}{_side(self.inside)}"
@@ -135,6 +148,10 @@ class Capsule(Obstacle):
 
     def _surface(self, extent: float, around: np.ndarray) -> Surface:
         return swept_surface(self.ends, np.full(2, self.radius), closed=True)
+
+    @property
+    def _middle(self) -> tuple[np.ndarray, float]:
+        return NO_MIDDLE if self.inside else (points_between(*self.ends, self.radius), self.radius)
 
     def _summary(self) -> str:
         return f"length {self.length:g} m, radius {self.radius:g} m{_side(self.inside)}"

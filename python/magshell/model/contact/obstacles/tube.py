@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from .... import _core as core
 from ...._input.quantity import quantity, shape_of
 from ...._input.scalars import all_positive, flag
 from ._surfaces import swept_surface
-from .obstacle import Obstacle, Surface
+from .obstacle import NO_MIDDLE, Obstacle, Surface, points_between
 
 if TYPE_CHECKING:
     from ...._input.kinds import Numbers
@@ -80,6 +81,14 @@ class Tube(Obstacle):
 
     def _surface(self, extent: float, around: np.ndarray) -> Surface:
         return swept_surface(self.points, self.radius, self.closed)
+
+    @property
+    def _middle(self) -> tuple[np.ndarray, float]:
+        if self.inside:
+            return NO_MIDDLE
+        radius, points = float(self.radius.min()), self.points
+        parts = [points_between(a, b, radius) for a, b in pairwise(points)]
+        return np.concatenate(parts), radius
 
     def _summary(self) -> str:
         low, high = self.radius.min(), self.radius.max()
