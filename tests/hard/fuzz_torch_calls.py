@@ -202,7 +202,13 @@ def _controls(s: Sample) -> Iterator[Call]:
         "lower": -1.0,
         "upper": (1.0, 2.0),
     }
-    receding |= {"trials": 2, "trial_amplitude": (0.1, 0.2), "trial_periods": (2, 3), "max_iterations": 2, "tolerance": 1e-3}
+    receding |= {
+        "trials": 2,
+        "trial_amplitude": (0.1, 0.2),
+        "trial_periods": (2, 3),
+        "max_iterations": 2,
+        "tolerance": 1e-3,
+    }
     yield Call(
         "control.receding_horizon",
         lambda **a: control.receding_horizon(

@@ -63,7 +63,10 @@ def test_a_keyword_that_is_elsewhere_is_told_where(call, words):
             "scale of a color must be sequential, diverging, cyclic or None",
         ),
         (lambda: ms.View(1, np.nan), r"azimuth \[degrees\] must be finite"),
-        (lambda: ms.View(1, 2, frame=np.zeros((2, 3))), "two opposite corners of a box, got the same point twice"),
+        (
+            lambda: ms.View(1, 2, frame=np.zeros((2, 3))),
+            "two opposite corners of a box, got the same point twice",
+        ),
         (lambda: ms.View(1, 2, frame=(0, 1)), r"frame \[m\] must have shape"),
         (
             lambda: ms.AdjointStorage("all"),

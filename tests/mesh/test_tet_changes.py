@@ -196,3 +196,16 @@ def test_a_hanging_vertex_does_not_weld():
     lower = ms.TetMesh(below, positive_each(below, np.array([[0, 1, 2, 4], [1, 3, 2, 4]])))
     with pytest.raises(ValueError, match="vertex 3 of mesh 1 lies on a face of mesh 0 and is no corner"):
         ms.weld(upper, lower)
+
+
+def test_welding_refuses_to_close_a_crack_of_a_solid():
+    """Use two blocks that touch without being joined, in one mesh, below a block that covers both."""
+    left = ms.meshes.box((1.0, 1.0, 1.0), cells=(1, 1, 1))
+    right = left.transformed(translation=(1.0, 0.0, 0.0))
+    cracked = ms.TetMesh(
+        np.concatenate([left.rest_positions, right.rest_positions]),
+        np.concatenate([left.tetrahedra, right.tetrahedra + left.n_vertices]),
+    )
+    cover = ms.meshes.box((2.0, 1.0, 1.0), cells=(2, 1, 1)).transformed(translation=(0.0, 0.0, 1.0))
+    with pytest.raises(ValueError, match="of mesh 0 both coincide with a vertex .* close the slit"):
+        ms.weld(cracked, cover)

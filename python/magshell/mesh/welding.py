@@ -69,6 +69,7 @@ def weld_solids(meshes: tuple[TetMesh, ...], tolerance: float | None) -> TetWeld
     pairs = surface[scipy.spatial.cKDTree(positions[surface]).query_pairs(tolerance, output_type="ndarray")]
     pairs = pairs[owner[pairs[:, 0]] != owner[pairs[:, 1]]]
     group = groups(len(positions), pairs)
+    _refuse_closed_slits(group, owner, offsets)
     first = np.unique(group, return_index=True)[1]
     number = np.empty(len(positions), dtype=np.int64)
     kept = np.sort(first)
@@ -88,6 +89,24 @@ def weld_solids(meshes: tuple[TetMesh, ...], tolerance: float | None) -> TetWeld
     _check_solids_connected(meshes, joined, maps, tolerance)
     ends = np.cumsum([0, *(mesh.n_tetrahedra for mesh in meshes)])
     return TetWeld(joined, maps, tuple(np.arange(a, b) for a, b in pairwise(ends)))
+
+
+def _refuse_closed_slits(cluster: np.ndarray, mesh_of: np.ndarray, offsets: np.ndarray) -> None:
+    """Raise ValueError if two vertices of one mesh are in a cluster: both sides of a slit at one vertex of another mesh.
+
+    cluster, mesh_of: the cluster of coincident vertices and the mesh of each vertex of all meshes; offsets: the first vertex of
+    each mesh.
+    """
+    owner = np.stack([cluster, mesh_of], axis=1)
+    _, which, counts = np.unique(owner, axis=0, return_inverse=True, return_counts=True)
+    doubled = np.flatnonzero(counts[which.ravel()] > 1)
+    if len(doubled):
+        part = mesh_of[doubled[0]]
+        vertices = doubled[(owner[doubled] == owner[doubled[0]]).all(axis=1)] - offsets[part]
+        raise ValueError(
+            f"vertices {vertices[0]} and {vertices[1]} of mesh {part} both coincide with a vertex of another "
+            "mesh; weld would close the slit between them"
+        )
 
 
 def _describe_nodes(mesh: TetMesh) -> str:
@@ -191,8 +210,7 @@ def weld(*meshes: TriangleMesh | TetMesh, tolerance: float | None = None) -> Wel
     vertex, at its position in the first of these meshes. Two vertices of the same mesh are never merged, so that its slits
     stay open; if both sides of a slit would be welded to one vertex, ValueError is raised.
 
-    Tetrahedral meshes are welded along faces of their surfaces, in the same way. But a slit closes if both of its sides are
-    welded to the same vertices. The tetrahedra keep the numbers and names of their `parts`.
+    Tetrahedral meshes are welded along faces of their surfaces, in the same way. The tetrahedra keep the numbers and names of their `parts`.
 
     Args:
         meshes: two or more, all triangle meshes or all tetrahedral meshes of one order. Normals of triangle meshes must
@@ -207,7 +225,7 @@ def weld(*meshes: TriangleMesh | TetMesh, tolerance: float | None = None) -> Wel
     Raises:
         ValueError: if a mesh shares no edge (tetrahedra: no face) with the others, if a common boundary is divided
             differently in two meshes, if two triangle meshes have opposite orientations, if more than two triangles would
-            meet at an edge, or if one part name has different numbers in two tetrahedral meshes.
+            meet at an edge, if a slit would be closed, or if one part name has different numbers in two tetrahedral meshes.
 
     >>> import magshell as ms
     >>> left = ms.meshes.rectangle(1.0, 1.0, cells=(4, 4))
@@ -256,18 +274,7 @@ def _vertex_maps(meshes, tolerance: float) -> list[np.ndarray]:
     )
     cluster = scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
 
-    # Two vertices of one mesh in a cluster are both sides of a slit at one vertex of another mesh.
-    owner = np.stack([cluster, mesh_of], axis=1)
-    _, which, counts = np.unique(owner, axis=0, return_inverse=True, return_counts=True)
-    doubled = np.flatnonzero(counts[which.ravel()] > 1)
-    if len(doubled):
-        part = mesh_of[doubled[0]]
-        vertices = doubled[(owner[doubled] == owner[doubled[0]]).all(axis=1)] - offsets[part]
-        raise ValueError(
-            f"vertices {vertices[0]} and {vertices[1]} of mesh {part} both coincide with a vertex of another "
-            "mesh; weld would close the slit between them"
-        )
-
+    _refuse_closed_slits(cluster, mesh_of, offsets)
     _, first, number = np.unique(cluster, return_index=True, return_inverse=True)
     rank = np.empty(len(first), dtype=np.int64)
     rank[np.argsort(first)] = np.arange(len(first))

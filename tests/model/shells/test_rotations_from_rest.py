@@ -20,7 +20,9 @@ def folded(x: np.ndarray) -> np.ndarray:
 
 
 def sheet(map_positions=lambda x: x, **values) -> tuple[ms.QuadraticTriangleMesh, ms.Shell]:
-    mesh = ms.QuadraticTriangleMesh.from_triangles(ms.TriangleMesh(map_positions(FLAT.rest_positions), FLAT.faces))
+    mesh = ms.QuadraticTriangleMesh.from_triangles(
+        ms.TriangleMesh(map_positions(FLAT.rest_positions), FLAT.faces)
+    )
     values = {"thickness": 0.02, "young_modulus": 1e6, "poisson_ratio": 0.3, **values}
     return mesh, ms.Shell(mesh, bending="midedge2", **values)
 

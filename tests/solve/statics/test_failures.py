@@ -136,7 +136,9 @@ def test_a_failure_beside_flat_faces_names_them():
     """Use faces so flat that shorter load steps do not help."""
     mesh = crossed(LENGTH, WIDTH, (20, 2), [0.0002, 0.5])
     with pytest.raises(ms.NotConverged) as caught:
-        bent_far(mesh, max_relaxation_steps=2)  # with 20 the round-off of these faces decides whether the solve succeeds
+        bent_far(
+            mesh, max_relaxation_steps=2
+        )  # with 20 the round-off of these faces decides whether the solve succeeds
     text = str(caught.value)
     named = re.search(
         r"(?:faces, namely|Face) (\d+) \(largest angle 179\.\d+ deg, height .* of the thickness\).* almost flat",

@@ -187,8 +187,8 @@ def _to_ellipsoid(points: np.ndarray, radii: np.ndarray) -> np.ndarray:
     squares = (radii / largest) ** 2
     least = squares.min()
     more = squares - least
-    # The nearest point to an inner point on a plane of symmetry may lie off that plane: the lower bound moves the inner point
-    # off the plane by a negligible distance.
+    # The point nearest to an inner point on a plane of symmetry may lie off that plane: the lower bound moves the inner
+    # point off the plane by a negligible distance.
     p = np.maximum(points / largest, 1e-12 * np.sqrt(squares))
     weighted = p * np.sqrt(squares)
     # u = t + the smallest square: so r^2 + t keeps its digits where it is small
