@@ -207,5 +207,5 @@ def test_welding_refuses_to_close_a_crack_of_a_solid():
         np.concatenate([left.tetrahedra, right.tetrahedra + left.n_vertices]),
     )
     cover = ms.meshes.box((2.0, 1.0, 1.0), cells=(2, 1, 1)).transformed(translation=(0.0, 0.0, 1.0))
-    with pytest.raises(ValueError, match="of mesh 0 both coincide with a vertex .* close the slit"):
+    with pytest.raises(ValueError, match=r"of mesh 0 both coincide with a vertex .* close the slit"):
         ms.weld(cracked, cover)

@@ -94,8 +94,8 @@ def weld_solids(meshes: tuple[TetMesh, ...], tolerance: float | None) -> TetWeld
 def _refuse_closed_slits(cluster: np.ndarray, mesh_of: np.ndarray, offsets: np.ndarray) -> None:
     """Raise ValueError if two vertices of one mesh are in a cluster: both sides of a slit at one vertex of another mesh.
 
-    cluster, mesh_of: the cluster of coincident vertices and the mesh of each vertex of all meshes; offsets: the first vertex of
-    each mesh.
+    cluster, mesh_of: the cluster of coincident vertices, and the mesh, of each vertex of all meshes; offsets: the first
+    vertex of each mesh.
     """
     owner = np.stack([cluster, mesh_of], axis=1)
     _, which, counts = np.unique(owner, axis=0, return_inverse=True, return_counts=True)
@@ -210,7 +210,8 @@ def weld(*meshes: TriangleMesh | TetMesh, tolerance: float | None = None) -> Wel
     vertex, at its position in the first of these meshes. Two vertices of the same mesh are never merged, so that its slits
     stay open; if both sides of a slit would be welded to one vertex, ValueError is raised.
 
-    Tetrahedral meshes are welded along faces of their surfaces, in the same way. The tetrahedra keep the numbers and names of their `parts`.
+    Tetrahedral meshes are welded along faces of their surfaces, in the same way. The tetrahedra keep the numbers and names
+    of their `parts`.
 
     Args:
         meshes: two or more, all triangle meshes or all tetrahedral meshes of one order. Normals of triangle meshes must
