@@ -3,8 +3,8 @@
 A field of several components is stored as one property per component (`name_x`, `name_y`, `name_z`), as other programs
 expect. A comment in the header says which properties belong together, so that the field is read back in one piece.
 
-magshell reads and writes this format itself, because a solve can continue from the fields of a file. meshio 5.3 writes no fields
-of faces and none with components; trimesh 5.2 writes positions in single precision and returns no fields.
+magshell reads and writes this format itself, because a solve can continue from the fields of a file. meshio 5.3 writes no
+fields of faces and none with components; trimesh 5.2 writes positions in single precision and returns no fields.
 """
 
 from __future__ import annotations
