@@ -4,9 +4,11 @@
 
 #include <pybind11/eigen.h>
 
+#include <string>
 #include <vector>
 
 #include "bindings/bindings.h"
+#include "magshell/core/errors.h"
 #include "magshell/core/types.h"
 
 namespace magshell::bindings {
@@ -18,6 +20,13 @@ inline Rows3 to_rows3(const Array& array) {
 
 inline VectorXd to_vector(const Array& array) {
     return Eigen::Map<const VectorXd>(array.data(), array.size());
+}
+
+/// Returns the entries of a one-dimensional array. Throws InvalidInput, which names it, if it has another number of axes.
+inline std::vector<Index> to_indices(const IndexArray& array, const char* name) {
+    if (array.ndim() != 1)
+        throw InvalidInput(std::string(name) + " must have one axis, got " + std::to_string(array.ndim()));
+    return {array.data(), array.data() + array.size()};
 }
 
 /// Returns one block for each of `rows`, `each` per row: (n, k, 3, 3), without the second axis if k = 0.

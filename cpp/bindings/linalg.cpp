@@ -36,12 +36,6 @@ const std::vector<std::pair<std::string, Ordering>> orderings{{"best", Ordering:
                                                               {"amd", Ordering::amd},
                                                               {"metis", Ordering::metis}};
 
-std::vector<Index> to_indices(const IndexArray& array, const char* name) {
-    if (array.ndim() != 1)
-        throw InvalidInput(std::string(name) + " must have one axis, got " + std::to_string(array.ndim()));
-    return {array.data(), array.data() + array.size()};
-}
-
 // A factor that several Python threads may use: solves run at the same time, a factorization waits for them.
 class SharedFactor {
   public:

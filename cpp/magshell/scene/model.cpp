@@ -158,7 +158,7 @@ std::vector<std::pair<std::string_view, double>> Model::energies(
 
 double Model::field_sampling_error(const VectorXd& q, const LoadParameters& load_parameters) {
     double largest = 0.0;
-    for (const std::unique_ptr<Term>& term : terms_) {
+    for (const std::unique_ptr<Term>& term : terms_.energies) {
         const double error = term->field_sampling_error(q.data(), load_parameters, extent_);
         if (!(error <= largest)) largest = error;
         if (std::isnan(largest)) break;
