@@ -60,8 +60,8 @@ VERBS = set(
     form format forward freeze gather generate get give go group grow guess halve handle hash have hide hold
     identify import improve include initialize insert integrate interpolate intersect invert is iterate join
     keep know label lead leave lengthen let lie limit linearize list load locate lock look lower make map
-    mark match measure merge mesh minimize mirror mix move multiply name negate normalize notify offer
-    offset open order orient override pad parse partition pass pause perform perturb pick place plot pop
+    mark match measure merge mesh minimize mirror mix move multiply name negate normalize notify number offer
+    offset open order orient override pad paint parse partition pass pause perform perturb pick place plot pop
     predict prepare prescribe print process produce project propagate provide pull push put query raise read
     rebuild receive record recover reduce refactorize refer refine reflect refuse register reject release
     remove rename renumber reorder repeat replace report represent request require rescale reset resize

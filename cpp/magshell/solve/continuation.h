@@ -24,7 +24,7 @@ struct PathOptions {
     double largest_step = 0.02;  // [-] largest arc length: about the rms displacement over the extent
     int max_points = 1000;
     double lowest_parameter = -1e300, highest_parameter = 1.0;  // [-] the path ends at either
-    bool locate_critical = true;  // whether to compute the critical points between path points
+    bool locate_critical = true;                // whether to compute the critical points between path points
     std::vector<WatchedObstacle> watched = {};  // those that move
 };
 
@@ -32,7 +32,7 @@ struct PathPoint {
     VectorXd state;
     double parameter = 0.0;
     Model::AngleBranches angle_branches;
-    Index unstable_directions = 0;  // number of negative eigenvalues of the Hessian
+    Index unstable_directions = 0;      // number of negative eigenvalues of the Hessian
     double field_sampling_error = 0.0;  // [-] as Term::field_sampling_error
 };
 

@@ -49,7 +49,8 @@ struct StaticsResult {
     bool at_roundoff =
         false;  // the residual is within round-off, but not within the tolerance relative to the forces that cancel
     bool stable = false;
-    double field_sampling_error = 0.0;  // [-] as Term::field_sampling_error, at the end of a search that succeeded
+    double field_sampling_error =
+        0.0;  // [-] as Term::field_sampling_error, at the end of a search that succeeded
     Index unstable_directions = 0;
     double linear_time = 0.0;              // [s] in factorizations and solves
     std::size_t bytes = 0;                 // of the model and the factorization

@@ -107,7 +107,9 @@ class Term {
     /// Estimates how far the force of the applied field is off because each element samples the field at one point, relative to
     /// that force or to the couples over the extent [m] of the bodies, from the samples of the last assembly, at about q. NaN if it
     /// cannot be told from them.
-    virtual double field_sampling_error(const double* /*q*/, const LoadParameters&, double /*extent*/) { return 0.0; }
+    virtual double field_sampling_error(const double* /*q*/, const LoadParameters&, double /*extent*/) {
+        return 0.0;
+    }
 
     virtual std::size_t bytes() const = 0;
 };

@@ -214,7 +214,7 @@ def pressed(scene, ball, depth):
 def test_a_small_ball_that_would_slip_between_contact_points_is_an_error(
     radius, face_samples, stiffness, offset
 ):
-    """Edges are 12.5 mm long: balls of 10 and 20 mm came out on the other side, without a force and without an error."""
+    """Check edges of 12.5 mm: balls of 10 and 20 mm came out on the other side, without a force and without an error."""
     ball = ob.Sphere(radius, center=(*offset, radius + TOUCHING))
     scene = over_a_sheet(ball, contact_stiffness=stiffness, face_samples=face_samples)
     found = pressed(scene, ball, 0.05)
@@ -251,7 +251,10 @@ def test_a_ball_that_slips_between_contact_points_slowly_is_an_error():
     "radius, face_samples, small", [(6e-3, 0, True), (6e-3, 3, False), (3e-3, 3, True), (8e-3, 0, False)]
 )
 def test_a_ball_that_fits_between_the_contact_points_is_warned_of(radius, face_samples, small):
-    """Between vertices that are 12 mm apart fits a ball of 7 mm radius, between three points on each face one of 3.5 mm."""
+    """Check that the size of a ball is compared with the gaps between contact points.
+
+    Between vertices that are 12 mm apart fits a ball of 7 mm radius; between three points on each face, one of 3.5 mm.
+    """
     ball = ob.Sphere(radius, center=(0.0, 0.0, radius + TOUCHING))
     scene = over_a_sheet(ball, face_samples=face_samples)
     rest = ms.equilibrium(scene)
@@ -264,8 +267,8 @@ def test_a_ball_that_fits_between_the_contact_points_is_warned_of(radius, face_s
     assert all(each.category is ms.MeshQualityWarning and each.filename == __file__ for each in told)
 
 
-def test_nothing_is_watched_where_no_obstacle_moves(monkeypatch):
-    """A scene without moving obstacles pays nothing for faces between the points in contact."""
+def test_obstacles_that_stand_still_are_not_watched(monkeypatch):
+    """Check that a scene without moving obstacles pays nothing for faces between the points in contact."""
     made = []
     watched = ms._core.WatchedObstacle
     monkeypatch.setattr(ms._core, "WatchedObstacle", lambda *each: made.append(each) or watched(*each))

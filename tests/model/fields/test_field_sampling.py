@@ -140,7 +140,10 @@ def test_the_estimate_of_the_core_does_not_miss_an_error_on_a_mesh_far_too_coars
 
 
 def test_a_field_that_a_mesh_resolves_is_sampled_at_no_more_points(monkeypatch):
-    """The check at seven points of every face took up to 62 % of a solve; now it is left out if the estimate is small."""
+    """Check that fields are sampled at seven points of a face only if the estimate of the error is not small.
+
+    The samples took up to 62 % of a solve.
+    """
     asked = []
     whole = ms._core.sample_fields
     monkeypatch.setattr(ms._core, "sample_fields", lambda *each: asked.append(each) or whole(*each))

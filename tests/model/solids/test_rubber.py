@@ -145,7 +145,7 @@ def test_results_are_saved_and_loaded_and_materials_copied(law, constants, tmp_p
 
 @pytest.mark.parametrize("law, constants", LAWS)
 def test_blocks_under_large_loads_keep_their_elements_upright(law, constants):
-    """Press a block to half its height, and pull it to three times it, in one call each."""
+    """Check a block that is pressed to half its height and pulled to three times its height, in one solve each."""
     for end in (-0.5, 2.0):
         solid = cube(law(**constants, bulk_modulus=50 * SHEAR), cells=(2, 2, 2))
         x = solid.mesh.rest_positions

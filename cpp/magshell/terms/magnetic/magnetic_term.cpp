@@ -203,7 +203,8 @@ void MagneticTerm::find_neighbours() {
 //   (|d_i| / |e_i|)^2 (G(x_b + e_i)^T m - F - F' e_i).
 //
 // Across an edge of the border it is taken as the mean of the others.
-double MagneticTerm::field_sampling_error(const double* q, const LoadParameters& load_parameters, double extent) {
+double MagneticTerm::field_sampling_error(const double* q, const LoadParameters& load_parameters,
+                                          double extent) {
     constexpr double cancelling = 0.1;  // [-] of the sum of the forces, as in field_sampling.py
     constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
     if (!field_.varies(load_parameters)) return 0.0;
@@ -249,8 +250,7 @@ double MagneticTerm::field_sampling_error(const double* q, const LoadParameters&
             const Sample& there = samples[neighbours_[f][i]];
             const Vec3 step = there.point - here.point,
                        corner = Eigen::Map<const Vec3>(q + 3 * surface_.corners[f][i]) - here.point;
-            const Vec3 beyond =
-                (there.gradient - here.gradient).transpose() * here.moment - rates[f] * step;
+            const Vec3 beyond = (there.gradient - here.gradient).transpose() * here.moment - rates[f] * step;
             sum += (corner.squaredNorm() / step.squaredNorm()) * beyond;
             ++count;
         }

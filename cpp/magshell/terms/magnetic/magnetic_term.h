@@ -29,7 +29,8 @@ class MagneticTerm final : public Term {
                   bool, SystemMatrix& out) const override;
     void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
              Gradient& out) override;
-    double field_sampling_error(const double* q, const LoadParameters& load_parameters, double extent) override;
+    double field_sampling_error(const double* q, const LoadParameters& load_parameters,
+                                double extent) override;
     std::size_t bytes() const override;
 
   private:
@@ -50,7 +51,8 @@ class MagneticTerm final : public Term {
     std::vector<double> thicknesses_;
     LargeVector<Magnetic::Element> elements_;
     std::vector<Magnetic::Field> fields_;  // sampled for the current assembly; empty in a uniform field
-    std::vector<std::array<Index, 3>> neighbours_;  // across the edge opposite each corner, -1 for none; see find_neighbours
+    std::vector<std::array<Index, 3>>
+        neighbours_;  // across the edge opposite each corner, -1 for none; see find_neighbours
     bool normal_magnetization_ = false;
 };
 

@@ -131,7 +131,7 @@ class Obstacle(Owner, ABC):
 
     @property
     def _middle(self) -> tuple[np.ndarray, float]:
-        """Points on the middle of a closed body, (k, 3) m in its own frame, and its smallest radius there, m."""
+        """Return points on the middle of a closed body, (k, 3) m in its own frame, and its smallest radius there, m."""
         return NO_MIDDLE
 
     @abstractmethod
