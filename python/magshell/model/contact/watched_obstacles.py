@@ -15,7 +15,7 @@ import numpy as np
 from ... import _core
 from ..._runtime.warning_stacklevel import callers_level
 from ...errors import MeshQualityWarning
-from .contacts_to_core import obstacles_of
+from .contacts_to_core import contact_points, obstacles_of
 
 if TYPE_CHECKING:
     from ..scene.scene import Scene
@@ -52,7 +52,7 @@ def watched_obstacles(scene: Scene, moving: Iterable[Obstacle]) -> list[_core.Wa
 
 def _faces_in_contact(scene: Scene, contact: Contact) -> np.ndarray:
     """Return the faces whose corners are all in contact, (k, 3) vertices of the scene."""
-    vertices, _ = scene._bodies.contact_points(contact)
+    vertices, _ = contact_points(scene._bodies, contact)
     alone = vertices[vertices[:, 1] < 0, 0]
     faces = scene.mesh.faces
     return faces[np.isin(faces, alone).all(axis=1)].astype(np.int32)
