@@ -30,7 +30,9 @@ def machine_time() -> float:
     return used.ru_utime + used.ru_stime
 
 
-@pytest.mark.skipif("CI" not in os.environ, reason="whoever works on it may use it where it lies")
+@pytest.mark.skipif(
+    "CI" not in os.environ, reason="developers may install the package in place, without a wheel"
+)
 def test_tested_package_was_installed_from_a_wheel():
     told = json.loads(distribution("magshell").read_text("direct_url.json") or "{}")
     assert told["url"].endswith(".whl") and "archive_info" in told

@@ -73,14 +73,11 @@ def half_size():
     by 1e-12 take 2500 to 7100 factorizations, or end where no step lowers the energy.
     """
     scene = idle_strip()
-
-    def solve():
-        return ms.equilibrium(scene, start=0.5 * scene.mesh.rest_positions)
-
+    cure = "Start from positions closer to an equilibrium"
     try:
-        return at_rest(solve())
-    except ms.NotConverged:
-        return refused(solve, "Start from positions closer to an equilibrium", ms.NotConverged)
+        return at_rest(ms.equilibrium(scene, start=0.5 * scene.mesh.rest_positions))
+    except ms.NotConverged as error:
+        return Answer(f"a stable equilibrium, or ...{cure}...", f"NotConverged: {error}", cure in str(error))
 
 
 @case("rolled into a scroll of three turns")

@@ -7,7 +7,7 @@ import pytest
 
 import magshell as ms
 from magshell._input.keyword_value import keyword_value
-from magshell._runtime.solve_keywords import SOLVE_KEYWORDS, SolveKeyword, keywords_of, names_of
+from magshell._runtime.solve_keywords import SOLVE_KEYWORDS, keywords_of, names_of
 
 SOLVES = sorted({solve for each in SOLVE_KEYWORDS.values() for solve in each.solves})
 
@@ -71,16 +71,3 @@ def test_values_of_the_shell_are_those_that_a_solve_can_replace() -> None:
 def test_wrong_value_is_refused_with_name_unit_and_shapes(name, value, words) -> None:
     with pytest.raises(ValueError, match=words):
         keyword_value(SOLVE_KEYWORDS[name], value, {"n_v": 4})
-
-
-def test_keyword_without_gradient_says_why(monkeypatch) -> None:
-    torch = pytest.importorskip("torch")
-    row: SolveKeyword = SOLVE_KEYWORDS["damping"]._replace(no_gradient="nobody derived it")
-    monkeypatch.setitem(SOLVE_KEYWORDS, "damping", row)
-    mesh = ms.meshes.rectangle(0.1, 0.05, cells=(2, 1))
-    shell = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
-    scene = ms.Scene(shell, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -1.0))
-    damping = torch.tensor(1e-3, dtype=torch.float64, requires_grad=True)
-    move = ms.simulate(scene, steps=1, time_step=1e-3, damping=damping, progress=False)
-    with pytest.raises(ms.NoGradient, match="no gradient by damping: nobody derived it"):
-        move.positions.sum().backward()

@@ -32,6 +32,7 @@ def open_npz(source: Any) -> Iterator[Any]:
             source.seek(0)
         with np.load(source, allow_pickle=False) as file:
             yield file
+    # zipfile raises NotImplementedError for a compression that it does not know.
     except (zipfile.BadZipFile, zlib.error, struct.error, NotImplementedError, EOFError) as error:
         raise ValueError(f"it is no .npz archive, or a damaged one: {error}") from error
 

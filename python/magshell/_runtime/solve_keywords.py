@@ -26,7 +26,6 @@ class SolveKeyword(NamedTuple):
     group: "load parameter", "damping", "shell" (the shell's constructor checks the value) or "solve".
     default: that of the signatures. minimum: "positive", "not negative", or "" for any number.
     varies: whether it may vary in time in ms.simulate.
-    no_gradient: why a gradient by it raises NoGradient; "" if it has one.
     """
 
     name: str
@@ -39,7 +38,6 @@ class SolveKeyword(NamedTuple):
     default: Any = None
     minimum: str = ""
     varies: bool = False
-    no_gradient: str = ""
 
 
 _FACTORS = (

@@ -108,11 +108,9 @@ class Inputs:
 
         A tensor that requires a gradient joins the leaves. Raises ValueError.
         """
-        row = SOLVE_KEYWORDS[name]
-        numbers = keyword_value(row, self._numbers(name, value), {"n_v": self.scene.mesh.n_vertices})
-        if row.no_gradient:
-            self.refuse(name, value, row.no_gradient)
-        return numbers
+        return keyword_value(
+            SOLVE_KEYWORDS[name], self._numbers(name, value), {"n_v": self.scene.mesh.n_vertices}
+        )
 
     def refuse(self, name: str, tensor: torch.Tensor, why: str) -> None:
         """Record that a tensor has no gradient by this input, and why: NoGradient says so when the gradient is asked

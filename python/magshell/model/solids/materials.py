@@ -172,6 +172,7 @@ class _NearlyIncompressible(SolidMaterial):
     """A material of constants that resist shear, and either a bulk modulus or Poisson's ratio."""
 
     isochoric = True
+    _FIRST_ORDER: tuple[str, ...]  # the constants of I1 - 3 and I2 - 3
     _volume: ClassVar = {
         "bulk_modulus": ("Pa", "positive", _positive),
         "poisson_ratio": _YOUNG["poisson_ratio"],
@@ -191,8 +192,8 @@ class _NearlyIncompressible(SolidMaterial):
         return self._energy if "bulk_modulus" in self._given else f"{self._energy} poisson_ratio"
 
     def _shear_modulus(self, constants: dict[str, np.ndarray]) -> np.ndarray:
-        """Return the shear modulus for small strains by the constants, Pa."""
-        raise NotImplementedError
+        """Return the shear modulus for small strains, Pa: twice the sum of the constants of first order."""
+        return 2.0 * sum(constants[name] for name in self._FIRST_ORDER)
 
     def _poisson_ratio(self, constants: dict[str, np.ndarray]) -> np.ndarray:
         if "poisson_ratio" in constants:
@@ -234,6 +235,7 @@ class Yeoh(_NearlyIncompressible):
     """
 
     _energy = "Yeoh"
+    _FIRST_ORDER = ("c10",)
     _ranges: ClassVar = {
         "c10": ("Pa", "positive", _positive),
         "c20": ("Pa", "a finite number", np.isfinite),
@@ -252,9 +254,6 @@ class Yeoh(_NearlyIncompressible):
     ):
         super().__init__(bulk_modulus, poisson_ratio, c10=c10, c20=c20, c30=c30)
 
-    def _shear_modulus(self, constants: dict[str, np.ndarray]) -> np.ndarray:
-        return 2.0 * constants["c10"]
-
 
 class MooneyRivlin(_NearlyIncompressible):
     """The Mooney-Rivlin material of rubber, nearly incompressible (Mooney 1940, Rivlin 1948):
@@ -272,6 +271,7 @@ class MooneyRivlin(_NearlyIncompressible):
     """
 
     _energy = "MooneyRivlin"
+    _FIRST_ORDER = ("c10", "c01")
     _ranges: ClassVar = {
         "c10": ("Pa", "positive", _positive),
         "c01": ("Pa", "not negative", _not_negative),
@@ -287,9 +287,6 @@ class MooneyRivlin(_NearlyIncompressible):
         poisson_ratio: Numbers | None = None,
     ):
         super().__init__(bulk_modulus, poisson_ratio, c10=c10, c01=c01)
-
-    def _shear_modulus(self, constants: dict[str, np.ndarray]) -> np.ndarray:
-        return 2.0 * (constants["c10"] + constants["c01"])
 
 
 class StableNeoHookean(_Isotropic):
