@@ -119,12 +119,20 @@ def _from_flat() -> dict[str, Any]:
     return results
 
 
-def semi_cylinder(cells: int, force: float) -> ms.Scene:
+def semi_cylinder(
+    cells: int | tuple[int, int],
+    force: float,
+    *,
+    length: float = 3.048,
+    thickness: float = 0.03,
+    poisson_ratio: float = 0.3,
+) -> ms.Scene:
     """Return case A8: half of a semi-cylinder clamped at one end, a force [N] on the top of the other (Sze, Liu, Lo
     2004)."""
-    radius, length = 1.016, 3.048
-    mesh = ms.meshes.cylinder(radius, length, (0.0, np.pi / 2), cells=(cells, cells))
-    sheet = ms.Shell(mesh, thickness=0.03, young_modulus=2.0685e7, poisson_ratio=0.3)
+    radius = 1.016
+    cells = (cells, cells) if isinstance(cells, int) else cells
+    mesh = ms.meshes.cylinder(radius, length, (0.0, np.pi / 2), cells=cells)
+    sheet = ms.Shell(mesh, thickness=thickness, young_modulus=2.0685e7, poisson_ratio=poisson_ratio)
     supports = [
         ms.Clamp(mesh.edges_at(y=0.0)),
         ms.SymmetryPlane((1, 0, 0)),

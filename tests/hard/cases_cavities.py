@@ -10,12 +10,19 @@ from scipy.optimize import brentq
 import magshell as ms
 
 
-def hollow_ball(cells=2, element="quadratic") -> ms.Solid:
+def hollow_ball(cells=2, element="quadratic", hollow=0.5, axes=(1.0, 1.0, 1.0), material=None) -> ms.Solid:
+    """Return a hollow ball, or an ellipsoid with these half axes.
+
+    hollow: radius of the hollow over that of the ball.
+    """
     ball = ms.meshes.ball(1.0, cells=cells)
     inner = np.linalg.norm(ball.rest_positions[ball.tetrahedra], axis=2).min(axis=1) < 0.5 - 1e-6
     kept, numbered = np.unique(ball.tetrahedra[~inner], return_inverse=True)
-    mesh = ms.TetMesh(ball.rest_positions[kept], numbered.reshape(-1, 4))
-    material = ms.NeoHookean("isochoric", young_modulus=3.0, poisson_ratio=0.49)
+    x = ball.rest_positions[kept]
+    radius = np.linalg.norm(x, axis=1, keepdims=True)
+    x = x * (hollow + (radius - 0.5) * (1.0 - hollow) / 0.5) / radius if hollow != 0.5 else x
+    mesh = ms.TetMesh(x * axes, numbered.reshape(-1, 4))
+    material = material or ms.NeoHookean("isochoric", young_modulus=3.0, poisson_ratio=0.49)
     return ms.Solid(mesh, material=material, element=element)
 
 
@@ -65,13 +72,7 @@ def crushed():
 
 @case("sixty bordered groups of cells that want {:g} times their volume, in one call", over=(0.3, 3.0))
 def grown(times):
-    mesh = ms.meshes.box((0.3, 0.1, 0.1), cells=(15, 4, 4))
-    material = ms.NeoHookean(young_modulus=1e4, poisson_ratio=0.3)
-    body = ms.Solid(mesh, material=material, element="linear")
-    at = mesh.tetrahedron_barycenters
-    number = (at[:, 0] / 0.02).astype(int) * 4 + 2 * (at[:, 1] > 0.05) + (at[:, 2] > 0.05)
-    cells = ms.PneumaticCells(body, number, stiffness=1e5, volume_ratio=times)
-    found = ms.equilibrium(ms.Scene(body, supports=[ms.Pin(mesh.vertices_at(x=0.0))], actuators=[cells]))
+    found, cells = swollen(times)
     ratios = found[cells].volume_ratios
     shear, lame = 1e4 / (2 * 1.3), 1e4 * 0.3 / (1.3 * 0.4)
 
@@ -81,3 +82,17 @@ def grown(times):
 
     free = brentq(over, 0.1, 10.0)
     return both(at_rest(found), near("volume ratio", float(np.median(ratios)), free, rel=0.02))
+
+
+def swollen(
+    times: float, cells=(15, 4, 4), *, poisson_ratio=0.3, stiffness=1e5
+) -> tuple[ms.Equilibrium, ms.PneumaticCells]:
+    """Compute the equilibrium of a block of groups of cells that want `times` their volume."""
+    mesh = ms.meshes.box((0.3, 0.1, 0.1), cells=cells)
+    material = ms.NeoHookean(young_modulus=1e4, poisson_ratio=poisson_ratio)
+    body = ms.Solid(mesh, material=material, element="linear")
+    at = mesh.tetrahedron_barycenters
+    number = (at[:, 0] / 0.02).astype(int) * 4 + 2 * (at[:, 1] > 0.05) + (at[:, 2] > 0.05)
+    groups = ms.PneumaticCells(body, number, stiffness=stiffness, volume_ratio=times)
+    scene = ms.Scene(body, supports=[ms.Pin(mesh.vertices_at(x=0.0))], actuators=[groups])
+    return ms.equilibrium(scene), groups

@@ -23,10 +23,10 @@ import magshell as ms
 NARROW = 4e-4  # m: it bends at the clamp alone, and its cells must not be wider than the bend
 
 
-def in_field(number: float, angle: float, rel: float) -> Answer:
+def in_field(number: float, angle: float, rel: float, cells=(80, 2), ratio=1e-4, width=NARROW) -> Answer:
     """Compare the end of a strip in a field at this angle with the elastica, M B h w L^2 / (E I) = number."""
-    mesh = graded(strip((80, 2), width=NARROW))
-    sheet = shell(mesh, thickness=1e-4 * LENGTH)  # the elastica does not stretch
+    mesh = graded(strip(cells, width=width))
+    sheet = shell(mesh, thickness=ratio * LENGTH)  # the elastica does not stretch
     direction = np.array([np.cos(angle), 0.0, np.sin(angle)])
     found = ms.equilibrium(
         cantilever(sheet, field=ms.UniformField()),
@@ -52,9 +52,9 @@ def against():
     return in_field(1e3 * np.pi**2 / 4.0, np.pi, 5e-3)
 
 
-def guided(field_over_modulus: float) -> ms.Equilibrium:
+def guided(field_over_modulus: float, cells=(8, 2)) -> ms.Equilibrium:
     """Compute the equilibrium of a strip that can only change its length, in a field M B over E along it."""
-    mesh = strip((8, 2))
+    mesh = strip(cells)
     sheet = shell(mesh)
     vertices = np.arange(mesh.n_vertices)
     supports = [ms.Pin(vertices, "yz"), ms.Pin(mesh.vertices_at(x=0.0), "x")]
@@ -81,22 +81,34 @@ def compressed():
 
 @case("a weight of {:g} E I / L^3: it hangs from its clamp", over=(1e2, 1e4))
 def heavy_strip(number):
-    mesh = graded(strip((80, 2), width=NARROW))
-    sheet = shell(mesh, thickness=1e-4 * LENGTH, mass_density=1e3)
+    return hanging_strip(number, rel=2e-3)
+
+
+def hanging_strip(number: float, rel: float, cells=(80, 2), ratio=1e-4) -> Answer:
+    """Compare the end of a strip whose weight is number E I / L^3 with the elastica."""
+    mesh = graded(strip(cells, width=NARROW))
+    sheet = shell(mesh, thickness=ratio * LENGTH, mass_density=1e3)
     weight = 1e3 * sheet.thickness[0]  # kg/m2
     gravity = number * YOUNG_MODULUS * sheet.thickness[0] ** 3 / 12.0 / LENGTH**3 / weight
     found = ms.equilibrium(cantilever(sheet, gravity=(0, 0, -gravity)))
     end = end_position(mesh, found.positions) / LENGTH
     expected = hanging(number)
-    return both(near("end x, z", end[[0, 2]], expected, rel=2e-3, scale=1.0), at_rest(found))
+    return both(near("end x, z", end[[0, 2]], expected, rel=rel, scale=1.0), at_rest(found))
 
 
 @case("a strip on a dipole that pulls 1e3 times harder than it can bear, in a scene that keeps them apart")
 def close_to_a_dipole():
-    """Check a strip pinned to a line below the dipole, which can only stretch; by symmetry its middle stays."""
-    mesh = strip((20, 2))
+    return above_a_guided_strip(0.02, 50.0)
+
+
+def above_a_guided_strip(height: float, moment: float, cells=(20, 2)) -> Answer:
+    """Check a strip pinned to a line below the dipole, which can only stretch; by symmetry its middle stays.
+
+    height: of the dipole [m]. moment: of it [A m2].
+    """
+    mesh = strip(cells)
     sheet = shell(mesh)
-    dipole = ms.Dipoles([[LENGTH / 2, 0.005, 0.02]], [[0.0, 0.0, 50.0]])
+    dipole = ms.Dipoles([[LENGTH / 2, 0.005, height]], [[0.0, 0.0, moment]])
     vertices = np.arange(mesh.n_vertices)
     supports = [ms.Pin(vertices, "yz"), ms.Pin(mesh.vertices_at(x=LENGTH / 2), "x")]
     scene = ms.Scene(sheet, supports=supports, field=dipole)

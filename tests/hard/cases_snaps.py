@@ -10,40 +10,40 @@ import magshell as ms
 from benchmarks.cases import cylinder_roof
 
 HALF_SPAN, RISE, DEPTH, THICKNESS, YOUNG_MODULUS = 1.0, 0.2, 0.5, 1e-3, 1e6
-BAR = float(np.hypot(HALF_SPAN, RISE))
 
 
-def toggle() -> tuple[ms.Scene, np.ndarray]:
+def toggle(rise: float = RISE, thickness: float = THICKNESS) -> tuple[ms.Scene, np.ndarray]:
     """Return a scene of two plates that lean on each other, hinged along feet and ridge, and the ridge's vertices.
 
     Von Mises' truss in St. Venant-Kirchhoff material: P = E h b z (z0^2 - z^2) / l^3 at the height z, so the limit
     points are at z = +- z0 / sqrt(3). The scene holds their load.
     """
     x = (-HALF_SPAN, -HALF_SPAN, 0.0, 0.0, HALF_SPAN, HALF_SPAN)
-    y, z = (0.0, DEPTH) * 3, (0.0, 0.0, RISE, RISE, 0.0, 0.0)
+    y, z = (0.0, DEPTH) * 3, (0.0, 0.0, rise, rise, 0.0, 0.0)
     mesh = ms.TriangleMesh(np.stack([x, y, z], axis=1), [[0, 2, 3], [0, 3, 1], [2, 4, 5], [2, 5, 3]])
     sheet = ms.Shell(
         mesh,
-        thickness=THICKNESS,
+        thickness=thickness,
         young_modulus=YOUNG_MODULUS,
         poisson_ratio=0.0,
         bending="hinge",
         curvature_scale=1e-3,  # its folds are hinges
     )
     ridge = np.array([2, 3])
-    load = ms.PointLoad(ridge, (0, 0, -limit_load() / 2.0))
+    load = ms.PointLoad(ridge, (0, 0, -limit_load(rise, thickness) / 2.0))
     return ms.Scene(sheet, supports=[ms.Pin([0, 1, 4, 5])], loads=[load]), ridge
 
 
-def limit_load() -> float:
-    return 2.0 * YOUNG_MODULUS * THICKNESS * DEPTH * (RISE / BAR) ** 3 / (3.0 * np.sqrt(3.0))
+def limit_load(rise: float = RISE, thickness: float = THICKNESS) -> float:
+    bar = float(np.hypot(HALF_SPAN, rise))
+    return 2.0 * YOUNG_MODULUS * thickness * DEPTH * (rise / bar) ** 3 / (3.0 * np.sqrt(3.0))
 
 
-def heights(factor: float) -> np.ndarray:
+def heights(factor: float, rise: float = RISE) -> np.ndarray:
     """Return the real heights at which the truss carries that multiple of its limit load, ascending."""
-    load = factor * limit_load() * BAR**3 / (YOUNG_MODULUS * THICKNESS * DEPTH)
-    roots = np.roots([-1.0, 0.0, RISE**2, -load])
-    return np.sort(roots[np.abs(roots.imag) < 1e-9 * RISE].real)
+    load = factor * 2.0 * rise**3 / (3.0 * np.sqrt(3.0))  # P l^3 / (E h b)
+    roots = np.roots([-1.0, 0.0, rise**2, -load])
+    return np.sort(roots[np.abs(roots.imag) < 1e-9 * rise].real)
 
 
 @case("{} times the limit load of a truss, at once", over=(0.99, 1.01, 10.0))
@@ -79,14 +79,16 @@ def toggle_by_arc_length():
     )
 
 
-def roof(thickness: float, load: float) -> ms.Scene:
+def roof(
+    thickness: float, load: float, cells: tuple[int, int] = (12, 12), nu: float = cylinder_roof.POISSON_RATIO
+) -> ms.Scene:
     """Return a quarter of the shallow roof of the accuracy table, with a quarter of `load` [N] at its center."""
-    mesh = cylinder_roof.quarter((12, 12))
+    mesh = cylinder_roof.quarter(cells)
     sheet = ms.Shell(
         mesh,
         thickness=thickness,
         young_modulus=cylinder_roof.YOUNG_MODULUS,
-        poisson_ratio=cylinder_roof.POISSON_RATIO,
+        poisson_ratio=nu,
     )
     hinge = mesh.vertices_at(x=cylinder_roof.RADIUS * np.sin(cylinder_roof.HALF_ANGLE))
     supports = [ms.Pin(hinge), ms.SymmetryPlane((1, 0, 0)), ms.SymmetryPlane((0, 1, 0))]

@@ -11,14 +11,17 @@ import magshell as ms
 from magshell.model.supports.supports import rotation_matrix
 
 
-def idle_strip() -> ms.Scene:
+def idle_strip(cells=(20, 2), thickness=1e-3) -> ms.Scene:
     """Return a scene of a strip without loads, whose equilibrium has no energy."""
-    return cantilever(shell(strip((20, 2)), thickness=1e-3))
+    return cantilever(shell(strip(cells), thickness=thickness))
 
 
-def found_again(start_from) -> Answer:
-    """Check that a solve from start_from(rest positions) returns to the rest shape."""
-    scene = idle_strip()
+def found_again(start_from, **sizes) -> Answer:
+    """Check that a solve from start_from(rest positions) returns to the rest shape.
+
+    sizes: cells and thickness of the strip.
+    """
+    scene = idle_strip(**sizes)
     rest = np.array(scene.mesh.rest_positions)
     found = ms.equilibrium(scene, start=start_from(rest))
     return both(near("positions", found.positions, rest, rel=1e-7, scale=LENGTH), at_rest(found))

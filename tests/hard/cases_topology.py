@@ -60,14 +60,14 @@ def doubled_face():
     return refused(lambda: ms.TriangleMesh(SQUARE[:3], [[0, 1, 2], [2, 1, 0]]), "have the same vertices")
 
 
-def joined_at_a_vertex(*supports) -> ms.Scene:
+def joined_at_a_vertex(*supports, thickness=1e-2, gravity=1e-3) -> ms.Scene:
     """Return a scene of two heavy squares with one common vertex, the first clamped at x = 0."""
     other = SQUARE + np.array((1, 1, 0))
     points = np.concatenate([SQUARE, other[1:]])
     mesh = ms.TriangleMesh(points, [[0, 1, 2], [0, 2, 3], [2, 4, 5], [2, 5, 6]])
-    sheet = shell(mesh, thickness=1e-2, mass_density=1e3)
+    sheet = shell(mesh, thickness=thickness, mass_density=1e3)
     clamp = ms.Clamp(mesh.edges_at(x=0.0))
-    return ms.Scene(sheet, supports=[clamp, *supports], gravity=(0, 0, -1e-3))
+    return ms.Scene(sheet, supports=[clamp, *supports], gravity=(0, 0, -gravity))
 
 
 @case("two sheets that touch in one vertex: it is a ball joint")
@@ -163,18 +163,24 @@ def free_sphere():
 @case("a closed ring pinched by two forces: bending only, 1e-6 of the membrane stiffness")
 def pinched_ring():
     """Compare the deflection with (pi/4 - 2/pi) P R^3 / (E I)."""
-    radius, width, thickness = 1.0, 0.1, 1e-3
-    mesh = ms.meshes.cylinder(radius, width, cells=(96, 2))
-    sheet = shell(mesh, thickness=thickness)
-    force = 1e-9  # N/m along the generators at the top and at the bottom
-    top, bottom = mesh.edges_at(x=0.0, z=radius), mesh.edges_at(x=0.0, z=-radius)
-    low = mesh.vertices_at(x=0.0, z=-radius)
-    supports = [ms.Pin(low), ms.Pin(mesh.vertices_at(x=0.0, z=radius), "x")]
-    scene = ms.Scene(sheet, supports=supports, loads=[ms.EdgeLoad(top, (0, 0, -force))])
-    assert len(bottom) == len(top)
+    radius, thickness, force = 1.0, 1e-3, 1e-9
+    scene = ring(force)
+    mesh = scene.mesh
     moved = ms.linear_response(scene).displacements[mesh.vertices_at(x=0.0, z=radius), 2].mean()
     expected = (np.pi / 4 - 2 / np.pi) * force * radius**3 / (1e6 * thickness**3 / 12.0)
     return near("how far it closes", -moved, expected, rel=5e-3)
+
+
+def ring(force: float, cells=(96, 2), thickness=1e-3) -> ms.Scene:
+    """Return a scene of a ring of radius 1 that stands on a generator, with `force` [N/m] down along the top one."""
+    radius, width = 1.0, 0.1
+    mesh = ms.meshes.cylinder(radius, width, cells=cells)
+    sheet = shell(mesh, thickness=thickness)
+    top, bottom = mesh.edges_at(x=0.0, z=radius), mesh.edges_at(x=0.0, z=-radius)
+    low = mesh.vertices_at(x=0.0, z=-radius)
+    supports = [ms.Pin(low), ms.Pin(mesh.vertices_at(x=0.0, z=radius), "x")]
+    assert len(bottom) == len(top)
+    return ms.Scene(sheet, supports=supports, loads=[ms.EdgeLoad(top, (0, 0, -force))])
 
 
 def square_tube(side: float, length: float, cells: tuple[int, int]) -> ms.TriangleMesh:
@@ -198,32 +204,40 @@ def square_tube(side: float, length: float, cells: tuple[int, int]) -> ms.Triang
 @case("folds of 90 degrees in the rest shape: a square tube in torsion")
 def box_beam():
     """Compare with Bredt's twist T L p / (4 A^2 G h), with the perimeter p = 4 a and A = a^2."""
-    side, length, thickness = 0.1, 0.5, 1e-3
-    mesh = square_tube(side, length, (6, 24))
-    sheet = shell(mesh, thickness=thickness, poisson_ratio=0.3)
-    angle = 1e-6
-    turned = ms.Pin(mesh.vertices_at(y=length), rotation=(0, angle, 0), center=(0, length, 0))
-    scene = ms.Scene(sheet, supports=[ms.Pin(mesh.vertices_at(y=0.0)), turned])
-    found = ms.equilibrium(scene)
+    side, length, thickness, angle = 0.1, 0.5, 1e-3, 1e-6
+    found = ms.equilibrium(twisted_tube(angle, (6, 24), length, thickness))
     shear_modulus = 1e6 / 2.6
     torque = angle * 4.0 * side**4 * shear_modulus * thickness / (length * 4.0 * side)
     return near("energy over Bredt's", found.energy / (0.5 * torque * angle), 1.0, rel=2e-2)
 
 
+def twisted_tube(angle: float, cells: tuple[int, int], length=0.5, thickness=1e-3) -> ms.Scene:
+    """Return a scene of a square tube, its ends held and turned by an angle [rad]."""
+    mesh = square_tube(0.1, length, cells)
+    sheet = shell(mesh, thickness=thickness, poisson_ratio=0.3)
+    turned = ms.Pin(mesh.vertices_at(y=length), rotation=(0, angle, 0), center=(0, length, 0))
+    return ms.Scene(sheet, supports=[ms.Pin(mesh.vertices_at(y=0.0)), turned])
+
+
 @case("two pieces in one scene, 1e6 apart in stiffness")
 def disconnected_pieces():
-    one = strip((20, 2))
+    return two_pieces(1e6, 4.0, (20, 2))
+
+
+def two_pieces(stiffer: float, number: float, cells: tuple[int, int]) -> Answer:
+    """Compare two strips in one scene, one of them `stiffer` and loaded by as much more, with a strip alone."""
+    one = strip(cells)
     other = one.transformed(translation=(0, 2 * LENGTH, 0))
     points = np.concatenate([one.rest_positions, other.rest_positions])
     both_pieces = ms.TriangleMesh(points, np.concatenate([one.faces, other.faces + one.n_vertices]))
-    modulus = np.repeat([1e6, 1e12], one.n_faces)
+    modulus = np.repeat([1e6, 1e6 * stiffer], one.n_faces)
     sheet = shell(both_pieces, young_modulus=modulus)
-    force = force_for(4.0, shell(one), LENGTH)
+    force = force_for(number, shell(one), LENGTH)
     middle = both_pieces.edge_midpoints[:, 1] > LENGTH
     far = both_pieces.edges_at(x=LENGTH)
     loads = [
         ms.EdgeLoad(far[~middle[far]], (0, 0, force)),
-        ms.EdgeLoad(far[middle[far]], (0, 0, 1e6 * force)),
+        ms.EdgeLoad(far[middle[far]], (0, 0, stiffer * force)),
     ]
     scene = ms.Scene(sheet, supports=[ms.Clamp(both_pieces.edges_at(x=0.0))], loads=loads)
     found = ms.equilibrium(scene)

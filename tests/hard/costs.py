@@ -40,15 +40,18 @@ class Cost:
     slow: bool = False
 
 
-def ventricle(cells: tuple[int, int]) -> tuple[ms.Scene, ms.Pressure, int]:
-    """Return problem 2 of Land et al. (2015): a truncated ellipsoid of Guccione's material, 10 kPa on its inner side.
+def ventricle(
+    cells: tuple[int, int], *, full: float = 10e3, wall: float = 3e-3, **material: object
+) -> tuple[ms.Scene, ms.Pressure, int]:
+    """Return problem 2 of Land et al. (2015): a truncated ellipsoid of Guccione's material, `full` [Pa] on its inner side.
 
-    cells: from the apex to the base, and through the wall. Returns the scene, its pressure, and the vertex of the inner
+    cells: from the apex to the base, and through the wall, `wall` [m] thick. material: replaces its properties. Returns
+    the scene, its pressure, and the vertex of the inner
     apex, which goes to z = -26.6 mm.
     """
     flat = ms.meshes.extruded(ms.meshes.disk(1.0, cells=cells[0]), 1.0, cells[1])
     a, b, depth = flat.rest_positions.T
-    short, long = 7e-3 + 3e-3 * depth, 17e-3 + 3e-3 * depth
+    short, long = 7e-3 + wall * depth, 17e-3 + wall * depth
     polar = np.pi - np.hypot(a, b) * (np.pi - np.arccos(5e-3 / long))  # from the base's side
     around = np.arctan2(b, a)
     x = np.stack(
@@ -60,17 +63,17 @@ def ventricle(cells: tuple[int, int]) -> tuple[ms.Scene, ms.Pressure, int]:
         axis=1,
     )
     mesh = ms.TetMesh(x, _upright(x, flat.tetrahedra))
-    material = ms.Guccione(
-        stiffness=10e3,
-        fibre_exponent=1.0,
-        cross_fibre_exponent=1.0,
-        fibre_shear_exponent=1.0,
-        bulk_modulus=1e6,
-        fibres=(1.0, 0.0, 0.0),
-    )
-    body = ms.Solid(mesh, material=material, element="quadratic")
+    properties: dict = {
+        "stiffness": 10e3,
+        "fibre_exponent": 1.0,
+        "cross_fibre_exponent": 1.0,
+        "fibre_shear_exponent": 1.0,
+        "bulk_modulus": 1e6,
+        "fibres": (1.0, 0.0, 0.0),
+    } | material
+    body = ms.Solid(mesh, material=ms.Guccione(**properties), element="quadratic")
     inner = _on(mesh, np.abs(depth) < 1e-9)
-    pressure = ms.Pressure(10e3, faces=_split(inner, body.mesh.n_faces // mesh.n_faces))
+    pressure = ms.Pressure(full, faces=_split(inner, body.mesh.n_faces // mesh.n_faces))
     base = ms.Pin(np.flatnonzero(np.abs(body.mesh.rest_positions[:, 2] - 5e-3) < 1e-9))
     apex = int(np.flatnonzero((np.hypot(a, b) < 1e-9) & (depth < 1e-9))[0])
     return ms.Scene(body, supports=[base], loads=[pressure]), pressure, apex

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import effort
-import numpy as np
 
 import magshell as ms
 from benchmarks import motion_costs, projective_motions, surrounding_costs, thrown_bars
-from benchmarks.statics import strongly_bent
 
 Counted = tuple[str, str, Callable[[], object]]  # family, case, the call to be counted
 
@@ -18,13 +16,10 @@ INTEGRATORS = (ms.ImplicitEuler(), ms.TRBDF2(), ms.SDIRK2(), ms.SDIRK3())
 
 def all_families() -> Iterator[Counted]:
     """Yield family, case and call of all that is counted."""
-    for faces in (512, 2048, 8192):
-        yield "strongly bent", f"{faces} faces", lambda n=faces: _solved(*strongly_bent(n))
-    for name, run in effort._all():
+    for name, run in effort.all_named():
         if _is_counted(name):
             family, _, case = name.partition("/")
             yield family, case, run
-    yield from _soft_solids()
     yield from _motions()
     yield from _projective()
 
@@ -67,64 +62,6 @@ COSTLY = {
     "hard starts/random positions",
     "hard starts/squeezed",
 }
-
-
-def _solved(scene: ms.Scene, controls: dict | None = None) -> ms.Equilibrium:
-    return ms.equilibrium(scene, **(controls or {}))
-
-
-def ventricle(cells: int, layers: int) -> ms.Scene:
-    """Return a quarter of the truncated ventricle of Land et al. 2015, problem 2, its base held, 10 kPa inside."""
-    unit = ms.meshes.box((1.0, 1.0, 1.0), cells=(cells, cells, layers))
-    a, b, depth = unit.rest_positions.T  # a square that becomes a quarter of a disc
-    a, b = a * np.sqrt(1.0 - b**2 / 2.0), b * np.sqrt(1.0 - a**2 / 2.0)
-    radius, around = np.hypot(a, b), np.arctan2(b, a)
-    short, long = 7e-3 + 3e-3 * depth, 17e-3 + 3e-3 * depth  # m, half axes of the shells
-    down = -np.pi + radius * (np.pi - np.arccos(5e-3 / long))
-    aside = -short * np.sin(down)
-    x = np.stack([aside * np.cos(around), aside * np.sin(around), long * np.cos(down)], axis=1)
-    mesh = ms.TetMesh(x, unit.tetrahedra[:, [0, 2, 1, 3]])
-    material = ms.Guccione(
-        stiffness=10e3,
-        fibre_exponent=1.0,
-        cross_fibre_exponent=1.0,
-        fibre_shear_exponent=1.0,
-        bulk_modulus=1e7,
-        fibres=(0.0, 0.0, 1.0),
-    )
-    solid = ms.Solid(mesh, material=material)
-    base = np.flatnonzero(np.abs(solid.mesh.rest_positions[:, 2] - 5e-3) < 1e-9)
-    inside = ms.Pressure(10e3, faces=unit.faces_at(z=0.0))
-    supports = [ms.Pin(base), ms.SymmetryPlane((1, 0, 0)), ms.SymmetryPlane((0, 1, 0))]
-    return ms.Scene(solid, supports=supports, loads=[inside])
-
-
-def thick_tube(pressure: float) -> ms.Scene:
-    """Return an eighth of a closed thick tube, nearly incompressible and free to extend, with a pressure inside [Pa]."""
-    inner, outer, half = 0.01, 0.015, 0.02  # m
-    unit = ms.meshes.box((1.0, 1.0, 1.0), cells=(6, 4, 4))
-    radial, around, along = unit.rest_positions.T
-    angle = 0.5 * np.pi * around
-    radius = inner + (outer - inner) * radial
-    x = np.stack([radius * np.cos(angle), radius * np.sin(angle), half * along], axis=1)
-    solid = ms.Solid(
-        ms.TetMesh(x, unit.tetrahedra), material=ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.4999)
-    )
-    ends = (
-        pressure * inner**2 / (outer**2 - inner**2)
-    )  # axial traction [Pa] that rigid end caps transmit to the wall
-    loads = [
-        ms.Pressure(pressure, faces=unit.faces_at(x=0.0)),
-        ms.Pressure(-ends, faces=unit.faces_at(z=1.0)),
-    ]
-    return ms.Scene(solid, supports=[ms.SymmetryPlane(normal) for normal in np.eye(3)], loads=loads)
-
-
-def _soft_solids() -> Iterator[Counted]:
-    for cells, layers in ((2, 1), (4, 1)):
-        yield "ventricle", f"{cells}x{layers} cells", lambda c=cells, n=layers: _solved(ventricle(c, n))
-    for pressure in (3e3, 6e3, 9e3):
-        yield "thick tube", f"{pressure:g} Pa", lambda p=pressure: _solved(thick_tube(p))
 
 
 def _motions() -> Iterator[Counted]:

@@ -184,7 +184,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("words", nargs="*", help="run only what has all of them in its name")
     parser.add_argument("--write", action="store_true", help=f"write {LAST_RELEASE.name} anew")
     options = parser.parse_args(arguments)
-    sys.path.append(str(Path(__file__).parents[1]))  # helpers that the hard cases share with other tests
+    sys.path.append(
+        str(Path(__file__).parents[1] / "support")
+    )  # helpers that the hard cases share with other tests
     now = measure(options.words, NUDGES if options.write else 0)
     last = read() if LAST_RELEASE.is_file() else {}
     lines, failures = compare(now, last)

@@ -10,16 +10,18 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
 from registry import all_cases
+from soft_solids import thick_tube, ventricle
 
 import magshell as ms
 from benchmarks.cases import magnetic_strip, rolled_strip
-from benchmarks.statics import CASES, oblique_field, semi_cylinder
+from benchmarks.statics import CASES, oblique_field, semi_cylinder, strongly_bent
 
 _SAME = 1e-6  # [-] relative difference below which energies are equal
 
@@ -38,14 +40,15 @@ def main(arguments: list[str] | None = None) -> int:
     if options.known:
         found = json.loads(options.known.read_text())
     else:
-        found = _measured(options.words, earlier)
+        found = measured(all_named(), options.words, earlier)
         if options.out:
             options.out.write_text(json.dumps(found, indent=1))
     _print_families(found, earlier)
     return 0
 
 
-def _measured(words: list[str], earlier: dict) -> dict:
+def measured(cases: Iterable[tuple[str, Callable]], words: list[str], earlier: dict) -> dict:
+    """Run the cases whose name holds all words; return what each call of ms.equilibrium took and how it ended."""
     calls: list[dict] = []
     solve = ms.equilibrium
 
@@ -54,11 +57,13 @@ def _measured(words: list[str], earlier: dict) -> dict:
             state = solve(*args, **keywords)
         except ms.NotConverged as error:
             state = error.last_good
-            calls.append({"factorizations": state.factorizations if state else 0, "failed": str(error)[:200]})
+            spent = [getattr(state, name, 0) for name in ("factorizations", "iterations")]
+            calls.append({"factorizations": spent[0], "iterations": spent[1], "failed": str(error)[:200]})
             raise
         calls.append(
             {
                 "factorizations": state.factorizations,
+                "iterations": state.iterations,
                 "energy": state.energy,
                 "stable": bool(state.stable),
                 "steps": [state.load_steps, state.relaxation_steps, state.saddles_escaped],
@@ -69,10 +74,11 @@ def _measured(words: list[str], earlier: dict) -> dict:
     found = {}
     ms.equilibrium = counted
     try:
-        for name, run in _all():
+        for name, run in cases:
             if not all(word in name for word in words):
                 continue
             calls.clear()
+            began = time.process_time()
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 try:
@@ -80,14 +86,17 @@ def _measured(words: list[str], earlier: dict) -> dict:
                 except Exception as error:
                     right = f"{type(error).__name__}: {error}"[:200]
             if calls:
-                found[name] = {"right": right, "calls": list(calls)}
-                print(_row(name, found[name], earlier.get(name)), flush=True)
+                seconds = round(time.process_time() - began, 3)
+                found[name] = {"right": right, "seconds": seconds, "calls": list(calls)}
+                print(row_of(name, found[name], earlier.get(name)), flush=True)
     finally:
         ms.equilibrium = solve
     return found
 
 
-def _all() -> Iterator[tuple[str, Callable]]:
+def all_named() -> Iterator[tuple[str, Callable]]:
+    for faces in (512, 2048, 8192):
+        yield f"strongly bent/{faces} faces", lambda n=faces: _solved(*strongly_bent(n))
     for angle in (30, 60, 90, 120, 150, 170):
         for beta in (2.0, 5.0, 10.0, 20.0, 35.0, 50.0, 100.0):
             for cells in ((10, 1), (40, 4)):
@@ -104,13 +113,13 @@ def _all() -> Iterator[tuple[str, Callable]]:
             )
     for cells in (8, 12, 16):
         for force in (300.0, 600.0, 1500.0, 3000.0):
-            yield f"A6/{cells}x{cells}/{force:g}", lambda n=cells, f=force: _solved(_pinched(n, f))
+            yield f"A6/{cells}x{cells}/{force:g}", lambda n=cells, f=force: _solved(pinched(n, f))
     for ratio in (1e-6, 1e-5, 1e-4, 1e-3, 1e-2):
         for cells in ((40, 2), (25, 1), (60, 6)):
             for degrees in (90, 200, 324):
                 yield (
                     f"rolled/{degrees}/{cells[0]}x{cells[1]}/{ratio:g}",
-                    lambda r=ratio, c=cells, a=degrees: _solved(_rolled(r, c, a)),
+                    lambda r=ratio, c=cells, a=degrees: _solved(rolled(r, c, a)),
                 )
     for name, (build, controls, _) in CASES.items():
         for bending in ("midedge", "hinge"):
@@ -127,6 +136,10 @@ def _all() -> Iterator[tuple[str, Callable]]:
                 f"easy/C1-{angle}, 60x6, beta {beta:g}",
                 lambda a=angle, b=beta: _solved(*oblique_field(a, b, (60, 6))),
             )
+    for cells, layers in ((2, 1), (4, 1)):
+        yield f"ventricle/{cells}x{layers} cells", lambda c=cells, n=layers: _solved(ventricle(c, n))
+    for pressure in (3e3, 6e3, 9e3):
+        yield f"thick tube/{pressure:g} Pa", lambda p=pressure: _solved(thick_tube(p))
     for each in all_cases():
         yield f"hard {each.family}/{each.name}", lambda c=each: bool(c.run().right)
 
@@ -135,21 +148,31 @@ def _solved(scene: ms.Scene, controls: dict | None = None) -> bool:
     return bool(ms.equilibrium(scene, **(controls or {})).stable)
 
 
-def _pinched(cells: int, force: float) -> ms.Scene:
+def pinched(
+    cells: int | tuple[int, int],
+    force: float,
+    *,
+    half: float = 100.0,
+    thickness: float = 1.0,
+    nu: float = 0.3,
+) -> ms.Scene:
     """Return A6: an eighth of a cylinder on rigid diaphragms, under two opposite forces [N] (Sze, Liu, Lo 2004)."""
-    radius, half = 100.0, 100.0
-    mesh = ms.meshes.cylinder(radius, half, (0.0, np.pi / 2), cells=(cells, cells))
-    sheet = ms.Shell(mesh, thickness=1.0, young_modulus=30e3, poisson_ratio=0.3)
+    radius = 100.0
+    cells = (cells, cells) if isinstance(cells, int) else cells
+    mesh = ms.meshes.cylinder(radius, half, (0.0, np.pi / 2), cells=cells)
+    sheet = ms.Shell(mesh, thickness=thickness, young_modulus=30e3, poisson_ratio=nu)
     supports = [ms.SymmetryPlane(normal) for normal in np.eye(3)]
     supports.append(ms.Pin(mesh.vertices_at(y=half), "xz"))
     top = mesh.nearest_vertex((0.0, 0.0, radius))
     return ms.Scene(sheet, supports=supports, loads=[ms.PointLoad(top, (0.0, 0.0, -force / 4))])
 
 
-def _rolled(ratio: float, cells: tuple[int, int], degrees: float) -> ms.Scene:
-    """Return a strip of thickness over length `ratio`, rolled up by a moment at its end."""
-    length, young_modulus = magnetic_strip.LENGTH, 1e6
-    mesh = ms.meshes.rectangle(length, 0.1 * length, cells=cells)
+def rolled(
+    ratio: float, cells: tuple[int, int], degrees: float, *, width: float = 0.1, young_modulus: float = 1e6
+) -> ms.Scene:
+    """Return a strip of thickness over length `ratio` and width over length `width`, rolled up by a moment at its end."""
+    length = magnetic_strip.LENGTH
+    mesh = ms.meshes.rectangle(length, width * length, cells=cells)
     sheet = ms.Shell(mesh, thickness=ratio * length, young_modulus=young_modulus, poisson_ratio=0.0)
     couple = -np.radians(degrees) * young_modulus * (ratio * length) ** 3 / 12.0 / length
     return ms.Scene(
@@ -159,11 +182,11 @@ def _rolled(ratio: float, cells: tuple[int, int], degrees: float) -> ms.Scene:
     )
 
 
-def _count(row: dict) -> int:
+def count_of(row: dict) -> int:
     return sum(call["factorizations"] for call in row["calls"])
 
 
-def _ends(row: dict, before: dict) -> tuple[int, int, float]:
+def ends(row: dict, before: dict) -> tuple[int, int, float]:
     """Count the calls that end higher and lower, and sum up the relative changes of their energies."""
     higher = lower = 0
     change = 0.0
@@ -178,16 +201,16 @@ def _ends(row: dict, before: dict) -> tuple[int, int, float]:
     return higher, lower, change
 
 
-def _row(name: str, row: dict, before: dict | None) -> str:
-    text = f"{name:60s} {_count(row):6d}"
+def row_of(name: str, row: dict, before: dict | None) -> str:
+    text = f"{name:60s} {count_of(row):6d}"
     if row["right"] is not True:
         text += f"  {row['right']}"
     if len(row["calls"]) == 1 and "energy" in row["calls"][0]:
         call = row["calls"][0]
         text += f"  E {call['energy']:.7g} steps {call['steps']}"
     if before:
-        higher, lower, change = _ends(row, before)
-        text += f"  before {_count(before)}" + (
+        higher, lower, change = ends(row, before)
+        text += f"  before {count_of(before)}" + (
             f", energies {higher} higher, {lower} lower ({change:+.2g})" if higher or lower else ""
         )
     return text
@@ -203,12 +226,12 @@ def _print_families(found: dict, earlier: dict) -> None:
         f"\n{'family':34s} {'cases':>5s} {'sum':>7s} {'most':>5s}   before: sum  most   ends higher, lower, change"
     )
     for family, names in families.items():
-        counts = [_count(found[name]) for name in names]
+        counts = [count_of(found[name]) for name in names]
         text = f"{family:34s} {len(names):5d} {sum(counts):7d} {max(counts):5d}"
         known = [name for name in names if name in earlier]
         if known:
-            old = [_count(earlier[name]) for name in known]
-            ends = [_ends(found[name], earlier[name]) for name in known]
+            old = [count_of(earlier[name]) for name in known]
+            ends = [ends(found[name], earlier[name]) for name in known]
             higher, lower, change = (sum(column) for column in zip(*ends, strict=True))
             text += f"   {sum(old):11d} {max(old):5d}   {higher:3d} {lower:3d} {change:+.3g}"
         wrong = [name for name in names if found[name]["right"] is not True]
