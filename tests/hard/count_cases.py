@@ -1,10 +1,11 @@
-"""Cases whose counts are kept: every family of effort.py, motions, contact and projective iterations."""
+"""Cases whose counts are kept: every family of effort.py, untuned scenes, motions, contact and projective iterations."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
 import effort
+import untuned_scenes
 
 import magshell as ms
 from benchmarks import motion_costs, projective_motions, surrounding_costs, thrown_bars
@@ -20,6 +21,7 @@ def all_families() -> Iterator[Counted]:
         if _is_counted(name):
             family, _, case = name.partition("/")
             yield family, case, run
+    yield from untuned_scenes.counted()
     yield from _motions()
     yield from _projective()
 
