@@ -1,6 +1,5 @@
 #include "bindings/scene_input.h"
 
-#include <map>
 #include <string>
 
 #include "bindings/arrays.h"
@@ -133,15 +132,6 @@ Vec3 to_vec3(const py::handle& given) {
     return {numbers.at(0), numbers.at(1), numbers.at(2)};
 }
 
-JointKind joint_kind(const std::string& name) {
-    const std::map<std::string, JointKind> kinds = {{"free", JointKind::free},
-                                                    {"fixed", JointKind::fixed},
-                                                    {"revolute", JointKind::revolute},
-                                                    {"prismatic", JointKind::prismatic},
-                                                    {"ball", JointKind::ball}};
-    return kinds.at(name);
-}
-
 std::vector<SkeletonInput> skeletons_of(const py::list& given) {
     std::vector<SkeletonInput> skeletons;
     for (const py::handle each : given) {
@@ -150,11 +140,12 @@ std::vector<SkeletonInput> skeletons_of(const py::list& given) {
         skeleton.owners = each["owners"].cast<std::vector<std::string>>();
         skeleton.labels = each["labels"].cast<std::vector<std::string>>();
         for (const py::handle joint : each["joints"])
-            skeleton.joints.push_back({joint_kind(joint["kind"].cast<std::string>()),
+            skeleton.joints.push_back({&JointKind::of(joint["kind"].cast<std::string>()),
                                        joint["parent"].cast<Index>(), to_vec3(joint["origin"]),
-                                       to_vec3(joint["axis"]), joint["driven"].cast<bool>(),
-                                       joint["damped"].cast<bool>(), joint["twisted"].cast<bool>(),
-                                       joint["served"].cast<bool>(), joint["coned"].cast<bool>()});
+                                       to_vec3(joint["axis"]), joint["numbers"].cast<std::vector<double>>(),
+                                       joint["driven"].cast<bool>(), joint["damped"].cast<bool>(),
+                                       joint["twisted"].cast<bool>(), joint["served"].cast<bool>(),
+                                       joint["coned"].cast<bool>()});
     }
     return skeletons;
 }

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <utility>
 
 #include "magshell/core/rotation_vector.h"
@@ -25,19 +24,6 @@ constexpr double motor_round_off = 1e-14;
 // [-] Error of the rotation of a link that is computed from four corners, over epsilon |x|/l; see rounding() and
 // test_long_chains_of_links_move_at_the_usual_tolerance.
 constexpr double rotation_round_off = 0.125;
-
-// Returns a unit vector perpendicular to an axis.
-Vec3 across(const Vec3& axis) {
-    Index smallest;
-    axis.cwiseAbs().minCoeff(&smallest);
-    return axis.cross(Vec3::Unit(smallest)).normalized();
-}
-
-// Returns the angle of the rotation about an axis that is nearest to a given rotation.
-double angle_about(const Vec3& axis, const Mat3& turn) {
-    const Vec3 u = across(axis), v = axis.cross(u);
-    return std::atan2(v.dot(turn * u) - u.dot(turn * v), u.dot(turn * u) + v.dot(turn * v));
-}
 
 // Returns the nodes of all links, link by link.
 std::vector<Index> nodes_of(const std::vector<RigidNodes>& links) {
@@ -65,6 +51,7 @@ SkeletonCoordinates::SkeletonCoordinates(std::vector<RigidNodes> links, std::vec
         coordinates_ += joints_[k].freedom();
         row_.push_back(row);
         row += links_[k].size();
+        if (!joints_[k].traits().has_origin) joints_[k].origin = links_[k].middle();
         vertices |= links_[k].has_vertices();
         if (!joints_[k].has_motor) continue;
         motors_.push_back({k, slices_[k].motor, n_motor_coordinates_});
@@ -96,48 +83,44 @@ Mat3 SkeletonCoordinates::frame(Index link, const std::vector<Pose>& poses) cons
     return parent < 0 ? Mat3::Identity() : poses[parent].rotation;
 }
 
-Vec3 SkeletonCoordinates::joint_position(Index link, const std::vector<Pose>& poses) const {
+JointSide SkeletonCoordinates::parent_side(Index link, const std::vector<Pose>& poses) const {
     const Joint& joint = joints_[link];
-    if (joint.parent < 0) return joint.origin;
+    if (joint.parent < 0) return {joint.origin, Mat3::Identity()};
     const Pose& parent = poses[joint.parent];
-    return parent.center + parent.rotation * (joint.origin - links_[joint.parent].middle());
+    return {parent.center + parent.rotation * (joint.origin - links_[joint.parent].middle()),
+            parent.rotation};
 }
 
-std::vector<SkeletonCoordinates::Column> SkeletonCoordinates::columns(const std::vector<Pose>& poses) const {
-    std::vector<Column> all;
-    for (Index k = 0; k < n_links(); ++k) {
-        const Joint& joint = joints_[k];
-        const double radians = 1.0 / links_[k].length();
-        const Mat3 frame = this->frame(k, poses);
-        const Vec3 place = joint.kind == JointKind::free ? poses[k].center : joint_position(k, poses);
-        if (joint.kind == JointKind::free)
-            for (int c = 0; c < 3; ++c) all.push_back({false, Vec3::Unit(c), place, 1.0});
-        if (joint.kind == JointKind::free || joint.kind == JointKind::ball)
-            for (int c = 0; c < 3; ++c) all.push_back({true, Vec3::Unit(c), place, radians});
-        if (joint.has_axis()) {
-            const bool turns = joint.kind == JointKind::revolute;
-            all.push_back({turns, frame * joint.axis, place, turns ? radians : 1.0});
-        }
-    }
+JointSide SkeletonCoordinates::child_side(Index link, const std::vector<Pose>& poses) const {
+    const Pose& pose = poses[link];
+    return {pose.center - pose.rotation * (links_[link].middle() - joints_[link].origin), pose.rotation};
+}
+
+std::vector<JointColumn> SkeletonCoordinates::columns(const std::vector<Pose>& poses) const {
+    std::vector<JointColumn> all;
+    for (Index k = 0; k < n_links(); ++k)
+        joints_[k].kind->add_columns(joints_[k], parent_side(k, poses), child_side(k, poses),
+                                     1.0 / links_[k].length(), all);
     return all;
 }
 
 LinkTwists SkeletonCoordinates::twists(const VectorXd& q) const {
     const std::vector<Pose> poses = this->poses(q);
-    const std::vector<Column> columns = this->columns(poses);
+    const std::vector<JointColumn> columns = this->columns(poses);
     std::vector<Vec3> points, arms;
     points.reserve(n_links());
     arms.reserve(nodes().size());
     LinkTwists::Twists twists(6, paths_->coordinate.size());
-    std::vector<const Column*> by_column(coordinates_);
+    std::vector<const JointColumn*> by_column(coordinates_);
     for (Index j = 0; j < coordinates_; ++j) by_column[column_of_[j]] = &columns[j];
     for (Index k = 0; k < n_links(); ++k) {
         points.push_back(poses[k].center);
         for (const Index node : links_[k].nodes()) arms.push_back(q.segment<3>(3 * node) - points[k]);
         for (Index at = paths_->start[k]; at < paths_->start[k + 1]; ++at) {
-            const Column& column = *by_column[paths_->coordinate[at]];
+            const JointColumn& column = *by_column[paths_->coordinate[at]];
             const Vec3 axis = column.scale * column.axis;
-            const Vec3 velocity = column.turns ? axis.cross(points[k] - column.origin) : axis;
+            const Vec3 velocity =
+                column.turns ? axis.cross(points[k] - column.origin) + column.pitch * axis : axis;
             twists.col(at).head<3>() = velocity;
             twists.col(at).tail<3>() = column.turns ? axis : Vec3(Vec3::Zero());
         }
@@ -147,13 +130,13 @@ LinkTwists SkeletonCoordinates::twists(const VectorXd& q) const {
 
 // Let F = sum g and M = sum (x - o_b) g^T over all nodes that coordinate b moves. The entry (a, b), with a on the path from the root to b, is
 //
-//   a and b rotate:                  sum g . (w_a x (w_b x (x - o_b))) = w_a . M w_b - (w_a . w_b) tr M
+//   a and b rotate:                  sum g . (w_a x (w_b x (x - o_b) + h_b w_b)) = w_a . M w_b - (w_a . w_b) tr M + h_b (w_a x w_b) . F
 //   a rotates, b translates:         (w_a x w_b) . F
 //   a translates:                    0
 //
 // each times the scales of a and b. For two rotations of one joint, in entry (a, b) the rotation b acts first.
 MatrixXd SkeletonCoordinates::second_derivative(const VectorXd& q, const VectorXd& gradient) const {
-    const std::vector<Column> columns = this->columns(poses(q));
+    const std::vector<JointColumn> columns = this->columns(poses(q));
     std::vector<Vec3> forces(n_links(), Vec3::Zero());
     std::vector<Mat3> products(n_links(),
                                Mat3::Zero());  // sum (x - place) g^T
@@ -174,15 +157,17 @@ MatrixXd SkeletonCoordinates::second_derivative(const VectorXd& q, const VectorX
             products[parent] += products[k] + (place[k] - place[parent]) * forces[k].transpose();
         }
         for (Index b = first_[k]; b < first_[k] + joint.freedom(); ++b) {
-            const Column& inner = columns[b];
-            const auto turn_and = [&](const Column& outer) {
+            const JointColumn& inner = columns[b];
+            const auto turn_and = [&](const JointColumn& outer) {
                 if (!inner.turns) return outer.axis.cross(inner.axis).dot(forces[k]);
-                return outer.axis.dot(products[k] * inner.axis) -
-                       outer.axis.dot(inner.axis) * products[k].trace();
+                const double turned = outer.axis.dot(products[k] * inner.axis) -
+                                      outer.axis.dot(inner.axis) * products[k].trace();
+                if (inner.pitch == 0.0) return turned;
+                return turned + inner.pitch * outer.axis.cross(inner.axis).dot(forces[k]);
             };
             for (Index above = k; above >= 0; above = joints_[above].parent)
                 for (Index a = first_[above]; a < first_[above] + joints_[above].freedom(); ++a) {
-                    const Column& outer = columns[a];
+                    const JointColumn& outer = columns[a];
                     if (!outer.turns || (above == k && !inner.turns)) continue;
                     const Index i = column_of_[a], j = column_of_[b];
                     out(i, j) = outer.scale * inner.scale * turn_and(outer);
@@ -198,21 +183,14 @@ MatrixXd SkeletonCoordinates::curvature(const VectorXd& q, const VectorXd& gradi
     return 0.5 * (second + second.transpose());
 }
 
-double SkeletonCoordinates::coordinate(Index link, const std::vector<Pose>& poses) const {
-    const Joint& joint = joints_[link];
-    const Mat3 frame = this->frame(link, poses);
-    if (joint.kind == JointKind::revolute)
-        return angle_about(joint.axis, frame.transpose() * poses[link].rotation);
-    const Vec3 own = poses[link].center - poses[link].rotation * (links_[link].middle() - joint.origin);
-    return joint.axis.dot(frame.transpose() * (own - joint_position(link, poses)));
-}
-
 void SkeletonCoordinates::set_values(const Values& values) {
     for (Motor& motor : motors_)
         for (Index c = 0; c < motor.slice.size(); ++c) motor.target[c] = values[motor.slice][c];
     for (Index k = 0; k < n_links(); ++k) {
         if (slices_[k].origin.size() > 0) joints_[k].origin = values.vector(slices_[k].origin);
         if (slices_[k].axis.size() > 0) joints_[k].axis = values.vector(slices_[k].axis);
+        for (std::size_t n = 0; n < slices_[k].numbers.size(); ++n)
+            joints_[k].numbers[n] = values.number(slices_[k].numbers[n]);
     }
 }
 
@@ -221,30 +199,9 @@ SkeletonCoordinates::Pose SkeletonCoordinates::moved_pose(Index link, const std:
                                                           const double* z) const {
     const Joint& joint = joints_[link];
     const RigidNodes& nodes = links_[link];
-    const auto turn = [&](const double* by) -> Mat3 {
-        return rotation(Vec3(by[0], by[1], by[2]) / nodes.length());
-    };
-    if (joint.kind == JointKind::free)
-        return {from[link].center + Vec3(z[0], z[1], z[2]), turn(z + 3) * from[link].rotation};
-    const bool root = joint.parent < 0;
-    const Mat3 before = root ? Mat3::Identity() : from[joint.parent].rotation,
-               after = root ? Mat3::Identity() : to[joint.parent].rotation;
-    Pose pose{joint_position(link, to), after};
-    switch (joint.kind) {
-        case JointKind::revolute:
-            pose.rotation = after * rotation((coordinate(link, from) + z[0] / nodes.length()) * joint.axis);
-            break;
-        case JointKind::ball:
-            pose.rotation = after * orthonormal(before.transpose() * turn(z) * from[link].rotation);
-            break;
-        case JointKind::prismatic:
-            pose.center += (coordinate(link, from) + z[0]) * (after * joint.axis);
-            break;
-        default:
-            break;
-    }
-    pose.center += pose.rotation * (nodes.middle() - joint.origin);
-    return pose;
+    const JointSide side = joint.kind->moved(joint, parent_side(link, from), child_side(link, from),
+                                             parent_side(link, to), z, nodes.length());
+    return {side.origin + side.rotation * (nodes.middle() - joint.origin), side.rotation};
 }
 
 void SkeletonCoordinates::move_links(VectorXd& q, std::vector<Pose> from, const VectorXd& z) const {
@@ -267,7 +224,9 @@ void SkeletonCoordinates::retract(VectorXd& q, const VectorXd& z) const {
 // error times their distance from the joint. The errors of several joints add up like independent random numbers, so their squares are added.
 VectorXd SkeletonCoordinates::rounding(const VectorXd& q) const {
     const std::vector<Pose> poses = this->poses(q);
-    // Sums over the joints on the path from the root, with w the error of the rotation about o, over epsilon: w^2, w^2 |o|^2 and w^2 o.
+    const std::vector<JointColumn> columns = this->columns(poses);
+    // Sums over the joints on the path from the root, with w the error of the rotation about o and h the pitch, over epsilon: w^2,
+    // w^2 (|o|^2 + h^2) and w^2 o.
     struct Sums {
         double one = 0.0, square = 0.0;
         Vec3 place = Vec3::Zero();
@@ -278,14 +237,13 @@ VectorXd SkeletonCoordinates::rounding(const VectorXd& q) const {
         const Joint& joint = joints_[k];
         Sums& sums = all[k];
         if (joint.parent >= 0) sums = all[joint.parent];
-        if (joint.kind == JointKind::revolute || joint.kind == JointKind::ball ||
-            joint.kind == JointKind::free) {
+        if (joint.traits().turns) {
             const double turn =
                 rotation_round_off * poses[k].center.cwiseAbs().maxCoeff() / links_[k].length() + 1.0;
-            const Vec3 at = joint.kind == JointKind::free ? poses[k].center : joint_position(k, poses);
+            const auto& [turns, axis, at, scale, pitch] = columns[first_[k]];
             sums.one += turn * turn;
             sums.place += turn * turn * at;
-            sums.square += turn * turn * at.squaredNorm();
+            sums.square += turn * turn * (at.squaredNorm() + pitch * pitch);
         }
         for (Index n = 0; n < links_[k].size(); ++n) {
             const Vec3 x = q.segment<3>(3 * links_[k].nodes()[n]);
@@ -370,35 +328,26 @@ VectorXd SkeletonCoordinates::motor_increment(const VectorXd& q) const {
     const std::vector<Pose> poses = this->poses(q);
     VectorXd increment = VectorXd::Zero(n_motor_coordinates());
     for (const Motor& motor : motors_) {
-        const Index link = motor.link, n = joints_[link].freedom();
-        const double length = links_[link].length(),
-                     reach = poses[link].center.cwiseAbs().maxCoeff() + length;
-        Vec3 off = Vec3::Zero();
-        double rounds = reach + length * motor.target.norm();
-        if (joints_[link].kind == JointKind::ball) {
-            const Eigen::AngleAxisd turn(
-                orthonormal(frame(link, poses) * rotation(motor.target) * poses[link].rotation.transpose()));
-            off = length * turn.angle() * turn.axis();
-        } else {
-            off[0] = motor.target[0] - coordinate(link, poses);
-            if (joints_[link].kind == JointKind::revolute)
-                off[0] = length * std::remainder(off[0], 2.0 * std::numbers::pi);
-            else
-                rounds = reach + std::abs(motor.target[0]);
-        }
+        const Index link = motor.link;
+        const Joint& joint = joints_[link];
+        const double length = links_[link].length(), rounds = poses[link].center.cwiseAbs().maxCoeff() +
+                                                              length + unit(link) * motor.target.norm();
+        const Vec3 off = joint.kind->motor_increment(joint, parent_side(link, poses), child_side(link, poses),
+                                                     motor.target, length);
         if (off.norm() > motor_round_off * rounds)
-            for (Index k = 0; k < n; ++k) increment[motor.first + k] = off[k];
+            for (Index k = 0; k < joint.freedom(); ++k) increment[motor.first + k] = off[k];
     }
     return increment;
 }
 
+double SkeletonCoordinates::unit(Index link) const {
+    return joints_[link].traits().has_lengths ? 1.0 : links_[link].length();
+}
+
 VectorXd SkeletonCoordinates::motor_units() const {
     VectorXd units(n_motor_coordinates());
-    for (const Motor& motor : motors_) {
-        const Joint& joint = joints_[motor.link];
-        units.segment(motor.first, joint.freedom())
-            .setConstant(joint.kind == JointKind::prismatic ? 1.0 : links_[motor.link].length());
-    }
+    for (const Motor& motor : motors_)
+        units.segment(motor.first, joints_[motor.link].freedom()).setConstant(unit(motor.link));
     return units;
 }
 
@@ -406,22 +355,22 @@ void SkeletonCoordinates::motor_vjp(const VectorXd& q, const VectorXd& by_motors
     const VectorXd by_units = motor_units().cwiseProduct(by_motors);
     const std::vector<Pose> poses = this->poses(q);
     for (const Motor& motor : motors_) {
-        if (joints_[motor.link].kind != JointKind::ball) {
-            out.values[motor.slice.first] += by_units[motor.first];
-            continue;
-        }
-        const Vec3 moment = frame(motor.link, poses).transpose() * by_units.segment<3>(motor.first);
-        out.values.segment<3>(motor.slice.first) += transposed_jacobian_times(motor.target, moment);
+        const Joint& joint = joints_[motor.link];
+        Vec3 by_coordinates = Vec3::Zero();
+        for (Index c = 0; c < joint.freedom(); ++c) by_coordinates[c] = by_units[motor.first + c];
+        const Vec3 by_target =
+            joint.kind->target_gradient(frame(motor.link, poses), motor.target, by_coordinates);
+        for (Index c = 0; c < joint.freedom(); ++c) out.values[motor.slice.first + c] += by_target[c];
     }
 }
 
 std::vector<Vec3> SkeletonCoordinates::ball_moments(const VectorXd& q, const VectorXd& gradient,
                                                     const VectorXd& z,
-                                                    const std::vector<Column>& columns) const {
+                                                    const std::vector<JointColumn>& columns) const {
     const VectorXd pull = twists(q).pull_back(gather(gradient));
     std::vector<Vec3> moments(n_links(), Vec3::Zero());
     for (Index k = 0; k < n_links(); ++k) {
-        if (joints_[k].kind != JointKind::ball) continue;
+        if (!joints_[k].traits().has_world_columns) continue;
         Vec3 rate, moment;
         for (int c = 0; c < 3; ++c) {
             const Index j = first_[k] + c, at = column_of_[j];
@@ -438,10 +387,10 @@ VectorXd SkeletonCoordinates::motor_force_change(const VectorXd& q, const Vector
     VectorXd z = VectorXd::Zero(coordinates_);
     z.tail(n_motor_coordinates_) = n_motor_coordinates;
     VectorXd change = second_derivative(q, gradient).transpose() * z;
-    const std::vector<Column> columns = this->columns(poses(q));
+    const std::vector<JointColumn> columns = this->columns(poses(q));
     const std::vector<Vec3> moments = ball_moments(q, gradient, z, columns);
     for (const Motor& motor : motors_) {
-        if (joints_[motor.link].kind != JointKind::ball) continue;
+        if (!joints_[motor.link].traits().has_world_columns) continue;
         for (Index above = joints_[motor.link].parent; above >= 0; above = joints_[above].parent)
             for (Index a = first_[above]; a < first_[above] + joints_[above].freedom(); ++a)
                 if (columns[a].turns)
@@ -450,9 +399,10 @@ VectorXd SkeletonCoordinates::motor_force_change(const VectorXd& q, const Vector
     return change;
 }
 
-// Gradients by the origins and axes of joints. A change of an origin or axis leaves the reference positions of the links as they are; at given
-// joint coordinates it displaces all links beyond the joint. With the rotations R of the parent link p and the child link k, their
-// angular velocities w in the motion B z, the joint's coordinate s and its rate s', and the current position o of the joint:
+// Gradients by the origins, axes and numbers of joints. A change of an origin or axis leaves the reference positions of the links as they are;
+// at given joint coordinates it displaces all links beyond the joint. The formulas for axes and numbers are those of the kinds
+// (joint_kinds.cpp). With the rotations R of the parent link p and the child link k, their angular velocities w in the motion B z, the joint's
+// coordinate s and its rate s', and the current position o of the joint:
 //
 //   origin, rotation            dx/do = R_p - R_k,      d(B z)/do = [w_p]x R_p - [w_k]x R_k;         for a translation they cancel
 //   axis, translation by s      dx = s R_p da,          d(B z) = s w_p x R_p da + s' R_p da
@@ -464,9 +414,8 @@ VectorXd SkeletonCoordinates::motor_force_change(const VectorXd& q, const Vector
 // which are fixed here.
 
 bool SkeletonCoordinates::has_joint_parameters() const {
-    return std::ranges::any_of(slices_, [](const ParameterSlices& slices) {
-        return slices.origin.size() > 0 || slices.axis.size() > 0;
-    });
+    return std::ranges::any_of(slices_,
+                               [](const ParameterSlices& slices) { return slices.origin.size() > 0; });
 }
 
 void SkeletonCoordinates::Beyond::add(const Beyond& later) {
@@ -479,7 +428,7 @@ void SkeletonCoordinates::Beyond::add(const Beyond& later) {
 
 std::vector<SkeletonCoordinates::Beyond> SkeletonCoordinates::beyond(
     const VectorXd& q, const VectorXd& by_state, const VectorXd& z, const VectorXd& gradient,
-    const std::vector<Pose>& poses, const std::vector<Column>& columns) const {
+    const std::vector<Pose>& poses, const std::vector<JointColumn>& columns) const {
     const VectorXd motion = twists(q).motion(z);
     const std::vector<Vec3> moments = ball_moments(q, gradient, z, columns);
     std::vector<Beyond> all(n_links());
@@ -508,33 +457,34 @@ std::vector<SkeletonCoordinates::Beyond> SkeletonCoordinates::beyond(
     return all;
 }
 
-Vec3 SkeletonCoordinates::axis_gradient(Index link, const Beyond& of, const Vec3& parent_rate,
-                                        const VectorXd& z, const std::vector<Pose>& poses,
-                                        const std::vector<Column>& columns) const {
-    const Vec3& axis = joints_[link].axis;
-    const Mat3 to_parent = frame(link, poses).transpose();
-    const Column& column = columns[first_[link]];
-    const double s = coordinate(link, poses), rate = column.scale * z[column_of_[first_[link]]];
-    Vec3 by_axis;
-    if (column.turns) {
-        Beyond about;
-        about.center = joint_position(link, poses);
-        about.velocity = of.velocity + of.rate.cross(about.center - of.center);
-        about.add(of);
-        const Vec3 by_turn = to_parent * (about.twist + about.moment.cross(parent_rate)),
-                   by_rate = rate * (to_parent * about.moment);
-        by_axis = std::sin(s) * by_turn + (1.0 - std::cos(s)) * by_turn.cross(axis) + std::cos(s) * by_rate +
-                  std::sin(s) * by_rate.cross(axis);
-    } else
-        by_axis = to_parent * (s * (of.slide + of.force.cross(parent_rate)) + rate * of.force);
-    return by_axis - axis.dot(by_axis) * axis;
+void SkeletonCoordinates::add_own_gradients(Index link, const Beyond& of, const Vec3& parent_rate,
+                                            const VectorXd& z, const std::vector<Pose>& poses,
+                                            const std::vector<JointColumn>& columns, Gradient& out) const {
+    const Joint& joint = joints_[link];
+    const ParameterSlices& slices = slices_[link];
+    if (slices.axis.size() == 0 && slices.numbers.empty()) return;
+    const JointSide parent = parent_side(link, poses);
+    Beyond about;
+    about.center = parent.origin;
+    about.velocity = of.velocity + of.rate.cross(about.center - of.center);
+    about.add(of);
+    const JointSums sums{
+        parent.rotation.transpose(), parent_rate, about.slide, about.force, about.twist, about.moment};
+    const double s = joint.kind->coordinate(joint, parent, child_side(link, poses)),
+                 rate = columns[first_[link]].scale * z[column_of_[first_[link]]];
+    for (std::size_t n = 0; n < slices.numbers.size(); ++n)
+        out.values[slices.numbers[n].first] += joint.kind->number_gradient(joint, n, s, rate, sums);
+    if (slices.axis.size() == 0) return;
+    const Vec3& axis = joint.axis;
+    const Vec3 by_axis = joint.kind->axis_gradient(joint, s, rate, sums);
+    out.values.segment<3>(slices.axis.first) += by_axis - axis.dot(by_axis) * axis;
 }
 
 void SkeletonCoordinates::joint_parameters_vjp(const VectorXd& q, const VectorXd& by_state, const VectorXd& z,
                                                const VectorXd& gradient, Gradient& out) const {
     if (!has_joint_parameters()) return;
     const std::vector<Pose> poses = this->poses(q);
-    const std::vector<Column> columns = this->columns(poses);
+    const std::vector<JointColumn> columns = this->columns(poses);
     const std::vector<Beyond> sums = beyond(q, by_state, z, gradient, poses, columns);
     for (Index k = 0; k < n_links(); ++k) {
         const Joint& joint = joints_[k];
@@ -542,13 +492,10 @@ void SkeletonCoordinates::joint_parameters_vjp(const VectorXd& q, const VectorXd
         const auto by_point = [&](const Mat3& turn, const Vec3& rate) -> Vec3 {
             return turn.transpose() * (sums[k].slide + sums[k].force.cross(rate));
         };
-        if (slices_[k].origin.size() > 0 &&
-            (joint.kind == JointKind::revolute || joint.kind == JointKind::ball))
+        if (slices_[k].origin.size() > 0 && joint.traits().turns)
             out.values.segment<3>(slices_[k].origin.first) +=
                 by_point(frame(k, poses), parent_rate) - by_point(poses[k].rotation, sums[k].rate);
-        if (slices_[k].axis.size() > 0 && joint.has_axis())
-            out.values.segment<3>(slices_[k].axis.first) +=
-                axis_gradient(k, sums[k], parent_rate, z, poses, columns);
+        add_own_gradients(k, sums[k], parent_rate, z, poses, columns, out);
     }
 }
 

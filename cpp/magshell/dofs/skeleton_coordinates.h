@@ -4,10 +4,10 @@
 // and of all links further from the root: it rotates them about an axis w through o, or translates them along w. This motion is a column of
 // B = dx/dz:
 //
-//   rotation:        dx/dz_b = w_b x (x - o_b) / l_b            translation:     dx/dz_b = w_b
+//   rotation:        dx/dz_b = (w_b x (x - o_b) + h_b w_b) / l_b            translation:     dx/dz_b = w_b
 //
-// l_b, the length of the link (rigid_nodes.h), makes all coordinates lengths. The second derivatives, for a coordinate a that belongs to an
-// earlier joint on the path from the root than b, are
+// h_b is the pitch of a screw, zero for other rotations. l_b, the length of the link (rigid_nodes.h), makes all coordinates lengths. The
+// second derivatives, for a coordinate a that belongs to an earlier joint on the path from the root than b, are
 //
 //   a rotates:       d2x/dz_a dz_b = w_a x dx/dz_b / l_a        a translates:    d2x/dz_a dz_b = 0
 //
@@ -17,7 +17,7 @@
 // at the joints. A single rigid body is a skeleton of one link with a free joint.
 #pragma once
 
-#include "magshell/body/joint.h"
+#include "magshell/dofs/joint.h"
 #include "magshell/dofs/reduced_coordinates.h"
 #include "magshell/dofs/rigid_nodes.h"
 
@@ -25,9 +25,11 @@ namespace magshell {
 
 class SkeletonCoordinates final : public ReducedCoordinates {
   public:
-    /// The parameters of a joint, empty if it has none: the target of its motor, its origin and its axis.
+    /// The parameters of a joint, empty if it has none: the target of its motor, its origin, its axis, and numbers of its kind. A joint
+    /// with an axis or numbers has an origin.
     struct ParameterSlices {
         ParameterSlice motor, origin, axis;
+        std::vector<ParameterSlice> numbers = {};
     };
     /// joints[k] connects links[k] to its parent; parents come first.
     SkeletonCoordinates(std::vector<RigidNodes> links, std::vector<Joint> joints,
@@ -54,24 +56,18 @@ class SkeletonCoordinates final : public ReducedCoordinates {
 
   private:
     using Pose = RigidNodes::Pose;
-    /// A column of B: a rotation about an axis, or a translation along it.
-    struct Column {
-        bool turns;    // whether it is a rotation
-        Vec3 axis;     // w, a unit vector
-        Vec3 origin;   // o, a point on the axis of a rotation [m]
-        double scale;  // angle or displacement per unit of the coordinate: 1/l [rad/m] or 1
-    };
 
     Index n_links() const { return static_cast<Index>(links_.size()); }
     std::vector<Pose> poses(const VectorXd& q) const;
     /// Returns the columns of all coordinates, joint by joint.
-    std::vector<Column> columns(const std::vector<Pose>& poses) const;
-    /// Returns the current position of the origin of a link's joint [m], as a point of the parent.
-    Vec3 joint_position(Index link, const std::vector<Pose>& poses) const;
+    std::vector<JointColumn> columns(const std::vector<Pose>& poses) const;
     /// Returns the current rotation of a link's parent; the identity for a root.
     Mat3 frame(Index link, const std::vector<Pose>& poses) const;
-    /// Returns the angle [rad] of a revolute joint, or the displacement [m] of a prismatic one.
-    double coordinate(Index link, const std::vector<Pose>& poses) const;
+    /// Return the two sides of a link's joint.
+    JointSide parent_side(Index link, const std::vector<Pose>& poses) const;
+    JointSide child_side(Index link, const std::vector<Pose>& poses) const;
+    /// Returns the length [m] of a unit of the coordinates of a link's joint: 1 for lengths, l for angles.
+    double unit(Index link) const;
     /// Returns the pose of a link after the coordinates of its joint change by z. from: poses before; to: poses after, already set for the
     /// parent.
     Pose moved_pose(Index link, const std::vector<Pose>& from, const std::vector<Pose>& to,
@@ -92,15 +88,16 @@ class SkeletonCoordinates final : public ReducedCoordinates {
     /// Returns these sums for every link.
     std::vector<Beyond> beyond(const VectorXd& q, const VectorXd& by_state, const VectorXd& z,
                                const VectorXd& gradient, const std::vector<Pose>& poses,
-                               const std::vector<Column>& columns) const;
-    /// Returns the gradient by the axis of a link's joint. of: sums of the link; parent_rate: angular velocity of its parent.
-    Vec3 axis_gradient(Index link, const Beyond& of, const Vec3& parent_rate, const VectorXd& z,
-                       const std::vector<Pose>& poses, const std::vector<Column>& columns) const;
+                               const std::vector<JointColumn>& columns) const;
+    /// Adds the gradients by the axis and the numbers of a link's joint. of: sums of the link; parent_rate: angular velocity of its parent.
+    void add_own_gradients(Index link, const Beyond& of, const Vec3& parent_rate, const VectorXd& z,
+                           const std::vector<Pose>& poses, const std::vector<JointColumn>& columns,
+                           Gradient& out) const;
     /// Returns a moment for each link, zero unless its joint is a ball joint. The columns of a ball joint are rotations about the world axes,
     /// also if earlier links rotate; so the derivative of sum g . B z by a rotation of an earlier link is smaller by this moment than if
     /// the columns rotated with that link. The moment is zero where B^T g is zero, as at an equilibrium without a motor in the joint.
     std::vector<Vec3> ball_moments(const VectorXd& q, const VectorXd& gradient, const VectorXd& z,
-                                   const std::vector<Column>& columns) const;
+                                   const std::vector<JointColumn>& columns) const;
     /// Returns sum_i g_i d2x_i/dz2 before the blocks of rotations of one joint are symmetrized.
     Eigen::MatrixXd second_derivative(const VectorXd& q, const VectorXd& gradient) const;
     /// Moves all links along z, counted from the poses `from`, and sets the positions of their nodes in q.

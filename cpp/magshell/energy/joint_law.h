@@ -20,18 +20,9 @@ struct JointLaw {
 
     static constexpr int size = 10;
     using Names = std::array<const char*, size>;
-    /// The parameter names of revolute joints, prismatic joints and ball joints. A ball joint has three
-    /// coordinates: the angle of its rotation, the angle from there to the target rotation of its servo, and
-    /// the angle of its axis from the reference direction.
-    static constexpr Names of_turns = {"spring_stiffness", "rest_angle",     "torque",      "target_angle",
-                                       "servo_stiffness",  "torque_limit",   "lower_limit", "upper_limit",
-                                       "limit_stiffness",  "limit_smoothing"};
-    static constexpr Names of_slides = {
-        "spring_stiffness", "rest_displacement", "force",       "target_displacement", "servo_stiffness",
-        "force_limit",      "lower_limit",       "upper_limit", "limit_stiffness",     "limit_smoothing"};
-    static constexpr Names of_balls = {
-        "spring_stiffness", nullptr,           nullptr,          nullptr, nullptr, nullptr, nullptr,
-        "upper_limit",      "limit_stiffness", "limit_smoothing"};
+    /// The parameter names of two more coordinates of a ball joint: the angle from its rotation to the target
+    /// rotation of its servo, and the angle of its axis from the reference direction. Those of the coordinate of
+    /// each kind of joint are in its traits (dofs/joint.h).
     static constexpr Names of_ball_servos = {nullptr,        nullptr, nullptr, nullptr, "servo_stiffness",
                                              "torque_limit", nullptr, nullptr, nullptr, nullptr};
     static constexpr Names of_cones = {nullptr, nullptr, nullptr,      nullptr,           nullptr,

@@ -44,13 +44,12 @@ ReducedCoordinatesList reduced_coordinates_of(const Bodies& bodies,
             const auto add = [&](const char* name, const char* unit, Index width) {
                 return registry.values.add(skeleton.labels[k], name, unit, 1, width);
             };
-            if (joint.kind == JointKind::free) continue;
-            if (joint.has_motor)
-                slices[k].motor = joint.kind == JointKind::ball       ? add("motor_rotation", "rad", 3)
-                                  : joint.kind == JointKind::revolute ? add("motor_angle", "SI", 1)
-                                                                      : add("motor_displacement", "SI", 1);
+            const JointKind::Traits& kind = joint.traits();
+            if (!kind.has_origin) continue;
+            if (joint.has_motor) slices[k].motor = add(kind.motor.name, kind.motor.unit, kind.freedom);
             slices[k].origin = add("origin", "m", 3);
-            if (joint.has_axis()) slices[k].axis = add("axis", "1", 3);
+            if (kind.has_axis) slices[k].axis = add("axis", "1", 3);
+            for (const auto& [name, unit] : kind.numbers) slices[k].numbers.push_back(add(name, unit, 1));
         }
         all.push_back(
             std::make_unique<SkeletonCoordinates>(std::move(links), skeleton.joints, std::move(slices)));

@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "magshell/body/joint.h"
 #include "magshell/body/shell.h"
 #include "magshell/body/six_node_shell.h"
 #include "magshell/body/solid.h"
 #include "magshell/dofs/dof_map.h"
+#include "magshell/dofs/joint.h"
 #include "magshell/field/applied_field.h"
 #include "magshell/force/drag.h"
 #include "magshell/terms/actuator/muscle_fibres.h"

@@ -262,8 +262,8 @@ void Builder::add_joints(const SceneInput& input) {
             if (joint.twisted) twisted.push_back({skeleton.owners[k], parent, child});
         }
     for (const ClosureInput& closure : input.closures)
-        joints.push_back({closure.owner, Joint{JointKind::ball, -1, closure.place, Vec3::Zero()},
-                          corners(closure.parent), corners(closure.child), JointTerm::Act::closure});
+        joints.push_back({closure.owner, Joint{.origin = closure.place}, corners(closure.parent),
+                          corners(closure.child), JointTerm::Act::closure});
     if (!joints.empty())
         out_.energies.push_back(
             std::make_unique<JointTerm>(joints, bodies_.nodes().rest, matrix_, registry_));

@@ -9,21 +9,16 @@ DamperTerm::DamperTerm(const std::vector<Input>& joints, const std::vector<Vec3>
     for (const Input& input : joints) {
         const LinkPair links(input.parent, input.child, rest, matrix);
         const ParameterSlice slice = registry.values.add(input.owner, "damping", "SI", 1, 1);
-        const bool length = input.joint.kind == JointKind::prismatic;
+        const bool length = input.joint.traits().has_lengths;
         const double reach = length ? links.reach() : 1.0 + links.reach() / links.length();
         const ParameterSlice axis =
             input.joint.has_axis() ? registry.values.add(input.owner, "axis", "1", 1, 3) : ParameterSlice{};
-        const auto add = [&](const JointForm& form, double share) {
-            each_.push_back({links, form, share, slice, axis, input.joint, length,
+        std::size_t number = 0;
+        for (const JointStrain& strain : input.joint.kind->damped(input.joint)) {
+            const JointForm form(strain.coordinate, input.joint.origin, links);
+            each_.push_back({links, form, strain.share, slice, axis, input.joint, number++, length,
                              form.at(links.rest()).first.cwiseAbs(), reach});
-        };
-        if (input.joint.kind != JointKind::ball) {
-            add(JointForm(input.joint, links), 1.0);
-            continue;
         }
-        for (int a = 0; a < 3; ++a)
-            for (int b = 0; b < 3; ++b)
-                add(JointForm::product(links, Vec3(Vec3::Unit(a)), Vec3(Vec3::Unit(b))), 0.5);
     }
     last_turn_.assign(each_.size(), 0.0);
     now_.resize(each_.size());
@@ -36,7 +31,8 @@ bool DamperTerm::set_values(const Values& values) {
         each.damping = each.share * values.number(each.slice);
         if (each.axis.size() == 0 || !values.changed(each.axis)) continue;
         each.joint.axis = values.vector(each.axis);
-        each.form = JointForm(each.joint, each.links);
+        each.form = JointForm(each.joint.kind->damped(each.joint)[each.number].coordinate, each.joint.origin,
+                              each.links);
         each.at_rest = each.form.at(each.links.rest()).first.cwiseAbs();
         changed = true;
     }
@@ -113,8 +109,8 @@ Strains DamperTerm::rates(const double* q, const double* v) const {
 // it. Its rate does wherever node velocities contain motions that the joint does not allow, which is the case
 // for the velocities of finite steps.
 //
-//   revolute   C = tr M - a . M a,  S = w . a,  s' = (C S' - S C')/(C^2 + S^2)     M_ij = e_i of the parent . e_j of the child
-//   prismatic  s' is linear in a
+//   an angle   C = tr M - a . M a,  S = w . a,  s' = (C S' - S C')/(C^2 + S^2)     M_ij = e_i of the parent . e_j of the child
+//   a length   s' is linear in a
 Vec3 DamperTerm::rate_by_axis(const Each& each, const double* q, const Corners& v) const {
     const Corners at = each.links.positions(q);
     Vec3 by_axis;
@@ -122,7 +118,8 @@ Vec3 DamperTerm::rate_by_axis(const Each& each, const double* q, const Corners& 
         Joint along = each.joint;
         for (int c = 0; c < 3; ++c) {
             along.axis = Vec3::Unit(c);
-            by_axis[c] = JointForm(along, each.links).at(at).first.cwiseProduct(v).sum();
+            const JointForm form(along.kind->form(along), along.origin, each.links);
+            by_axis[c] = form.at(at).first.cwiseProduct(v).sum();
         }
     } else {
         Mat3 m, rate;

@@ -6,8 +6,8 @@
 //
 //   sigma = d (s - s^)/(a dt)
 //
-// which approximates d s' with the order of the time integrator and a symmetric matrix. The strains of a ball
-// joint are the nine products between the axes of both links: sum s'^2 = 2 omega^2.
+// which approximates d s' with the order of the time integrator and a symmetric matrix. A ball joint has nine
+// strains instead (JointKind::damped).
 #pragma once
 
 #include <string>
@@ -71,6 +71,7 @@ class DamperTerm final : public ElasticTerm {
         ParameterSlice slice;
         ParameterSlice axis;  // if the joint has an axis
         Joint joint;
+        std::size_t number;  // among the strains of the joint
         bool length;
         JointForm::Corners at_rest;  // |ds/dx|
         double reach, damping = 0.0;

@@ -5,31 +5,18 @@
 #include <numbers>
 
 namespace magshell {
-namespace {
 
-Vec3 across(const Vec3& axis) {
-    Index smallest;
-    axis.cwiseAbs().minCoeff(&smallest);
-    return axis.cross(Vec3::Unit(smallest)).normalized();
-}
-
-}  // namespace
-
-JointForm::JointForm(const Joint& joint, const LinkPair& links) : angle_(joint.kind == JointKind::revolute) {
-    const auto add = [&](CornerForm& form, const Vec3& of_parent, const Vec3& of_child, double factor) {
-        form.add(links.vector(false, of_parent), links.vector(true, of_child), factor);
+JointForm::JointForm(const JointCoordinate& coordinate, const Vec3& origin, const LinkPair& links)
+    : angle_(!coordinate.sines.empty()) {
+    const auto add = [&](CornerForm& form, const JointCoordinate::Product& product) {
+        form.add(links.vector(false, product.of_parent), links.vector(true, product.of_child),
+                 product.factor);
     };
-    if (angle_) {
-        const Vec3 u = across(joint.axis), v = joint.axis.cross(u);
-        add(form_, u, u, 1.0);
-        add(form_, v, v, 1.0);
-        add(sine_, v, u, 1.0);
-        add(sine_, u, v, -1.0);
-    } else if (joint.kind == JointKind::prismatic)
-        form_.add(links.vector(false, joint.axis),
-                  links.point(true, joint.origin) - links.point(false, joint.origin));
-    else
-        for (int c = 0; c < 3; ++c) add(form_, Vec3::Unit(c), Vec3::Unit(c), 1.0);
+    for (const JointCoordinate::Product& product : coordinate.products) add(form_, product);
+    for (const JointCoordinate::Product& product : coordinate.sines) add(sine_, product);
+    if (!coordinate.along.isZero(0.0))
+        form_.add(links.vector(false, coordinate.along),
+                  links.point(true, origin) - links.point(false, origin));
 }
 
 JointForm JointForm::product(const LinkPair& links, const Vec3& of_parent, const Vec3& of_child) {

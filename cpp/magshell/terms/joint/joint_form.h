@@ -1,14 +1,12 @@
 // JointForm: a scalar coordinate of the relative pose of two links, computed from their corners
 // (corner_form.h), with the derivatives that Newton's method needs.
 //
-//   revolute   s = arg(C + i S),  C = u_p . u_c + v_p . v_c,  S = v_p . u_c - u_p . v_c      u, v perpendicular to the axis
-//   prismatic  s = a_p . (o_c - o_p)
-//   ball       s = sum e_p . e_c = 1 + 2 cos(angle);  or one product of the rotation, a_p . b_c
+//   s = sum y_p . y_c + a_p . (o_c - o_p),  or an angle s = arg(C + i S) with two such sums; see JointCoordinate
 //
 //   d2s/dx2 = pairs (x) I + cross (first other^T + other first^T),  first = ds/dx; for an angle other = d(log |C + i S|)/dx
 #pragma once
 
-#include "magshell/body/joint.h"
+#include "magshell/dofs/joint.h"
 #include "magshell/terms/joint/corner_form.h"
 
 namespace magshell {
@@ -33,8 +31,8 @@ class JointForm {
     };
 
     JointForm() = default;
-    /// Creates the coordinate of a joint.
-    JointForm(const Joint& joint, const LinkPair& links);
+    /// Creates a coordinate of a joint. origin: that of the joint, in the reference configuration.
+    JointForm(const JointCoordinate& coordinate, const Vec3& origin, const LinkPair& links);
     /// Creates a_p . b_c for two vectors given in the reference configuration, or the sum of such products over
     /// the columns of two matrices.
     static JointForm product(const LinkPair& links, const Vec3& of_parent, const Vec3& of_child);

@@ -14,11 +14,9 @@ constexpr double small_angle = 1e-4;
 // smallest angle [rad]: ratios of odd functions of the angle stay finite there
 constexpr double no_angle = 1e-100;
 
-const JointLaw::Names& names_of(JointKind kind, JointTerm::Act act) {
+const JointLaw::Names& names_of(const Joint& joint, JointTerm::Act act) {
     if (act == JointTerm::Act::ball_servo) return JointLaw::of_ball_servos;
-    if (act == JointTerm::Act::cone) return JointLaw::of_cones;
-    if (kind == JointKind::prismatic) return JointLaw::of_slides;
-    return kind == JointKind::ball ? JointLaw::of_balls : JointLaw::of_turns;
+    return act == JointTerm::Act::cone ? JointLaw::of_cones : joint.traits().law;
 }
 
 }  // namespace
@@ -40,16 +38,15 @@ JointTerm::JointTerm(const std::vector<Input>& joints, const std::vector<Vec3>& 
             each.slices.push_back(add("stiffness", "N/m", 1));
             each.geometry = add("origin", "m", 3);
         } else {
-            for (const char* name : names_of(joint.kind, each.act))
+            for (const char* name : names_of(joint, each.act))
                 each.slices.push_back(name ? add(name, "SI", 1) : ParameterSlice{});
             if (each.act == Act::ball_servo)
                 each.geometry = add("target_rotation", "rad", 3);
             else if (each.act == Act::cone || joint.has_axis())
                 each.geometry = add("axis", "1", 3);
-            if (each.act == Act::cone)
-                each.top = each.cosine = 1.0;
-            else if (joint.kind == JointKind::ball)
-                each.top = 3.0, each.cosine = 2.0;
+            const JointCoordinate own = joint.kind->form(joint);
+            each.top = each.act == Act::cone ? 1.0 : own.top;
+            each.cosine = each.act == Act::cone ? 1.0 : own.cosine;
         }
         each.find_form();
     }
@@ -58,7 +55,7 @@ JointTerm::JointTerm(const std::vector<Input>& joints, const std::vector<Vec3>& 
 void JointTerm::Each::find_form() {
     switch (act) {
         case Act::coordinate:
-            form = JointForm(joint, links);
+            form = JointForm(joint.kind->form(joint), joint.origin, links);
             break;
         case Act::ball_servo:
             form = JointForm::product(links, rotation(target_rotation), Mat3::Identity());

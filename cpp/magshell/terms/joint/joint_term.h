@@ -56,7 +56,7 @@ class JointTerm final : public Term {
         CornerSum gap;                // of a loop closure
         CornerForm::Corners at_rest;  // |d(form)/dx|; of a loop closure |d(gap)/dx|
         double reach;  // magnitude that round-off is proportional to: [m], or in link lengths for angles
-        double top = 0.0, cosine = 0.0;      // c; zero if the form is the coordinate itself
+        double top = 0.0, cosine = 0.0;      // c; zero if the form is the coordinate itself (JointCoordinate)
         std::vector<ParameterSlice> slices;  // of the law; the stiffness of a loop closure
         ParameterSlice
             geometry;  // parameter of the form: axis, origin of a loop closure, or a servo's target rotation
@@ -65,7 +65,7 @@ class JointTerm final : public Term {
         double stiffness = 0.0;  // of a loop closure
 
         void find_form();
-        bool length() const { return act == Act::closure || joint.kind == JointKind::prismatic; }
+        bool length() const { return act == Act::closure || joint.traits().has_lengths; }
     };
     /// The coordinate of a joint at a state, with E' and E'' by its form.
     struct State {

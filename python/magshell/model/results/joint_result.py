@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..._runtime.frozen import Frozen
-from ..rigid.joints import Joint
+from ..rigid.joints import JOINTS, Joint
 from ..rigid.rigid import RigidBodyResult, _cross
 from ..rigid.skeleton import motor_rows
 
@@ -89,18 +89,18 @@ class JointResult(Frozen):
 
         The parent has the opposite torque. It is NaN in the state that a motion starts from.
         """
-        if self.joint._kind == "ball":
-            return self._motor("ball", "motor_rotation")
-        return self._motor("revolute", "motor_angle")
+        return self._motor("torque")
 
     @property
     def motor_force(self) -> Computed:
         """The motor force of a Prismatic on its child along the axis, (...) N, like `motor_torque`."""
-        return self._motor("prismatic", "motor_displacement")
+        return self._motor("force")
 
-    def _motor(self, kind: str, value: str):
-        if self.joint._kind != kind or not self.joint._driven:
-            raise ValueError(f"only a {kind.capitalize()} with a {value} has a motor")
+    def _motor(self, unknown: str):
+        of_length = unknown == "force"
+        if self.joint._spec.slides != of_length or not self.joint._driven:
+            names = {spec.motor: "" for spec in JOINTS.values() if spec.motor and spec.slides == of_length}
+            raise ValueError(f"only a joint with a {' or a '.join(names)} has a motor {unknown}")
         return self._result._driving[..., motor_rows(self._result.scene._bodies.skeletons, self.joint)]
 
     @property

@@ -25,7 +25,8 @@ class JointSpec:
 
     kind: its name in the core. freedoms: how many coordinates it has. slides: whether its coordinate is a length [m], not
     an angle [rad]. defaults: by the name of each number, the value with which it does not act. vectors: the unit of each
-    number that has three components. axis: whether it has an axis: "none", "required", or "optional".
+    number that has three components. axis: whether it has an axis: "none", "required", or "optional". numbers: the unit of
+    each number that is needed besides origin and axis, in the order of the core's JointKind::Traits.
     """
 
     kind: str
@@ -34,6 +35,7 @@ class JointSpec:
     axis: str = "none"
     defaults: dict[str, Any] = field(default_factory=dict)
     vectors: dict[str, str] = field(default_factory=dict)
+    numbers: dict[str, str] = field(default_factory=dict)
 
     @property
     def motor(self) -> str:
@@ -44,12 +46,13 @@ class JointSpec:
     def replaceable(self) -> tuple[str, ...]:
         """The names of all numbers that a solve can replace."""
         rate = ("rate",) if self.freedoms else ()
-        return (*self.defaults, *rate, "origin", *(() if self.axis == "none" else ("axis",)))
+        axis = () if self.axis == "none" else ("axis",)
+        return (*self.defaults, *rate, "origin", *axis, *self.numbers)
 
     def unit(self, name: str) -> str:
         """Return the unit of one of its numbers; that of its coordinate if the name is empty."""
-        if name in self.vectors:
-            return self.vectors[name]
+        if name in self.vectors or name in self.numbers:
+            return {**self.vectors, **self.numbers}[name]
         for names, of_angle, of_length in _UNITS:
             if name in names:
                 return of_length if self.slides else of_angle
@@ -152,6 +155,8 @@ class Joint(Owner):
             if not self._axis_length > 0:
                 raise ValueError("axis must not be zero")
             self.axis = along / self._axis_length
+        for name in self._spec.numbers:
+            setattr(self, name, self._checked(name, law.pop(name)))
         self._given = {name: self._checked(name, value) for name, value in law.items() if value is not None}
         self._check_together()
         self.rate: float | np.ndarray | None = None if rate is None else self._checked_rate(rate)
@@ -253,7 +258,7 @@ class Joint(Owner):
     @property
     def _geometry(self) -> tuple[str, ...]:
         """The names of the numbers that say where it is at rest."""
-        return ("origin", "axis") if self._has_axis else ("origin",)
+        return ("origin", *(("axis",) if self._has_axis else ()), *self._spec.numbers)
 
     def _again(self, law: dict[Any, Any]) -> Joint:
         own = {name: getattr(self, name) for name in self._geometry}

@@ -254,12 +254,14 @@ def _skeleton(skeleton: Skeleton, part: dict[int, int], label: dict[int, str]) -
 def _joint(joint: Joint | None, number: dict[int, int]) -> dict[Any, Any]:
     if joint is None:
         still = dict.fromkeys(("driven", "damped", "twisted", "served", "coned"), False)
-        return {"kind": "free", "parent": -1, "origin": np.zeros(3), "axis": np.zeros(3), **still}
+        place = {"origin": np.zeros(3), "axis": np.zeros(3), "numbers": []}
+        return {"kind": "free", "parent": -1, **place, **still}
     return {
         "kind": joint._kind,
         "parent": -1 if joint.parent is None else number[id(joint.parent)],
         "origin": joint.origin,
         "axis": joint.axis,
+        "numbers": [getattr(joint, name) for name in joint._spec.numbers],
         "driven": joint._driven,
         "damped": joint._has("damping"),
         "twisted": joint._spec.freedoms == 3 and joint._has("torque"),
