@@ -289,10 +289,110 @@ def test_a_saddle_point_with_a_small_corner_is_solved(corner):
         sp.block_array([[stiffness, jacobian.T], [jacobian, -corner * sp.identity(constraints)]])
     )
     factor, report = factorized(matrix)
-    assert report.succeeded, report
+    assert report.succeeded and report.perturbed_pivots == 0, report
     assert report.negative_pivots == constraints
     rhs = generator.standard_normal(matrix.shape[0])
-    assert backward_error(matrix, factor.solve(rhs), rhs) < 1e-12
+    assert backward_error(matrix, factor.solve(rhs), rhs) < 1e-14
+
+
+def saddle_point(kind, seed):
+    """Return a regular matrix with constraints, of a kind whose pivots are often outside their own front."""
+    generator = np.random.default_rng(seed)
+    size = int(generator.integers(40, 220))
+    constraints = int(generator.integers(2, size // 2))
+    stiffness = dominant(random_symmetric(size, 0.1, seed))
+    jacobian = sp.random(constraints, size, 0.2, random_state=generator) + sp.eye(constraints, size)
+    corner = None
+    if kind == "soft":
+        stiffness = 10.0 ** generator.uniform(-4.0, 4.0) * stiffness
+    elif kind == "indefinite":
+        stiffness = random_symmetric(size, 0.1, seed) + sp.eye(size)
+    elif kind == "small corner":
+        corner = -(10.0 ** generator.uniform(-15.0, -4.0)) * sp.eye(constraints)
+    elif kind == "ties":
+        tied = np.array([generator.choice(size, 2, replace=False) for _ in range(constraints)])
+        rows = np.repeat(np.arange(constraints), 2)
+        jacobian = sp.csc_matrix(
+            (np.tile([1.0, -1.0], constraints), (rows, tied.ravel())), (constraints, size)
+        )
+        jacobian += 0.1 * sp.eye(constraints, size)
+    matrix = sp.csc_matrix(sp.block_array([[stiffness, jacobian.T], [jacobian, corner]]))
+    order = generator.permutation(matrix.shape[0])
+    return matrix[order][:, order]
+
+
+@pytest.mark.parametrize("decades", [0.0, 6.0])
+@pytest.mark.parametrize("kind", ["definite", "indefinite", "soft", "small corner", "ties"])
+def test_saddle_points_are_solved_and_their_inertia_is_right(kind, decades):
+    """Bound the error by the theorem of backward stability, n epsilon growth: no figure of one processor."""
+    for seed in range(30):
+        matrix = saddle_point(kind, seed)
+        size = matrix.shape[0]
+        generator = np.random.default_rng(1000 + seed)
+        scale = np.exp2(
+            np.round(generator.uniform(-decades, decades, size) * np.log2(10.0))
+        )  # causes no round-off
+        to_rows = 1.0 / np.sqrt(abs(matrix).max(axis=0).toarray().ravel())
+        eigenvalues = np.linalg.eigvalsh(to_rows * matrix.toarray() * np.reshape(to_rows, (-1, 1)))
+        assert abs(eigenvalues).min() > 1e-8 * abs(eigenvalues).max(), "dense arithmetic cannot tell the sign"
+        scaled = sp.csc_matrix(sp.diags(scale) @ matrix @ sp.diags(scale))
+        factor, report = factorized(scaled)
+        assert report.succeeded and report.perturbed_pivots == 0, (seed, report)
+        assert report.negative_pivots == (eigenvalues < 0.0).sum(), seed
+        rhs = scale * generator.standard_normal(size)
+        solution = factor.solve(rhs)
+        residual = abs(rhs - scaled @ solution) / scale * to_rows
+        sizes = (abs(scaled) @ abs(solution) + abs(rhs)) / scale * to_rows
+        bound = size * np.finfo(float).eps * max(1.0, report.pivot_growth)
+        assert residual.max() <= bound * sizes.max(), (
+            seed,
+            residual.max() / sizes.max(),
+            report.pivot_growth,
+        )
+
+
+def test_delayed_pivots_give_the_same_bits_on_any_number_of_threads():
+    matrix = sp.block_diag([saddle_point("ties", seed) for seed in range(6)])
+    rhs = np.random.default_rng(4).standard_normal((matrix.shape[0], 3))
+    threads, results = num_threads(), []
+    try:
+        for count in (1, 2, 3):
+            set_num_threads(count)
+            factor, report = factorized(matrix)
+            results.append((factor.solve(rhs), report.negative_pivots, report.pivot_growth))
+    finally:
+        set_num_threads(threads)
+    for solution, negative, growth in results[1:]:
+        assert np.array_equal(solution, results[0][0])
+        assert (negative, growth) == results[0][1:]
+    assert backward_error(matrix, results[0][0], rhs) < 1e-14
+
+
+def test_a_factor_is_reused_after_delayed_pivots():
+    """Factorize a saddle point, a definite matrix of the same pattern, and the saddle point again."""
+    saddle = saddle_point("ties", 3)
+    definite = dominant(saddle)
+    starts, rows, values = lower(saddle)
+    factor = _core.analyze(saddle.shape[0], starts, rows)
+    rhs = np.random.default_rng(3).standard_normal(saddle.shape[0])
+    solutions = []
+    for matrix in (saddle, definite, saddle):
+        assert factor.factorize(values if matrix is saddle else lower(matrix)[2]).succeeded
+        solutions.append(factor.solve(rhs))
+        assert backward_error(matrix, solutions[-1], rhs) < 2e-14
+    assert np.array_equal(solutions[0], solutions[2])
+    assert np.array_equal(solutions[1], factorized(definite)[0].solve(rhs))
+
+
+@pytest.mark.parametrize("repeated", [1, 7])
+def test_dependent_constraints_are_singular(repeated):
+    jacobian = sp.csr_matrix(kkt(120, 30, 12)[120:, :120])
+    jacobian = sp.vstack([jacobian, jacobian[:repeated]])
+    stiffness = dominant(random_symmetric(120, 0.1, 12))
+    factor, report = factorized(sp.block_array([[stiffness, jacobian.T], [jacobian, None]]))
+    assert not report.succeeded and "singular" in report.reason
+    with pytest.raises(ValueError, match="no factorization to solve with"):
+        factor.solve(np.ones(factor.size))
 
 
 def test_pivot_growth_distinguishes_definite_from_ill_conditioned():

@@ -13,4 +13,9 @@ namespace magshell {
 /// if a value is not finite.
 double equilibrate(const SparsePattern& pattern, LargeVector<double>& values, std::vector<double>& scale);
 
+/// Replaces an equilibrated S A S in the same way until the largest entry of every row is between 1/2 and 4,
+/// and multiplies `scale` accordingly. Returns the largest entry of all.
+double equilibrate_further(const SparsePattern& pattern, LargeVector<double>& values,
+                           std::vector<double>& scale);
+
 }  // namespace magshell

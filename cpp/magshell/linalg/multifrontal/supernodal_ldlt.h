@@ -5,17 +5,19 @@
 //
 // S scales rows and columns by powers of two, so that the result does not depend on units. Pivots are 1x1 or
 // 2x2 and are chosen among the 32 columns of a block, never across fronts: the pattern of L is fixed by the
-// analysis, and definite and indefinite matrices cost the same. A pivot that vanishes to round-off is replaced;
-// solutions are then refined, and if even that does not recover a known solution the matrix is reported as
-// singular.
+// analysis, and definite and mildly indefinite matrices cost the same. A matrix that has no such pivots, as a
+// saddle point may, is factorized again with delayed pivots (DelayedLdlt). A pivot that vanishes to round-off
+// even then is replaced; solutions are refined, and if that does not recover a known solution the matrix is
+// reported as singular.
 //
-// Every sum is formed in an order that depends on the pattern only: the bits are the same for any number of
-// threads.
+// Every sum is formed in an order that depends on the pattern only, and with delayed pivots on the values: the
+// bits are the same for any number of threads.
 #pragma once
 
 #include <memory>
 
 #include "magshell/linalg/multifrontal/assembly_plan.h"
+#include "magshell/linalg/multifrontal/delayed_ldlt.h"
 #include "magshell/linalg/multifrontal/pivot_block.h"
 #include "magshell/linalg/multifrontal/work_spaces.h"
 
@@ -53,6 +55,9 @@ class SupernodalLdlt : public Factor {
     /// Factorizes a front. from, to: work spaces that contain the updates of its children, and that receive its
     /// own.
     PivotTally process(Index front, double* from, double* to);
+    /// Factorizes with pivots inside fronts; ends early where these are not stable.
+    PivotTally factorize_by_plan();
+    bool is_doubtful(const PivotTally& tally) const;
     void solve_factored(Eigen::Ref<Eigen::MatrixXd> rhs) const;
     VectorXd refined_solution(const VectorXd& rhs) const;
     bool recovers_known_solution() const;
@@ -67,6 +72,7 @@ class SupernodalLdlt : public Factor {
     std::shared_ptr<SharedWork> work_;
     std::vector<double> diagonal_, coupling_;  // D
     std::vector<Index> pivot_order_;           // within each front
+    std::unique_ptr<DelayedLdlt> delayed_;  // replaces all of these where pivots inside fronts are not stable
 };
 
 }  // namespace magshell
