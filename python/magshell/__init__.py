@@ -55,7 +55,7 @@ from .model.loads.pressure import Pressure
 from .model.loads.water import Water
 from .model.results.body_result import BodyResult
 from .model.results.joint_result import JointResult
-from .model.rigid.joints import Ball, Fixed, Joint, LoopClosure, Prismatic, Revolute
+from .model.rigid.joints import Ball, Fixed, Joint, LoopClosure, Prismatic, Revolute, Screw
 from .model.rigid.link import Link
 from .model.rigid.rigid import RigidBody, RigidBodyResult
 from .model.rigid.skeleton import Skeleton
@@ -183,6 +183,7 @@ __all__ = [
     "RigidBodyResult",
     "SampledField",
     "Scene",
+    "Screw",
     "SelfContact",
     "Shell",
     "Skeleton",

@@ -45,6 +45,7 @@ def rigid_calls(s: Sample) -> Iterator[Call]:
     link, base = (ms.Link(mass=1e-3, inertia=1e-8, center=(x, 0, 0)) for x in (0.1, 0.2))
     for joint, own in (
         (ms.Revolute, {**place, **pulls, **turns}),
+        (ms.Screw, {**place, "pitch": 0.01, **pulls, **turns}),
         (ms.Prismatic, {**place, **pulls, **slides}),
         (ms.Ball, {"origin": (0, 0, 0), **of_balls}),
         (ms.Revolute, {**place, "motor_angle": 0.1, "rate": 1.0}),

@@ -26,6 +26,8 @@ from gradient_kinds_six_nodes import six_nodes_at_rest, six_nodes_in_motion
 from gradient_kinds_skeletons import (
     motorized_skeleton_at_rest,
     motorized_skeleton_in_motion,
+    screws_at_rest,
+    screws_in_motion,
     skeleton_at_rest,
     skeleton_in_motion,
     thrown_skeleton,
@@ -298,6 +300,8 @@ MAKERS = {
         ms.TRBDF2(), adjoint_storage=ms.AdjointStorage("checkpoints", memory_budget=2e4)
     ),
     "a thrown skeleton": thrown_skeleton,
+    "at rest, with screws": screws_at_rest,
+    "in motion, with screws": screws_in_motion,
     "at rest, with a driven skeleton": motorized_skeleton_at_rest,
     "in motion, with a driven skeleton, euler": lambda: motorized_skeleton_in_motion(ms.ImplicitEuler()),
     "in motion, with a driven skeleton": lambda: motorized_skeleton_in_motion(

@@ -217,3 +217,53 @@ def thrown_skeleton() -> Kind:
     fixed = {**EXACT, "steps": STEPS, "integrator": ms.ImplicitEuler(), "progress": False}
     reach = {**REACH, "velocity": 0.1, "angular_velocity": 10.0, "center": 0.01, "rate": 5.0}
     return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=reach)
+
+
+def _screws(moves: bool):
+    """Build a sheet that carries a screw with a spring and limits, and on it one with a motor."""
+    base = MESH.rest_positions[CORNER].mean(axis=0)
+    inertia = (4e-7, 5e-7, 6e-7)
+    root = ms.Link(CORNER, mass=1e-3, inertia=1e-7)
+    nut, arm = (
+        ms.Link(center=base + np.array(off), mass=2e-3, inertia=inertia, magnetic_moment=(1e-3, 2e-3, 5e-3))
+        for off in ((0.01, 0.0, 0.01), (0.02, 0.02, 0.01))
+    )
+    law = {"spring_stiffness": 1e-3, "rest_angle": 0.2, "torque": 1e-5, "target_angle": 0.3}
+    law |= {"servo_stiffness": 1e-3, "torque_limit": 1e-3, **_LIMITS}
+    if moves:
+        law |= {"damping": 2e-6, "upper_limit": 0.05}
+    screws = [
+        ms.Screw(nut, root, origin=np.add(base, (0.01, 0, 0)), axis=(0.2, 1, 0.1), pitch=2e-3, **law),
+        ms.Screw(
+            arm,
+            nut,
+            origin=np.add(base, (0.02, 0.01, 0)),
+            axis=(0, 0.3, 1),
+            pitch=-3e-3,
+            motor_angle=0.0 if moves else 0.4,
+        ),
+    ]
+    sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
+    return ms.Scene(
+        [sheet, ms.Skeleton([root, nut, arm], screws)],
+        supports=[ms.Clamp(MESH.edges_at(x=0.0))],
+        field=[ms.UniformField(), DIPOLES],
+        gravity=(0.1, 0.2, -9.81),
+        allow_rigid_motions=moves,
+    )
+
+
+def screws_at_rest() -> Kind:
+    return Kind(_screws(False), {**DEFAULTS, **FACTORS}, fixed=EXACT, reach=_REACH)
+
+
+def screws_in_motion() -> Kind:
+    controls = {**IN_TIME, "time_step": 5e-3}
+    fixed = {
+        **EXACT,
+        "steps": STEPS,
+        "integrator": ms.TRBDF2(),
+        "progress": False,
+        "adjoint_storage": "stages",
+    }
+    return Kind(_screws(True), controls, ms.simulate, fixed=fixed, step=3e-4, reach=_REACH, in_time=STEPS)

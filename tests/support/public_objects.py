@@ -110,6 +110,7 @@ def _bodies(given: Arrays) -> dict[str, object]:
         "ball": ball,
         "fixed": ms.Fixed(link, lower, given([0, 0, -1.5])),
         "slide": ms.Prismatic(link, origin=given([0, 0, 0]), axis=given([0, 1.0, 0]), force=0.1),
+        "screw": ms.Screw(link, origin=given([0, 0, 0]), axis=given([0, 1.0, 0]), pitch=0.01),
         "closure": ms.LoopClosure(link, lower, origin=given([0, 0, -1.5]), stiffness=10.0),
         "skeleton": ms.Skeleton([link, lower], [hinge, ball]),
         "tie": ms.Tie(

@@ -54,8 +54,8 @@ struct JointStrain {
 
 /// The sums of SkeletonCoordinates::Beyond over the child and all links beyond it, about the origin of the joint as a point of the parent.
 struct JointSums {
-    Mat3 to_parent;    // from world axes to those of the parent
-    Vec3 parent_rate;  // angular velocity of the parent
+    Mat3 to_parent;                // from world axes to those of the parent
+    Vec3 parent_rate, child_rate;  // angular velocities of the parent and the child
     Vec3 slide, force, twist, moment;
 };
 

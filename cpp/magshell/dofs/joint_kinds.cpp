@@ -71,15 +71,15 @@ const JointLaw::Names law_of_angles = {"spring_stiffness", "rest_angle",     "to
                                        "limit_stiffness",  "limit_smoothing"};
 
 // Rotates about the axis.
-class RevoluteJoint final : public JointKind {
+class RevoluteJoint : public JointKind {
   public:
     RevoluteJoint()
-        : JointKind({.name = "revolute",
-                     .freedom = 1,
-                     .has_axis = true,
-                     .turns = true,
-                     .motor = {"motor_angle", "SI"},
-                     .law = law_of_angles}) {}
+        : RevoluteJoint({.name = "revolute",
+                         .freedom = 1,
+                         .has_axis = true,
+                         .turns = true,
+                         .motor = {"motor_angle", "SI"},
+                         .law = law_of_angles}) {}
 
     void add_columns(const Joint& joint, const JointSide& parent, const JointSide&, double radians,
                      std::vector<JointColumn>& out) const override {
@@ -109,6 +109,64 @@ class RevoluteJoint final : public JointKind {
                          const Vec3& target, double length) const override {
         const double off = target[0] - coordinate(joint, parent, child);
         return {length * std::remainder(off, 2.0 * std::numbers::pi), 0.0, 0.0};
+    }
+
+  protected:
+    explicit RevoluteJoint(Traits traits) : JointKind(std::move(traits)) {}
+};
+
+// Rotates about the axis by s and translates along it by h s. The pitch h [m/rad] is its number.
+class ScrewJoint final : public RevoluteJoint {
+  public:
+    ScrewJoint()
+        : RevoluteJoint({.name = "screw",
+                         .freedom = 1,
+                         .has_axis = true,
+                         .turns = true,
+                         .motor = {"motor_angle", "SI"},
+                         .law = law_of_angles,
+                         .numbers = {{"pitch", "m/rad"}}}) {}
+
+    void add_columns(const Joint& joint, const JointSide& parent, const JointSide&, double radians,
+                     std::vector<JointColumn>& out) const override {
+        out.push_back({true, parent.rotation * joint.axis, parent.origin, radians, joint.numbers[0]});
+    }
+    JointSide moved(const Joint& joint, const JointSide& parent, const JointSide& child, const JointSide& to,
+                    const double* z, double length) const override {
+        const double s = coordinate(joint, parent, child) + z[0] / length;
+        return {to.origin + joint.numbers[0] * s * (to.rotation * joint.axis),
+                to.rotation * rotation(s * joint.axis)};
+    }
+    // The displacement tells the number of full turns.
+    double coordinate(const Joint& joint, const JointSide& parent, const JointSide& child) const override {
+        const double slid = joint.axis.dot(parent.rotation.transpose() * (child.origin - parent.origin)) /
+                            joint.numbers[0],
+                     turned = RevoluteJoint::coordinate(joint, parent, child);
+        return slid + std::remainder(turned - slid, 2.0 * std::numbers::pi);
+    }
+    // The rotation is about the origin as a point of the child, and the translation changes with the axis.
+    Vec3 axis_gradient(const Joint& joint, double s, double rate, const JointSums& sums) const override {
+        const double pitch = joint.numbers[0];
+        const Vec3 off = pitch * s * (sums.to_parent.transpose() * joint.axis);
+        JointSums of_child = sums;
+        of_child.twist -= off.cross(sums.slide) + sums.child_rate.cross(off).cross(sums.force);
+        of_child.moment -= off.cross(sums.force);
+        return RevoluteJoint::axis_gradient(joint, s, rate, of_child) +
+               pitch * by_displacement(s, rate, sums);
+    }
+    double number_gradient(const Joint& joint, std::size_t, double s, double rate,
+                           const JointSums& sums) const override {
+        return joint.axis.dot(by_displacement(s, rate, sums));
+    }
+    Vec3 motor_increment(const Joint& joint, const JointSide& parent, const JointSide& child,
+                         const Vec3& target, double length) const override {
+        return {length * (target[0] - coordinate(joint, parent, child)), 0.0, 0.0};
+    }
+
+  private:
+    // Returns the gradient by a vector b of the parent, for a translation by s b.
+    static Vec3 by_displacement(double s, double rate, const JointSums& sums) {
+        return sums.to_parent * (s * (sums.slide + sums.force.cross(sums.parent_rate)) + rate * sums.force);
     }
 };
 
@@ -198,9 +256,11 @@ const JointKind& JointKind::of(std::string_view name) {
     static const FreeJoint free;
     static const FixedJoint fixed;
     static const RevoluteJoint revolute;
+    static const ScrewJoint screw;
     static const PrismaticJoint prismatic;
     static const BallJoint ball;
-    static const std::array<const JointKind*, 5> table = {&free, &fixed, &revolute, &prismatic, &ball};
+    static const std::array<const JointKind*, 6> table = {&free,  &fixed,     &revolute,
+                                                          &screw, &prismatic, &ball};
     const auto* const found =
         std::ranges::find(table, name, [](const JointKind* kind) { return kind->traits().name; });
     if (found == table.end()) throw std::out_of_range("there is no kind of joint " + std::string(name));

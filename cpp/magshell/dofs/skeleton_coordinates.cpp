@@ -468,8 +468,13 @@ void SkeletonCoordinates::add_own_gradients(Index link, const Beyond& of, const 
     about.center = parent.origin;
     about.velocity = of.velocity + of.rate.cross(about.center - of.center);
     about.add(of);
-    const JointSums sums{
-        parent.rotation.transpose(), parent_rate, about.slide, about.force, about.twist, about.moment};
+    const JointSums sums{parent.rotation.transpose(),
+                         parent_rate,
+                         of.rate,
+                         about.slide,
+                         about.force,
+                         about.twist,
+                         about.moment};
     const double s = joint.kind->coordinate(joint, parent, child_side(link, poses)),
                  rate = columns[first_[link]].scale * z[column_of_[first_[link]]];
     for (std::size_t n = 0; n < slices.numbers.size(); ++n)

@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..._input.tensors import detached
 from ..._runtime.frozen import Frozen
-from ..rigid.joints import JOINTS, Joint
+from ..rigid.joint_table import JOINTS
+from ..rigid.joints import Joint
 from ..rigid.rigid import RigidBodyResult, _cross
 from ..rigid.skeleton import motor_rows
 
@@ -31,7 +33,10 @@ class JointResult(Frozen):
 
     @property
     def angle(self) -> Computed:
-        """The angle of a Revolute, with full turns over a motion, or that of the rotation of a Ball, (...) rad."""
+        """The angle of a Revolute, with full turns over a motion, or that of the rotation of a Ball, (...) rad.
+
+        That of a Screw has its full turns in every state.
+        """
         spec = self.joint._spec
         if not spec.freedoms or spec.slides:
             raise ValueError(f"a {type(self.joint).__name__} has no angle")
@@ -48,13 +53,20 @@ class JointResult(Frozen):
         )
         trace = rotation[..., 0, 0] + rotation[..., 1, 1] + rotation[..., 2, 2]
         angle = xp.arctan2(twice_sine, trace - 1.0)
-        return _unwrapped(angle)
+        if not self.joint._pitch:
+            return _unwrapped(angle)
+        numbers = detached(self._displacement) / self._at_states("pitch")
+        return angle + _like(2.0 * np.pi * np.round((numbers - detached(angle)) / (2.0 * np.pi)), rotation)
 
     @property
     def displacement(self) -> Computed:
-        """The displacement of a Prismatic, (...) m."""
-        if not self.joint._spec.slides:
+        """The displacement of a Prismatic or a Screw, (...) m."""
+        if not self.joint._spec.slides and not self.joint._pitch:
             raise ValueError(f"a {type(self.joint).__name__} has no displacement")
+        return self._displacement
+
+    @property
+    def _displacement(self) -> Computed:
         along = _like(self._axis, self._child.center)
         if self._parent is not None:
             along = _rotated(self._parent.rotation, along)
@@ -62,7 +74,7 @@ class JointResult(Frozen):
 
     @property
     def rate(self) -> Computed:
-        """The rate of its coordinate in a motion: (n,) rad/s of a Revolute, m/s of a Prismatic.
+        """The rate of its coordinate in a motion: (n,) rad/s of a Revolute or a Screw, m/s of a Prismatic.
 
         Of a Ball it is the angular velocity of the child relative to the parent, in the world's axes, (n, 3) rad/s.
         """
@@ -85,7 +97,7 @@ class JointResult(Frozen):
     @property
     def motor_torque(self) -> Computed:
         """The motor torque of a Revolute on its child about the axis, (...) N m; of a Ball (..., 3), in the world's
-        axes.
+        axes. That of a Screw is the work per angle: a force along its axis is included by the pitch.
 
         The parent has the opposite torque. It is NaN in the state that a motion starts from.
         """
@@ -115,7 +127,7 @@ class JointResult(Frozen):
     def gap(self) -> Computed:
         """The distance of the joint's origin on the child from that on the parent, (...) m.
 
-        It is the remaining gap of a LoopClosure, the displacement of a Prismatic, and round-off of other joints. The
+        It is the remaining gap of a LoopClosure, the displacement of a Prismatic or a Screw, and round-off of others. The
         origin is that in the scene, also in a solve with another origin.
         """
         return ((self.place - self._position_on(self._parent)) ** 2).sum(-1) ** 0.5
@@ -126,10 +138,15 @@ class JointResult(Frozen):
 
         Results depend on it through the positions of the links only, so it needs no gradient of its own.
         """
+        return self._at_states("axis")
+
+    def _at_states(self, name: str) -> np.ndarray:
+        """Return a number of the joint; with a row for each state of the result if they have different ones."""
         result = self._result
         if np.ndim(result.positions) == 2 or hasattr(result, "_values"):
-            return result._values_at(0).current(self.joint).axis
-        return np.stack([result._values_at(k).current(self.joint).axis for k in range(len(result.positions))])
+            return getattr(result._values_at(0).current(self.joint), name)
+        states = range(len(result.positions))
+        return np.stack([getattr(result._values_at(k).current(self.joint), name) for k in states])
 
     @property
     def _relative(self):

@@ -250,6 +250,7 @@ def check_joints(inputs: Inputs, points: np.ndarray) -> None:
             gap = gap - along * (along @ gap)
         elif own._spec.freedoms == 1:
             tilt = float(np.linalg.norm(turn @ joint.axis - along))
+            gap = gap - along * joint._slid_by(parent_turn.T @ turn, along @ gap)
         if np.linalg.norm(gap) > _OPEN * size or tilt > _OPEN:
             raise ValueError(
                 f"start had another {'origin or axis' if joint._has_axis else 'origin'} of {own!r:.60}: there links would "

@@ -93,6 +93,13 @@ _SPECS = (
     JointSpec("fixed"),
     JointSpec("revolute", freedoms=1, axis="required", defaults=_one_coordinate("angle", "torque")),
     JointSpec(
+        "screw",
+        freedoms=1,
+        axis="required",
+        defaults=_one_coordinate("angle", "torque"),
+        numbers={"pitch": "m/rad"},
+    ),
+    JointSpec(
         "prismatic",
         freedoms=1,
         slides=True,

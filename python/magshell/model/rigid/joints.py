@@ -179,6 +179,8 @@ class Joint(Owner):
                     found["origin"] = found["origin"] + np.cross(self._turning, moved).sum(axis=0)
                 if self._has_axis and self._spec.freedoms == 1:
                     found["axis"] = found["axis"] + self._axis_gradient(place.rest, moved)
+                if "pitch" in found:
+                    found["pitch"] = found["pitch"] + self.rate * self.axis @ moved.sum(axis=0)
         if self._has_axis:  # of a unit vector along what was given
             across = found["axis"] - self.axis * (self.axis @ found["axis"])
             found["axis"] = across / self._axis_length
@@ -192,8 +194,22 @@ class Joint(Owner):
         return (by_velocities * self._directions(points)).sum()
 
     def _axis_gradient(self, points: np.ndarray, by_velocities: np.ndarray) -> np.ndarray:
-        arms = by_velocities if self._spec.slides else np.cross(points - self.origin, by_velocities)
+        if self._spec.slides:
+            return self.rate * by_velocities.sum(axis=0)
+        arms = np.cross(points - self.origin, by_velocities) + self._pitch * by_velocities
         return self.rate * arms.sum(axis=0)
+
+    @property
+    def _pitch(self) -> float:
+        """Return how far it slides per angle, m/rad: zero but for screws."""
+        return getattr(self, "pitch", 0.0)
+
+    def _slid_by(self, rotation: np.ndarray, slid: float) -> float:
+        """Return how far the child slides along the axis if it is rotated by a matrix (3, 3), m: zero but for screws.
+
+        slid: about how far it slides, m, which tells the full turns.
+        """
+        return 0.0
 
     @property
     def _turning(self) -> np.ndarray:
@@ -204,7 +220,7 @@ class Joint(Owner):
         """Return the derivative of points (n, 3) m by its coordinate, (n, 3) m/rad or 1."""
         if self._spec.slides:
             return np.broadcast_to(self.axis, points.shape)
-        return np.cross(self.axis, points - self.origin)
+        return np.cross(self.axis, points - self.origin) + self._pitch * self.axis
 
     def __repr__(self) -> str:
         law = "".join(f", {name} {_format_number(value)}" for name, value in self._given.items())
@@ -306,6 +322,73 @@ class Revolute(Joint):
     ):
         law = {name: value for name, value in locals().items() if name in self._spec.defaults}
         super().__init__(child, parent, origin, axis, rate, **law)
+
+
+class Screw(Joint):
+    """Turns a link about an axis and slides it along the axis at a fixed ratio: a nut on a lead screw.
+
+    pitch: m/rad, how far it slides per angle, the lead over 2 pi. It is not zero; a negative one is that of a left-handed
+        thread. A solve may replace it, as origin and axis.
+
+    child, parent, origin, axis, and the numbers of springs, dampers, torques, servos, limits and motors: as in Revolute,
+    in terms of the angle, which counts full turns. So do the targets of motors, which are not reached by the shorter way.
+    A force F along the axis acts as the torque pitch F. `result[screw]` has an angle and a displacement.
+
+    >>> import math
+    >>> import magshell as ms
+    >>> nut = ms.Link(mass=1.0, inertia=0.1, center=(0, 0, 0))
+    >>> pitch = 2e-3 / (2 * math.pi)
+    >>> screw = ms.Screw(nut, origin=(0, 0, 0), axis=(0, 0, 1), pitch=pitch, motor_angle=20.0)
+    >>> rest = ms.equilibrium(ms.Scene(ms.Skeleton([nut], [screw]), gravity=(0, 0, -9.81)))
+    >>> print(f"{rest[screw].displacement:.6f} m, {rest[screw].motor_torque:.6f} N m")
+    0.006366 m, 0.003123 N m
+    """
+
+    _spec = JOINTS["screw"]
+    _in_time = tuple(_spec.defaults)
+    _replaceable = _spec.replaceable
+
+    def __init__(
+        self,
+        child: RigidBody,
+        parent: RigidBody | None = None,
+        *,
+        origin: Numbers,
+        axis: Numbers,
+        pitch: Numbers,
+        spring_stiffness: Numbers | None = None,
+        rest_angle: Numbers | None = None,
+        damping: Numbers | None = None,
+        torque: Numbers | None = None,
+        motor_angle: Numbers | None = None,
+        target_angle: Numbers | None = None,
+        servo_stiffness: Numbers | None = None,
+        torque_limit: Numbers | None = None,
+        lower_limit: Numbers | None = None,
+        upper_limit: Numbers | None = None,
+        limit_stiffness: Numbers | None = None,
+        limit_smoothing: Numbers | None = None,
+        rate: Numbers | None = None,
+    ):
+        law = {name: value for name, value in locals().items() if name in self._spec.defaults}
+        super().__init__(child, parent, origin, axis, rate, pitch=pitch, **law)
+
+    def _checked(self, name: str, value) -> float | np.ndarray:
+        checked = super()._checked(name, value)
+        if name == "pitch" and checked == 0.0:
+            raise ValueError("pitch of a Screw must not be zero: a Revolute only turns")
+        return checked
+
+    def _slid_by(self, rotation: np.ndarray, slid: float) -> float:
+        sines = np.array(
+            [
+                rotation[2, 1] - rotation[1, 2],
+                rotation[0, 2] - rotation[2, 0],
+                rotation[1, 0] - rotation[0, 1],
+            ]
+        )
+        turned, angle = np.arctan2(self.axis @ sines, np.trace(rotation) - 1.0), slid / self.pitch
+        return self.pitch * (angle + np.remainder(turned - angle + np.pi, 2.0 * np.pi) - np.pi)
 
 
 class Prismatic(Joint):
