@@ -231,8 +231,8 @@ def _print_families(found: dict, earlier: dict) -> None:
         known = [name for name in names if name in earlier]
         if known:
             old = [count_of(earlier[name]) for name in known]
-            ends = [ends(found[name], earlier[name]) for name in known]
-            higher, lower, change = (sum(column) for column in zip(*ends, strict=True))
+            changes_of = [ends(found[name], earlier[name]) for name in known]
+            higher, lower, change = (sum(column) for column in zip(*changes_of, strict=True))
             text += f"   {sum(old):11d} {max(old):5d}   {higher:3d} {lower:3d} {change:+.3g}"
         wrong = [name for name in names if found[name]["right"] is not True]
         print(text + (f"   NOT RIGHT: {wrong}" if wrong else ""))

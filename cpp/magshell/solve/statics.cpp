@@ -6,7 +6,7 @@
 
 #include "magshell/core/errors.h"
 #include "magshell/solve/globalization/deflation.h"
-#include "magshell/solve/globalization/pseudo_transient.h"
+#include "magshell/solve/globalization/proximal_continuation.h"
 #include "magshell/solve/newton/load_control.h"
 
 namespace magshell {
@@ -96,6 +96,23 @@ class Statics {
                model.dof_map().prescribed_increment(result_.state, to_).isZero(0.0);
     }
 
+    // Returns true if the state may be relaxed at the final loads from any state of the load path: there is an energy to descend, and
+    // nothing is moved by force.
+    bool can_relax_at_once() const {
+        const Model& model = newton_.model();
+        return options_.start_at_rest && options_.require_stable && options_.watched.empty() &&
+               !model.capabilities().has_barrier &&
+               model.dof_map().prescribed_increment(result_.state, to_).isZero(0.0);
+    }
+
+    // Returns true if shorter load steps would not help after a failed one: a short step fails because the stable branch ends. The load
+    // path of solids and cavities costs more than a descent at the final loads.
+    bool load_path_has_ended(const LoadStepController& steps, const NewtonReport& report) const {
+        if (newton_.is_unsymmetric()) return false;
+        const bool pays = stop_on_instability_ && newton_.model().capabilities().has_stress_prediction();
+        return !pays || steps.is_short(report);
+    }
+
     // Returns the load parameters at a fraction of the load path, and applies the values that vary to the model.
     LoadParameters load_parameters_at(double progress) {
         LoadParameters there = interpolate(from_, to_, progress);
@@ -116,7 +133,8 @@ class Statics {
         LoadStepController steps(options_.first_step, longest_step, options_.smallest_step,
                                  newton_.model().extent(), stop_on_instability_);
         FactorReport factor;  // at the end of the last load step
-        int halvings = 0;     // of a load step that ended beyond an obstacle
+        bool may_descend = longest_step == 1.0 && can_relax_at_once();
+        int halvings = 0;  // of a load step that ended beyond an obstacle
         while (result_.progress < 1.0) {
             const double left = 1.0 - result_.progress, step = clear_step(steps.propose(left));
             if (step == 0.0) return false;
@@ -153,15 +171,19 @@ class Statics {
                 steps.reset_to(0.5 * step);
                 continue;
             }
+            if (through.empty() && may_descend && load_path_has_ended(steps, report)) {
+                may_descend = false;
+                if (relax_to_stable(1.0)) return true;
+            }
             if (through.empty() && steps.reject(step, report) && options_.start_at_rest) continue;
             // Rotations and obstacles must be followed in steps; other loads may be relaxed at their final values at once.
             factor = {};
             const double relaxed = clear_step(std::min(left, longest_step));
             if (relaxed == 0.0) return false;
             const double end = relaxed < left ? result_.progress + relaxed : 1.0;
-            if ((stop_on_instability_ || !try_standard_newton(end)) && !relax_to_stable(end)) {
-                if (stop_on_instability_ && steps.retry_once()) continue;
-                return false;
+            if (stop_on_instability_ || !try_standard_newton(end)) {
+                if (!relax_to_stable(end)) return false;
+                if (end == 1.0) return true;
             }
             halvings = 0;
             inexact_ = false;
@@ -274,46 +296,38 @@ class Statics {
         return factor.succeeded;
     }
 
-    // Relaxes at a load fraction. The Newton iteration that finishes a relaxation may still converge to a saddle; the
-    // relaxation is then repeated from there.
+    // Relaxes at a load fraction, to a stable state.
     bool relax_to_stable(double target) {
-        constexpr int attempts = 5;  // see test_a_compressed_strip_leaves_the_saddle
-        for (int k = 0; k < attempts; ++k) {
-            VectorXd trial = result_.state;
-            const LoadParameters load_parameters = load_parameters_at(target);
-            RelaxationReport report;
-            try {
-                report = relax(newton_, trial, load_parameters, options_.max_relaxation_steps,
-                               options_.start_at_rest);
-            } catch (const EffortSpent&) {
-                result_.failed.state = std::move(trial);
-                result_.failed.load_parameters = load_parameters;
-                throw;
-            }
-            result_.relaxation_steps += report.steps;
-            result_.saddles_escaped += report.saddles_escaped;
-            if (!report.converged) {
-                newton_.model().set_angle_branches(result_.angle_branches);
-                result_.reason = report.reason;
-                result_.failed.state = std::move(trial);
-                result_.failed.load_parameters = load_parameters;
-                result_.failed.last_displacement = report.last_displacement;
-                result_.failed.descent_direction = report.descent_direction;
-                return false;
-            }
-            accept(trial, load_parameters, target, report.residual);
-            if (!check_stability()) return false;
-            if (result_.stable) refine_solution();
-            if (result_.stable) return true;
-            if (result_.unstable_directions == 0) {
-                result_.reason =
-                    "the equilibrium is neither stable nor unstable: its stiffness matrix is singular";
-                return false;
-            }
+        VectorXd trial = result_.state;
+        const LoadParameters load_parameters = load_parameters_at(target);
+        RelaxationReport report;
+        try {
+            report = proximal_continuation(newton_, trial, load_parameters, options_.max_relaxation_steps);
+        } catch (const EffortSpent&) {
+            result_.failed.state = std::move(trial);
+            result_.failed.load_parameters = load_parameters;
+            throw;
         }
-        result_.reason =
-            "all " + std::to_string(attempts) + " equilibria that the relaxation found are saddle points";
-        return false;
+        result_.relaxation_steps += report.steps;
+        result_.saddles_escaped += report.saddles_escaped;
+        if (!report.converged) {
+            newton_.model().set_angle_branches(result_.angle_branches);
+            result_.reason = report.reason;
+            result_.failed.state = std::move(trial);
+            result_.failed.load_parameters = load_parameters;
+            result_.failed.last_displacement = report.last_displacement;
+            result_.failed.descent_direction = report.descent_direction;
+            return false;
+        }
+        accept(trial, load_parameters, target, report.residual);
+        judge(report.factor);
+        if (!result_.stable) {
+            result_.reason =
+                "the equilibrium is neither stable nor unstable: its stiffness matrix is singular";
+            return false;
+        }
+        refine_solution();
+        return true;
     }
 
     // Takes one more step with the factorization at hand, if that reduces the residual.

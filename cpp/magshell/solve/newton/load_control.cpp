@@ -45,6 +45,12 @@ void LoadStepController::accept(double step, const NewtonReport& report) {
     failed_length_ *= failed_step_growth;
 }
 
+bool LoadStepController::is_short(const NewtonReport& report) const {
+    // [-] over the extent; see test_a_semi_cylinder_pulled_and_pushed
+    constexpr double short_length = 0.1;
+    return length_of(report) < short_length;
+}
+
 bool LoadStepController::reject(double step, const NewtonReport& report) {
     // [-] Shortening after a diverged iteration, after another failure, and at most; see test_a_flat_strip_far_beyond_where_it_buckles.
     constexpr double diverged_factor = 0.25, usual_factor = 0.5, least_factor = 0.125;
@@ -52,15 +58,12 @@ bool LoadStepController::reject(double step, const NewtonReport& report) {
     constexpr double not_shorter = 0.9;
     // [-] Smallest step in any case, of the load path; see test_a_thin_strip_rolled_up.
     constexpr double shortest_step = 1e-6;
-    // [-] Length and size of steps whose repeated failure marks the end of a branch; see test_a_semi_cylinder_pulled_and_pushed.
-    constexpr double short_length = 0.05, short_step = 0.25;
     constexpr int enough = 2;  // failures in a row; see test_a_semi_cylinder_pulled_and_pushed
     failed_step_ = step;
     step_ = (report.diverged ? diverged_factor : usual_factor) * step;
     ++failures_;
     if (stop_on_instability_) {
         const double before = failed_length_, length = failed_length_ = length_of(report);
-        if (!retried_ && failures_ >= enough && length < short_length && step <= short_step) return false;
         // A shorter step that moves as far is not driven by the load: the branch has ended.
         if (failures_ >= enough && length > not_shorter * before) return false;
         const double good_step = good_length / std::max(length, negligible_length) * step;

@@ -30,8 +30,8 @@ class LoadStepController {
     /// Shortens the step after a failure. Returns false if shorter steps are not worth trying.
     bool reject(double step, const NewtonReport& report);
 
-    /// Returns true once if shorter steps are worth trying after all, because no descent led away from the apparent end of the branch.
-    bool retry_once() { return !std::exchange(retried_, true) && step_ >= smallest_; }
+    /// Returns true if a failed step was so short that not its length is the cause but the end of the stable branch.
+    bool is_short(const NewtonReport& report) const;
     /// Continues with this step size after a part of the path that was not taken by load steps.
     void reset_to(double step) { step_ = step; }
 
@@ -42,7 +42,6 @@ class LoadStepController {
     const double longest_, extent_;
     const bool stop_on_instability_;
     const bool fixed_;  // the smallest step was given by the caller
-    bool retried_ = false;
     int failures_ = 0;  // since the last success
     double failed_step_ = 2.0,
            failed_length_ = 0.0;  // the shortest step that failed, and the length of its first iteration

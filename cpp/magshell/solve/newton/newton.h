@@ -65,6 +65,7 @@ struct NewtonPolicy {
         nullptr;  // of the last factorization, if it was made at the state where the solve begins
     std::function<VectorXd(const VectorXd&)> correction =
         {};  // returns what to add to the first step, or an empty vector
+    std::function<void(const VectorXd&)> visit = {};  // called with every state after the first
 };
 
 /// The result of one solve at fixed load parameters.
@@ -161,6 +162,8 @@ class Newton {
     Model& model() { return model_; }
     /// The last factorization; null before the first.
     const std::shared_ptr<Factor>& factor() const { return factor_; }
+    /// Returns true if the matrix assembled last is nonsymmetric.
+    bool is_unsymmetric() const { return unsymmetric_; }
     const NewtonOptions& options() const { return options_; }
     int factorizations() const { return factorizations_; }
     int failed_factorizations() const { return failed_factorizations_; }

@@ -232,6 +232,7 @@ class FullSteps final : public NewtonIteration {
         extrapolated_ = true;
         if (policy_.inexact) last_.step = std::move(step);
         evaluate_with_contact();
+        if (policy_.visit) policy_.visit(q_);
         return true;
     }
 

@@ -1,0 +1,392 @@
+#include "magshell/solve/globalization/proximal_continuation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "magshell/solve/globalization/lbfgs_descent.h"
+#include "magshell/solve/modes.h"
+
+namespace magshell {
+namespace {
+
+// [-] Ratio of actual to predicted decrease above which L-BFGS steps follow; the usual bound of a good step of a trust region (N&W 4.1).
+// See test_a_semi_cylinder_pulled_and_pushed.
+constexpr double good_ratio = 0.25;
+// [-] Factor by which the shift is raised and lowered [Waechter, Biegler 2006]; see test_a_semi_cylinder_pulled_and_pushed.
+constexpr double shift_factor = 8.0;
+// [-] Shift, over the stiffness of the body along the step, below which it is left out; see test_a_semi_cylinder_pulled_and_pushed.
+constexpr double negligible_shift = 0.01;
+// Numbers of L-BFGS steps and of mixed iterations in a step, at most; see test_both_sides_of_a_saddle_cost_the_same.
+constexpr int max_lbfgs_steps = 20, max_proximal_iterations = 12;
+// Number of rounds of L-BFGS in a row until mixed iterations are tried; it doubles when they do not pay. See test_hard.py, fields, against.
+constexpr int first_patience = 8;
+// Number of attempts at a step, each with a higher shift, at most; see test_small_load_on_a_shallow_roof.
+constexpr int max_attempts = 8;
+// [-] Displacement over the extent below which a step has settled, at an equilibrium or a saddle; see
+// test_a_compressed_strip_leaves_the_saddle.
+constexpr double settled_length = 1e-4;
+// [-] Length of a Newton step over the extent below which Newton's method finishes, as round-off hides the change of the energy; see
+// test_small_load_on_a_shallow_roof.
+constexpr double final_length = 1e-3;
+// [-] Length of a Newton step over the extent below which round-off hides the change of the energy; see
+// test_small_load_on_a_shallow_roof.
+constexpr double hidden_length = 1e-6;
+// [-] Increase of the energy that counts as none, over its size; see test_small_load_on_a_shallow_roof.
+constexpr double energy_tolerance = 1e-12;
+
+class ProximalContinuation {
+  public:
+    ProximalContinuation(Newton& newton, VectorXd& q, const LoadParameters& load_parameters)
+        : newton_(newton),
+          model_(newton.model()),
+          q_(q),
+          load_parameters_(load_parameters),
+          settled_(settled_length * model_.extent()) {}
+
+    RelaxationReport run(int max_steps) {
+        if (!begin()) return report_;
+        for (; report_.steps < max_steps; ++report_.steps)
+            if (!assess() || !advance()) return report_;
+        report_.reason = "no equilibrium after " + std::to_string(max_steps) + " relaxation steps";
+        return report_;
+    }
+
+  private:
+    // Moves prescribed nodes to their targets. Returns false, with a reason in the report, if that is impossible.
+    bool begin() {
+        const VectorXd move = model_.dof_map().prescribed_increment(q_, load_parameters_);
+        if (model_.capabilities().has_barrier && model_.capabilities().max_step_length(q_, move) < 1.0)
+            report_.reason = model_.capabilities().describe_blocked_step(q_, move);
+        model_.dof_map().retract(q_, move);
+        energy_ = model_.energy(q_, load_parameters_);
+        if (report_.reason.empty()) report_.reason = model_.capabilities().invalid_state_reason(q_);
+        return report_.reason.empty();
+    }
+
+    bool fail(std::string reason) {
+        report_.reason = std::move(reason);
+        return false;
+    }
+
+    // Factorizes at q and computes the Newton step. Returns false if the descent is finished; the report says how.
+    bool assess() {
+        if (solved_) return assess_hessian(true);
+        newton_.evaluate(q_, load_parameters_, {});
+        report_.residual = newton_.relative_residual(q_, {});
+        const bool at_rest = report_.residual <= newton_.options().tolerance;
+        if (shift_ == 0.0 || at_rest) return assess_hessian(at_rest);
+        if (!factorize_definite()) return fail("no step lowers the energy, however short");
+        // A shift that the step does not need may hide that the state is close to a saddle.
+        return length(step_) >= settled_ || report_.last_displacement >= settled_ || assess_hessian(true);
+    }
+
+    // Assesses q by its Hessian: an equilibrium, a saddle, or a state to be left by a Newton step with or without a shift.
+    bool assess_hessian(bool at_rest) {
+        factor_ = newton_.factorize_at(q_, load_parameters_);
+        if (!factor_.succeeded && newton_.relative_residual(q_, {}) <= newton_.options().tolerance) {
+            report_.neutral = true;
+            return fail("the equilibrium is neither stable nor unstable: its stiffness matrix is singular (" +
+                        factor_.reason + ")");
+        }
+        if (factor_.succeeded && factor_.negative_pivots == 0) {
+            shift_ = 0.0;
+            report_.descent_direction.resize(0);
+            report_.factor = factor_;
+            report_.converged =
+                solved_ || newton_.relative_residual(q_, {}, false) <= newton_.options().tolerance;
+            if (!report_.converged) step_ = newton_step();
+            return !report_.converged;
+        }
+        solved_ = false;
+        if (factor_.succeeded && at_rest) {
+            const Mode mode = most_unstable_mode(newton_, q_, load_parameters_, factor_.negative_pivots);
+            // Above the size of the most negative eigenvalue, so that H + shift M is positive definite.
+            shift_ = std::max(shift_, 1.1 * std::abs(mode.eigenvalue));
+            if (mode.eigenvalue < 0.0) leave_saddle(mode);
+            newton_.evaluate(q_, load_parameters_, {});
+        } else if (shift_ == 0.0) {
+            raise_shift(shift_factor);
+        }
+        return factorize_definite() ||
+               fail(factor_.succeeded ? "no step lowers the energy, however short" : factor_.reason);
+    }
+
+    // Takes one step by L-BFGS or by mixed iterations. Returns false, with a reason in the report, if no attempt lowers the energy.
+    bool advance() {
+        crossing_reason_.clear();
+        for (int attempt = 0; attempt < max_attempts; ++attempt) {
+            const double whole = length(step_), stiffness = slope() / square(step_);
+            const bool finishes = shift_ == 0.0 && whole < final_length * model_.extent();
+            if (finishes ? reach_proximal_point() : take_step()) {
+                if (shift_ > 0.0) last_shift_ = shift_;
+                shift_ /= shift_factor;
+                if (shift_ < negligible_shift * stiffness) shift_ = 0.0;
+                return true;
+            }
+            const bool moved = keep_best_state();
+            // The next step becomes shorter by the factor, and no longer than the extent.
+            const double shorter = std::max(shift_factor, whole / model_.extent());
+            shift_ = std::max(shift_factor * shift_, shift_ + (shorter - 1.0) * stiffness);
+            last_shift_ = shift_;
+            if (moved) return true;
+            newton_.evaluate(q_, load_parameters_, {});
+            if (!factorize_definite()) break;
+        }
+        return fail("no step lowers the energy, however short" +
+                    (crossing_reason_.empty() ? std::string() : "; " + crossing_reason_));
+    }
+
+    // Takes a step by the method that pays. L-BFGS steps are cheap, but in a narrow curved valley they creep; mixed iterations leave the
+    // valley's walls alone, so their steps grow by the shift factor each. After some rounds of L-BFGS they are tried, and go on while
+    // they lower the energy ever faster, or faster than L-BFGS, per factorization.
+    bool take_step() {
+        const double before = energy_;
+        const int factorizations = newton_.factorizations() - 1;
+        const auto gain = [&] { return (before - energy_) / (newton_.factorizations() - factorizations); };
+        if (mixed_gain_ == 0.0 && lbfgs_rounds_ < patience_) {
+            if (!predicts_well() || !lbfgs_round()) return reach_proximal_point();
+            ++lbfgs_rounds_;
+            lbfgs_gain_ = gain();
+            return true;
+        }
+        lbfgs_rounds_ = 0;
+        const bool reached = reach_proximal_point();
+        const double now = reached ? gain() : mixed_gain_ / shift_factor;
+        const bool pays = now > lbfgs_gain_ || (reached && now > mixed_gain_);
+        patience_ = now > lbfgs_gain_ ? first_patience : 2 * patience_;
+        mixed_gain_ = pays ? now : 0.0;
+        return reached;
+    }
+
+    // Returns true if the energy falls along the whole Newton step about as the quadratic model predicts.
+    bool predicts_well() {
+        const Model::AngleBranches angle_branches = model_.angle_branches();
+        const double predicted = 0.5 * (slope() + shift_ * square(step_));
+        VectorXd trial = q_, step = step_;
+        NewtonReport ignored;
+        constexpr double shortest = 1e-4;  // [-] of the step; see test_landing_solid_is_not_inverted
+        const bool feasible = newton_.apply_increment(trial, step, shortest, ignored) >= 0.0;
+        const double energy = feasible ? model_.energy(trial, load_parameters_) : energy_;
+        model_.set_angle_branches(angle_branches);
+        return energy_ - energy > good_ratio * predicted;
+    }
+
+    // Descends by L-BFGS steps with the factorization at hand. Returns false, and leaves q as it was, if they do not get anywhere.
+    bool lbfgs_round() {
+        const double before = energy_;
+        const double moved = lbfgs_descent(newton_, q_, energy_, load_parameters_, max_lbfgs_steps);
+        // [-] Displacement over the extent that counts as none; see test_both_sides_of_a_saddle_cost_the_same.
+        constexpr double no_displacement = 1e-9;
+        if (!(energy_ < before && moved > no_displacement * model_.extent())) {
+            newton_.evaluate(q_, load_parameters_, {});
+            return false;
+        }
+        report_.last_displacement = moved;
+        return true;
+    }
+
+    // Solves for the proximal point by mixed iterations, the first of which is the step at hand; without a shift, for the equilibrium.
+    // Returns false, and leaves q as it was, if they do not converge to a state of less energy.
+    bool reach_proximal_point() {
+        const bool exact = shift_ == 0.0;
+        const VectorXd from = q_, weights = shift_ * model_.metric();
+        const Model::AngleBranches angle_branches = model_.angle_branches();
+        VectorXd trial = q_;
+        best_.resize(0);
+        double lowest = energy_;
+        NewtonPolicy policy{.stop_on_instability = true, .inexact = !exact, .factor = &factor_};
+        if (!exact) {
+            policy.proximal = {&weights, &from};
+            policy.max_iterations = std::min(max_proximal_iterations, newton_.options().max_iterations);
+        }
+        policy.visit = [&](const VectorXd& there) {
+            const VectorXd moved = there - from;
+            const double energy =
+                model_.energy(there, load_parameters_) + 0.5 * moved.dot(weights.cwiseProduct(moved));
+            if (!(energy < lowest - energy_tolerance * std::abs(lowest))) return;
+            lowest = energy;
+            best_ = there;
+            best_branches_ = model_.angle_branches();
+        };
+        const NewtonReport report = newton_.solve(trial, load_parameters_, policy);
+        const double energy = report.converged ? model_.energy(trial, load_parameters_) : 0.0;
+        // Round-off hides the change of the energy along a very short step; the state must then be as near as the step predicts.
+        const double expected = length(step_);
+        const bool as_expected =
+            expected <= hidden_length * model_.extent() && length(trial - from) <= 3.0 * expected;
+        const bool lower = as_expected || energy <= energy_ + energy_tolerance * std::abs(energy_);
+        if (!report.converged || report.factor.negative_pivots > 0 || !lower || crosses_obstacle(trial)) {
+            model_.set_angle_branches(angle_branches);
+            return false;
+        }
+        report_.last_displacement = length(trial - from);
+        report_.residual = report.residual;
+        solved_ = exact;
+        q_ = std::move(trial);
+        energy_ = energy;
+        return true;
+    }
+
+    // Moves to the state of least energy that the last failed iteration passed through. Returns false if there is none.
+    bool keep_best_state() {
+        if (best_.size() == 0 || crosses_obstacle(best_)) return false;
+        report_.last_displacement = length(best_ - q_);
+        q_ = std::move(best_);
+        model_.set_angle_branches(best_branches_);
+        energy_ = model_.energy(q_, load_parameters_);
+        return true;
+    }
+
+    // Displaces q along the mode as far as the energy falls, on the side where it falls deeper.
+    void leave_saddle(const Mode& mode) {
+        // [-] difference of depths that decides; see test_a_pressed_beam_buckles_to_where_the_field_pushes_it
+        constexpr double deeper_share = 1e-6;
+        struct Side {
+            VectorXd q;
+            double energy;
+        };
+        const auto at = [&](double amplitude) {
+            Side side{q_, std::numeric_limits<double>::infinity()};
+            const VectorXd push = amplitude * mode.shape;
+            if (model_.capabilities().has_barrier && model_.capabilities().max_step_length(q_, push) < 1.0)
+                return side;
+            model_.dof_map().retract(side.q, push);
+            if (!crosses_obstacle(side.q)) side.energy = model_.energy(side.q, load_parameters_);
+            return side;
+        };
+        const auto down = [&](double sign) {
+            // A straight displacement stretches a thin shell, so the first one may have to be very short.
+            constexpr double least = 1e-6;  // [-] of the usual one; see test_untuned.py
+            double amplitude = settled_;
+            Side side = at(sign * amplitude);
+            while (!(side.energy < energy_) && amplitude > least * settled_)
+                side = at(sign * (amplitude *= 0.1));
+            for (amplitude *= 2.0; amplitude < model_.extent(); amplitude *= 2.0) {
+                Side next = at(sign * amplitude);
+                if (!(next.energy < side.energy)) break;
+                side = std::move(next);
+            }
+            return side;
+        };
+        ++report_.saddles_escaped;
+        report_.descent_direction = mode.shape;
+        report_.last_displacement = model_.extent();  // the next steps do not settle here
+        const Side one = down(1.0);
+        // Contact ends every displacement early on both sides, so that depths cannot be compared.
+        const Side other = model_.capabilities().has_barrier && std::isfinite(one.energy) ? one : down(-1.0);
+        const bool deeper = one.energy - other.energy >
+                            deeper_share * (energy_ - one.energy) + energy_tolerance * std::abs(energy_);
+        const Side& better = deeper || !std::isfinite(one.energy) ? other : one;
+        if (!std::isfinite(better.energy)) return;
+        q_ = better.q;
+        energy_ = better.energy;
+    }
+
+    // Factorizes H + shift M and computes its Newton step; raises the shift until the matrix is positive definite. The model must have
+    // been evaluated at q. Returns false if the shift becomes so large that no step is left.
+    bool factorize_definite() {
+        // [-] Largest shift, over the stiffness or the rate of the forces; see test_blocked_contact_names_the_faces_in_the_way.
+        constexpr double largest = 1e4;
+        Eigen::MatrixXd no_moves(q_.size(), 0);
+        for (double times = shift_factor;; times *= shift_factor) {
+            const VectorXd weights = shift_ * model_.metric();
+            const FactorReport factor =
+                newton_.factorize(q_, load_parameters_, false, {&weights, &q_}, no_moves);
+            if (factor.succeeded && factor.negative_pivots == 0) {
+                factor_ = factor;
+                step_ = newton_step();
+                return true;
+            }
+            raise_shift(times);
+            if (!(shift_ > 0.0 && shift_ <= largest * std::max(largest_stiffness(), forced_shift())))
+                return false;
+        }
+    }
+
+    // Multiplies the shift, or begins with the last one, or with the one that holds the body against the forces.
+    void raise_shift(double times) {
+        // [-] First shift, over forced_shift(); see test_both_sides_of_a_saddle_cost_the_same.
+        constexpr double first = 1e-3;
+        if (shift_ > 0.0)
+            shift_ *= times;
+        else if (last_shift_ > 0.0)
+            shift_ = last_shift_ / shift_factor;
+        else
+            shift_ = std::max(first * forced_shift(), 1e-12 * largest_stiffness());
+    }
+
+    VectorXd newton_step() const { return newton_.solve_with_factor(-newton_.gradient(q_, {})); }
+    double length(const VectorXd& p) const {
+        return p.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
+    }
+    double square(const VectorXd& p) const { return p.dot(model_.metric().cwiseProduct(p)); }
+    double slope() const { return std::abs(newton_.gradient(q_, {}).dot(step_)); }
+
+    // Returns true if a point would pass through an obstacle on the straight way from q to `trial`.
+    bool crosses_obstacle(const VectorXd& trial) {
+        std::string reason =
+            model_.capabilities().crossing_reason(q_, load_parameters_, trial, load_parameters_);
+        if (reason.empty()) return false;
+        crossing_reason_ = std::move(reason);
+        return true;
+    }
+
+    // Returns the shift [N/m3] at which the forces move a body held by the proximal term alone by a twentieth of its extent.
+    double forced_shift() const {
+        // [-] see test_far_beyond_its_first_instability_a_sheet_has_many
+        constexpr double forced_length = 0.05;
+        const DofMap& dof_map = model_.dof_map();
+        const VectorXd force = dof_map.vector(model_.residual().gradient),
+                       area = dof_map.weights(model_.metric());
+        double most = 0.0;
+        for (Index k = 0; k < dof_map.size(); ++k)
+            if (area[k] > 0.0) most = std::max(most, std::abs(force[k]) / area[k]);
+        return most / (forced_length * model_.extent());
+    }
+
+    // Returns the largest diagonal entry of the last assembled Hessian per area [N/m3]; this shift holds every vertex in place.
+    double largest_stiffness() const {
+        const VectorXd stiffness = model_.diagonal();
+        double most = 0.0;
+        for (Index k = 0; k < model_.n_coordinates(); ++k)
+            if (model_.metric()[k] > 0.0) most = std::max(most, std::abs(stiffness[k]) / model_.metric()[k]);
+        return most;
+    }
+
+    Newton& newton_;
+    Model& model_;
+    VectorXd& q_;
+    const LoadParameters& load_parameters_;
+    const double settled_;  // [m]
+    RelaxationReport report_;
+    double energy_ = 0.0;                    // [J] at q
+    double shift_ = 0.0, last_shift_ = 0.0;  // [N/m3], now and when it was needed last
+    FactorReport factor_;                    // of the last factorization, made at q
+    VectorXd step_;                          // the Newton step that it gives
+    VectorXd best_;  // the state of least energy on the way of the last iteration, if any
+    Model::AngleBranches best_branches_;                // of the angles there
+    int lbfgs_rounds_ = 0, patience_ = first_patience;  // rounds of L-BFGS in a row, and at most
+    double mixed_gain_ = 0.0,
+           lbfgs_gain_ = 0.0;  // [J] decrease of the energy per factorization; 0: mixed iterations do not pay
+    bool solved_ = false;      // whether Newton's method has converged to q
+    std::string crossing_reason_;  // why an obstacle refused the last step, in words; empty if none did
+};
+
+}  // namespace
+
+RelaxationReport proximal_continuation(Newton& newton, VectorXd& q, const LoadParameters& load_parameters,
+                                       int max_steps) {
+    RelaxationReport report = ProximalContinuation(newton, q, load_parameters).run(max_steps);
+    const ModelCapabilities& has = newton.model().capabilities();
+    if (report.converged || !has.has_barrier || !has.invalid_state_reason(q).empty()) return report;
+    // Contact may be the cause whatever the reason was, so the largest contact force is named.
+    newton.evaluate(q, load_parameters, {});
+    if (const std::string hardest = newton.model().contacts().describe_largest_force(); !hardest.empty())
+        report.reason += "; bodies touch: " + hardest;
+    return report;
+}
+
+}  // namespace magshell
