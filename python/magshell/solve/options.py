@@ -70,7 +70,7 @@ class Newton:
         10 m are known to 1e-13), that is more than the tolerance, and results have fewer digits.
     max_iterations: a load step that needs more is halved.
     first_load_step: of the way from the old controls to the new ones, in (0, 1].
-    min_load_step: below it, the solve relaxes down the energy instead (implicit Euler steps of a gradient flow). Up
+    min_load_step: below it, the solve descends the energy at the final loads instead (proximal continuation). Up
         to 1/64 it is that of ways of usual length: where the whole way leads many extents far, shorter ones are tried.
     max_relaxation_steps: how many of those before it gives up.
     max_factorizations: how many of them before an equilibrium is given up, wherever it is then; 20 iterations without one

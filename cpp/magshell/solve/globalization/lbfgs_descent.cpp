@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -72,6 +73,8 @@ class Descent {
         return here_;
     }
 
+    const std::string& crossing_reason() const { return crossing_reason_; }
+
   private:
     // Returns the L-BFGS direction at the current state.
     VectorXd direction() const {
@@ -104,9 +107,10 @@ class Descent {
             VectorXd there = here_.q;
             model_.dof_map().retract(there, alpha * step);
             const double energy = model_.energy(there, load_parameters_), change = energy - here_.energy;
-            const bool crosses = !model_.capabilities()
-                                      .crossing_reason(here_.q, load_parameters_, there, load_parameters_)
-                                      .empty();
+            std::string crossing =
+                model_.capabilities().crossing_reason(here_.q, load_parameters_, there, load_parameters_);
+            const bool crosses = !crossing.empty();
+            if (crosses) crossing_reason_ = std::move(crossing);
             if (crosses || !(change <= armijo_c1 * alpha * slope + allowed)) {
                 if (accepted_alpha > 0.0) break;
                 too_far = true;
@@ -139,18 +143,19 @@ class Descent {
     const LoadParameters& load_parameters_;
     LbfgsHistory history_;
     DescentState here_;
+    std::string crossing_reason_;
 };
 
 }  // namespace
 
-double lbfgs_descent(Newton& newton, VectorXd& q, double& energy, const LoadParameters& load_parameters,
-                     int most_steps) {
+LbfgsRound lbfgs_descent(Newton& newton, VectorXd& q, double& energy, const LoadParameters& load_parameters,
+                         int most_steps) {
     Descent descent(newton, load_parameters, q, energy);
     const DescentState& end = descent.run(most_steps);
     const double moved = (end.q - q).head(newton.model().n_coordinates()).lpNorm<Eigen::Infinity>();
     q = end.q;
     energy = end.energy;
-    return moved;
+    return {moved, descent.crossing_reason()};
 }
 
 }  // namespace magshell

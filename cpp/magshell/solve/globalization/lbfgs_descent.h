@@ -5,13 +5,19 @@
 // without such stresses.
 #pragma once
 
+#include <string>
+
 #include "magshell/solve/newton/newton.h"
 
 namespace magshell {
 
+struct LbfgsRound {
+    double displacement = 0.0;    // [m] the largest, or 0 if no step lowers the energy
+    std::string crossing_reason;  // why an obstacle refused a trial, in words; empty if none did
+};
+
 /// Descends from q, whose energy is given, with Newton's last factorization, which must be positive definite. Updates q and its energy.
-/// Returns the largest displacement [m], or 0 if no step lowers the energy.
-double lbfgs_descent(Newton& newton, VectorXd& q, double& energy, const LoadParameters& load_parameters,
-                     int most_steps);
+LbfgsRound lbfgs_descent(Newton& newton, VectorXd& q, double& energy, const LoadParameters& load_parameters,
+                         int most_steps);
 
 }  // namespace magshell

@@ -25,6 +25,11 @@ constexpr int max_lbfgs_steps = 20, max_proximal_iterations = 12;
 constexpr int first_patience = 8;
 // Number of attempts at a step, each with a higher shift, at most; see test_small_load_on_a_shallow_roof.
 constexpr int max_attempts = 8;
+// [-] Decrease of the energy, over its size, below which a settled step counts as idle, and the number of them in a row after which no
+// equilibrium is expected: obstacles may hold a body where its energy still falls. See
+// test_a_small_ball_that_would_slip_between_contact_points_is_an_error.
+constexpr double idle_decrease = 1e-10;
+constexpr int max_idle_steps = 5;
 // [-] Displacement over the extent below which a step has settled, at an equilibrium or a saddle; see
 // test_a_compressed_strip_leaves_the_saddle.
 constexpr double settled_length = 1e-4;
@@ -48,9 +53,11 @@ class ProximalContinuation {
 
     RelaxationReport run(int max_steps) {
         if (!begin()) return report_;
-        for (; report_.steps < max_steps; ++report_.steps)
-            if (!assess() || !advance()) return report_;
-        report_.reason = "no equilibrium after " + std::to_string(max_steps) + " relaxation steps";
+        while (report_.steps < max_steps && assess() && advance()) ++report_.steps;
+        if (report_.converged || report_.neutral) return report_;
+        if (report_.reason.empty())
+            report_.reason = "no equilibrium after " + std::to_string(max_steps) + " relaxation steps";
+        describe_failure();
         return report_;
     }
 
@@ -69,6 +76,21 @@ class ProximalContinuation {
     bool fail(std::string reason) {
         report_.reason = std::move(reason);
         return false;
+    }
+
+    // Adds to the report in which direction the energy still falls, and whether an obstacle is in the way.
+    void describe_failure() {
+        const FactorReport factor = newton_.factorize_at(q_, load_parameters_);
+        if (!factor.succeeded) return;
+        if (step_.size() > 0) {
+            VectorXd ahead = q_;
+            model_.dof_map().retract(ahead, step_);
+            if (crossing_reason_.empty()) crosses_obstacle(ahead);
+        }
+        if (!crossing_reason_.empty()) report_.reason += "; " + crossing_reason_;
+        if (factor.negative_pivots == 0) return;
+        Mode mode = most_unstable_mode(newton_, q_, load_parameters_, factor.negative_pivots);
+        if (mode.eigenvalue < 0.0) report_.descent_direction = std::move(mode.shape);
     }
 
     // Factorizes at q and computes the Newton step. Returns false if the descent is finished; the report says how.
@@ -116,7 +138,7 @@ class ProximalContinuation {
 
     // Takes one step by L-BFGS or by mixed iterations. Returns false, with a reason in the report, if no attempt lowers the energy.
     bool advance() {
-        crossing_reason_.clear();
+        const double before = energy_;
         for (int attempt = 0; attempt < max_attempts; ++attempt) {
             const double whole = length(step_), stiffness = slope() / square(step_);
             const bool finishes = shift_ == 0.0 && whole < final_length * model_.extent();
@@ -124,7 +146,12 @@ class ProximalContinuation {
                 if (shift_ > 0.0) last_shift_ = shift_;
                 shift_ /= shift_factor;
                 if (shift_ < negligible_shift * stiffness) shift_ = 0.0;
-                return true;
+                const bool hardly_lower = before - energy_ <= idle_decrease * std::abs(energy_);
+                const bool idle = !solved_ && report_.last_displacement < settled_ &&
+                                  (hardly_lower || !crossing_reason_.empty());
+                idle_steps_ = idle ? idle_steps_ + 1 : 0;
+                if (!idle) crossing_reason_.clear();
+                return idle_steps_ < max_idle_steps || fail("no step lowers the energy, however short");
             }
             const bool moved = keep_best_state();
             // The next step becomes shorter by the factor, and no longer than the extent.
@@ -135,8 +162,7 @@ class ProximalContinuation {
             newton_.evaluate(q_, load_parameters_, {});
             if (!factorize_definite()) break;
         }
-        return fail("no step lowers the energy, however short" +
-                    (crossing_reason_.empty() ? std::string() : "; " + crossing_reason_));
+        return fail("no step lowers the energy, however short");
     }
 
     // Takes a step by the method that pays. L-BFGS steps are cheap, but in a narrow curved valley they creep; mixed iterations leave the
@@ -177,14 +203,15 @@ class ProximalContinuation {
     // Descends by L-BFGS steps with the factorization at hand. Returns false, and leaves q as it was, if they do not get anywhere.
     bool lbfgs_round() {
         const double before = energy_;
-        const double moved = lbfgs_descent(newton_, q_, energy_, load_parameters_, max_lbfgs_steps);
+        LbfgsRound round = lbfgs_descent(newton_, q_, energy_, load_parameters_, max_lbfgs_steps);
+        if (!round.crossing_reason.empty()) crossing_reason_ = std::move(round.crossing_reason);
         // [-] Displacement over the extent that counts as none; see test_both_sides_of_a_saddle_cost_the_same.
         constexpr double no_displacement = 1e-9;
-        if (!(energy_ < before && moved > no_displacement * model_.extent())) {
+        if (!(energy_ < before && round.displacement > no_displacement * model_.extent())) {
             newton_.evaluate(q_, load_parameters_, {});
             return false;
         }
-        report_.last_displacement = moved;
+        report_.last_displacement = round.displacement;
         return true;
     }
 
@@ -371,6 +398,7 @@ class ProximalContinuation {
     int lbfgs_rounds_ = 0, patience_ = first_patience;  // rounds of L-BFGS in a row, and at most
     double mixed_gain_ = 0.0,
            lbfgs_gain_ = 0.0;  // [J] decrease of the energy per factorization; 0: mixed iterations do not pay
+    int idle_steps_ = 0;       // in a row
     bool solved_ = false;      // whether Newton's method has converged to q
     std::string crossing_reason_;  // why an obstacle refused the last step, in words; empty if none did
 };

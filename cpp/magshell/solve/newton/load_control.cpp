@@ -47,7 +47,7 @@ void LoadStepController::accept(double step, const NewtonReport& report) {
 
 bool LoadStepController::is_short(const NewtonReport& report) const {
     // [-] over the extent; see test_a_semi_cylinder_pulled_and_pushed
-    constexpr double short_length = 0.1;
+    constexpr double short_length = 0.05;
     return length_of(report) < short_length;
 }
 
