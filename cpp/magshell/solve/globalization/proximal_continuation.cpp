@@ -29,7 +29,7 @@ constexpr int max_attempts = 8;
 // equilibrium is expected: obstacles may hold a body where its energy still falls. See
 // test_a_small_ball_that_would_slip_between_contact_points_is_an_error.
 constexpr double idle_decrease = 1e-10;
-constexpr int max_idle_steps = 5;
+constexpr int max_idle_steps = 5;  // see test_a_small_ball_that_would_slip_between_contact_points_is_an_error
 // [-] Displacement over the extent below which a step has settled, at an equilibrium or a saddle; see
 // test_a_compressed_strip_leaves_the_saddle.
 constexpr double settled_length = 1e-4;
@@ -125,8 +125,10 @@ class ProximalContinuation {
         solved_ = false;
         if (factor_.succeeded && at_rest) {
             const Mode mode = most_unstable_mode(newton_, q_, load_parameters_, factor_.negative_pivots);
-            // Above the size of the most negative eigenvalue, so that H + shift M is positive definite.
-            shift_ = std::max(shift_, 1.1 * std::abs(mode.eigenvalue));
+            // [-] above the size of the most negative eigenvalue, so that H + shift M is positive definite; see
+            // test_a_compressed_strip_leaves_the_saddle
+            constexpr double above_instability = 1.1;
+            shift_ = std::max(shift_, above_instability * std::abs(mode.eigenvalue));
             if (mode.eigenvalue < 0.0) leave_saddle(mode);
             newton_.evaluate(q_, load_parameters_, {});
         } else if (shift_ == 0.0) {
@@ -286,11 +288,12 @@ class ProximalContinuation {
         };
         const auto down = [&](double sign) {
             // A straight displacement stretches a thin shell, so the first one may have to be very short.
-            constexpr double least = 1e-6;  // [-] of the usual one; see test_untuned.py
+            // [-] of the usual one, and of the one before; see tests/hard/untuned.py, thickness
+            constexpr double least = 1e-6, shorter = 0.1;
             double amplitude = settled_;
             Side side = at(sign * amplitude);
             while (!(side.energy < energy_) && amplitude > least * settled_)
-                side = at(sign * (amplitude *= 0.1));
+                side = at(sign * (amplitude *= shorter));
             for (amplitude *= 2.0; amplitude < model_.extent(); amplitude *= 2.0) {
                 Side next = at(sign * amplitude);
                 if (!(next.energy < side.energy)) break;
@@ -335,14 +338,14 @@ class ProximalContinuation {
 
     // Multiplies the shift, or begins with the last one, or with the one that holds the body against the forces.
     void raise_shift(double times) {
-        // [-] First shift, over forced_shift(); see test_both_sides_of_a_saddle_cost_the_same.
-        constexpr double first = 1e-3;
+        // [-] First shift, over forced_shift() and over largest_stiffness(); see test_both_sides_of_a_saddle_cost_the_same.
+        constexpr double first = 1e-3, first_of_stiffness = 1e-12;
         if (shift_ > 0.0)
             shift_ *= times;
         else if (last_shift_ > 0.0)
             shift_ = last_shift_ / shift_factor;
         else
-            shift_ = std::max(first * forced_shift(), 1e-12 * largest_stiffness());
+            shift_ = std::max(first * forced_shift(), first_of_stiffness * largest_stiffness());
     }
 
     VectorXd newton_step() const { return newton_.solve_with_factor(-newton_.gradient(q_, {})); }
