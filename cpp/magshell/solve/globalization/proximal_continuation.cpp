@@ -288,7 +288,8 @@ class ProximalContinuation {
         };
         const auto down = [&](double sign) {
             // A straight displacement stretches a thin shell, so the first one may have to be very short.
-            // [-] of the usual one, and of the one before; see tests/hard/untuned.py, thickness
+            // [-] of the usual one, and of the one before; fixed by thin sheets in
+            // test_counts_of_every_family_are_those_of_the_last_release
             constexpr double least = 1e-6, shorter = 0.1;
             double amplitude = settled_;
             Side side = at(sign * amplitude);
