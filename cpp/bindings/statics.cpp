@@ -115,6 +115,16 @@ void register_statics(py::module_& module) {
         .def_readonly("last_move", &FailedAttempt::last_displacement)
         .def_readonly("falling", &FailedAttempt::descent_direction);
 
+    py::class_<SolveStep>(module, "SolveStep")
+        .def_readonly("load_fraction", &SolveStep::load_fraction)
+        .def_readonly("method", &SolveStep::method)
+        .def_readonly("displacement", &SolveStep::displacement)
+        .def_readonly("factorizations", &SolveStep::factorizations)
+        .def_readonly("iterations", &SolveStep::iterations)
+        .def_readonly("energy", &SolveStep::energy)
+        .def_readonly("negative_pivots", &SolveStep::negative_pivots)
+        .def_readonly("failure", &SolveStep::failure);
+
     py::class_<StaticsResult>(module, "StaticsResult")
         .def_readonly("outcome", &StaticsResult::outcome)
         .def_readonly("state", &StaticsResult::state)
@@ -124,12 +134,14 @@ void register_statics(py::module_& module) {
         .def_readonly("reason", &StaticsResult::reason)
         .def_readonly("effort_spent", &StaticsResult::effort_spent)
         .def_readonly("failed", &StaticsResult::failed)
+        .def_readonly("log", &StaticsResult::log)
         .def_readonly("iterations", &StaticsResult::iterations)
         .def_readonly("factorizations", &StaticsResult::factorizations)
         .def_readonly("failed_factorizations", &StaticsResult::failed_factorizations)
         .def_readonly("load_steps", &StaticsResult::load_steps)
         .def_readonly("relaxation_steps", &StaticsResult::relaxation_steps)
         .def_readonly("saddles_escaped", &StaticsResult::saddles_escaped)
+        .def_readonly("symmetric_saddles", &StaticsResult::symmetric_saddles)
         .def_readonly("residual", &StaticsResult::residual)
         .def_readonly("at_roundoff", &StaticsResult::at_roundoff)
         .def_readonly("stable", &StaticsResult::stable)

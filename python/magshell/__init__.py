@@ -105,6 +105,7 @@ from .solve.statics.extrapolation import Extrapolation, richardson_extrapolation
 from .solve.statics.multistable import find_equilibria
 from .solve.statics.path import CriticalPoint, EquilibriumPath, follow_path
 from .solve.statics.solve import equilibrium
+from .solve.statics.solve_log import SolveLog, SolveStep
 from .solve.statics.warm_start import WarmStart
 
 __all__ = [
@@ -189,6 +190,8 @@ __all__ = [
     "Skeleton",
     "Skin",
     "Solid",
+    "SolveLog",
+    "SolveStep",
     "StVenantKirchhoff",
     "StableNeoHookean",
     "Strains",

@@ -310,3 +310,10 @@ def test_replaced_makes_another_with_every_value_that_the_message_names() -> Non
         test_no_attribute_can_be_assigned(other)
         for value, now in given.items():
             np.testing.assert_array_equal(getattr(other, value), now, err_msg=f"{name}.{value}")
+
+
+def test_a_list_that_contains_itself_is_refused() -> None:
+    endless: list = []
+    endless.append(endless)
+    with pytest.raises(ValueError, match="angle_branches must not contain itself"):
+        ms.MotionState(0.0, np.zeros(6), velocity=np.zeros(6), angle_branches=endless)

@@ -301,6 +301,8 @@ def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
     found = {
         "equilibrium": rest,
         "equilibria": ms.EquilibriumSet([rest, rest]),
+        "log of a solve": rest.log,
+        "step of a solve": rest.log[0],
         "trajectory": move,
         "state of motion": move.end,
         "path": path,

@@ -42,6 +42,7 @@ class Statics {
           to_(to),
           options_(options),
           result_(result),
+          log_(newton),
           stop_on_instability_(can_stop_on_instability()),
           sides_(newton.model()),
           predictor_(newton.model().n_coordinates()) {}
@@ -57,9 +58,16 @@ class Statics {
             result_.effort_spent = true;
             result_.reason = "it gave up after " + std::to_string(newton_.factorizations()) +
                              " factorizations (max_factorizations of the solver)";
+            log_.record({.method = "last step", .failure = result_.reason});
         }
         if (!found) finish();
         return found;
+    }
+
+    /// Returns what was tried, with what was spent after the last step.
+    std::vector<SolveStep> take_log() {
+        log_.record_cost({.method = "stability"});
+        return log_.steps();
     }
 
     /// Makes an inexact state exact if the load path ends early.
@@ -69,6 +77,7 @@ class Statics {
         newton_.model().set_angle_branches(result_.angle_branches);
         const NewtonReport report = newton_.solve(trial, load_parameters_at(result_.progress));
         inexact_ = false;
+        record("exact solution of the last state", result_.progress, trial, report);
         if (!report.converged) return newton_.model().set_angle_branches(result_.angle_branches);
         result_.state = trial;
         result_.angle_branches = newton_.model().angle_branches();
@@ -153,6 +162,7 @@ class Statics {
                 report.converged = false;
                 report.reason = through;
             }
+            record("load step", target, trial, report);
             if (report.converged) {
                 halvings = 0;
                 was_stable_ = report.factor.negative_pivots == 0;
@@ -211,6 +221,20 @@ class Statics {
         return 0.0;
     }
 
+    // Adds a step from the state of the result to the log.
+    void record(const char* method, double target, const VectorXd& trial, const NewtonReport& report) {
+        const Model& model = newton_.model();
+        SolveStep step{.method = method, .negative_pivots = report.factor.negative_pivots};
+        if (report.converged) {
+            step.displacement = (trial - result_.state).head(model.n_coordinates()).lpNorm<Eigen::Infinity>();
+            step.energy = model.energy(trial, interpolate(from_, to_, target));
+        } else {
+            step.failure = report.reason;
+        }
+        log_.set_load_fraction(target);
+        log_.record(std::move(step));
+    }
+
     // Solves one load step; intermediate states need not be exact.
     NewtonReport solve_load_step(VectorXd& q, const LoadParameters& load_parameters, double step,
                                  bool on_the_way) {
@@ -239,6 +263,7 @@ class Statics {
             solve_away_from(newton_, trial, to_, {options_.away_from, options_.away_length},
                             iteration_factor * newton_.options().max_iterations);
         result_.reason = report.reason;
+        record("deflated Newton", 1.0, trial, report);
         if (!report.converged) return false;
         accept(trial, to_, 1.0, report.residual);
         return check_stability();
@@ -258,14 +283,16 @@ class Statics {
         if (!newton_.options().mixed) return false;
         VectorXd trial = result_.state;
         const LoadParameters load_parameters = load_parameters_at(target);
-        const NewtonReport report =
+        NewtonReport report =
             newton_.solve(trial, load_parameters, {.mixed = false, .search_at_barrier = false});
-        const bool found = report.converged && sides_.crossed(trial, load_parameters).empty();
-        if (found)
+        if (report.converged) report.reason = sides_.crossed(trial, load_parameters);
+        report.converged = report.converged && report.reason.empty();
+        record("standard Newton", target, trial, report);
+        if (report.converged)
             accept(trial, load_parameters, target, report.residual);
         else
             newton_.model().set_angle_branches(result_.angle_branches);
-        return found;
+        return report.converged;
     }
 
     void accept(const VectorXd& state, const LoadParameters& load_parameters, double progress,
@@ -301,8 +328,11 @@ class Statics {
         VectorXd trial = result_.state;
         const LoadParameters load_parameters = load_parameters_at(target);
         RelaxationReport report;
+        log_.record_cost({.method = "stability"});
+        log_.set_load_fraction(target);
         try {
-            report = proximal_continuation(newton_, trial, load_parameters, options_.max_relaxation_steps);
+            report =
+                proximal_continuation(newton_, trial, load_parameters, options_.max_relaxation_steps, log_);
         } catch (const EffortSpent&) {
             result_.failed.state = std::move(trial);
             result_.failed.load_parameters = load_parameters;
@@ -310,6 +340,7 @@ class Statics {
         }
         result_.relaxation_steps += report.steps;
         result_.saddles_escaped += report.saddles_escaped;
+        result_.symmetric_saddles += report.symmetric_saddles;
         if (!report.converged) {
             newton_.model().set_angle_branches(result_.angle_branches);
             result_.reason = report.reason;
@@ -357,6 +388,7 @@ class Statics {
     const LoadParameters from_, to_;
     const StaticsOptions& options_;
     StaticsResult& result_;
+    SolveLog log_;
     const bool stop_on_instability_;  // load steps end at once when they leave the stable states
     bool was_stable_ = true;          // at the end of the last load step
     bool inexact_ = false;            // whether the last load step ended before full convergence
@@ -381,8 +413,8 @@ StaticsResult find_equilibrium(Model& model, const VectorXd& start,
     Newton newton(model, options.newton, [&](double residual) {
         if (watch) watch(result.progress, residual);
     });
+    Statics statics(newton, from, to, options, result);
     try {
-        Statics statics(newton, from, to, options, result);
         result.outcome = statics.run() ? Outcome::converged : Outcome::failed;
         if (result.outcome == Outcome::converged)
             result.field_sampling_error = model.field_sampling_error(result.state, result.load_parameters);
@@ -393,6 +425,7 @@ StaticsResult find_equilibrium(Model& model, const VectorXd& start,
     }
     for (LoadParameters* each : {&result.load_parameters, &result.failed.load_parameters})
         each->conservativeResize(std::max<Index>(0, each->size() - varying.size()));
+    result.log = statics.take_log();
     result.iterations = newton.iterations();
     result.factorizations = newton.factorizations();
     result.failed_factorizations = newton.failed_factorizations();

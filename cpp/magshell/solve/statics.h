@@ -3,6 +3,7 @@
 
 #include "magshell/solve/globalization/obstacle_sides.h"
 #include "magshell/solve/newton/newton.h"
+#include "magshell/solve/solve_log.h"
 
 namespace magshell {
 
@@ -43,8 +44,10 @@ struct StaticsResult {
     bool effort_spent = false;            // whether the budget of factorizations ended the solve
     std::string reason;
     FailedAttempt failed;
+    std::vector<SolveStep> log;  // of all steps; their factorizations and iterations sum to those below
     int iterations = 0, factorizations = 0, failed_factorizations = 0, load_steps = 0, relaxation_steps = 0;
     int saddles_escaped = 0;
+    int symmetric_saddles = 0;  // of these: those with equal decreases of the energy on both sides
     double residual = 0.0;
     bool at_roundoff =
         false;  // the residual is within round-off, but not within the tolerance relative to the forces that cancel

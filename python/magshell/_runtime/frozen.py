@@ -159,9 +159,17 @@ def _of_fixed_parts(thing: Any, state: dict[str, Any]) -> dict[str, Any]:
     as_given = getattr(thing, "_as_given", ())
     read_only({name: value for name, value in state.items() if name not in as_given})
     return {
-        name: value if name.startswith("_") or name in as_given else _fixed(value)
+        name: value if name.startswith("_") or name in as_given else _fixed_attribute(name, value)
         for name, value in state.items()
     }
+
+
+def _fixed_attribute(name: str, value: Any) -> Any:
+    """Return the value of an attribute as `_fixed` does. Raises ValueError if it contains itself."""
+    try:
+        return _fixed(value)
+    except RecursionError:
+        raise ValueError(f"{name} must not contain itself, or lists nested without end") from None
 
 
 def _new_of_fixed_parts(new: Any) -> Any:

@@ -193,7 +193,7 @@ def test_a_path_by_a_pressure_that_is_a_value():
 
 @pytest.mark.parametrize("times", [0.3, 100.0])
 def test_a_balloon_is_filled_from_one_at_rest(times):
-    """Start at an equilibrium under the full load: load steps then take the volume to its new value."""
+    """Start at an equilibrium under the full load: load steps or a descent then take the volume to its new value."""
     body = hollow_ball()
     rest = ms.Cavity(body, pressure=0.0).rest_volume(ball_scene(body))
     liquid = ms.Cavity(body, volume=rest, bulk_modulus=1e5)
@@ -201,7 +201,7 @@ def test_a_balloon_is_filled_from_one_at_rest(times):
     start = ms.equilibrium(scene)
     filled = {liquid: {"volume": times * rest}}
     found = ms.equilibrium(scene, start=start, values=filled)
-    assert found.stable and found.load_steps > 1
+    assert found.stable and found.load_steps + found.relaxation_steps > 1
     assert np.abs(found.positions - ms.equilibrium(scene, values=filled).positions).max() < 1e-6
     if times < 1.0:
         return

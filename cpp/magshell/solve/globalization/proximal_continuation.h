@@ -18,6 +18,7 @@
 #include <string>
 
 #include "magshell/solve/newton/newton.h"
+#include "magshell/solve/solve_log.h"
 
 namespace magshell {
 
@@ -25,6 +26,7 @@ struct RelaxationReport {
     bool converged = false;
     bool neutral = false;  // stationary, with a singular Hessian
     int steps = 0, saddles_escaped = 0;
+    int symmetric_saddles = 0;  // of these: those with equal decreases of the energy on both sides
     double residual = 0.0;
     FactorReport factor;             // of the Hessian at the end, if converged
     double last_displacement = 0.0;  // [m], of the last accepted step
@@ -33,8 +35,8 @@ struct RelaxationReport {
 };
 
 /// Descends from q to a stable equilibrium at these load parameters, in at most max_steps steps. Moves prescribed nodes to their targets
-/// first, and leaves q at the last state.
+/// first, and leaves q at the last state. Appends its steps to the log, also if it is interrupted.
 RelaxationReport proximal_continuation(Newton& newton, VectorXd& q, const LoadParameters& load_parameters,
-                                       int max_steps);
+                                       int max_steps, SolveLog& log);
 
 }  // namespace magshell

@@ -11,6 +11,7 @@ from ...model.fields.magnet_overlap import describe_magnet_overlap
 from ...model.shells.obtuse_faces import describe_faces
 from ...model.supports.constraints import free_rigid_motions
 from .load_strain import strain_of_loads
+from .solve_log import SolveLog, SolveStep, steps_of
 
 if TYPE_CHECKING:
     from ... import _core
@@ -42,6 +43,8 @@ def why_not(inputs: Inputs, found: _core.StaticsResult, at_rest: bool) -> str:
         else "The last converged state is in `error.last_good`."
     )
     sentences = [f"{head}: {found.reason}."]
+    if tried := SolveLog(tuple(SolveStep(*step) for step in steps_of(found))).summary():
+        sentences.append(f"Steps taken: {tried}; `error.last_good.log` lists them.")
     near = np.zeros(0, dtype=int)  # vertices that have to do with it
     if found.effort_spent:
         sentences += _seen(inputs, found)
@@ -49,6 +52,7 @@ def why_not(inputs: Inputs, found: _core.StaticsResult, at_rest: bool) -> str:
         sentences += _attempts(found, at_rest and not whole, scene._bodies)
         told, near = _unbalanced_vertices(inputs, found)
         sentences += told
+    if failed.state.size:
         positions = scene._model.positions(failed.state)
         fields = map(inputs.values.current, scene.fields)
         if inside := describe_magnet_overlap(fields, positions, scene.mesh.edge_lengths):

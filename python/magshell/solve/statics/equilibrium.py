@@ -21,6 +21,7 @@ from ...model.scene.scene import Scene
 from ...model.scene.values import Values
 from ...model.shells.strains import Largest, strains_of
 from ...model.supports.supports import Clamp, Pin, SymmetryPlane
+from .solve_log import SolveLog, SolveStep
 
 if TYPE_CHECKING:
     from ..._input.kinds import Computed
@@ -36,7 +37,10 @@ class Equilibrium(SaveMixin, OfOneBody):
     energies: J, by term. stable: no direction lowers the energy; n_negative_eigenvalues: how many do.
     residual: relative to the forces that cancel in it, and to their round-off. at_roundoff: whether round-off ended the
         solve, above the solver's tolerance, as of very thin sheets and long chains.
-    progress: how far the controls got, 1 unless a solve failed.
+    saddles_escaped: unstable states that the solve left along their lowest modes. symmetric_saddles: those where the
+        energy falls equally on both sides, within 1e-6 of its decrease: a convention chose this equilibrium among
+        others of equal energy (the largest displacement of the mode is positive); ms.find_equilibria finds the others.
+    load_fraction: how far the controls got, 1 unless a solve failed.
     largest_membrane_strain, largest_bending_strain: magnitudes, 1, of what `strains` has. Beyond 0.2 the sheet leaves
         the model, of which ms.LargeStrainWarning warns.
     wall_time, linear_time: s, in all and in factorizations and back-substitutions. memory: bytes, of the core.
@@ -56,6 +60,7 @@ class Equilibrium(SaveMixin, OfOneBody):
     load_steps: int
     relaxation_steps: int
     saddles_escaped: int
+    symmetric_saddles: int
     residual: float
     at_roundoff: bool
     load_fraction: float
@@ -71,6 +76,7 @@ class Equilibrium(SaveMixin, OfOneBody):
     _values: Any = field(repr=False)
     _own_points: Any = field(repr=False, default=None)  # (10 a rigid part, 3)
     _driving: Any = field(repr=False, default=None)  # (m,) N m or N, of motors in joints, in the core's order
+    _steps: tuple[tuple[Any, ...], ...] = field(repr=False, default=())  # as in SolveStep
 
     def __copy__(self) -> Equilibrium:
         return self  # immutable
@@ -107,6 +113,11 @@ class Equilibrium(SaveMixin, OfOneBody):
     def energy(self) -> float:
         """The potential energy, all terms together, J."""
         return sum(self.energies.values())
+
+    @property
+    def log(self) -> SolveLog:
+        """The steps of the solve and what each of them cost, as SolveLog: `print(result.log)` shows a table."""
+        return SolveLog(tuple(SolveStep(*step) for step in self._steps))
 
     def strains(self) -> Any:
         """Return the principal strains of all faces of the shells, as Strains; with one solid alone, those of result[solid].
@@ -158,6 +169,11 @@ class Equilibrium(SaveMixin, OfOneBody):
         strain = Largest(self.largest_membrane_strain, self.largest_bending_strain)
         crossings = describe_self_intersections(self.scene.mesh, np.asarray(detached(self.positions))[None])
         extra = f", {self.saddles_escaped} saddles left" if self.saddles_escaped else ""
+        tie = (
+            "\n  the energy fell equally on both sides of a saddle: ms.find_equilibria finds the other equilibria"
+            if self.symmetric_saddles
+            else ""
+        )
         extra += f", {self.relaxation_steps} relaxation steps" if self.relaxation_steps else ""
         ended = " at round-off" if self.at_roundoff else ""
         return (
@@ -166,6 +182,7 @@ class Equilibrium(SaveMixin, OfOneBody):
             f"  {crossings}\n"
             f"  energy {self.energy:.6g} J ({energies})\n"
             f"  {self.iterations} iterations, {self.factorizations} factorizations, {self.load_steps} load steps{extra}\n"
+            f"  {self.log.summary() or 'no step was necessary'}\n"
             f"  residual {self.residual:.1e}{ended}, {self.wall_time:.3g} s, {self.memory / 1e6:.3g} MB, "
-            f"{self.factorization}"
+            f"{self.factorization}{tie}"
         )

@@ -29,6 +29,7 @@ from ..options import MixedNewton, Newton
 from .along_path import AlongPath, all_can_move
 from .diagnosis import why_not
 from .equilibrium import Equilibrium
+from .solve_log import steps_of
 from .start import starting_point
 
 if TYPE_CHECKING:
@@ -215,6 +216,7 @@ def _result(
         load_steps=found.load_steps,
         relaxation_steps=found.relaxation_steps,
         saddles_escaped=found.saddles_escaped,
+        symmetric_saddles=found.symmetric_saddles,
         residual=found.residual,
         at_roundoff=found.at_roundoff,
         load_fraction=found.load_fraction,
@@ -230,6 +232,7 @@ def _result(
         _values=inputs.values,
         _own_points=points[n_v:] if scene.rigid_parts else None,
         _driving=driving,
+        _steps=steps_of(found),
     )
 
 
