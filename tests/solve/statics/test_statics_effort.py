@@ -140,3 +140,45 @@ def test_state_of_an_early_end_is_an_equilibrium():
     assert 0.0 < last.load_fraction < 1.0 and last.residual < 0.5
     there = ms.equilibrium(scene, start=last, **controls)
     assert there.stable and there.load_fraction == 1.0 and there.residual <= 1e-10
+
+
+def membrane_and_ball() -> tuple[ms.Shell, np.ndarray, ms.TriangleMesh]:
+    """Return a membrane of 10 mm radius, the vertices of its border, and the surface of a ball of 4 mm above it."""
+    mesh = ms.meshes.disk(10e-3, cells=10)
+    border = np.flatnonzero(np.linalg.norm(mesh.rest_positions, axis=1) > 9.99e-3)
+    ball = ms.meshes.ball(4e-3, cells=6).surface.transformed(translation=(1e-4, 5e-5, 4.35e-3))
+    return ms.Shell(mesh, thickness=2e-4, young_modulus=1e6), border, ball
+
+
+def test_a_ball_is_pressed_into_a_membrane_by_a_penalty() -> None:
+    sheet, border, _ = membrane_and_ball()
+    ball = ms.obstacles.Sphere(radius=4e-3, center=(0, 0, 4.3e-3))
+    scene = ms.Scene(sheet, supports=[ms.Pin(border)], contacts=[ms.Contact(ball, offset=1e-4)])
+    start = ms.equilibrium(scene)
+    found = ms.equilibrium(scene, start=start, values={ball: {"center": (0, 0, 3e-3)}})
+    assert found.stable and np.ptp(found.positions[:, 2]) > 1e-3  # a tenth of the radius
+    assert found.factorizations <= 120
+
+
+def test_a_ball_is_pressed_into_a_membrane_by_a_barrier() -> None:
+    sheet, border, surface = membrane_and_ball()
+    ball = ms.Shell(surface, thickness=1e-4, young_modulus=1e6)
+    moved = ms.Pin(np.arange(surface.n_vertices), body=ball, displacement=(0, 0, -1.3e-3))
+    scene = ms.Scene(
+        [sheet, ball], supports=[ms.Pin(border, body=sheet), moved], contacts=[ms.Contact(sheet, ball)]
+    )
+    found = ms.equilibrium(scene)
+    assert found.stable and np.ptp(found[sheet].positions[:, 2]) > 1e-3
+    assert found.factorizations <= 80
+
+
+def test_a_change_of_one_percent_takes_three_factorizations() -> None:
+    mesh = ms.meshes.rectangle(0.04, 0.01, cells=(24, 6))
+    sheet = ms.Shell(mesh, thickness=1e-4, young_modulus=1e6, remanent_magnetization=(60e3, 0, 0))
+    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
+    rest = ms.equilibrium(scene, applied_flux_density=(0, 0, 5e-3))
+    for values, factor in (({}, 1.01), ({"young_modulus": 1.01e6}, 1.0), ({"thickness": 1.01e-4}, 1.0)):
+        found = ms.equilibrium(
+            scene, start=rest, applied_flux_density=(0, 0, 5e-3 * factor), values={sheet: values}
+        )
+        assert found.factorizations <= 3 < rest.factorizations
