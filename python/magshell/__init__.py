@@ -98,7 +98,7 @@ from .solve.options import (
     Newton,
     ProjectiveDynamics,
 )
-from .solve.statics.energies_at import energies
+from .solve.statics.energies_at import Forces, energies, energy, forces, free_motions, hessian
 from .solve.statics.equilibria import EquilibriumSet
 from .solve.statics.equilibrium import Equilibrium
 from .solve.statics.extrapolation import Extrapolation, richardson_extrapolation
@@ -141,6 +141,7 @@ __all__ = [
     "Fibres",
     "FieldSamplingWarning",
     "Fixed",
+    "Forces",
     "Guccione",
     "ImplicitEuler",
     "Interrupted",
@@ -215,11 +216,15 @@ __all__ = [
     "animate",
     "control",
     "energies",
+    "energy",
     "envs",
     "equilibrium",
     "fibres_along",
     "find_equilibria",
     "follow_path",
+    "forces",
+    "free_motions",
+    "hessian",
     "linear_buckling",
     "linear_response",
     "load",

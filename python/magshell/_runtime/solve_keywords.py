@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 _LINE = 120  # characters of a line of a docstring
 
-_FINDERS = ("equilibrium", "find_equilibria", "energies")
+_FINDERS = ("equilibrium", "find_equilibria", "energies", "energy", "forces", "hessian")
 _STATIC = (*_FINDERS, "follow_path", "linear_response", "linear_buckling")
 _MOTION = ("simulate",)
 

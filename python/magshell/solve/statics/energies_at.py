@@ -1,24 +1,27 @@
-"""Energies of a scene at given positions, which need not be an equilibrium: ms.energies."""
+"""Energies of a scene at given positions, which need not be an equilibrium, and their derivatives."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+import scipy
 
 from ..._input.quantity import quantity
-from ..._input.tensors import requires_gradient, to_array
+from ..._input.scalars import flag
+from ..._input.tensors import dtype_like, like
 from ..._runtime.solve_keywords import given_to
 from ..._runtime.solver_entry_point import solve_entry
 from ...model.bodies.bodies import checked_body
+from ...model.scene.scene import Scene
 from ...model.shells.shell import Shell
 from ...model.solids.solid import Solid
+from ..adjoint.energy import EnergyAdjoint, Unknowns
 from .single_solve import inputs_of
 from .start import check_faces
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
-    from ...model.scene.scene import Scene
 
 
 _ELASTIC = ("membrane", "bending")  # of shells
@@ -44,7 +47,7 @@ def energies(
     curvature_scale: Numbers | None = None,
     vertex_loads: Numbers | None = None,
     values: dict[Any, Any] | None = None,
-) -> dict[str, float]:
+) -> dict[str, Any]:
     """Compute the potential energies of a scene at given positions, in equilibrium or not, {name: J}.
 
     positions: (n_v, 3) m. edge_rotations: (n_e,) rad, as a result has them, of sheets with bending="midedge"; by default
@@ -55,7 +58,9 @@ def energies(
     values: as in ms.equilibrium.
 
     At the positions of an equilibrium these are its `energies`. The directions that clamps prescribe are used; other
-    prescribed displacements are not. Energies have no gradients here: those of an equilibrium do.
+    prescribed displacements are not. Tensors get energies that are tensors: see ms.energy. The gradient by positions
+    is that of the sum of all energies; the one of a single energy, with others left out, raises NoGradient. Those by values
+    may be of single energies.
 
     Raises ValueError on bad input, and where there is no energy: bodies in contact intersect or are nearer than
     they may be, or elements are inside out whose material does not bear it.
@@ -69,34 +74,261 @@ def energies(
     0.000101002
     """
     arguments = given_to("energies", locals())
-    given = {"positions": positions, "edge_rotations": edge_rotations}
-    inputs = inputs_of(scene, arguments, ignore_velocity_forces=True)
-    if inputs.leaves or any(map(requires_gradient, given.values())):
-        raise ValueError("energies have no gradients: give tensors detached")
-    mesh, model = scene.mesh, scene._model
-    number = None if checked_body(body) is None else scene._bodies.number(body)
-    places = quantity("positions", "m", to_array("positions", positions), (mesh.n_vertices, 3))
-    scene._bodies.check_welded("positions", "m", places)
-    check_faces(scene, places)
-    rotations = np.zeros(scene._bodies.n_rotations)
-    if edge_rotations is not None:
-        rotations = to_array("edge_rotations", edge_rotations)
-        rotations = quantity("edge_rotations", "rad", rotations, (scene._bodies.n_rotations,))
+    number = None if checked_body(body) is None else _number(scene, body)
+    at = _point("energies", scene, positions, edge_rotations, arguments)
+    leaves = at.adjoint.inputs.leaves
+    if number is not None and leaves:
+        raise ValueError("energies of one body have no gradients: give tensors detached, or no body")
+    with at.adjoint.inputs.in_core():
+        found = at.adjoint.by_name() if number is None else _of_body(scene, number, at.adjoint.of_terms())
+    if not leaves:
+        return found
+    from ..adjoint.autograd import energies_of
+
+    tensors = energies_of(at.adjoint, np.array([*found.values()]), at.dtype, at.adjoint.inputs.tensors)
+    return dict(zip(found, tensors.unbind(), strict=True))
+
+
+@solve_entry
+def energy(
+    scene: Scene,
+    positions: Numbers,
+    *,
+    edge_rotations: Numbers | None = None,
+    remanent_magnetization: Numbers | None = None,
+    applied_flux_density: Numbers | None = None,
+    load_factor: Any = 1.0,
+    gravity_factor: Any = 1.0,
+    field_factor: Any = 1.0,
+    support_factor: Any = 1.0,
+    thickness: Numbers | None = None,
+    young_modulus: Numbers | None = None,
+    poisson_ratio: Numbers | None = None,
+    mass_density: Numbers | None = None,
+    curvature_scale: Numbers | None = None,
+    vertex_loads: Numbers | None = None,
+    values: dict[Any, Any] | None = None,
+) -> Any:
+    """Compute the potential energy of a scene at given positions, in equilibrium or not, J: the sum of ms.energies.
+
+    positions: (n_v, 3) m. edge_rotations: (n_e,) rad, as in ms.energies.
+
+    {keywords}
+    values: as in ms.equilibrium.
+
+    With tensors it is a tensor, differentiable by positions, edge rotations and everything else above. First derivatives by
+    positions and edge rotations are exact. Those by values are differences of eighth order, checked against sixth, one value
+    of the core after another (8 energies each): cheap for a number, slow for one number a face of a large mesh.
+    Second derivatives by positions (Hessian-vector products) are exact; so are those by positions and values, where
+    the gradient by positions is taken first. Those by value and value raise NoGradient; so do third derivatives.
+
+    Raises ValueError as ms.energies does, and NoGradient where an energy is not smooth in a value.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))])
+    >>> round(ms.energy(scene, mesh.rest_positions * (1.01, 1, 1)), 9)  # J
+    0.000101002
+    """
+    arguments = given_to("energy", locals())
+    at = _point("energy", scene, positions, edge_rotations, arguments)
+    inputs = at.adjoint.inputs
     with inputs.in_core():
-        state = model.state(places, rotations)
-        # Positions do not determine the directions that clamps hold: the clamps prescribe these degrees of freedom.
-        first = 3 * scene._bodies.n_points
-        directions = slice(first, first + 3 * len(scene._constraints.directions))
-        state[directions] += model.driven_increment(state, inputs.controls)[directions]
-        if reason := model.refusal(state):
+        found = at.adjoint.by_name()
+    if not inputs.leaves:
+        return sum(found.values())
+    from ..adjoint.autograd import energies_of
+
+    return energies_of(at.adjoint, np.array([*found.values()]), at.dtype, inputs.tensors).sum()
+
+
+@solve_entry
+def forces(
+    scene: Scene,
+    positions: Numbers,
+    *,
+    edge_rotations: Numbers | None = None,
+    remanent_magnetization: Numbers | None = None,
+    applied_flux_density: Numbers | None = None,
+    load_factor: Any = 1.0,
+    gravity_factor: Any = 1.0,
+    field_factor: Any = 1.0,
+    support_factor: Any = 1.0,
+    thickness: Numbers | None = None,
+    young_modulus: Numbers | None = None,
+    poisson_ratio: Numbers | None = None,
+    mass_density: Numbers | None = None,
+    curvature_scale: Numbers | None = None,
+    vertex_loads: Numbers | None = None,
+    values: dict[Any, Any] | None = None,
+) -> Forces:
+    """Compute the forces of a scene at given positions: minus the gradient of ms.energy.
+
+    positions: (n_v, 3) m. edge_rotations: (n_e,) rad, as in ms.energies.
+
+    {keywords}
+    values: as in ms.equilibrium.
+
+    Returns (on_vertices (n_v, 3) N, on_edge_rotations (n_e,) N m); the latter are zero on edges that cannot rotate.
+    They include no forces of supports: at an equilibrium, what is left is what supports bear. With tensors they are
+    tensors, differentiable once by positions, edge rotations and everything else above. Vertices that are welded together
+    share their force.
+
+    Raises ValueError as ms.energies does, and for scenes with rigid bodies or skeletons.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))])
+    >>> pulled = ms.forces(scene, mesh.rest_positions * (1.01, 1, 1)).on_vertices
+    >>> round(float(pulled[mesh.vertices_at(x=0.0), 0].sum()), 6)  # N, E t b (1.01^2 - 1)/2 1.01
+    0.20301
+    """
+    arguments = given_to("forces", locals())
+    at = _point("forces", scene, positions, edge_rotations, arguments)
+    inputs = at.adjoint.inputs
+    if not inputs.leaves:
+        return Forces(*(like(-each, *inputs.given) for each in at.adjoint.by_unknowns))
+    from ..adjoint.autograd import slopes_of
+
+    return Forces(*(-each for each in slopes_of(at.adjoint, at.dtype, inputs.tensors)))
+
+
+@solve_entry
+def hessian(
+    scene: Scene,
+    positions: Numbers,
+    *,
+    edge_rotations: Numbers | None = None,
+    reduced: bool = False,
+    remanent_magnetization: Numbers | None = None,
+    applied_flux_density: Numbers | None = None,
+    load_factor: Any = 1.0,
+    gravity_factor: Any = 1.0,
+    field_factor: Any = 1.0,
+    support_factor: Any = 1.0,
+    thickness: Numbers | None = None,
+    young_modulus: Numbers | None = None,
+    poisson_ratio: Numbers | None = None,
+    mass_density: Numbers | None = None,
+    curvature_scale: Numbers | None = None,
+    vertex_loads: Numbers | None = None,
+    values: dict[Any, Any] | None = None,
+) -> Any:
+    """Compute the Hessian of ms.energy at given positions, a symmetric scipy.sparse matrix.
+
+    positions: (n_v, 3) m. edge_rotations: (n_e,) rad, as in ms.energies.
+    reduced: of the free unknowns alone: B^T H B, with B of ms.free_motions. By default H has the order of
+        positions.ravel(), then of the edge rotations: 3 n_v + n_e rows; those of edges that cannot rotate are zero.
+
+    {keywords}
+    values: as in ms.equilibrium.
+
+    It is not projected: away from an equilibrium it may be indefinite. What couples all vertices, such as the pressure of a
+    cavity, fills it.
+
+    Raises ValueError as ms.forces does, and for tensors that require a gradient.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))])
+    >>> ms.hessian(scene, mesh.rest_positions, reduced=True).shape  # (33 - 3) * 3, and 70 edges that rotate
+    (160, 160)
+    """
+    arguments = given_to("hessian", locals())
+    flag("reduced", reduced)
+    at = _point("hessian", scene, positions, edge_rotations, arguments)
+    if at.adjoint.inputs.leaves:
+        raise ValueError("a Hessian has no gradients: give tensors detached")
+    order = at.adjoint.unknowns
+    whole = scipy.sparse.csr_array(order.to_core.T @ at.adjoint.hessian @ order.to_core)
+    if not reduced:
+        return whole
+    motions = free_motions(scene)
+    return scipy.sparse.csr_array(motions.T @ whole @ motions)
+
+
+def free_motions(scene: Scene) -> Any:
+    """Return the sparse matrix B (3 n_v + n_e, n) of the motions that supports leave free, for ms.hessian.
+
+    scene: without rigid bodies and skeletons; else a ValueError.
+
+    Its rows have the order of positions.ravel(), then of the edge rotations; B z is a motion of them, B^T f a force on
+    the free unknowns z. Its columns are orthonormal but where vertices are welded together.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, bending="hinge")
+    >>> ms.free_motions(ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))])).shape
+    (171, 90)
+    """
+    if not isinstance(scene, Scene):
+        raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
+    order, model = Unknowns("free_motions", scene), scene._model
+    free = np.arange(model.free_size)
+    rows, columns, entries = [], [], []
+    for first in range(
+        3
+    ):  # the free unknowns of one vertex follow each other, at most three: one of them at a time
+        some = free % 3 == first
+        values = model.expand(some.astype(float))
+        there = np.flatnonzero(np.abs(values) > 1e-12)  # 1: a direction's component, of at most 1
+        rows.append(there)
+        entries.append(values[there])
+        columns.append(np.rint(model.expand(np.where(some, free, 0.0))[there] / values[there]).astype(int))
+    data = np.concatenate(entries), (np.concatenate(rows), np.concatenate(columns))
+    of_core = scipy.sparse.csr_array(data, shape=(model.size, model.free_size))
+    return scipy.sparse.csr_array(order.gathered @ of_core)
+
+
+class Forces(NamedTuple):
+    """The forces of a scene at given positions, the result of ms.forces.
+
+    on_vertices: (n_v, 3) N. on_edge_rotations: (n_e,) N m.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))])
+    >>> ms.forces(scene, mesh.rest_positions).on_vertices.shape
+    (33, 3)
+    """
+
+    on_vertices: Any
+    on_edge_rotations: Any
+
+
+class _Point(NamedTuple):
+    """The energies at positions, and the dtype of tensors made of them."""
+
+    adjoint: EnergyAdjoint
+    dtype: Any
+
+
+def _number(scene: Scene, body: Shell | Solid) -> int:
+    if not isinstance(scene, Scene):
+        raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
+    return scene._bodies.number(body)
+
+
+def _point(function: str, scene: Scene, positions, edge_rotations, arguments: dict[str, Any]) -> _Point:
+    """Check the arguments of one of the functions here. Raises ValueError, also where there is no energy."""
+    inputs = inputs_of(scene, arguments, ignore_velocity_forces=True)
+    model, bodies = scene._model, scene._bodies
+    places = quantity("positions", "m", inputs.take("positions", positions), (scene.mesh.n_vertices, 3))
+    bodies.check_welded("positions", "m", places)
+    check_faces(scene, places, "positions")
+    rotations = np.zeros(bodies.n_rotations)
+    if edge_rotations is not None:
+        rotations = inputs.take("edge_rotations", edge_rotations)
+        rotations = quantity("edge_rotations", "rad", rotations, (bodies.n_rotations,))
+    with inputs.in_core():
+        adjoint = EnergyAdjoint(function, inputs, model.state(places, rotations))
+        if reason := model.refusal(adjoint.state(inputs.controls)):
             raise ValueError(f"there is no energy at these positions: {reason}")
-        of_terms = model.term_energies(state, [], inputs.controls)
-    if number is not None:
-        return _of_body(scene, number, of_terms)
-    found: dict[str, float] = {}
-    for name, energy in of_terms:
-        found[name] = found.get(name, 0.0) + energy
-    return found
+    return _Point(adjoint, dtype_like(*inputs.given) if inputs.leaves else None)
 
 
 def _of_body(scene, number: int, of_terms: list[tuple[str, float]]) -> dict[str, float]:

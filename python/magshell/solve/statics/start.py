@@ -54,7 +54,7 @@ def starting_point(
     return state, [], inputs.controls, False
 
 
-def check_faces(scene: Scene, positions: np.ndarray) -> None:
+def check_faces(scene: Scene, positions: np.ndarray, name: str = "start") -> None:
     """Raise ValueError for a face of a shell without area, which has no normal. Materials check the elements of solids."""
     for body, span in zip(scene._bodies.shells, scene._bodies.spans, strict=True):
         if isinstance(body, Solid):
@@ -65,5 +65,5 @@ def check_faces(scene: Scene, positions: np.ndarray) -> None:
         flat = np.flatnonzero(area <= 1e-12 * span.mesh.face_areas)
         if flat.size:
             raise ValueError(
-                f"start [m] leaves face {span.first_face + flat[0]} without area: {area[flat[0]]:.3g} m2"
+                f"{name} [m] leaves face {span.first_face + flat[0]} without area: {area[flat[0]]:.3g} m2"
             )

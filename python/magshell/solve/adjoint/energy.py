@@ -1,0 +1,268 @@
+"""The derivatives of the energies of a scene at given positions. Works on arrays; autograd.py has the tensors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy
+
+from ... import _core
+from ...errors import NoGradient
+from ...model.scene.solve_inputs import Inputs
+from ...model.scene.values import Gradient
+from .static import by_leaf
+
+if TYPE_CHECKING:
+    from ...model.scene.scene import Scene
+    from ...model.scene.solve_inputs import Leaf
+
+POSITIONAL = ("positions", "edge_rotations")  # names of the leaves that are no values
+
+# Central differences of eighth and of sixth order, at 1, 2, 3 and 4 steps (1, coefficients of the textbook): exact for
+# polynomials up to the eighth degree. Tested by test_first_derivatives_by_values_agree_with_differences.
+_EIGHTH = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280])
+_SIXTH = np.array([3 / 4, -3 / 20, 1 / 60, 0.0])
+# The first step (1), as a fraction of the value, and the steps of a value that is zero (SI units of the value); each
+# is tried with these fractions (1) of it until both orders agree. Tested by
+# test_first_derivatives_by_values_agree_with_differences.
+_STEP, _STEP_AT_ZERO, _SHORTER = 1 / 64, 1e-2, (1.0, 1e-1, 1e-2, 1e-3, 1e-4)
+# Both orders agree if their difference is at most this fraction (1) of the largest derivative. Tested by
+# test_first_derivatives_by_values_agree_with_differences.
+_AGREE = 1e-8
+
+
+class Unknowns:
+    """The order of the positions and edge rotations of a caller among all unknowns of the core, by a sparse matrix.
+
+    Raises ValueError, with the name of the function that needs it, for a scene whose unknowns are not its vertices
+    and edges alone: with rigid bodies or skeletons.
+    """
+
+    def __init__(self, function: str, scene: Scene):
+        model, bodies = scene._model, scene._bodies
+        counted = np.arange(1.0, model.size + 1)  # 0: an edge that cannot rotate
+        found = np.concatenate([model.positions(counted).ravel(), model.edge_rotations(counted)])
+        theirs = np.flatnonzero(found)
+        ours = np.abs(found[theirs]).astype(int) - 1
+        first = 3 * bodies.n_points
+        held = np.arange(first, first + 3 * len(scene._constraints.directions))
+        if scene.rigid_parts or np.union1d(ours, held).size != model.size:
+            raise ValueError(
+                f"{function}: the scene has rigid bodies or skeletons, which move otherwise than "
+                "by positions of vertices: energies have derivatives by positions without them only"
+            )
+        shared = np.bincount(ours, minlength=model.size)[ours]
+        entries = np.sign(found[theirs]), (ours, theirs)
+        shape = (model.size, found.size)
+        self.n_positions: int = 3 * scene.mesh.n_vertices
+        self.gathered: scipy.sparse.csr_array = scipy.sparse.csr_array(entries, shape=shape).T.tocsr()
+        # Vertices that are welded together are one unknown, and share the derivative by it.
+        weights = scipy.sparse.csr_array((entries[0] / shared, entries[1]), shape=shape)
+        self.to_core: scipy.sparse.csr_array = weights
+
+    def split(self, full: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return a gradient by all unknowns as those by positions (n_v, 3) and by edge rotations (n_e,)."""
+        ours = self.to_core.T @ full
+        return ours[: self.n_positions].reshape(-1, 3), ours[self.n_positions :]
+
+    def joined(self, by_positions: np.ndarray, by_rotations: np.ndarray) -> np.ndarray:
+        """Return a motion of positions and edge rotations as one of all unknowns."""
+        return self.to_core @ np.concatenate([by_positions.ravel(), by_rotations])
+
+
+class EnergyAdjoint:
+    """The energies of a scene at a state, with their derivatives.
+
+    base: the state without the directions that clamps prescribe; these follow from the load parameters and the values.
+    """
+
+    def __init__(self, function: str, inputs: Inputs, base: np.ndarray):
+        self.inputs: Inputs = inputs
+        self._function, self._base = function, base
+        self._model = inputs.scene._model
+
+    def state(self, controls: np.ndarray) -> np.ndarray:
+        """Return all unknowns. Positions do not determine the directions that clamps hold: the clamps prescribe these."""
+        scene, state = self.inputs.scene, self._base.copy()
+        first = 3 * scene._bodies.n_points
+        directions = slice(first, first + 3 * len(scene._constraints.directions))
+        state[directions] += self._model.driven_increment(state, controls)[directions]
+        return state
+
+    def of_terms(self, controls: np.ndarray | None = None) -> list[tuple[str, float]]:
+        """Return the energies of the terms in the core, which must hold the values."""
+        controls = self.inputs.controls if controls is None else controls
+        return self._model.term_energies(self.state(controls), [], controls)
+
+    def by_name(self, controls: np.ndarray | None = None) -> dict[str, float]:
+        """Return the energies, {name: J}, those of one name summed; the core must hold the values."""
+        found: dict[str, float] = {}
+        for name, energy in self.of_terms(controls):
+            found[name] = found.get(name, 0.0) + energy
+        return found
+
+    @cached_property
+    def unknowns(self) -> Unknowns:
+        return Unknowns(self._function, self.inputs.scene)
+
+    def _gradient(self, controls: np.ndarray) -> np.ndarray:
+        state = self.state(controls)
+        self._model.term_energies(state, [], controls)  # sets the turns of angles to those at rest
+        return self._model.gradient(state, controls)
+
+    @cached_property
+    def gradient(self) -> np.ndarray:
+        """The gradient of the sum by all unknowns of the core."""
+        with self.inputs.in_core():
+            return self._gradient(self.inputs.controls)
+
+    @cached_property
+    def hessian(self) -> scipy.sparse.csr_array:
+        """The Hessian of the sum by all unknowns of the core, whole."""
+        state, controls = self.state(self.inputs.controls), self.inputs.controls
+        with self.inputs.in_core():
+            self._model.term_energies(state, [], controls)
+            size, starts, rows, values = self._model.hessian(state, controls, reduced=False)
+            columns, stiffnesses = self._model.low_rank(reduced=False)
+        lower = scipy.sparse.csc_array((values, rows, starts), shape=(size, size))
+        whole = lower + lower.T - scipy.sparse.diags_array(lower.diagonal())
+        if np.any(stiffnesses):
+            thin = scipy.sparse.csc_array(columns)
+            whole = whole + thin @ scipy.sparse.diags_array(np.ravel(stiffnesses)) @ thin.T
+        return scipy.sparse.csr_array(whole)
+
+    def gradients(self, weights: np.ndarray, wanted: Sequence[bool]) -> list[np.ndarray | None]:
+        """Compute the gradients of the weighted sum of `by_name` by the wanted leaves. Raises NoGradient if there is
+        none.
+        """
+        found = []
+        for leaf, is_wanted in zip(self.inputs.leaves, wanted, strict=True):
+            if not is_wanted:
+                found.append(None)
+            elif leaf.name in POSITIONAL and leaf.owner is None:
+                found.append(self.weight_of_all(weights) * self.by_unknowns[POSITIONAL.index(leaf.name)])
+            else:
+                found.append(
+                    self._differences(leaf, lambda c: weights * np.array([*self.by_name(c).values()]))
+                )
+        return found
+
+    @property
+    def by_unknowns(self) -> tuple[np.ndarray, np.ndarray]:
+        """The gradient of the sum by positions (n_v, 3) and by edge rotations (n_e,)."""
+        return self.unknowns.split(self.gradient)
+
+    def weight_of_all(self, weights: np.ndarray) -> float:
+        """Return the one weight of all energies. Raises NoGradient if they differ."""
+        if np.ptp(weights) > 0.0:
+            raise NoGradient("no gradient by positions of single energies: take that of their sum, ms.energy")
+        return float(weights[0])
+
+    def mixed(
+        self, weight: float, by_positions: np.ndarray, by_rotations: np.ndarray, wanted: Sequence[bool]
+    ) -> tuple[float, list[np.ndarray | None]]:
+        """Compute m . g, with the gradient g and a motion m in two arrays as `by_unknowns`, and weight (m . g) by leaves."""
+        motion = self.unknowns.joined(by_positions, by_rotations)
+        moved = self.unknowns.split(weight * (self.hessian @ motion)) if any(wanted) else ()
+        found, of_values = [], None
+        for leaf, is_wanted in zip(self.inputs.leaves, wanted, strict=True):
+            if not is_wanted:
+                found.append(None)
+            elif leaf.name in POSITIONAL and leaf.owner is None:
+                found.append(moved[POSITIONAL.index(leaf.name)])
+            elif self._follows(leaf):
+                found.append(
+                    self._differences(leaf, lambda c: np.array([weight * (motion @ self._gradient(c))]))
+                )
+            else:
+                of_values = self._by_values(weight * motion) if of_values is None else of_values
+                found.append(by_leaf(self.inputs, leaf, of_values))
+        return float(motion @ self.gradient), found
+
+    def _follows(self, leaf: Leaf) -> bool:
+        """Return whether directions of clamps can change with a leaf, or load parameters, which `vjp` leaves out."""
+        scene = self.inputs.scene
+        if leaf.owner is None:
+            return leaf.name != "remanent_magnetization"
+        return any(leaf.owner is each for each in scene.supports) or bool(self._moved_by(leaf, False))
+
+    def _by_values(self, motion: np.ndarray) -> Gradient:
+        inputs, state = self.inputs, self.state(self.inputs.controls)
+        with inputs.in_core():
+            self._model.term_energies(state, [], inputs.controls)
+            by_values = _core.vjp(self._model, state, inputs.controls, motion)
+        return Gradient(inputs.scene, by_values, np.zeros_like(inputs.controls))
+
+    def _moved_by(self, leaf: Leaf, of_values: bool) -> list[tuple[str, str]]:
+        """Return those values of the core, or those load parameters, that depend on a leaf."""
+        scene = self.inputs.scene
+        layout = scene._value_layout if of_values else scene._control_layout
+        mixed = np.random.default_rng(0).uniform(0.5, 1.5, layout.size)
+        zeros = scene._value_layout.zeros(), scene._control_layout.zeros()
+        found = []
+        for key in layout:
+            probe = layout.packed({key: layout.of(mixed, *key)}, layout.zeros())
+            both = (probe, zeros[1]) if of_values else (zeros[0], probe)
+            if np.any(by_leaf(self.inputs, leaf, Gradient(scene, *both))):
+                found.append(key)
+        return found
+
+    def _differences(self, leaf: Leaf, function: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """Return the derivative of the sum of a function of the load parameters, in the core, by a leaf.
+
+        It is found by differences of the values and load parameters that depend on the leaf, one after another.
+        """
+        inputs, scene = self.inputs, self.inputs.scene
+        by_values, by_controls = scene._value_layout.zeros(), scene._control_layout.zeros()
+        numbers, controls = inputs.values.numbers, inputs.controls
+        with inputs.in_core():
+            try:
+                for key in self._moved_by(leaf, True):
+
+                    def with_values(changed):
+                        self._model.set_values(changed)
+                        return function(controls)
+
+                    entries = scene._value_layout.of(np.arange(numbers.size), *key).ravel()
+                    _by_entries(with_values, numbers, entries, by_values, leaf.name)
+            finally:
+                self._model.set_values(numbers)
+            for key in self._moved_by(leaf, False):
+                entries = scene._control_layout.of(np.arange(controls.size), *key).ravel()
+                _by_entries(function, controls, entries, by_controls, leaf.name)
+        return by_leaf(inputs, leaf, Gradient(scene, by_values, by_controls))
+
+
+def _by_entries(
+    function: Callable[[np.ndarray], np.ndarray],
+    numbers: np.ndarray,
+    entries: np.ndarray,
+    out: np.ndarray,
+    name: str,
+) -> None:
+    """Write the derivatives of the sum of a function by some of its numbers; NoGradient if differences do not settle."""
+    size = np.abs(function(numbers)).max()
+    scale = np.abs(numbers[entries]).max()
+    steps = np.where(
+        numbers[entries] != 0.0, _STEP * np.abs(numbers[entries]), _STEP * scale or _STEP_AT_ZERO
+    )
+    for shorter in _SHORTER:
+        eighth, sixth = np.zeros(entries.size), np.zeros(entries.size)
+        for k, entry in enumerate(entries):
+            step = shorter * steps[k]
+            for m in range(4):
+                there, back = numbers.copy(), numbers.copy()
+                there[entry] += (m + 1) * step
+                back[entry] -= (m + 1) * step
+                # Each part alone: parts that do not depend on the number cancel exactly.
+                change = (function(there) - function(back)).sum() / step
+                eighth[k] += _EIGHTH[m] * change
+                sixth[k] += _SIXTH[m] * change
+        rounding = 1e3 * np.finfo(float).eps * size / (shorter * steps)
+        if (np.abs(eighth - sixth) <= _AGREE * np.abs(eighth).max() + rounding).all():
+            out[entries] = eighth
+            return
+    raise NoGradient(f"no gradient by {name}: the energy is not smooth there, or not finite near it")
