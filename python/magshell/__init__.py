@@ -98,7 +98,7 @@ from .solve.options import (
     Newton,
     ProjectiveDynamics,
 )
-from .solve.statics.energies_at import Forces, energies, energy, forces, free_motions, hessian
+from .solve.statics.energies_at import energies, energy, forces, free_motions, hessian
 from .solve.statics.equilibria import EquilibriumSet
 from .solve.statics.equilibrium import Equilibrium
 from .solve.statics.extrapolation import Extrapolation, richardson_extrapolation
@@ -141,7 +141,6 @@ __all__ = [
     "Fibres",
     "FieldSamplingWarning",
     "Fixed",
-    "Forces",
     "Guccione",
     "ImplicitEuler",
     "Interrupted",

@@ -148,6 +148,14 @@ def check_one_value(scene, positions, given, value, numbers):
     assert np.allclose(of_forces.numpy(), -mixed.numpy(), rtol=1e-12, atol=0)
 
 
+def test_one_number_stands_for_all_faces():
+    """Check numbers that all rows of the core equal, which change together."""
+    scene, given, positions, rotations = at("midedge")
+    given = {**given, "edge_rotations": rotations}
+    for value, number in (("thickness", 1e-3), ("young_modulus", 1e6), ("poisson_ratio", 0.3)):
+        check_one_value(scene, positions, given, value, np.array(number))
+
+
 def test_values_of_objects_have_derivatives():
     """Check values of a scene's objects: a stiffness of a contact, and the moduli of a material."""
     scene, _, positions, _ = at("contact")

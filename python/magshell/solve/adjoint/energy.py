@@ -210,6 +210,20 @@ class EnergyAdjoint:
                 found.append(key)
         return found
 
+    def _is_one(self, leaf: Leaf, key: tuple[str, str], of_values: bool) -> bool:
+        """Return whether a leaf is one number that all rows of a value of the core equal, up to constants."""
+        if np.prod(leaf.shape, dtype=int) != 1:
+            return False
+        scene = self.inputs.scene
+        layout = scene._value_layout if of_values else scene._control_layout
+        mixed = np.random.default_rng(1).uniform(0.5, 1.5, layout.size)
+        of_key = layout.of(mixed, *key)
+        zeros = scene._value_layout.zeros(), scene._control_layout.zeros()
+        probe = layout.packed({key: of_key}, layout.zeros())
+        both = (probe, zeros[1]) if of_values else (zeros[0], probe)
+        found = by_leaf(self.inputs, leaf, Gradient(scene, *both))
+        return bool(np.isclose(float(np.sum(found)), of_key.sum(), rtol=1e-12, atol=0.0))
+
     def _differences(self, leaf: Leaf, function: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
         """Return the derivative of the sum of a function of the load parameters, in the core, by a leaf.
 
@@ -227,12 +241,16 @@ class EnergyAdjoint:
                         return function(controls)
 
                     entries = scene._value_layout.of(np.arange(numbers.size), *key).ravel()
-                    _by_entries(with_values, numbers, entries, by_values, leaf.name)
+                    _by_entries(
+                        with_values, numbers, entries, by_values, leaf.name, self._is_one(leaf, key, True)
+                    )
             finally:
                 self._model.set_values(numbers)
             for key in self._moved_by(leaf, False):
                 entries = scene._control_layout.of(np.arange(controls.size), *key).ravel()
-                _by_entries(function, controls, entries, by_controls, leaf.name)
+                _by_entries(
+                    function, controls, entries, by_controls, leaf.name, self._is_one(leaf, key, False)
+                )
         return by_leaf(inputs, leaf, Gradient(scene, by_values, by_controls))
 
 
@@ -242,16 +260,22 @@ def _by_entries(
     entries: np.ndarray,
     out: np.ndarray,
     name: str,
+    together: bool,
 ) -> None:
-    """Write the derivatives of the sum of a function by some of its numbers; NoGradient if differences do not settle."""
+    """Write the derivatives of the sum of a function by some of its numbers; NoGradient if differences do not settle.
+
+    together: all of these numbers change as one.
+    """
     size = np.abs(function(numbers)).max()
     scale = np.abs(numbers[entries]).max()
     steps = np.where(
         numbers[entries] != 0.0, _STEP * np.abs(numbers[entries]), _STEP * scale or _STEP_AT_ZERO
     )
+    changed = [entries] if together else list(entries)
+    steps = steps.min(keepdims=True) if together else steps
     for shorter in _SHORTER:
-        eighth, sixth = np.zeros(entries.size), np.zeros(entries.size)
-        for k, entry in enumerate(entries):
+        eighth, sixth = np.zeros(len(changed)), np.zeros(len(changed))
+        for k, entry in enumerate(changed):
             step = shorter * steps[k]
             for m in range(4):
                 there, back = numbers.copy(), numbers.copy()
@@ -263,6 +287,6 @@ def _by_entries(
                 sixth[k] += _SIXTH[m] * change
         rounding = 1e3 * np.finfo(float).eps * size / (shorter * steps)
         if (np.abs(eighth - sixth) <= _AGREE * np.abs(eighth).max() + rounding).all():
-            out[entries] = eighth
+            out[entries] = eighth / (entries.size if together else 1)
             return
     raise NoGradient(f"no gradient by {name}: the energy is not smooth there, or not finite near it")
