@@ -148,7 +148,7 @@ def check_one_value(scene, positions, given, value, numbers):
     assert np.allclose(of_forces.numpy(), -mixed.numpy(), rtol=1e-12, atol=0)
 
 
-def test_one_number_stands_for_all_faces():
+def test_scalar_values_agree_with_differences():
     """Check numbers that all rows of the core equal, which change together."""
     scene, given, positions, rotations = at("midedge")
     given = {**given, "edge_rotations": rotations}
@@ -298,7 +298,7 @@ def test_bad_input_is_refused(function):
         function(scene, positions, youngs_modulus=1e6, **given)
 
 
-def test_tensors_without_derivatives_are_refused():
+def test_functions_without_derivatives_refuse_tensors():
     scene, given, positions, _ = at("midedge")
     (x,) = tensors(positions)
     with pytest.raises(ValueError, match="a Hessian has no gradients"):
