@@ -42,7 +42,7 @@ Stepper::Stepper(Newton& newton, const Tableau& tableau, Inertia inertia, const 
     if (projective.on) projective_ = std::make_unique<ProjectiveSolver>(newton, projective);
 }
 
-NewtonReport Stepper::solve(VectorXd& q, const LoadParameters& load_parameters,
+NewtonReport Stepper::solve(VectorXd& q, const MotionState& begin, const LoadParameters& load_parameters,
                             const ProximalTerm& proximal) {
     Model& model = newton_.model();
     if (projective_) {
@@ -59,7 +59,21 @@ NewtonReport Stepper::solve(VectorXd& q, const LoadParameters& load_parameters,
     q = predicted;
     model.set_angle_branches(angle_branches);
     NewtonPolicy standard{.proximal = proximal, .mixed = false, .search_at_barrier = false};
-    if (has.has_stiffness_jumps) standard.steps = NewtonPolicy::Steps::contracting;
+    if (has.has_stiffness_jumps) {
+        standard.steps = NewtonPolicy::Steps::descending;
+        // The prediction may fold faces, and then lies in another valley: the descent begins where its energy is lower.
+        const auto energy = [&](const VectorXd& there) {
+            const VectorXd away = there - *proximal.target;
+            return model.energy(there, load_parameters) +
+                   0.5 * away.dot(proximal.weights->cwiseProduct(away));
+        };
+        const double ahead = energy(predicted);
+        model.set_angle_branches(begin.angle_branches);
+        if (ahead <= energy(begin.q))
+            model.set_angle_branches(angle_branches);
+        else
+            q = begin.q;
+    }
     return newton_.solve(q, load_parameters, standard);
 }
 
@@ -153,7 +167,7 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative,
         }
         const StageMotion motion{&x_hat, &v_hat, step.stage_time()};
         const ProximalTerm proximal{&step.weights(), &target, &motion};
-        const NewtonReport report = solve(q, load_parameters[i + 1], proximal);
+        const NewtonReport report = solve(q, state, load_parameters[i + 1], proximal);
         if (!report.converged) {
             reason = model.not_finite(q, load_parameters[i + 1]);
             if (reason.empty()) reason = report.reason;

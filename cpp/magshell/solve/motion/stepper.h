@@ -87,8 +87,10 @@ class Stepper {
     const StepAlgebra& algebra(double dt, const Tableau& tableau);
 
   private:
-    /// Solves a stage, by damped or standard Newton steps if the usual ones fail.
-    NewtonReport solve(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal);
+    /// Solves a stage of a step from q, the prediction; by standard Newton steps or a descent if the usual steps fail.
+    /// begin: the beginning of the step.
+    NewtonReport solve(VectorXd& q, const MotionState& begin, const LoadParameters& load_parameters,
+                       const ProximalTerm& proximal);
 
     Newton& newton_;
     std::unique_ptr<ProjectiveSolver> projective_;  // nullptr: stages are solved by Newton

@@ -44,10 +44,9 @@ struct ProximalTerm {
 
 /// How one solve iterates. The defaults solve for a stationary point of the energy, as exactly as the options say.
 struct NewtonPolicy {
-    /// full: full steps, shortened only where states have no energy. contracting: standard steps that are shortened until they contract
-    /// (natural monotonicity test [Deuflhard]), in rounds with fixed normal forces of friction; slower, and robust if contacts open and
-    /// close, stick and slip. It needs a proximal term.
-    enum class Steps { full, contracting };
+    /// full: full steps, shortened only where states have no energy. descending: standard steps that lower the energy of a time stage, in
+    /// rounds with fixed normal forces of friction; slower, and robust if contacts open and close, stick and slip. It needs a proximal term.
+    enum class Steps { full, descending };
 
     ProximalTerm proximal = {};
     Steps steps = Steps::full;
