@@ -14,11 +14,11 @@ namespace magshell {
 struct SolveStep {
     double load_fraction = 0.0;  // of the load path, at the end of the step
     std::string method;
-    double displacement = 0.0;  // [m] largest of a node; 0 if the step was not accepted
+    double displacement = 0.0;  // [m] largest component of a node's; 0 if the step was not accepted
     int factorizations = 0, iterations = 0;
     double energy = std::numeric_limits<double>::quiet_NaN();  // [J] at the end of an accepted step
-    Index negative_pivots = 0;                                 // of the last factorization
-    std::string failure;  // why the step was not accepted; empty if it was
+    Index negative_pivots = 0;  // of the last factorization, with the shift of a descent
+    std::string failure;        // why the step was not accepted; empty if it was
 };
 
 /// Records the steps of a solve. The cost of a step is everything that was spent since the step before.

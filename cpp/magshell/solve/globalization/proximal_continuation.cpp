@@ -12,16 +12,16 @@
 namespace magshell {
 namespace {
 
-// [-] Ratio of actual to predicted decrease above which L-BFGS steps follow; the usual bound of a good step of a trust region (N&W 4.1).
+// [-] Ratio of actual to predicted decrease above which L-BFGS steps follow; below it a trust region would shrink (N&W 4.1).
 // See test_a_semi_cylinder_pulled_and_pushed.
 constexpr double good_ratio = 0.25;
-// [-] Factor by which the shift is raised and lowered [Waechter, Biegler 2006]; see test_a_semi_cylinder_pulled_and_pushed.
+// [-] Factor by which the shift is lowered, and first raised [Waechter, Biegler 2006]; see test_a_semi_cylinder_pulled_and_pushed.
 constexpr double shift_factor = 8.0;
 // [-] Shift, over the stiffness of the body along the step, below which it is left out; see test_a_semi_cylinder_pulled_and_pushed.
 constexpr double negligible_shift = 0.01;
 // Numbers of L-BFGS steps and of mixed iterations in a step, at most; see test_both_sides_of_a_saddle_cost_the_same.
 constexpr int max_lbfgs_steps = 20, max_proximal_iterations = 12;
-// Number of rounds of L-BFGS in a row until mixed iterations are tried; see test_hard_case_reaches_its_answer, fields, against.
+// Number of rounds of L-BFGS in a row until mixed iterations are tried; see test_hard_case_reaches_its_answer.
 constexpr int patience = 8;
 // Number of attempts at a step, each with a higher shift, at most; see test_small_load_on_a_shallow_roof.
 constexpr int max_attempts = 8;
@@ -53,8 +53,11 @@ class ProximalContinuation {
           settled_(settled_length * model_.extent()) {}
 
     RelaxationReport run(int max_steps) {
-        if (!begin()) return report_;
-        while (report_.steps < max_steps && assess() && advance()) ++report_.steps;
+        if (!begin()) {
+            record("descent", 0.0, report_.reason);
+            return report_;
+        }
+        while (assess() && report_.steps < max_steps && advance()) ++report_.steps;
         if (report_.converged || report_.neutral) return report_;
         if (report_.reason.empty())
             report_.reason = "no equilibrium after " + std::to_string(max_steps) + " relaxation steps";
@@ -231,7 +234,8 @@ class ProximalContinuation {
     }
 
     // Solves for the proximal point by mixed iterations, the first of which is the step at hand; without a shift, for the equilibrium.
-    // Returns false, and leaves q as it was, if they do not converge to a state of less energy.
+    // Returns false, and leaves q as it was, if they do not converge, leave the stable states, or raise the energy by more than
+    // round-off.
     bool reach_proximal_point() {
         const bool exact = shift_ == 0.0;
         const VectorXd from = q_, weights = shift_ * model_.metric();
@@ -287,7 +291,7 @@ class ProximalContinuation {
         return lower ? "the way passes through an obstacle" : "the energy of the state reached is higher";
     }
 
-    // Moves to the state of least energy that the last failed iteration passed through. Returns false if there is none.
+    // Moves to the state of least energy, with the proximal term, that the last failed iteration passed through. Returns false if there is none.
     bool keep_best_state() {
         if (best_.size() == 0 || crosses_obstacle(best_)) return false;
         report_.last_displacement = length(best_ - q_);
@@ -298,7 +302,8 @@ class ProximalContinuation {
         return true;
     }
 
-    // Displaces q along the mode as far as the energy falls, on the side where it falls deeper.
+    // Displaces q along the mode as far as the energy falls, on the side where it falls deeper. Where round-off hides that it falls,
+    // the displacement is the shortest one.
     void leave_saddle(const Mode& mode) {
         // [-] difference of depths that decides; see test_a_pressed_beam_buckles_to_where_the_field_pushes_it
         constexpr double deeper_share = 1e-6;
@@ -370,7 +375,7 @@ class ProximalContinuation {
         }
     }
 
-    // Multiplies the shift, or begins with the last one, or with the one that holds the body against the forces.
+    // Multiplies the shift, or begins with a part of the last one, or of the one that holds the body against the forces.
     void raise_shift(double times) {
         // [-] First shift, over forced_shift() and over largest_stiffness(); see test_both_sides_of_a_saddle_cost_the_same.
         constexpr double first = 1e-3, first_of_stiffness = 1e-12;

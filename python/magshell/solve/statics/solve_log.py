@@ -30,12 +30,13 @@ class SolveStep(NamedTuple):
 
     load_fraction: of the way from the old controls to the new ones, at the end of the step.
     method: in words: "load step" and "standard Newton" change the loads; "L-BFGS", "proximal Newton", "Newton", "best
-        state of the failed step" and "along the lowest mode of a saddle" descend at fixed loads; "deflated Newton"
-        searches for another equilibrium; "stability" is a factorization that decides about it.
-    displacement: m, the largest of a vertex; 0 if the step was not accepted.
-    factorizations, iterations: spent on the step, with all failed attempts at it.
-    energy: J, at the end of the step; NaN if it was not accepted.
-    negative_pivots: of the last matrix: the number of directions in which it is unstable.
+        state of the failed step" and "along the lowest mode of a saddle" descend at fixed loads, and "descent" is the
+        end of a descent that failed; "deflated Newton" searches for another equilibrium; "stability" is a
+        factorization that decides about it.
+    displacement: m, the largest component of a vertex's displacement; 0 if the step was not accepted.
+    factorizations, iterations: spent since the step before. Steps of L-BFGS count as iterations.
+    energy: J, at the end of the step; NaN if it was not accepted. It does not decide where forces have no potential.
+    negative_pivots: of the last matrix. In a descent that matrix is shifted until it has none, so 0 is no stability.
     failure: why the step was not accepted; empty if it was.
 
     >>> import magshell as ms
@@ -103,7 +104,7 @@ class SolveLog(Frozen):
     def summary(self) -> str:
         """Say in one line how many steps each method took, in the order in which the methods came.
 
-        A method's failed steps are counted in brackets.
+        The number of those that failed stands in brackets.
         """
         taken: dict[str, list[int]] = {}
         for step in self.steps:
@@ -115,7 +116,7 @@ class SolveLog(Frozen):
 
 
 def steps_of(found: _core.StaticsResult) -> tuple[tuple[Any, ...], ...]:
-    """Return the steps of a result of the core as plain tuples, in the order of the fields of SolveStep."""
+    """Return the steps of a result of the core as plain tuples, which can be saved, in the order of SolveStep's fields."""
     return tuple(tuple(getattr(step, name) for name in SolveStep._fields) for step in found.log)
 
 
