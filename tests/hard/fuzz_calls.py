@@ -210,6 +210,11 @@ def _solves(s: Sample) -> Iterator[Call]:
     }
     places = {"positions": s.positions, "edge_rotations": np.zeros(n_e), "body": None}
     yield Call("energies", ms.energies, {**magnetic, **replaced, **places})
+    there = {name: value for name, value in places.items() if name != "body"}
+    yield Call("energy", ms.energy, {**magnetic, **replaced, **there})
+    yield Call("forces", ms.forces, {**magnetic, **replaced, **there})
+    yield Call("hessian", ms.hessian, {**magnetic, **replaced, **there, "reduced": True})
+    yield Call("free_motions", ms.free_motions, {"scene": s.magnetic})
     quick = ms.MixedNewton(max_iterations=10, max_relaxation_steps=5)
     search = dict(
         start=s.positions, require_stable=True, ignore_velocity_forces=False, solver=quick, progress=False

@@ -27,6 +27,8 @@ NOT_CALLED = {
     "ContactState": "a result",
     "Reaction": "a result",
     "Trajectory": "a result",
+    "SolveLog": "a result",
+    "SolveStep": "a result",
     "Strains": "a result",
     "LargeStrainWarning": "a warning",
     "FieldSamplingWarning": "a warning",

@@ -31,6 +31,7 @@ from gradient_kinds_skeletons import (
     skeleton_at_rest,
     skeleton_in_motion,
     thrown_skeleton,
+    turning_screw,
 )
 from gradient_scenes import Kind
 from gradient_world import (
@@ -303,6 +304,7 @@ MAKERS = {
     "at rest, with screws": screws_at_rest,
     "in motion, with screws": screws_in_motion,
     "at rest, with a driven skeleton": motorized_skeleton_at_rest,
+    "in motion, with a turning screw": turning_screw,
     "in motion, with a driven skeleton, euler": lambda: motorized_skeleton_in_motion(ms.ImplicitEuler()),
     "in motion, with a driven skeleton": lambda: motorized_skeleton_in_motion(
         ms.TRBDF2(), adjoint_storage="stages"

@@ -219,6 +219,21 @@ def thrown_skeleton() -> Kind:
     return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=reach)
 
 
+def turning_screw() -> Kind:
+    """Build a nut on a screw in the air that turns against its lower limit and a damper."""
+    nut = ms.Link(mass=2e-3, inertia=4e-7, center=(0.01, 0.0, 0.01), magnetic_moment=(1e-3, 2e-3, 5e-3))
+    stop = {"lower_limit": 0.1, "upper_limit": 2.0, "limit_stiffness": 1e-3, "limit_smoothing": 0.05}
+    at = {"origin": (0.0, 0.0, 0.0), "axis": (0.1, 0.2, 1.0), "pitch": 4e-3}
+    screw = ms.Screw(nut, **at, rate=-5.0, damping=1e-4, **stop)
+    scene = ms.Scene(
+        ms.Skeleton([nut], [screw]), field=ms.UniformField(), gravity=(0, 0, -2.0), allow_rigid_motions=True
+    )
+    controls = {"applied_flux_density": (1e-3, -5e-4, 2e-3), "time_step": 3e-3}
+    fixed = {**EXACT, "steps": STEPS, "integrator": ms.ImplicitEuler(), "progress": False}
+    reach = {**REACH, "center": 0.01, "rate": 5.0}
+    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=reach)
+
+
 def _screws(moves: bool):
     """Build a sheet that carries a screw with a spring and limits, and on it one with a motor."""
     base = MESH.rest_positions[CORNER].mean(axis=0)
@@ -243,9 +258,16 @@ def _screws(moves: bool):
             motor_angle=0.0 if moves else 0.4,
         ),
     ]
+    links = [root, nut, arm]
+    if moves:  # one in the air that turns against its lower limit and a damper
+        wheel = ms.Link(center=base + np.array((0.0, 0.01, 0.01)), mass=2e-3, inertia=inertia)
+        spin = {"rate": -5.0, "damping": 1e-4, "lower_limit": 0.1, "limit_stiffness": 1e-3}
+        spin |= {"limit_smoothing": 0.05, "upper_limit": 2.0}
+        places = {"origin": np.add(base, (0, 0.01, 0)), "axis": (0.1, 0, 1), "pitch": 4e-3}
+        links, screws = [*links, wheel], [*screws, ms.Screw(wheel, **places, **spin)]
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
     return ms.Scene(
-        [sheet, ms.Skeleton([root, nut, arm], screws)],
+        [sheet, ms.Skeleton(links, screws)],
         supports=[ms.Clamp(MESH.edges_at(x=0.0))],
         field=[ms.UniformField(), DIPOLES],
         gravity=(0.1, 0.2, -9.81),

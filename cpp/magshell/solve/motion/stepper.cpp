@@ -61,7 +61,7 @@ NewtonReport Stepper::solve(VectorXd& q, const MotionState& begin, const LoadPar
     NewtonPolicy standard{.proximal = proximal, .mixed = false, .search_at_barrier = false};
     if (has.has_stiffness_jumps) {
         standard.steps = NewtonPolicy::Steps::descending;
-        // The prediction may fold faces, and then lies in another valley: the descent begins where its energy is lower.
+        // The prediction may lie in another valley: the descent begins where its energy is lower.
         const auto energy = [&](const VectorXd& there) {
             const VectorXd away = there - *proximal.target;
             return model.energy(there, load_parameters) +
