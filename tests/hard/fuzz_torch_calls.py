@@ -288,6 +288,13 @@ def _optimizers() -> Iterator[Call]:
     limits = {"memory": 3, "first_step": 1.0, "max_evaluations": 5, "max_backtracks": 2}
     yield Call("optim.LBFGS", stepped(optim.LBFGS), {**box, **limits})
 
+    def least_squares(**arguments):
+        x = torch.ones(3, dtype=torch.float64, requires_grad=True)
+        return optim.GaussNewton([x], **arguments).step(lambda: x**2)
+
+    del limits["memory"]
+    yield Call("optim.GaussNewton", least_squares, {**box, **limits, "jacobian": "auto"})
+
     x = torch.ones(3, dtype=torch.float64, requires_grad=True)
     options = {
         "max_iterations": 2,

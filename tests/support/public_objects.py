@@ -15,7 +15,9 @@ from magshell._runtime.frozen import Frozen
 
 # Classes whose objects change by their nature, with the reason.
 STATEFUL = {
-    **dict.fromkeys(("optim.MMA", "optim.GCMMA", "optim.LBFGS"), "optimizers of torch, with a state"),
+    **dict.fromkeys(
+        ("optim.MMA", "optim.GCMMA", "optim.LBFGS", "optim.GaussNewton"), "optimizers of torch, with a state"
+    ),
     "envs.Environment": "an environment of gymnasium, with an episode under way",
 }
 

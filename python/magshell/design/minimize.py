@@ -44,7 +44,8 @@ def minimize(
     """Minimize objective(*parameters) and leave the parameters at the best design.
 
     objective: function that returns a scalar tensor, or a dict of named terms to add up, or a tuple of one of these with
-    a dict of terms to record, with a tensor of constraints (m,) <= 0, or with both.
+    a dict of terms to record, with a tensor of constraints (m,) <= 0, or with both. For `ms.optim.GaussNewton` it returns
+    residuals (m,), or a dict of named ones; the objective is half of the sum of their squares.
     parameters: tensors with requires_grad, the ones the optimizer was made with.
     optimizer: one of `ms.optim` or of `torch.optim`, or a function that makes one from the list of parameters.
     Those of torch know no bounds and no constraints.

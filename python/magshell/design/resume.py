@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from .configuration import changes
-from .objective_value import Answer
 
 if TYPE_CHECKING:
     from .run import Run
@@ -68,17 +67,16 @@ def check_objective(run: Run, snapshot: dict[Any, Any]) -> None:
 
 def _evaluated(run, best: dict[Any, Any]) -> tuple[float, float]:
     """Return objective and violation of the best design. Raises ValueError if it cannot be evaluated."""
-    from .optim.sample import Trial
 
     def closure():
-        answer = Answer.of(run.objective(*run.parameters))
+        answer = run.answer()
         return answer.objective, answer.constraints
 
     run.set(best["parameters"])
     run.load_states(best["stateful"])
     try:
         with run.accepting_jumps(best["jumped"]):
-            trial = Trial(closure, run.parameters)
+            trial = run.optimizer.trial_of(closure)
     except Exception as error:
         raise ValueError(f"the best design of the checkpoint cannot be evaluated: {error}") from error
     return trial.objective, float(trial.constraints.max(initial=0.0))

@@ -120,7 +120,7 @@ class Run:
         self._evaluations += 1
         before = self.states() if self._checkpointed else None
         try:
-            answer = Answer.of(self.objective(*self.parameters))
+            answer = self.answer()
         except DesignRejected as error:
             self.rejections[reason_of(error)] += 1
             log.debug("minimize: design %d rejected: %s", self._evaluations, error)
@@ -129,6 +129,11 @@ class Run:
             self.watch()
         self._answers.append(_Seen(self.values(), answer.terms, before))
         return answer.objective, answer.constraints
+
+    def answer(self) -> Answer:
+        """Evaluate the objective at the current parameters: what it returns, in parts."""
+        answered = self.objective(*self.parameters)
+        return Answer.of_residuals(answered) if self.optimizer.takes_residuals else Answer.of(answered)
 
     def begin(self) -> None:
         """Evaluate the start and record it as iteration 0."""

@@ -1,4 +1,4 @@
-"""Optimizers for designs, as torch optimizers with closures: `MMA`, `GCMMA` and `LBFGS`.
+"""Optimizers for designs, as torch optimizers with closures: `MMA`, `GCMMA`, `LBFGS` and `GaussNewton`.
 
 torch is imported when one of them is first asked for.
 """
@@ -10,9 +10,9 @@ from typing import Any
 
 from ..._input.tensors import require_torch
 
-_HOMES = {"GCMMA": ".gcmma", "LBFGS": ".lbfgs", "MMA": ".mma"}
+_HOMES = {"GCMMA": ".gcmma", "GaussNewton": ".gauss_newton", "LBFGS": ".lbfgs", "MMA": ".mma"}
 
-__all__ = ["GCMMA", "LBFGS", "MMA"]
+__all__ = ["GCMMA", "LBFGS", "MMA", "GaussNewton"]
 
 
 def __getattr__(name: str) -> Any:

@@ -19,6 +19,9 @@ class Iterate:
     With another closure object, or parameters that were changed in between, `evaluate` calls the closure again.
     """
 
+    takes_residuals = False  # whether the closure returns residuals, not an objective
+    _sample_type: type[Sample] = Sample
+
     def __init__(self):
         self._sample: Sample | None = None
         self._sample_x: np.ndarray | None = None
@@ -39,7 +42,7 @@ class Iterate:
         self._check_design(x)
         known = self._sample is not None and np.array_equal(x, self._sample_x)
         if not (known and self._closure in (None, closure)):
-            self._store(x, Trial(closure, self.parameters).differentiate())
+            self._store(x, self.trial_of(closure).differentiate())
         self._closure = closure
         return self._sample
 
@@ -67,7 +70,11 @@ class Iterate:
     def _trial(self, x: np.ndarray) -> tuple[np.ndarray, Trial]:
         """Return the design x as the parameters store it, and the closure's values there."""
         x = self._write(x)
-        return x, Trial(self._closure, self.parameters)
+        return x, self.trial_of(self._closure)
+
+    def trial_of(self, closure: Callable[..., Any]) -> Any:
+        """Return the values of a closure at the current parameters."""
+        return Trial(closure, self.parameters)
 
     def _store(self, x: np.ndarray, sample: Sample) -> None:
         self._sample_x, self._sample = x, sample
@@ -86,7 +93,7 @@ class Iterate:
             if name.startswith(_SAMPLE)
         }
         self._sample_x = sample.pop("x", None)
-        self._sample = Sample(**sample) if sample else None
+        self._sample = self._sample_type(**sample) if sample else None
         self._closure = None
 
 

@@ -46,8 +46,8 @@ class Trial:
         self.constraints = np.zeros(0)
         if self._constraints is not None:
             self.constraints: Any = self._constraints.detach().double().cpu().numpy().copy()
-        _require_finite("the objective", np.array([self.objective]))
-        _require_finite("the constraints", self.constraints)
+        require_finite("the objective", np.array([self.objective]))
+        require_finite("the constraints", self.constraints)
 
     def differentiate(self) -> Sample:
         """Return the sample with gradients. The parameters' `.grad` is then that of the objective; after an error, as
@@ -94,7 +94,7 @@ class Trial:
                 for p in self._parameters
             ]
         )
-        _require_finite(f"the gradient of {label}", row.numpy())
+        require_finite(f"the gradient of {label}", row.numpy())
         return row.numpy()
 
     def _leave(self, gradients: list[Any]) -> None:
@@ -135,7 +135,8 @@ def _checked_constraints(constraints) -> torch.Tensor | None:
     return constraints if len(constraints) else None
 
 
-def _require_finite(label: str, values: np.ndarray) -> None:
+def require_finite(label: str, values: np.ndarray) -> None:
+    """Raise FloatingPointError if a number is not finite. label: what the numbers are."""
     bad = ~np.isfinite(values)
     if bad.any():
         entry = int(bad.argmax())

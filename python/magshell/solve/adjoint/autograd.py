@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -163,6 +164,21 @@ def depends_on(tensor: torch.Tensor, other: torch.Tensor) -> bool:
     if not tensor.requires_grad:
         return False
     return torch.autograd.grad(tensor.sum(), other, retain_graph=True, allow_unused=True)[0] is not None
+
+
+def products(
+    outputs: Sequence[torch.Tensor],
+    inputs: Sequence[torch.Tensor],
+    weights: Sequence[torch.Tensor],
+    differentiable: bool = False,
+) -> tuple[torch.Tensor | None, ...]:
+    """Return the products of weights of the outputs with their Jacobian, one for each input; None where there is none.
+
+    differentiable: whether the products are connected to the weights.
+    """
+    return torch.autograd.grad(
+        outputs, inputs, weights, retain_graph=True, create_graph=differentiable, allow_unused=True
+    )
 
 
 def _numbers(by_output) -> np.ndarray:
