@@ -31,17 +31,6 @@ PathResult follow(Model& model, const VectorXd& start, const Model::AngleBranche
 }  // namespace
 
 void register_continuation(py::module_& module) {
-    py::class_<PathOptions>(module, "PathOptions")
-        .def(py::init<>())
-        .def_readwrite("newton", &PathOptions::newton)
-        .def_readwrite("first_step", &PathOptions::first_step)
-        .def_readwrite("max_step", &PathOptions::largest_step)
-        .def_readwrite("max_points", &PathOptions::max_points)
-        .def_readwrite("min_parameter", &PathOptions::lowest_parameter)
-        .def_readwrite("highest_parameter", &PathOptions::highest_parameter)
-        .def_readwrite("locate_critical", &PathOptions::locate_critical)
-        .def_readwrite("watched", &PathOptions::watched);
-
     py::class_<PathPoint>(module, "PathPoint")
         .def_readonly("state", &PathPoint::state)
         .def_readonly("parameter", &PathPoint::parameter)
@@ -51,13 +40,27 @@ void register_continuation(py::module_& module) {
 
     py::enum_<CriticalKind>(module, "CriticalKind")
         .value("limit", CriticalKind::limit)
-        .value("bifurcation", CriticalKind::bifurcation);
+        .value("bifurcation", CriticalKind::bifurcation)
+        .value("flutter", CriticalKind::flutter);
 
     py::class_<CriticalPoint>(module, "CriticalPoint")
         .def_readonly("point", &CriticalPoint::point)
         .def_readonly("kind", &CriticalPoint::kind)
         .def_readonly("mode", &CriticalPoint::mode)
         .def_readonly("after_point", &CriticalPoint::after_point);
+
+    py::class_<PathOptions>(module, "PathOptions")
+        .def(py::init<>())
+        .def_readwrite("newton", &PathOptions::newton)
+        .def_readwrite("first_step", &PathOptions::first_step)
+        .def_readwrite("max_step", &PathOptions::largest_step)
+        .def_readwrite("max_points", &PathOptions::max_points)
+        .def_readwrite("min_parameter", &PathOptions::lowest_parameter)
+        .def_readwrite("highest_parameter", &PathOptions::highest_parameter)
+        .def_readwrite("locate_critical", &PathOptions::locate_critical)
+        .def_readwrite("watched", &PathOptions::watched)
+        .def_readwrite("branch_at", &PathOptions::branch_at)
+        .def_readwrite("branch_side", &PathOptions::branch_side);
 
     py::class_<PathResult>(module, "PathResult")
         .def_readonly("outcome", &PathResult::outcome)

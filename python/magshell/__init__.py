@@ -104,6 +104,7 @@ from .solve.statics.equilibrium import Equilibrium
 from .solve.statics.extrapolation import Extrapolation, richardson_extrapolation
 from .solve.statics.multistable import find_equilibria
 from .solve.statics.path import CriticalPoint, EquilibriumPath, follow_path
+from .solve.statics.path_events import PathEvent
 from .solve.statics.solve import equilibrium
 from .solve.statics.solve_log import SolveLog, SolveStep
 from .solve.statics.warm_start import WarmStart
@@ -165,6 +166,7 @@ __all__ = [
     "NoGradient",
     "NotConverged",
     "ObjectiveFailed",
+    "PathEvent",
     "Picture",
     "Pin",
     "PlacedField",

@@ -25,7 +25,7 @@ MEASURED: dict[str, tuple[int, int, str]] = {
     "ventricle in four calls, 3x1 cells": (80, 80, ""),
     "ventricle, 5x2 cells": (154, 155, "apex at -26.75 mm"),
     "ventricle in four calls, 5x2 cells": (846, 813, "300, 202, 177 and 167 of them"),
-    "closed thick tube, 1x3x3 cells": (82, 114, "NotConverged at the second of four pressures"),
+    "closed thick tube, 1x3x3 cells": (17, 24, "4 or 5 a pressure"),
     "arm of four chambers, 4x7x7 cells": (24, 37, ""),
     "arm of four chambers, 10x7x7 cells": (26, 38, "0.8 s a pressure"),
 }
@@ -156,7 +156,7 @@ def _tube(cells):
     scene, inside, end = thick_tube(cells)
     pull = 1.0 / (1.5**2 - 1.0)  # [-] over the pressure: pi r^2 over the area of the wall
     found = None
-    for each in (0.5e5, 1e5, 1.5e5, 2e5):
+    for each in (0.25e5, 0.5e5, 0.75e5, 1e5):  # the limit is at 1.2e5: test_nonsymmetric_stability.py
         values = {inside: {"pressure": each}, end: {"pressure": -pull * each}}
         found = ms.equilibrium(scene, values=values, start=found)
         yield found, f"{each:g} Pa, length {found.positions[:, 2].max():.5f} m"

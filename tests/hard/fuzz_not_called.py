@@ -55,4 +55,5 @@ NOT_CALLED = {
     "envs.robots.soft_arm": "makes an Environment",
     "num_threads": "takes nothing",
     "show_config": "takes nothing",
+    "PathEvent": "a result",
 }

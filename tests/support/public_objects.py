@@ -340,6 +340,7 @@ def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
         ms.CriticalPoint,
         ms.Extrapolation,
         ms.MultistartResult,
+        ms.PathEvent,
         ms.PrintableMinimum,
         ms.PrintableStage,
     )

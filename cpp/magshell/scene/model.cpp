@@ -333,16 +333,15 @@ void Model::require_symmetric() const {
     if (std::none_of(terms_.energies.begin(), terms_.energies.end(),
                      [](const auto& term) { return term->name() == "pressure"; }))
         throw InvalidInput(
-            "the torque of a Ball has no potential, so the stiffness is not symmetric. Equilibria, motions "
-            "and their gradients "
-            "can be computed; vibrations, buckling loads and followed paths cannot: use torques of Revolute "
-            "joints instead");
+            "the torque of a Ball has no potential, so the stiffness is not symmetric. Equilibria, paths, "
+            "motions and their gradients "
+            "can be computed; vibrations and buckling loads cannot: use torques of Revolute joints instead");
     throw InvalidInput(
         "the pressure has no potential, so the stiffness is not symmetric: its faces end at a free border, "
         "or neighbouring "
-        "faces have different pressures. Equilibria, motions and their gradients can be computed; "
-        "vibrations, buckling loads "
-        "and followed paths cannot: close the surface, hold its border, or give one pressure to all of it");
+        "faces have different pressures. Equilibria, paths, motions and their gradients can be "
+        "computed; vibrations and buckling loads "
+        "cannot: close the surface, hold its border, or give one pressure to all of it");
 }
 
 void Model::begin_step(const VectorXd& q, const LoadParameters& load_parameters) {

@@ -6,6 +6,7 @@
 
 #include "magshell/core/errors.h"
 #include "magshell/solve/modes.h"
+#include "magshell/solve/nonsymmetric_modes.h"
 
 namespace magshell {
 namespace {
@@ -65,18 +66,8 @@ class Follower {
     // Follows the path from `start` to the end of the parameter range, or until until_ returns true. Returns false, with a reason in
     // the result, if it cannot be followed that far.
     bool run(const VectorXd& start) {
-        PathPoint here{start, 0.0, {}, 0};
-        const NewtonReport at_rest = newton_.solve(here.state, load_parameters(0.0));
-        if (!at_rest.converged) return fail("the start is not an equilibrium: " + at_rest.reason);
-        here.angle_branches = model_.angle_branches();
         Tangent tangent;
-        if (!find_tangent(here, tangent)) return fail("the tangent does not exist at the start");
-        here.field_sampling_error = model_.field_sampling_error(here.state, load_parameters(here.parameter));
-        psi_ = std::max(length(tangent.state), min_movement * options_.largest_step);
-        normalize(tangent);
-        if (tangent.parameter < 0.0) flip(tangent);
-        result_.points.push_back(here);
-        step_ = options_.first_step / tangent.parameter;
+        if (!(options_.branch_at ? begin_branch(tangent) : begin(start, tangent))) return false;
         while (static_cast<int>(result_.points.size()) < options_.max_points) {
             if (!advance(tangent)) return false;
             const PathPoint& last = result_.points.back();
@@ -89,6 +80,36 @@ class Follower {
     }
 
   private:
+    // Begins at an equilibrium, in the direction in which the path parameter grows.
+    bool begin(const VectorXd& start, Tangent& tangent) {
+        PathPoint here{start, 0.0, {}, 0};
+        const NewtonReport at_rest = newton_.solve(here.state, load_parameters(0.0));
+        if (!at_rest.converged) return fail("the start is not an equilibrium: " + at_rest.reason);
+        here.angle_branches = model_.angle_branches();
+        if (!find_tangent(here, tangent)) return fail("the tangent does not exist at the start");
+        here.field_sampling_error = model_.field_sampling_error(here.state, load_parameters(here.parameter));
+        psi_ = std::max(length(tangent.state), min_movement * options_.largest_step);
+        normalize(tangent);
+        if (tangent.parameter < 0.0) flip(tangent);
+        result_.points.push_back(here);
+        step_ = options_.first_step / tangent.parameter;
+        return true;
+    }
+
+    // Begins at a bifurcation, along its mode, which is perpendicular to the path through it [Crisfield 21.7; Keller 1977].
+    bool begin_branch(Tangent& tangent) {
+        const CriticalPoint& from = *options_.branch_at;
+        psi_ = from.psi;
+        result_.points.push_back(from.point);
+        tangent = {options_.branch_side * from.mode, 0.0};
+        if (!(length(tangent.state) > 0.0)) return fail("the mode of the bifurcation moves nothing");
+        normalize(tangent);
+        step_ = options_.largest_step;
+        model_.set_angle_branches(from.point.angle_branches);
+        model_.evaluate(from.point.state, load_parameters(from.point.parameter));
+        return true;
+    }
+
     /// Returns the load parameters at a path parameter and applies the values that vary with them to the model.
     LoadParameters load_parameters(double parameter) const {
         LoadParameters there = interpolate(from_, to_, parameter);
@@ -135,9 +156,8 @@ class Follower {
         const VectorXd held = model_.parameters().prescribed_rate(point.state, at, rate_);
         Eigen::MatrixXd pull = held;
         const FactorReport factor = newton_.factorize(point.state, at, false, {}, pull);
-        model_.require_symmetric();  // for an unsymmetric matrix the pivots are no measure of stability
         if (!factor.succeeded) return false;
-        point.unstable_directions = factor.negative_pivots;
+        point.unstable_directions = count_unstable_directions(newton_, point.state, at, factor);
         tangent = {response(point.state, at, held, pull.col(0)), 1.0};
         return true;
     }
@@ -230,12 +250,26 @@ class Follower {
         return true;
     }
 
+    // Returns the mode with the eigenvalue nearest to zero of the tangent factorized last, by its real part. transposed: the mode of K^T,
+    // which is the same if K is symmetric. Sets whether the eigenvalue is one of a complex pair.
+    Mode nearest_mode(bool transposed, bool* complex = nullptr) {
+        if (complex) *complex = false;
+        if (!newton_.is_unsymmetric()) return modes_near_zero(newton_, 1).front();
+        const std::vector<NonsymmetricMode> modes = spectrum_near_zero(newton_, 0.0, transposed).modes;
+        if (modes.empty()) return {0.0, VectorXd::Zero(model_.size())};
+        const NonsymmetricMode& nearest =
+            *std::min_element(modes.begin(), modes.end(), [](const auto& a, const auto& b) {
+                return std::abs(a.eigenvalue.real()) < std::abs(b.eigenvalue.real());
+            });
+        if (complex) *complex = nearest.eigenvalue.imag() != 0.0;
+        return {nearest.eigenvalue.real(), nearest.shape};
+    }
+
     // Returns the size of the eigenvalue nearest to zero at the point factorized last, with a sign that changes at the critical point:
-    // positive as long as the point has `count` unstable directions, negative otherwise.
-    double signed_eigenvalue(const PathPoint& point, Index count, VectorXd* mode) {
-        const std::vector<Mode> modes = modes_near_zero(newton_, 1);
-        if (mode) *mode = modes.front().shape;
-        const double size = std::abs(modes.front().eigenvalue);
+    // positive as long as the point has `count` unstable directions, negative otherwise. Sets the mode too.
+    double signed_eigenvalue(const PathPoint& point, Index count) {
+        nearest_ = nearest_mode(false, &oscillates_);
+        const double size = std::abs(nearest_.eigenvalue);
         return point.unstable_directions == count ? size : -size;
     }
 
@@ -273,11 +307,10 @@ class Follower {
     void locate_one(const Probe& below, const Probe& above, const Tangent& along) {
         const PathPoint& base = result_.points.back();
         const Index count = below.point.unstable_directions;
-        VectorXd mode;
         if (!probe(base, along, below.step)) return;
-        double low = below.step, high = above.step, at_low = signed_eigenvalue(below.point, count, nullptr);
+        double low = below.step, high = above.step, at_low = signed_eigenvalue(below.point, count);
         if (!probe(base, along, above.step)) return;
-        double at_high = signed_eigenvalue(above.point, count, &mode);
+        double at_high = signed_eigenvalue(above.point, count);
         const double tolerance = eigenvalue_tolerance * std::max(std::abs(at_low), std::abs(at_high));
         PathPoint best = above.point;
         int side = 0;
@@ -285,7 +318,7 @@ class Follower {
             const double step = low + (high - low) * at_low / (at_low - at_high);
             const std::optional<Probe> between = probe(base, along, step);
             if (!between) break;
-            const double value = signed_eigenvalue(between->point, count, &mode);
+            const double value = signed_eigenvalue(between->point, count);
             best = between->point;
             if (std::abs(value) <= tolerance) break;
             if (value > 0.0) {
@@ -300,14 +333,25 @@ class Follower {
                 side = -1;
             }
         }
-        const VectorXd drive =
-            model_.parameters().gradient_rate(best.state, load_parameters(best.parameter), rate_);
-        const VectorXd free_drive = model_.dof_map().vector(drive), free_mode = model_.dof_map().vector(mode);
+        result_.critical.push_back(
+            {best, kind_of(best), nearest_.shape, static_cast<Index>(result_.points.size()) - 1, psi_});
+    }
+
+    // Returns the kind of the critical point located last. At a limit point the loads act on the left mode, so that the path has no
+    // tangent with a change of the loads; at a bifurcation they do not.
+    CriticalKind kind_of(PathPoint point) {
+        if (oscillates_) return CriticalKind::flutter;
+        const LoadParameters at = load_parameters(point.parameter);
+        const VectorXd drive = model_.parameters().gradient_rate(point.state, at, rate_);
+        VectorXd left = nearest_.shape;
+        if (newton_.is_unsymmetric()) {
+            newton_.factorize_at(point.state, at);
+            left = nearest_mode(true).shape;
+        }
+        const VectorXd free_drive = model_.dof_map().vector(drive), free_mode = model_.dof_map().vector(left);
         const double alignment =
             std::abs(free_drive.dot(free_mode)) / (free_drive.norm() * free_mode.norm() + no_norm);
-        const CriticalKind kind =
-            alignment > limit_alignment ? CriticalKind::limit : CriticalKind::bifurcation;
-        result_.critical.push_back({best, kind, mode, static_cast<Index>(result_.points.size()) - 1});
+        return alignment > limit_alignment ? CriticalKind::limit : CriticalKind::bifurcation;
     }
 
     Newton& newton_;
@@ -316,10 +360,12 @@ class Follower {
     const PathOptions& options_;
     const Until& until_;
     PathResult& result_;
-    ObstacleSides sides_;  // at the last accepted point
-    VectorXd weight_;      // diagonal matrix of |dx|^2 / extent^2
-    double psi_ = 1.0;     // weight of the path parameter in the arc length
-    double step_ = 0.0;    // arc length of the next or current step
+    Mode nearest_;             // the mode nearest to zero at the point examined last
+    bool oscillates_ = false;  // whether its eigenvalue is one of a complex pair
+    ObstacleSides sides_;      // at the last accepted point
+    VectorXd weight_;          // diagonal matrix of |dx|^2 / extent^2
+    double psi_ = 1.0;         // weight of the path parameter in the arc length
+    double step_ = 0.0;        // arc length of the next or current step
 };
 
 }  // namespace

@@ -11,12 +11,32 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "magshell/solve/newton/newton.h"
 #include "magshell/solve/statics.h"
 
 namespace magshell {
+
+struct PathPoint {
+    VectorXd state;
+    double parameter = 0.0;
+    Model::AngleBranches angle_branches;
+    Index unstable_directions = 0;      // as count_unstable_directions
+    double field_sampling_error = 0.0;  // [-] as Term::field_sampling_error
+};
+
+/// limit: the path turns round. bifurcation: another path crosses. flutter: a pair of complex eigenvalues changes the sign of its real part.
+enum class CriticalKind { limit, bifurcation, flutter };
+
+struct CriticalPoint {
+    PathPoint point;
+    CriticalKind kind;
+    VectorXd mode;      // of all dofs, largest displacement 1
+    Index after_point;  // index of the last path point before it
+    double psi;         // weight of the path parameter in the arc length
+};
 
 struct PathOptions {
     NewtonOptions newton;
@@ -26,23 +46,9 @@ struct PathOptions {
     double lowest_parameter = -1e300, highest_parameter = 1.0;  // [-] the path ends at either
     bool locate_critical = true;                // whether to compute the critical points between path points
     std::vector<WatchedObstacle> watched = {};  // those that move
-};
-
-struct PathPoint {
-    VectorXd state;
-    double parameter = 0.0;
-    Model::AngleBranches angle_branches;
-    Index unstable_directions = 0;      // number of negative eigenvalues of the Hessian
-    double field_sampling_error = 0.0;  // [-] as Term::field_sampling_error
-};
-
-enum class CriticalKind { limit, bifurcation };
-
-struct CriticalPoint {
-    PathPoint point;
-    CriticalKind kind;
-    VectorXd mode;      // of all dofs, largest displacement 1
-    Index after_point;  // index of the last path point before it
+    std::optional<CriticalPoint> branch_at =
+        {};                    // a bifurcation where the path begins, on the branch that crosses there
+    double branch_side = 1.0;  // +-1: the direction along its mode
 };
 
 struct PathResult {

@@ -5,12 +5,9 @@
 #include <cmath>
 
 namespace magshell {
-namespace {
-
 using Eigen::MatrixXd;
 
-// Returns pseudo-random start vectors, the same in every run; no symmetry of a scene is likely to be orthogonal to them.
-MatrixXd generic_start(Index rows, int columns) {
+MatrixXd generic_vectors(Index rows, Index columns) {
     constexpr double two_to_53 = 9007199254740992.0;  // the number of doubles in [0.5, 1); plain-words: ok
     MatrixXd start(rows, columns);
     std::uint64_t state = 88172645463325252ull;
@@ -23,8 +20,6 @@ MatrixXd generic_start(Index rows, int columns) {
         }
     return start;
 }
-
-}  // namespace
 
 std::vector<Mode> modes_near_zero(Newton& newton, int count) {
     const Model& model = newton.model();
@@ -50,7 +45,7 @@ std::vector<Mode> modes_near_zero(Newton& newton, int count) {
         for (Index c = 0; c < x.cols(); ++c) product.col(c) = root.cwiseProduct(dof_map.expand(x.col(c)));
         return product;
     };
-    MatrixXd y = generic_start(dof_map.size(), columns);
+    MatrixXd y = generic_vectors(dof_map.size(), columns);
     VectorXd eigenvalues = VectorXd::Zero(columns);
     // [-] Relative change of the eigenvalue nearest to zero at convergence; see test_the_modes_solve_the_problem.
     constexpr double eigenvalue_change = 1e-7;

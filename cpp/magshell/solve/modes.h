@@ -10,6 +10,9 @@ struct Mode {
     VectorXd shape;     // of all dofs, largest displacement 1
 };
 
+/// Returns pseudo-random start vectors, the same in every run; no symmetry of a scene is likely to be orthogonal to them.
+Eigen::MatrixXd generic_vectors(Index rows, Index columns);
+
 /// Returns the `count` modes with the eigenvalues nearest to zero, ascending, by subspace iteration with the last factorization of
 /// `newton`, which must be that of the Hessian itself.
 std::vector<Mode> modes_near_zero(Newton& newton, int count);

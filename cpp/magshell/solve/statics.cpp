@@ -8,6 +8,7 @@
 #include "magshell/solve/globalization/deflation.h"
 #include "magshell/solve/globalization/proximal_continuation.h"
 #include "magshell/solve/newton/load_control.h"
+#include "magshell/solve/nonsymmetric_modes.h"
 
 namespace magshell {
 namespace {
@@ -317,8 +318,13 @@ class Statics {
     bool check_stability() { return judge(newton_.factorize_at(result_.state, result_.load_parameters)); }
 
     bool judge(const FactorReport& factor) {
-        result_.unstable_directions = factor.negative_pivots;
-        result_.stable = factor.succeeded && factor.negative_pivots == 0 && factor.perturbed_pivots == 0;
+        return judge(factor,
+                     count_unstable_directions(newton_, result_.state, result_.load_parameters, factor));
+    }
+
+    bool judge(const FactorReport& factor, Index unstable_directions) {
+        result_.unstable_directions = unstable_directions;
+        result_.stable = factor.succeeded && unstable_directions == 0 && factor.perturbed_pivots == 0;
         if (!factor.succeeded) result_.reason = factor.reason;
         return factor.succeeded;
     }
@@ -351,7 +357,7 @@ class Statics {
             return false;
         }
         accept(trial, load_parameters, target, report.residual);
-        judge(report.factor);
+        judge(report.factor, 0);
         if (!result_.stable) {
             result_.reason =
                 "the equilibrium is neither stable nor unstable: its stiffness matrix is singular";

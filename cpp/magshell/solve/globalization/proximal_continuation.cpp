@@ -8,6 +8,7 @@
 
 #include "magshell/solve/globalization/lbfgs_descent.h"
 #include "magshell/solve/modes.h"
+#include "magshell/solve/nonsymmetric_modes.h"
 
 namespace magshell {
 namespace {
@@ -127,7 +128,11 @@ class ProximalContinuation {
             return fail("the equilibrium is neither stable nor unstable: its stiffness matrix is singular (" +
                         factor_.reason + ")");
         }
-        if (factor_.succeeded && factor_.negative_pivots == 0) {
+        const bool stable =
+            factor_.succeeded && (factor_.negative_pivots == 0 ||
+                                  (at_rest && !has_potential() &&
+                                   count_unstable_directions(newton_, q_, load_parameters_, factor_) == 0));
+        if (stable) {
             shift_ = 0.0;
             report_.descent_direction.resize(0);
             report_.factor = factor_;
@@ -268,8 +273,9 @@ class ProximalContinuation {
         const bool too_long = length(trial - from) > model_.extent();
         const bool lower =
             !has_potential() || as_expected || energy <= energy_ + energy_tolerance * std::abs(energy_);
-        if (!report.converged || report.factor.negative_pivots > 0 || too_long || !lower ||
-            crosses_obstacle(trial)) {
+        // Without a potential the eigenvalues decide about stability, and only at an equilibrium.
+        const bool unstable = report.factor.negative_pivots > 0 && !(exact && !has_potential());
+        if (!report.converged || unstable || too_long || !lower || crosses_obstacle(trial)) {
             model_.set_angle_branches(angle_branches);
             record(exact ? "Newton" : "proximal Newton", 0.0, failure_of(report, too_long, lower));
             return false;

@@ -30,10 +30,10 @@ class Pressure(Owner):
 
     Faces of quadratic elements are curved, and integrated exactly. The pressure has a potential, p times the displaced
     volume, if it is uniform and the surface is closed, or its border is held or on symmetry planes. Without a potential
-    equilibria, motions, linear response and gradients are exact, too, with an unsymmetric stiffness. Then `stable` says
-    that the symmetric part of the stiffness is positive definite, which excludes slow instability but not flutter, and the
-    energy is only the work on the straight path from the rest shape. ms.follow_path, ms.linear_buckling and
-    ms.vibration_modes need a potential and refuse.
+    equilibria, paths, motions, linear response and gradients are exact, too, with an unsymmetric stiffness. Then `stable`
+    says that no eigenvalue of the stiffness has a negative real part, which excludes slow instability but not flutter, and
+    the energy is only the work on the straight path from the rest shape. ms.linear_buckling and ms.vibration_modes need a
+    potential and refuse.
 
     A cube under a pressure all around, p = 0.03 of a modulus of 1 at a Poisson's ratio of 0.25, shrinks by p (1 - 2 nu) to
     first order:

@@ -34,7 +34,8 @@ class Equilibrium(SaveMixin, OfOneBody):
 
     positions: (n_v, 3) m; edge_rotations: (n_e,) rad, zero where an edge has none.
     remanent_magnetization: (n_f, 3) A/m, or None; applied_flux_density: (3,) T, the uniform part.
-    energies: J, by term. stable: no direction lowers the energy; n_negative_eigenvalues: how many do.
+    energies: J, by term. stable: no direction lowers the energy; n_negative_eigenvalues: how many do. Under forces without
+        potential: how many motions against friction grow; it may still flutter.
     residual: relative to the forces that cancel in it, and to their round-off. at_roundoff: whether round-off ended the
         solve, above the solver's tolerance, as of very thin sheets and long chains.
     saddles_escaped: unstable states that the solve left along their lowest modes. symmetric_saddles: those where the

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,6 +33,7 @@ from ...model.shells.strains import StrainHistory, strains_of, warn_if_large
 from ..options import MixedNewton, Newton
 from .along_path import AlongPath
 from .equilibrium import Equilibrium
+from .path_events import PathEvent, events_along
 from .single_solve import solve
 from .start import starting_point
 
@@ -44,9 +46,10 @@ if TYPE_CHECKING:
 class CriticalPoint:
     """A point of a path where it gains or loses an unstable direction.
 
-    parameter: on the path. kind: "limit" (the path turns round here) or "bifurcation" (another branch crosses).
-    positions: (n_v, 3) m. mode: (n_v, 3), the displacement that costs nothing here, largest component 1.
-    after_point: index of the last point of the path before it.
+    parameter: on the path. kind: "limit" (the path turns round here), "bifurcation" (another branch crosses, which
+    path.switch_branch follows) or, under forces without potential, "flutter" (oscillations begin to grow). positions:
+    (n_v, 3) m. mode: (n_v, 3), the displacement that costs nothing here, largest component 1. after_point: index of the
+    last point of the path before it.
     """
 
     parameter: float
@@ -54,6 +57,7 @@ class CriticalPoint:
     positions: np.ndarray = field(repr=False)
     mode: np.ndarray = field(repr=False)
     after_point: int
+    _found: Any = field(repr=False)
 
 
 @immutable
@@ -86,6 +90,74 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
     _moving: AlongPath = field(repr=False)
     _from: Any = field(repr=False)
     _to: Any = field(repr=False)
+    _options: Any = field(repr=False)
+
+    def switch_branch(
+        self,
+        critical: CriticalPoint,
+        side: int = 1,
+        *,
+        until: Callable[[float, np.ndarray], bool] | None = None,
+        max_step: float | None = None,
+        max_points: int | None = None,
+        progress: bool = True,
+    ) -> EquilibriumPath:
+        """Follows the branch that crosses this path at a bifurcation, beginning there along its mode.
+
+        critical: a bifurcation of this path. side: 1 or -1, the direction along `critical.mode`; the two halves of a
+        symmetric branch mirror each other. until, progress: as in ms.follow_path. max_step, max_points: by default
+        those of this path.
+
+        The first step has the length max_step. If the path itself is found again instead of the branch, a smaller
+        max_step helps.
+
+        Raises NotConverged and Interrupted with the path so far as `last_good`; ValueError on bad input.
+        Source: Keller (1977), Numerical solution of bifurcation and nonlinear eigenvalue problems.
+
+        >>> import magshell as ms
+        >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+        >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+        >>> load = ms.EdgeLoad(mesh.edges_at(x=0.1), (-0.4, 0, 0))
+        >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[load])
+        >>> straight = ms.follow_path(scene)
+        >>> buckled = straight.switch_branch(straight.critical[0])
+        >>> bool(straight.stable[-1]), bool(buckled.stable[-1])
+        (False, True)
+        """
+        if not any(critical is each for each in self.critical):
+            raise ValueError("critical must be one of path.critical of this path")
+        if critical.kind != "bifurcation":
+            raise ValueError(
+                f"critical must be a bifurcation, where another branch crosses; this one is a {critical.kind} point"
+            )
+        if side not in (1, -1):
+            raise ValueError(f"side must be 1 or -1, got {side!r}")
+        options = _core.PathOptions()
+        for name in ("newton", "first_step", "min_parameter", "locate_critical", "watched"):
+            setattr(options, name, getattr(self._options, name))
+        options.max_step = self._options.max_step if max_step is None else positive("max_step", "", max_step)
+        options.max_points = (
+            self._options.max_points if max_points is None else count("max_points", max_points, least=2)
+        )
+        options.branch_at, options.branch_side = critical._found, float(side)
+        found = critical._found.point
+        return _follow(
+            self._inputs,
+            self._moving,
+            (found.state, found.turns, self._from),
+            options,
+            _checked_until(until),
+            progress,
+        )
+
+    @cached_property
+    def events(self) -> tuple[PathEvent, ...]:
+        """The events along the path, in order: its critical points, and contacts that are made and lost.
+
+        The contact of each pair of a body and an obstacle, or of two bodies, is made where the first of its points touch and
+        lost where the last ones part.
+        """
+        return events_along(self)
 
     def equilibrium(self, index: int) -> Equilibrium:
         """Return one of the points, stable or not, as an Equilibrium, from which another solve may start."""
@@ -178,8 +250,8 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
             lowest, highest = self.parameters.min(), self.parameters.max()
             lines[0] += f", {int(self.stable.sum())} of them stable, parameter {lowest:.4g} to {highest:.4g}"
         lines += [
-            f"  {point.kind} at {point.parameter:.6g}, after point {point.after_point}"
-            for point in self.critical
+            f"  {event.kind} at {event.parameter:.6g}, after point {event.after_point}"
+            for event in self.events
         ]
         strain = StrainHistory(self.largest_membrane_strain, self.largest_bending_strain)
         lines.append(f"  {describe_strains(self, strain)}")
@@ -252,8 +324,7 @@ def follow_path(
     min_parameter = number("min_parameter", min_parameter)
     if not min_parameter < 0:
         raise ValueError(f"min_parameter must be below 0, where the path starts, got {min_parameter}")
-    if until is not None and not callable(until):
-        raise ValueError(f"until must be a function of (parameter, positions), got {until!r}")
+    until = _checked_until(until)
     if start is not None and not isinstance(start, Equilibrium):
         raise ValueError(f"start must be an Equilibrium of this scene, got {type(start).__name__}")
     inputs = plain_inputs(scene, **arguments)
@@ -266,6 +337,22 @@ def follow_path(
     options.locate_critical = locate_critical
     options.watched = watched_obstacles(scene, moving.obstacles())
 
+    return _follow(inputs, moving, (state, angle_branches, from_), options, until, progress)
+
+
+def _checked_until(until: Any) -> Any:
+    """Return a function that ends a path, or None; raise ValueError on anything else."""
+    if until is not None and not callable(until):
+        raise ValueError(f"until must be a function of (parameter, positions), got {until!r}")
+    return until
+
+
+def _follow(
+    inputs: Inputs, moving: AlongPath, start: tuple[Any, Any, Any], options: Any, until: Any, progress: bool
+) -> EquilibriumPath:
+    """Follow a path in the core. start: its state, the branches of its angles and the load parameters at parameter 0."""
+    scene = inputs.scene
+    state, angle_branches, from_ = start
     began = time.perf_counter()
     with inputs.in_core(), SolveBar("path", progress) as bar:
         found = _core.follow_path(
@@ -280,7 +367,7 @@ def follow_path(
             _advance(bar),
         )
         bending = _bending_energies(scene, found, inputs.controls)
-    path = _path(inputs, moving, found, from_, time.perf_counter() - began)
+    path = _path(inputs, moving, found, from_, options, time.perf_counter() - began)
     log.debug("path: %s, %d points, %.3g s", found.outcome.name, len(path), path.wall_time)
     if found.outcome == _core.Outcome.interrupted:
         raise Interrupted(f"interrupted after {len(path)} points of the path", path)
@@ -335,7 +422,7 @@ def _advance(bar):
     return advance
 
 
-def _path(inputs: Inputs, moving: AlongPath, found, from_, wall_time: float) -> EquilibriumPath:
+def _path(inputs: Inputs, moving: AlongPath, found, from_, options, wall_time: float) -> EquilibriumPath:
     scene = inputs.scene
     model = scene._model
     points = found.points
@@ -361,6 +448,7 @@ def _path(inputs: Inputs, moving: AlongPath, found, from_, wall_time: float) -> 
         _moving=moving,
         _from=from_,
         _to=inputs.controls,
+        _options=options,
     )
 
 
@@ -372,8 +460,9 @@ def _largest(model, values: Values, point) -> tuple[Any, ...]:
 def _critical(model, found) -> CriticalPoint:
     return CriticalPoint(
         parameter=found.point.parameter,
-        kind="limit" if found.kind == _core.CriticalKind.limit else "bifurcation",
+        kind=found.kind.name,
         positions=model.positions(found.point.state),
         mode=model.positions(found.mode),
         after_point=found.after_point,
+        _found=found,
     )
