@@ -38,6 +38,13 @@ VectorXd change(Model& model, const StaticsResult& equilibrium, const LoadParame
     return first_order_change(model, equilibrium, to);
 }
 
+VectorXd change_along(Model& model, const StaticsResult& equilibrium, const VectorXd& gradient_change,
+                      const VectorXd& prescribed_change) {
+    const py::gil_scoped_release unlocked;
+    const std::lock_guard lock(model.in_use());
+    return equilibrium_jvp(model, equilibrium, gradient_change, prescribed_change);
+}
+
 // Returns the lowest eigenmodes of all degrees of freedom about an equilibrium, their eigenvalues [N/m3], and
 // the number of negative ones.
 py::tuple lowest_modes(Model& model, const VectorXd& state, const Model::AngleBranches& turns,
@@ -164,6 +171,11 @@ void register_statics(py::module_& module) {
     module.def("first_order_change", &change, py::arg("model"), py::arg("equilibrium"), py::arg("to"),
                "The change of the state to first order, from an equilibrium whose factor was kept to these "
                "controls and the values that the model holds now.");
+    module.def(
+        "push_forward", &change_along, py::arg("model"), py::arg("equilibrium"), py::arg("gradient_change"),
+        py::arg("prescribed_change"),
+        "The derivative of the state along a direction of the inputs of a solve, along which the gradient "
+        "and what supports and motors prescribe change so. The model must hold the values of that solve.");
 }
 
 }  // namespace magshell::bindings

@@ -65,6 +65,7 @@ __all__: list[str] = [
     "pair_sums",
     "pull_back",
     "pull_back_motion",
+    "push_forward",
     "sample_fields",
     "set_num_threads",
     "shell_stresses",
@@ -1181,6 +1182,16 @@ def pull_back_motion(
     by_driving: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"] = ...,
     load_fraction: typing.Any = None,
 ) -> dict[str, typing.Any]: ...
+def push_forward(
+    model: Model,
+    equilibrium: StaticsResult,
+    gradient_change: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    prescribed_change: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    """
+    The derivative of the state along a direction of the inputs of a solve, along which the gradient and what supports and motors prescribe change so. The model must hold the values of that solve.
+    """
+
 def sample_fields(
     fields: collections.abc.Sequence[AppliedField],
     scales: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],

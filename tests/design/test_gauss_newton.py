@@ -69,7 +69,7 @@ def test_step_of_a_singular_model_is_the_shortest(rng):
     np.testing.assert_allclose(step, -np.linalg.pinv(jacobian) @ residuals, atol=1e-10)
 
 
-def test_shorter_radii_reuse_the_same_products(rng):
+def test_step_of_a_smaller_radius_takes_no_products(rng):
     jacobian, residuals = rng.standard_normal((20, 6)), rng.standard_normal(20)
     gradient, count = jacobian.T @ residuals, []
     model = ProductModel(

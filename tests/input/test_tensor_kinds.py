@@ -120,21 +120,30 @@ def dual(function, tensor):
         return function(forward.make_dual(tensor, tensor))
 
 
-TRANSFORMS = {
-    "vmap": lambda f, t: torch.vmap(f)(t.repeat(2, 1)),
+REVERSE = {
     "grad": lambda f, t: torch.func.grad(lambda x: f(x).sum())(t),
-    "jvp": lambda f, t: torch.func.jvp(f, (t,), (t,)),
     "jacrev": lambda f, t: torch.func.jacrev(f)(t),
     "vjp": lambda f, t: torch.func.vjp(f, t),
-    "dual numbers": dual,  # whose tangent was dropped without a word
 }
+FORWARD = {"jvp": lambda f, t: torch.func.jvp(f, (t,), (t,)), "dual numbers": dual}
 
 
 @SOLVES
-@pytest.mark.parametrize("name", TRANSFORMS)
-def test_transforms_are_told_that_they_cannot(scene, solve, name):
-    with pytest.raises(ValueError, match=r"remanent_magnetization \[A/m\] is inside a transform.*backward"):
-        TRANSFORMS[name](lambda magnetization: solve(scene, magnetization), STRENGTH)
+def test_batches_of_designs_are_refused_by_name(scene, solve):
+    with pytest.raises(ValueError, match=r"remanent_magnetization \[A/m\] is inside torch\.vmap.*loop"):
+        torch.vmap(lambda magnetization: solve(scene, magnetization))(STRENGTH.repeat(2, 1))
+
+
+@pytest.mark.parametrize("name", FORWARD)
+def test_motions_have_no_tangents(scene, name):
+    with pytest.raises(ms.NoGradient, match="no tangents of a motion"):
+        FORWARD[name](lambda magnetization: motion(scene, magnetization), STRENGTH)
+
+
+@pytest.mark.parametrize("name", [*FORWARD, *REVERSE])
+def test_linear_response_has_no_derivatives(scene, name):
+    with pytest.raises(ValueError, match="requires a gradient, and nothing passes one back"):
+        {**FORWARD, **REVERSE}[name](lambda magnetization: linear(scene, magnetization), STRENGTH)
 
 
 @WITH_GRADIENT

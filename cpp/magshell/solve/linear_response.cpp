@@ -84,6 +84,27 @@ VectorXd stiffness_times(const VectorXd& motion, Model& model, const VectorXd& q
     return forces;
 }
 
+// Returns the change of all dofs that cancels a change of the gradient, to first order, while prescribed dofs change. The model was
+// evaluated last at the state of the equilibrium.
+VectorXd state_change(Model& model, const StaticsResult& equilibrium, const LoadParameters& load_parameters,
+                      VectorXd gradient, VectorXd change) {
+    const VectorXd& q = equilibrium.state;
+    const DofMap& dof_map = model.dof_map();
+    const bool moves = !change.isZero(0.0);
+    if (moves || model.capabilities().has_unsymmetric_tangent) model.assemble(q, load_parameters, false);
+    if (moves) {
+        VectorXd pull(q.size());
+        model.multiply(change, pull);
+        model.nonsymmetric_tangent().add_product(change, false, pull);
+        dof_map.add_motor_increment_forces(model.residual().gradient, change, pull);
+        gradient += pull;
+    }
+    VectorXd reduced = -dof_map.vector(gradient);
+    solve_at_equilibrium(model, *equilibrium.factor, false, reduced);
+    change += dof_map.expand(reduced);
+    return change;
+}
+
 }  // namespace
 
 SmallDeflection small_deflection(Model& model, const VectorXd& q, const LoadParameters& unloaded,
@@ -120,26 +141,19 @@ SmallDeflection small_deflection(Model& model, const VectorXd& q, const LoadPara
 VectorXd first_order_change(Model& model, const StaticsResult& equilibrium, const LoadParameters& to) {
     if (!equilibrium.factor)
         throw InvalidInput("the equilibrium has no factorization: it was solved without gradients");
-    const VectorXd& q = equilibrium.state;
-    const DofMap& dof_map = model.dof_map();
-
     model.set_angle_branches(equilibrium.angle_branches);
-    model.evaluate(q, to);
-    VectorXd change = dof_map.prescribed_increment(q, to);
-    VectorXd force = model.residual().gradient;
-    const bool moves = !change.isZero(0.0);
-    if (moves || model.capabilities().has_unsymmetric_tangent) model.assemble(q, to, false);
-    if (moves) {
-        VectorXd pull(q.size());
-        model.multiply(change, pull);
-        model.nonsymmetric_tangent().add_product(change, false, pull);
-        dof_map.add_motor_increment_forces(model.residual().gradient, change, pull);
-        force += pull;
-    }
-    VectorXd reduced = -dof_map.vector(force);
-    solve_at_equilibrium(model, *equilibrium.factor, false, reduced);
-    change += dof_map.expand(reduced);
-    return change;
+    model.evaluate(equilibrium.state, to);
+    return state_change(model, equilibrium, to, model.residual().gradient,
+                        model.dof_map().prescribed_increment(equilibrium.state, to));
+}
+
+VectorXd equilibrium_jvp(Model& model, const StaticsResult& equilibrium, const VectorXd& gradient_change,
+                         const VectorXd& prescribed_change) {
+    if (!equilibrium.factor)
+        throw InvalidInput("the equilibrium has no factorization: it was solved without gradients");
+    model.set_angle_branches(equilibrium.angle_branches);
+    model.evaluate(equilibrium.state, equilibrium.load_parameters);
+    return state_change(model, equilibrium, equilibrium.load_parameters, gradient_change, prescribed_change);
 }
 
 }  // namespace magshell

@@ -26,4 +26,10 @@ SmallDeflection small_deflection(Model& model, const VectorXd& q, const LoadPara
 /// that the model has now: the first Newton step with the old Hessian. Throws InvalidInput if no factorization was stored.
 VectorXd first_order_change(Model& model, const StaticsResult& equilibrium, const LoadParameters& to);
 
+/// Returns the derivative of all dofs along a direction of the parameters, along which the gradient at the fixed state changes by
+/// gradient_change and prescribed dofs by prescribed_change, both of all dofs: H dq_f = -(dg + H_fh dq_h). The model must have the
+/// parameters of the equilibrium. Throws InvalidInput if no factorization was stored.
+VectorXd equilibrium_jvp(Model& model, const StaticsResult& equilibrium, const VectorXd& gradient_change,
+                         const VectorXd& prescribed_change);
+
 }  // namespace magshell

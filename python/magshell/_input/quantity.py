@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .tensor_kinds import is_tensor, numbers_of, why_not
+from .tensor_kinds import is_followed, is_tensor, numbers_of, why_not
 
 
 def quantity(name: str, unit: str, values: Any, shape: tuple[int | str, ...]) -> np.ndarray:
@@ -83,7 +83,7 @@ def array_of(label: str, values: Any, wanted: str) -> np.ndarray:
     """
     if why := why_not(values):
         raise ValueError(f"{label} {why}")
-    if getattr(values, "requires_grad", False):
+    if is_tensor(values) and is_followed(values):
         raise ValueError(f"{label} requires a gradient, and nothing passes one back to it: detach it first")
     if np.ma.is_masked(values):
         raise ValueError(f"{label} has masked entries: fill them first")

@@ -6,9 +6,9 @@ import sys
 
 import numpy as np
 
-_NO_TRANSFORM = (
-    "is inside a transform (vmap, torch.func, dual numbers, is_grads_batched), which cannot look into a solve: take "
-    "gradients with backward() or torch.autograd.grad, one at a time, and loop over designs"
+_BATCHED = (
+    "is inside torch.vmap with another value for each member, or inside is_grads_batched, which cannot look into a solve: "
+    "loop over designs, or over gradients with torch.func.jacrev, which calls them one at a time"
 )
 _DEEPEST = 5  # axes of any input, and one more
 
@@ -19,8 +19,19 @@ def is_tensor(value) -> bool:
     return torch is not None and isinstance(value, torch.Tensor)
 
 
+def is_followed(tensor) -> bool:
+    """Return whether torch differentiates by a tensor: it requires a gradient, or is inside a transform."""
+    from ..solve.adjoint.autograd import is_transformed
+
+    return tensor.requires_grad or is_transformed(tensor)
+
+
 def numbers_of(tensor) -> np.ndarray:
     """Return the numbers of a readable tensor, without its graph. bfloat16, which numpy lacks, becomes float32."""
+    from ..solve.adjoint.autograd import is_transformed, outside_transforms
+
+    if is_transformed(tensor):
+        return outside_transforms(tensor, numbers_of)
     plain = tensor.detach().cpu().resolve_conj().resolve_neg()
     return (plain.float() if plain.dtype == sys.modules["torch"].bfloat16 else plain).numpy()
 
@@ -36,10 +47,10 @@ def why_not(values) -> str:
 
 
 def _why_not(torch, tensor) -> str:
-    from ..solve.adjoint.autograd import is_transformed
+    from ..solve.adjoint.autograd import is_batched
 
-    if is_transformed(tensor):
-        return _NO_TRANSFORM
+    if is_batched(tensor):
+        return _BATCHED
     if tensor.is_nested:
         return "is a nested tensor: hand over its parts one by one"
     if tensor.layout != torch.strided:
@@ -60,7 +71,7 @@ def _why_not_all(values, depth: int) -> str:
     for part in values:
         if not is_tensor(part):
             why = _why_not_all(part, depth - 1)
-        elif part.requires_grad:
+        elif is_followed(part):
             why = (
                 "is a list of tensors, of which some require a gradient that would be lost: torch.stack them"
             )

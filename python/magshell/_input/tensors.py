@@ -9,7 +9,7 @@ import numpy as np
 
 from .quantity import fits, real_numbers
 from .scalars import positive
-from .tensor_kinds import is_tensor, numbers_of, why_not
+from .tensor_kinds import is_followed, is_tensor, numbers_of, why_not
 
 
 def require_torch(what: str):
@@ -51,8 +51,12 @@ def positive_number(name: str, unit: str, value: Any):
 
 def requires_gradient(value: Any) -> bool:
     """Return whether torch records the operations on this value: a tensor with a gradient, while gradients are
-    enabled."""
-    return is_tensor(value) and value.requires_grad and sys.modules["torch"].is_grad_enabled()
+    enabled, or one inside a transform."""
+    if not is_tensor(value):
+        return False
+    if value.requires_grad and sys.modules["torch"].is_grad_enabled():
+        return True
+    return is_followed(value) and not value.requires_grad
 
 
 def detached(value: Any):
@@ -70,7 +74,7 @@ def plain_arrays(named: dict[Any, Any]) -> dict[Any, Any]:
 
 def to_array(name: str, value: Any):
     """Return a tensor's numbers, and anything else as it is. Raises ValueError if the tensor requires a gradient."""
-    if is_tensor(value) and value.requires_grad and not why_not(value):
+    if is_tensor(value) and not why_not(value) and is_followed(value):
         raise ValueError(f"{name} requires a gradient, and nothing passes one back to it: detach it first")
     return detached(value)
 

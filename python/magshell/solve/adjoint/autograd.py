@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,53 +18,191 @@ if TYPE_CHECKING:
 
 
 class Solved(torch.autograd.Function):
-    """Result arrays that were computed from the leaves (tensors), with the adjoint that computes their gradients."""
+    """Result arrays that were computed from the leaves (tensors), with the adjoint that computes their derivatives."""
 
     @staticmethod
     def forward(
-        ctx: Any,
         adjoint: Adjoint | MotionAdjoint,
         arrays: tuple[np.ndarray, ...],
         dtype: torch.dtype,
         *leaves: torch.Tensor,
     ) -> tuple[torch.Tensor, ...]:
-        ctx.adjoint = adjoint
-        # Not by save_for_backward: that raises an error for a leaf changed in place since, whose numbers are not used here.
-        ctx.leaves = leaves
         return tuple(torch.from_numpy(array).to(dtype=dtype) for array in arrays)
 
     @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: tuple[torch.Tensor, ...]) -> None:
+        adjoint, arrays, dtype, *leaves = inputs
+        # Not by save_for_backward: that raises an error for a leaf changed in place since, whose numbers are not used here.
+        ctx.leaves = leaves
+        ctx.products = _Products(
+            adjoint,
+            [dtype for _ in arrays],
+            [(tuple(leaf.shape), leaf.dtype, leaf.device) for leaf in leaves],
+        )
+
+    @staticmethod
     def backward(ctx: Any, *by_outputs: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
-        arrays = [_numbers(each) for each in by_outputs]
-        gradients = ctx.adjoint.gradients(arrays, ctx.needs_input_grad[3:])
-        by_leaves = [
-            None if values is None else torch.from_numpy(np.array(values)).to(leaf)
-            for values, leaf in zip(gradients, ctx.leaves, strict=True)
-        ]
+        wanted = tuple(ctx.needs_input_grad[3:])
+        found = iter(_Transposed.apply(ctx.products.by(wanted), *by_outputs))
+        by_leaves = [next(found) if is_wanted else None for is_wanted in wanted]
         if torch.is_grad_enabled():  # create_graph=True
-            given = [each for each in by_leaves if each is not None]
-            marked = iter(Once.apply(len(given), *given, *ctx.leaves, *by_outputs))
-            by_leaves = [None if each is None else next(marked) for each in by_leaves]
+            once = _Once.apply(*ctx.leaves)
+            by_leaves = [None if each is None else each + once.to(each) for each in by_leaves]
         return None, None, None, *by_leaves
 
+    @staticmethod
+    def jvp(ctx: Any, *tangents: torch.Tensor | None) -> tuple[torch.Tensor, ...]:
+        leaves = zip(tangents[3:], ctx.leaves, strict=True)
+        along = [torch.zeros_like(leaf) if each is None else each for each, leaf in leaves]
+        once = _Once.apply(*(_primal(leaf) for leaf in ctx.leaves))
+        return tuple(each + once.to(each) for each in _Tangent.apply(ctx.products, *along))
 
-class Once(torch.autograd.Function):
-    """Gradients connected to the tensors that they depend on, so that second derivatives raise NoGradient.
+    @staticmethod
+    def vmap(info: Any, in_dims: tuple[Any, ...], *inputs: Any) -> tuple[Any, Any]:
+        raise ValueError("torch.vmap over the inputs of a solve: loop over designs")
 
-    They are connected to the leaves as well as to the derivatives by the results: those of a loss linear in the positions
-    are constant, and torch would take gradients without a graph for constants, with zero derivatives.
+
+class _Products:
+    """The derivatives of results by leaves as products, of arrays with the Jacobian and its transpose.
+
+    outputs: dtype of each result. leaves: (shape, dtype, device) of each leaf. wanted: by which leaves; all by default.
+    """
+
+    def __init__(
+        self,
+        adjoint: Adjoint | MotionAdjoint,
+        outputs: list[torch.dtype],
+        leaves: list[tuple[Any, ...]],
+        wanted: tuple[bool, ...] | None = None,
+    ):
+        self._adjoint, self._outputs, self._leaves = adjoint, outputs, leaves
+        self._wanted = (True,) * len(leaves) if wanted is None else wanted
+
+    def by(self, wanted: tuple[bool, ...] | None) -> _Products:
+        """Return the derivatives by some of the leaves, or by all."""
+        return _Products(self._adjoint, self._outputs, self._leaves, wanted)
+
+    def transposed(self, by_outputs: Sequence[torch.Tensor]) -> list[torch.Tensor]:
+        """Return the gradients by the wanted leaves."""
+        found = self._adjoint.gradients([_numbers(each) for each in by_outputs], self._wanted)
+        like = zip(found, self._leaves, strict=True)
+        return [
+            torch.from_numpy(np.array(each)).to(dtype=dtype, device=device)
+            for each, (_, dtype, device) in like
+            if each is not None
+        ]
+
+    def tangent(self, along: Sequence[torch.Tensor]) -> list[torch.Tensor]:
+        """Return the tangents of the results."""
+        found = self._adjoint.tangents([_numbers(each) for each in along])
+        return [
+            torch.from_numpy(each).to(dtype=dtype) for each, dtype in zip(found, self._outputs, strict=True)
+        ]
+
+    def all_along(self, given: Sequence[torch.Tensor]) -> list[torch.Tensor]:
+        """Return tangents of all leaves from those of the wanted ones; zeros for the others."""
+        some = iter(given)
+        return [
+            next(some) if is_wanted else torch.zeros(shape, dtype=dtype, device=device)
+            for is_wanted, (shape, dtype, device) in zip(self._wanted, self._leaves, strict=True)
+        ]
+
+
+class _Transposed(torch.autograd.Function):
+    """Products of derivatives by results with the Jacobian of a solve, linear in them; forward and backward."""
+
+    @staticmethod
+    def forward(products: _Products, *by_outputs: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        return tuple(products.transposed(by_outputs))
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: tuple[torch.Tensor, ...]) -> None:
+        ctx.products, *_ = inputs
+
+    @staticmethod
+    def backward(ctx: Any, *motions: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
+        return None, *_Tangent.apply(ctx.products, *ctx.products.all_along(motions))
+
+    @staticmethod
+    def jvp(ctx: Any, *tangents: torch.Tensor | None) -> tuple[torch.Tensor, ...]:
+        return _Transposed.apply(ctx.products, *tangents[1:])
+
+    @staticmethod
+    def vmap(info: Any, in_dims: tuple[Any, ...], *inputs: Any) -> tuple[tuple[torch.Tensor, ...], Any]:
+        return _looped(_Transposed, info.batch_size, in_dims, inputs)
+
+
+class _Tangent(torch.autograd.Function):
+    """Products of the Jacobian of a solve with tangents of its leaves, linear in them; forward and backward."""
+
+    @staticmethod
+    def forward(products: _Products, *along: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        return tuple(products.tangent(along))
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: tuple[torch.Tensor, ...]) -> None:
+        ctx.products, *_ = inputs
+
+    @staticmethod
+    def backward(ctx: Any, *by_outputs: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
+        return None, *_Transposed.apply(ctx.products.by(None), *by_outputs)
+
+    @staticmethod
+    def jvp(ctx: Any, *tangents: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        return _Tangent.apply(ctx.products, *tangents[1:])
+
+    @staticmethod
+    def vmap(info: Any, in_dims: tuple[Any, ...], *inputs: Any) -> tuple[tuple[torch.Tensor, ...], Any]:
+        return _looped(_Tangent, info.batch_size, in_dims, inputs)
+
+
+def _looped(function: Any, count: int, in_dims: tuple[Any, ...], inputs: tuple[Any, ...]):
+    """Apply a function to each member of a batch, and stack the results."""
+    found = [
+        function.apply(
+            *(
+                each if dim is None else each.select(dim, member)
+                for each, dim in zip(inputs, in_dims, strict=True)
+            )
+        )
+        for member in range(count)
+    ]
+    stacked = tuple(torch.stack(each) for each in zip(*found, strict=True))
+    return stacked, (0,) * len(stacked)
+
+
+class _Once(torch.autograd.Function):
+    """A zero connected to the leaves, added to first derivatives, so that second derivatives raise NoGradient.
+
+    First derivatives are linear in the derivatives by the results, or in tangents, and are differentiable by these. They
+    depend on the leaves as well, in a way that has no derivative here.
     """
 
     @staticmethod
-    def forward(ctx: Any, count: int, *given: torch.Tensor) -> tuple[torch.Tensor, ...]:
-        return given[:count]
+    def forward(*leaves: torch.Tensor) -> torch.Tensor:
+        return torch.zeros((), dtype=torch.float64)
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[torch.Tensor, ...], output: torch.Tensor) -> None:
+        pass
 
     @staticmethod
     def backward(ctx: Any, *_: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
-        raise NoGradient(
-            "no second derivatives: a solve's gradient is exact, but it has none itself (create_graph=True, "
-            "torch.autograd.functional.hessian). Take differences of gradients: H v = (g(x + h v) - g(x - h v)) / 2h."
-        )
+        raise NoGradient(_SECOND)
+
+    @staticmethod
+    def jvp(ctx: Any, *_: torch.Tensor) -> torch.Tensor:
+        raise NoGradient(_SECOND)
+
+    @staticmethod
+    def vmap(info: Any, in_dims: tuple[Any, ...], *leaves: torch.Tensor) -> tuple[torch.Tensor, None]:
+        return torch.zeros((), dtype=torch.float64), None
+
+
+_SECOND = (
+    "no second derivatives: a solve's gradient is exact, but it has none itself (create_graph=True, "
+    "torch.autograd.functional.hessian). Take differences of gradients: H v = (g(x + h v) - g(x - h v)) / 2h."
+)
 
 
 class _Energies(torch.autograd.Function):
@@ -196,9 +334,40 @@ def solved(
 
 def is_transformed(tensor: torch.Tensor) -> bool:
     """Return whether a tensor is wrapped by torch.func or has a tangent of forward-mode differentiation."""
+    return _is_wrapped(tensor) or _has_tangent(tensor)
+
+
+def is_batched(tensor: torch.Tensor) -> bool:
+    """Return whether a tensor stands for several, one for each member of a batch of torch.vmap."""
+    while _is_wrapped(tensor):
+        functorch = torch._C._functorch
+        if functorch.is_batchedtensor(tensor) or functorch.is_legacy_batchedtensor(tensor):
+            return True
+        tensor = functorch.get_unwrapped(tensor)
+    return False
+
+
+def outside_transforms(tensor: torch.Tensor, function: Callable[[torch.Tensor], Any]) -> Any:
+    """Return a function of a tensor without its wrappers of torch.func and its tangent; it must not be batched."""
+    from torch._functorch.pyfunctorch import temporarily_clear_interpreter_stack
+
+    while _is_wrapped(tensor):
+        tensor = torch._C._functorch.get_unwrapped(tensor)
+    with temporarily_clear_interpreter_stack():
+        return function(_primal(tensor))
+
+
+def _primal(tensor: torch.Tensor) -> torch.Tensor:
+    return torch.autograd.forward_ad.unpack_dual(tensor).primal if _has_tangent(tensor) else tensor
+
+
+def _has_tangent(tensor: torch.Tensor) -> bool:
+    return torch.autograd.forward_ad.unpack_dual(tensor).tangent is not None
+
+
+def _is_wrapped(tensor: torch.Tensor) -> bool:
     try:
         functorch = torch._C._functorch
-        wrapped = functorch.is_functorch_wrapped_tensor(tensor) or functorch.is_legacy_batchedtensor(tensor)
+        return functorch.is_functorch_wrapped_tensor(tensor) or functorch.is_legacy_batchedtensor(tensor)
     except AttributeError:  # a torch without these functions raises its own error later
-        wrapped = False
-    return wrapped or torch.autograd.forward_ad.unpack_dual(tensor).tangent is not None
+        return False

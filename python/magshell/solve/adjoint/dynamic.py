@@ -42,3 +42,10 @@ class MotionAdjoint:
         gradient = Gradient(inputs.scene, found_by.pop("values"), found_by.pop("controls"), found_by)
         leaves = zip(inputs.leaves, wanted, strict=True)
         return [by_leaf(inputs, leaf, gradient) if is_wanted else None for leaf, is_wanted in leaves]
+
+    def tangents(self, along: list[np.ndarray]) -> list[np.ndarray]:
+        """Raise NoGradient: motions have no forward mode."""
+        raise NoGradient(
+            "no tangents of a motion: ms.simulate has gradients in reverse mode only. Use backward(), torch.func.vjp or "
+            'jacrev, and GaussNewton(jacobian="backward")'
+        )

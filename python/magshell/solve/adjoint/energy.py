@@ -13,6 +13,7 @@ from ... import _core
 from ...errors import NoGradient
 from ...model.scene.solve_inputs import Inputs
 from ...model.scene.values import Gradient
+from .differences import EIGHTH, SIXTH
 from .static import by_leaf
 
 if TYPE_CHECKING:
@@ -21,10 +22,6 @@ if TYPE_CHECKING:
 
 POSITIONAL = ("positions", "edge_rotations")  # names of the leaves that are no values
 
-# Central differences of eighth and of sixth order, at 1, 2, 3 and 4 steps (1, coefficients of the textbook): exact for
-# polynomials up to the eighth degree. Tested by test_first_derivatives_by_values_agree_with_differences.
-_EIGHTH = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280])
-_SIXTH = np.array([3 / 4, -3 / 20, 1 / 60, 0.0])
 # The first step (1), as a fraction of the value, and the steps of a value that is zero (SI units of the value); each
 # is tried with these fractions (1) of it until both orders agree. Tested by
 # test_first_derivatives_by_values_agree_with_differences.
@@ -283,8 +280,8 @@ def _by_entries(
                 back[entry] -= (m + 1) * step
                 # Each part alone: parts that do not depend on the number cancel exactly.
                 change = (function(there) - function(back)).sum() / step
-                eighth[k] += _EIGHTH[m] * change
-                sixth[k] += _SIXTH[m] * change
+                eighth[k] += EIGHTH[m] * change
+                sixth[k] += SIXTH[m] * change
         rounding = 1e3 * np.finfo(float).eps * size / (shorter * steps)
         if (np.abs(eighth - sixth) <= _AGREE * np.abs(eighth).max() + rounding).all():
             out[entries] = eighth / (entries.size if together else 1)

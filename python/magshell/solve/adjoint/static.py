@@ -11,6 +11,7 @@ from ... import _core
 from ...errors import NoGradient
 from ...model.scene.solve_inputs import Inputs
 from ...model.scene.values import Gradient
+from .tangent import motor_tangent, state_tangent
 
 if TYPE_CHECKING:
     from ...model.scene.solve_inputs import Leaf
@@ -29,10 +30,31 @@ class Adjoint:
         """
         self._refuse()
         inputs, model = self._inputs, self._inputs.scene._model
+        refused = any(leaf.refusal for leaf in inputs.leaves)
+        if not (refused or any(np.any(each) for each in by_outputs)):  # those of another load case, say
+            return [
+                np.zeros(leaf.shape) if asked else None
+                for leaf, asked in zip(inputs.leaves, wanted, strict=True)
+            ]
         with inputs.in_core():
             gradient = Gradient(inputs.scene, *_core.pull_back(model, self._found, *by_outputs))
         leaves = zip(inputs.leaves, wanted, strict=True)
         return [by_leaf(inputs, leaf, gradient) if asked else None for leaf, asked in leaves]
+
+    def tangents(self, along: list[np.ndarray]) -> list[np.ndarray]:
+        """Compute the derivatives of positions, edge rotations and forces of motors along changes of all leaves.
+
+        Raises NoGradient where there are none.
+        """
+        self._refuse()
+        inputs, found, model = self._inputs, self._found, self._inputs.scene._model
+        n_driven = len(model.driving(found.state, found.controls, found.turns))
+        if not any(np.any(each) for each in along):
+            change = np.zeros(model.size)
+        else:
+            change = state_tangent(inputs, found, along)
+        driving = motor_tangent(inputs, found, along, change) if n_driven else np.zeros(0)
+        return [np.ascontiguousarray(model.points(change)), model.edge_rotations(change), driving]
 
     def _refuse(self) -> None:
         found = self._found

@@ -154,8 +154,9 @@ def solve(
         if moving is not None and found.load_fraction < 1.0:
             inputs = inputs.with_values(moving.values(found.load_fraction))
     with inputs.in_core():
-        energies = _energies(scene, found)
-        result = _result(scene, inputs, found, energies, time.perf_counter() - began)
+        energies, arrays = _energies(scene, found), _arrays(scene, found)
+        strain = largest_of(scene, found.state, inputs.values.all_sheets.thickness)
+    result = _result(inputs, found, energies, arrays, strain, time.perf_counter() - began)
     log.debug(
         "equilibrium: %s, %.4g of the way, %d iterations, %d factorizations, residual %.2g, %.3g s",
         found.outcome.name,
@@ -196,11 +197,17 @@ def _energies(scene: Scene, found) -> dict[str, float] | None:
 
 
 def _result(
-    scene: Scene, inputs: Inputs, found, energies: dict[Any, Any] | None, wall_time: float
+    inputs: Inputs,
+    found: _core.StaticsResult,
+    energies: dict[str, float] | None,
+    arrays: tuple[np.ndarray, ...],
+    strain: Largest,
+    wall_time: float,
 ) -> Equilibrium:
-    points, edge_rotations, driving = _outputs(inputs, found)
+    """Return the result. The scene is not held meanwhile: tensors with tangents have theirs computed at once."""
+    scene = inputs.scene
+    points, edge_rotations, driving = _outputs(inputs, found, arrays)
     n_v = scene.mesh.n_vertices
-    strain = largest_of(scene, found.state, inputs.values.all_sheets.thickness)
     return Equilibrium(
         scene=scene,
         positions=points[:n_v] if scene.rigid_parts else points,
@@ -236,17 +243,18 @@ def _result(
     )
 
 
-def _outputs(inputs: Inputs, found):
-    """Return the positions with the points of rigid bodies, the edge rotations and the forces of motors.
-
-    They are tensors if an input requires a gradient.
-    """
-    model, driven = inputs.scene._model, any(joint._driven for joint in inputs.scene.joints)
-    arrays = (
+def _arrays(scene: Scene, found: _core.StaticsResult) -> tuple[np.ndarray, ...]:
+    """Return the positions with the points of rigid bodies, the edge rotations and the forces of motors."""
+    model, driven = scene._model, any(joint._driven for joint in scene.joints)
+    return (
         np.ascontiguousarray(model.points(found.state)),
         model.edge_rotations(found.state),
         model.driving(found.state, found.controls, found.turns) if driven else np.zeros(0),
     )
+
+
+def _outputs(inputs: Inputs, found: _core.StaticsResult, arrays: tuple[np.ndarray, ...]) -> tuple[Any, ...]:
+    """Return the arrays as tensors if an input is a tensor, connected to those that require a gradient."""
     if not inputs.leaves:
         return tuple(like(array, *inputs.given) for array in arrays)
     from ..adjoint.autograd import solved

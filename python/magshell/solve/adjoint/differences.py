@@ -1,0 +1,75 @@
+"""Central differences of high order along one direction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+# Central differences of eighth and of sixth order, at 1, 2, 3 and 4 steps (1, coefficients of the textbook): exact for
+# polynomials up to the eighth degree. Tested by test_first_derivatives_by_values_agree_with_differences.
+EIGHTH = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280])
+SIXTH = np.array([3 / 4, -3 / 20, 1 / 60, 0.0])
+# Two estimates of a derivative agree if they differ by the first fraction (1) of its largest entry; of those that differ by
+# more, the best is taken, up to the second fraction. Tested by test_tangents_agree_with_gradients_in_every_kind.
+# Round-off of the function is this fraction (1) of its largest value. Tested by the same.
+_ROUNDING = 64 * np.finfo(float).eps
+_AGREE, _LARGEST_DIFFERENCE = 1e-11, 1e-7
+
+
+def directional_derivative(function: Callable[[float], np.ndarray], steps: list[float]) -> np.ndarray | None:
+    """Return the derivative of a function of one number at zero, by the first of these steps that suffices; or None.
+
+    Rows of the function's values (k, n) have units of their own.
+    """
+    best, smallest, before = None, _LARGEST_DIFFERENCE, np.inf
+    for step in steps:
+        stencil = _Stencil(function, step)
+        try:
+            linear = stencil.slope(4)
+            if stencil.difference(linear, stencil.slope(1)) <= _AGREE:
+                return linear
+            eighth, sixth = stencil.weighted(EIGHTH), stencil.weighted(SIXTH)
+        except ValueError:  # beyond the range of the value
+            continue
+        difference = stencil.difference(eighth, sixth)
+        if difference <= _AGREE:
+            return eighth
+        if difference <= smallest:
+            best, smallest = eighth, difference
+        if before < _LARGEST_DIFFERENCE and difference > before:  # round-off by now
+            break
+        before = difference
+    return best
+
+
+class _Stencil:
+    """Central differences of a function at multiples of a step."""
+
+    def __init__(self, function: Callable[[float], np.ndarray], step: float):
+        self._function, self._step = function, step
+        self._slopes: dict[int, np.ndarray] = {}
+        self._largest: np.ndarray | float = 0.0  # value of the function, for each row
+
+    def slope(self, multiple: int) -> np.ndarray:
+        """Return the central difference at a multiple of the step."""
+        if multiple not in self._slopes:
+            there, back = (self._function(sign * multiple * self._step) for sign in (1, -1))
+            self._largest = np.maximum(self._largest, np.abs(there).max(axis=-1, initial=0.0))
+            self._slopes[multiple] = (there - back) / (2 * multiple * self._step)
+        return self._slopes[multiple]
+
+    def weighted(self, order: np.ndarray) -> np.ndarray:
+        """Return a difference of high order, with the weights of the changes at 1, 2, 3 and 4 steps."""
+        return sum(2 * m * weight * self.slope(m) for m, weight in enumerate(order, 1))
+
+    def difference(self, one: np.ndarray, other: np.ndarray) -> float:
+        """Return the largest difference of two estimates relative to the largest entry of its row, beyond round-off.
+
+        It is infinite if an estimate is not finite.
+        """
+        if not (np.isfinite(one).all() and np.isfinite(other).all()):
+            return np.inf
+        size, apart = (np.abs(each).max(axis=-1, initial=0.0) for each in (one, one - other))
+        apart = apart - _ROUNDING * self._largest / self._step
+        return float(np.max(apart / np.where(size > 0.0, size, 1.0), where=apart > 0.0, initial=0.0))

@@ -1,0 +1,142 @@
+"""The tangent of an equilibrium: the derivative of its results along a direction of its inputs. Works on arrays.
+
+    H dq_f = -(dg + H_fh dq_h)
+
+dg is the change of the gradient of the energy at the fixed state, and dq_h that of what supports and motors prescribe. Both
+are differences along the direction, so that the cost does not grow with the number of inputs: at most eight evaluations of
+the gradient, four where it is linear, and one back-substitution with the stored factorization.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ... import _core
+from ...errors import NoGradient
+from ...model.rigid.joints import Joint
+from ...model.scene.values import Values
+from .differences import directional_derivative
+
+if TYPE_CHECKING:
+    from ...model.scene.solve_inputs import Inputs, Leaf
+
+# The first step as a fraction (1) of the largest entry of a value, and the step of a value that is zero (SI unit of the
+# value); and the fractions (1) of these that are tried until both orders agree. Tested by
+# test_tangents_agree_with_gradients_in_every_kind.
+_STEP, _SHORTER = 1 / 64, (1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5)
+_STEP_AT_ZERO, _FROM_ZERO = 1e-2, (1.0, 1e2, 1e4, 1e6, 1e-2, 1e-4, 1e-6)
+
+
+def state_tangent(inputs: Inputs, found: _core.StaticsResult, along: list[np.ndarray]) -> np.ndarray:
+    """Return the derivative of all dofs of an equilibrium along changes of all leaves of its inputs.
+
+    Raises NoGradient where there is none.
+    """
+    model = inputs.scene._model
+    total = np.zeros((2, model.size))  # of the gradient, and of what is prescribed
+    with inputs.in_core():
+        try:
+            model.term_energies(found.state, found.turns, inputs.controls)  # sets the turns of angles
+            for leaf, change in zip(inputs.leaves, along, strict=True):
+                if np.any(change):
+                    total += _rates(inputs, found, leaf, change)
+        finally:
+            model.set_values(inputs.values.numbers)
+        return _core.push_forward(model, found, *total)
+
+
+def motor_tangent(
+    inputs: Inputs, found: _core.StaticsResult, along: list[np.ndarray], change: np.ndarray
+) -> np.ndarray:
+    """Return the derivative of the forces of motors along changes of all leaves, with which all dofs change so."""
+    model, state, turns = inputs.scene._model, found.state, found.turns
+    total = np.zeros(len(model.driving(state, found.controls, turns)))
+    size = float(np.abs(change).max(initial=0.0))
+    with inputs.in_core():
+        try:
+            if size > 0.0:
+                steps = [_STEP * inputs.scene._bodies.extent * factor / size for factor in _SHORTER]
+                total += _required(
+                    directional_derivative(
+                        lambda t: model.driving(state + t * change, inputs.controls, turns)[None], steps
+                    )
+                )[0]
+            for leaf, each in zip(inputs.leaves, along, strict=True):
+                if not np.any(each):
+                    continue
+
+                def at(step: float, leaf=leaf, each=each) -> np.ndarray:
+                    numbers, controls = changed(inputs, leaf, step * each)
+                    model.set_values(numbers)
+                    return model.driving(state, controls, turns)[None]
+
+                total += _required(directional_derivative(at, _steps(inputs, leaf, each)))[0]
+        finally:
+            model.set_values(inputs.values.numbers)
+    return total
+
+
+def _required(derivative: np.ndarray | None) -> np.ndarray:
+    if derivative is None:
+        raise NoGradient("no tangent of the forces of motors: they are not smooth in the inputs")
+    return derivative
+
+
+def changed(inputs: Inputs, leaf: Leaf, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the numbers of all values and the load parameters after the change of a leaf. Raises ValueError beyond its
+    range."""
+    scene, values = inputs.scene, inputs.values
+    replaced, magnetization = values.replaced, inputs.magnetization
+    if leaf.owner is not None:
+        now = _added(values.replaced[leaf.owner][leaf.name], change)
+        replaced = {**replaced, leaf.owner: {**replaced[leaf.owner], leaf.name: now}}
+    elif leaf.name == "remanent_magnetization":
+        magnetization = _added(magnetization, change)
+    else:
+        layout, key = scene._control_layout, ("scene", leaf.name)
+        now = _added(layout.of(inputs.controls, *key)[0], change)
+        return values.numbers, layout.packed({key: now}, inputs.controls)
+    return Values(scene, replaced, magnetization).numbers, inputs.controls
+
+
+def _added(value, change: np.ndarray) -> np.ndarray:
+    value = np.asarray(value, dtype=np.float64)
+    return value + np.broadcast_to(change, value.shape)
+
+
+def _rates(inputs: Inputs, found: _core.StaticsResult, leaf: Leaf, change: np.ndarray) -> np.ndarray:
+    """Return the derivatives of the gradient at the fixed state, and of the increments to what is prescribed, (2, n)."""
+    advice = "take gradients with backward(), torch.func.vjp or jacrev"
+    if leaf.refusal:
+        raise NoGradient(f"no tangent by {leaf.name}: {leaf.refusal}")
+    if isinstance(leaf.owner, Joint) and leaf.name in leaf.owner._geometry:
+        raise NoGradient(f"no tangent by the {leaf.name} of a {type(leaf.owner).__name__}: {advice}")
+    model, state = inputs.scene._model, found.state
+
+    def at(step: float) -> np.ndarray:
+        numbers, controls = changed(inputs, leaf, step * change)
+        model.set_values(numbers)
+        return np.stack([model.gradient(state, controls), model.driven_increment(state, controls)])
+
+    rates = directional_derivative(at, _steps(inputs, leaf, change))
+    if rates is None:
+        raise NoGradient(
+            f"no tangent by {leaf.name}: the forces are not smooth in it, or it is at the end of its range; {advice}"
+        )
+    return rates
+
+
+def _steps(inputs: Inputs, leaf: Leaf, change: np.ndarray) -> list[float]:
+    """Return the steps along a change that are tried one after another."""
+    if leaf.owner is not None:
+        value = inputs.values.replaced[leaf.owner][leaf.name]
+    elif leaf.name == "remanent_magnetization":
+        value = inputs.magnetization
+    else:
+        value = inputs.scene._control_layout.of(inputs.controls, "scene", leaf.name)
+    size, length = np.abs(np.asarray(value)).max(initial=0.0), np.abs(change).max()
+    if size == 0.0:
+        return [_STEP_AT_ZERO * factor / length for factor in _FROM_ZERO]
+    return [_STEP * size * factor / length for factor in _SHORTER]
