@@ -4,7 +4,7 @@ Load steps, relaxation and paths keep every point on its side of an obstacle, or
 """
 
 import warnings
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -245,6 +245,40 @@ def test_a_ball_that_slips_between_contact_points_slowly_is_an_error():
     scene = over_a_sheet(ball, contact_stiffness=1e4, face_samples=0)
     with pytest.raises(ms.NotConverged, match=r"passes between the points in contact.*face_samples=3"):
         in_small_steps(scene, ball, 0.05, 25)
+
+
+def test_a_path_does_not_pass_through_a_small_ball_between_contact_points():
+    """Check that the path ends with an error: it turns back and forth at the ball, or a face would sweep over its middle."""
+    ball = ob.Sphere(0.01, center=(0.006, 0.003, 0.01 + TOUCHING))
+    scene = over_a_sheet(ball, contact_stiffness=1e4, face_samples=0)
+    with pytest.raises(ms.NotConverged, match="the path ended after") as caught:
+        ms.follow_path(
+            scene, values=moved(ball, 0.05), start=ms.equilibrium(scene), max_points=100, progress=False
+        )
+    path = caught.value.last_good
+    assert len(path) > 1 and path.parameters[-1] < 1.0
+
+
+def lifted(factor, solve):
+    """Return the solve of a sheet whose rim is lifted by 0.05 m times this factor, under a small ball that stands still."""
+    mesh = sheet().mesh
+    rim = ms.Clamp(np.flatnonzero(mesh.edge_faces[:, 1] < 0), displacement=(0.0, 0.0, 0.05))
+    ball = ob.Sphere(0.01, center=(0.006, 0.003, 0.01 + TOUCHING))
+    middle = np.flatnonzero(np.hypot(*mesh.rest_positions[:, :2].T) < 0.7 * RADIUS)
+    contact = ms.Contact(ball, contact_stiffness=1e4, face_samples=0, vertices=middle)
+    scene = ms.Scene(sheet(), supports=[rim], contacts=[contact])
+    start = ms.equilibrium(scene, support_factor=0.0)
+    return solve(scene, support_factor=factor, start=start)
+
+
+def test_supports_that_pull_a_sheet_over_a_small_ball_are_an_error():
+    """Check that the ball, which stands still, does not come out on the other side of the sheet."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ms.MeshQualityWarning)
+        with pytest.raises(ms.NotConverged, match="passes between the points in contact"):
+            lifted(1.0, ms.equilibrium)
+        with pytest.raises(ms.NotConverged, match="the path ended after"):
+            lifted(1.0, partial(ms.follow_path, max_points=100, progress=False))
 
 
 @pytest.mark.parametrize(

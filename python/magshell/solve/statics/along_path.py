@@ -14,6 +14,7 @@ from ...model.scene.values import Values
 from ...model.supports.supports import Support
 
 if TYPE_CHECKING:
+    from ...model.scene.scene import Scene
     from .start import Origin
 
 
@@ -82,6 +83,17 @@ class AlongPath:
 
     def _part(self, values: Values, key: tuple[str, str]) -> np.ndarray:
         return self._layout.of(values.numbers, *key)
+
+
+def moving_obstacles(
+    scene: Scene, along: AlongPath | None, before: np.ndarray, after: np.ndarray
+) -> tuple[Obstacle, ...]:
+    """Return the obstacles that move between two sets of load parameters, and with `along`; all if supports move."""
+    factors = [scene._control_layout.of(each, "scene", "support_factor") for each in (before, after)]
+    moves = [np.any(move.rotation) or np.any(move.translation) for move in scene._constraints.moves]
+    if any(moves) and not np.array_equal(*factors):
+        return scene.obstacles
+    return along.obstacles() if along is not None else ()
 
 
 def all_can_move(inputs: Inputs, start: Origin) -> bool:

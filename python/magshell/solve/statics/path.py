@@ -31,7 +31,7 @@ from ...model.scene.values import Values
 from ...model.shells.obtuse_faces import warn_of_obtuse_faces
 from ...model.shells.strains import StrainHistory, strains_of, warn_if_large
 from ..options import MixedNewton, Newton
-from .along_path import AlongPath
+from .along_path import AlongPath, moving_obstacles
 from .equilibrium import Equilibrium
 from .path_events import PathEvent, events_along
 from .single_solve import solve
@@ -335,7 +335,7 @@ def follow_path(
     options.first_step, options.max_step = first_step, max_step
     options.min_parameter, options.max_points = max(min_parameter, -1e300), max_points
     options.locate_critical = locate_critical
-    options.watched = watched_obstacles(scene, moving.obstacles())
+    options.watched = watched_obstacles(scene, moving_obstacles(scene, moving, from_, inputs.controls))
 
     return _follow(inputs, moving, (state, angle_branches, from_), options, until, progress)
 

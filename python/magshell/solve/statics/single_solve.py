@@ -26,7 +26,7 @@ from ...model.shells.obtuse_faces import warn_of_obtuse_faces
 from ...model.shells.strains import Largest, largest_of, warn_if_large
 from ..adjoint.static import Adjoint
 from ..options import MixedNewton, Newton
-from .along_path import AlongPath, all_can_move
+from .along_path import AlongPath, all_can_move, moving_obstacles
 from .diagnosis import why_not
 from .equilibrium import Equilibrium
 from .solve_log import steps_of
@@ -141,10 +141,10 @@ def solve(
     moving: values of the scene that change along with the load parameters.
     """
     scene, entries = inputs.scene, []
+    options.watched = watched_obstacles(scene, moving_obstacles(scene, moving, from_, to))
     if moving is not None:
         from_, to = np.concatenate([from_, moving.before]), np.concatenate([to, moving.after])
         entries = moving.entries
-        options.watched = watched_obstacles(scene, moving.obstacles())
     options.keep_factor = options.keep_factor or bool(inputs.leaves)
     began = time.perf_counter()
     with inputs.in_core():
