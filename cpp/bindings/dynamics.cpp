@@ -1,9 +1,11 @@
 // Binds motions and their adjoints. Whole runs release the GIL.
 #include <limits>
+#include <memory>
 #include <string>
 #include <tuple>
 
 #include "bindings/arrays.h"
+#include "bindings/call_python.h"
 #include "bindings/gradients.h"
 #include "bindings/strains.h"
 #include "bindings/watch.h"
@@ -66,6 +68,22 @@ VectorXd numbers_of(const Model& model, const StrainSet& strains) {
     return numbers;
 }
 
+// Copies of the result share the Python function, so that they can be made and destroyed without the GIL.
+AdaptiveSteps adaptive_of(const Model& model, const TimeVaryingParameters& varying, const py::dict& given) {
+    AdaptiveSteps adaptive;
+    adaptive.tolerance = given["tolerance"].cast<double>();
+    adaptive.interval = given["interval"].cast<double>();
+    adaptive.intervals = given["intervals"].cast<Index>();
+    adaptive.deepest = given["deepest"].cast<int>();
+    adaptive.record_every = given["record_every"].cast<Index>();
+    const auto function = std::make_shared<py::object>(given["controls"]);
+    adaptive.load_parameters = [&model, varying, function](Index interval, double begin, double end) {
+        const py::gil_scoped_acquire locked;
+        return load_parameters_of(model, varying, call_python(*function, interval, begin, end).cast<Array>());
+    };
+    return adaptive;
+}
+
 MotionInput input_of(Model& model, const py::dict& given) {
     const auto array = [&](const char* name) { return given[name].cast<Array>(); };
     MotionInput input;
@@ -85,8 +103,8 @@ MotionInput input_of(Model& model, const py::dict& given) {
     input.viscosity = {given["stiffness_damping"].cast<double>(), given["maxwell_modulus"].cast<double>(),
                        given["maxwell_time"].cast<double>()};
     input.tableau = tableau_of(given["integrator"].cast<std::string>());
-    input.time_step = given["time_step"].cast<double>();
-    input.steps = given["steps"].cast<Index>();
+    input.time_steps = given["time_steps"].cast<std::vector<double>>();
+    input.recorded = given["recorded"].cast<std::vector<Index>>();
     input.varying =
         TimeVaryingParameters(model.parameters().registry(), given["varying"].cast<std::vector<Index>>());
     input.load_parameters = load_parameters_of(model, input.varying, array("controls"));
@@ -97,7 +115,8 @@ MotionInput input_of(Model& model, const py::dict& given) {
         input.projective = {true, iterations, tolerance, history, coulomb};
         if (tolerance > 0.0) input.newton.tolerance = tolerance;
     }
-    input.record_every = given["record_every"].cast<Index>();
+    if (const py::object adaptive = given["adaptive"]; !adaptive.is_none())
+        input.adaptive = adaptive_of(model, input.varying, adaptive.cast<py::dict>());
     return input;
 }
 
@@ -217,7 +236,8 @@ py::dict back(Model& model, const MotionInput& input, const MotionResult& motion
     result["own_velocities"] = model.bodies().points(gradient.velocities);
     result["mass"] = VectorXd(model.bodies().points(gradient.mass).rowwise().sum());
     result["damping"] = VectorXd(model.bodies().positions(gradient.damping).rowwise().sum());
-    result["time_step"] = gradient.time_step;
+    result["time_step"] = VectorXd(Eigen::Map<const VectorXd>(
+        gradient.time_steps.data(), static_cast<Eigen::Index>(gradient.time_steps.size())));
     result["stiffness_damping"] = gradient.viscosity.stiffness_damping;
     result["maxwell_modulus"] = gradient.viscosity.maxwell_modulus;
     result["maxwell_time"] = gradient.viscosity.maxwell_time;
@@ -241,6 +261,12 @@ void register_dynamics(py::module_& module) {
         .def_readonly("outcome", &MotionResult::outcome)
         .def_readonly("reason", &MotionResult::reason)
         .def_readonly("steps_done", &MotionResult::steps_done)
+        .def_readonly("fraction_done", &MotionResult::fraction_done)
+        .def_readonly("time_steps", &MotionResult::time_steps)
+        .def_readonly("steps_recorded", &MotionResult::steps_recorded)
+        .def_readonly("step_errors", &MotionResult::step_errors)
+        .def_readonly("step_factorizations", &MotionResult::step_factorizations)
+        .def_readonly("divided", &MotionResult::divided)
         .def_readonly("begun", &MotionResult::begun)
         .def_property_readonly("last_state", [](const MotionResult& r) { return r.last.q; })
         .def_property_readonly("last_velocity", [](const MotionResult& r) { return r.last.v; })

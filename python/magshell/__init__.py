@@ -28,6 +28,7 @@ from .errors import (
     NoGradient,
     NotConverged,
     ObjectiveFailed,
+    StepErrorWarning,
     UnitWarning,
 )
 from .mesh import generate as meshes
@@ -92,6 +93,7 @@ from .solve.options import (
     SDIRK2,
     SDIRK3,
     TRBDF2,
+    Adaptive,
     AdjointStorage,
     ImplicitEuler,
     MixedNewton,
@@ -113,6 +115,7 @@ __all__ = [
     "SDIRK2",
     "SDIRK3",
     "TRBDF2",
+    "Adaptive",
     "AdjointStorage",
     "AppliedField",
     "AreaLoad",
@@ -196,6 +199,7 @@ __all__ = [
     "SolveStep",
     "StVenantKirchhoff",
     "StableNeoHookean",
+    "StepErrorWarning",
     "Strains",
     "Style",
     "SurfaceTension",

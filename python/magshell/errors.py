@@ -98,6 +98,20 @@ class LargeStrainWarning(UserWarning):
         self.last_good: Any = last_good
 
 
+class StepErrorWarning(UserWarning):
+    """A warning about the time steps of a motion.
+
+    Either their estimated error exceeds 1 % of the extent, or more than a tenth of them took over 20 factorizations: then
+    they are too long. Or a gradient is computed through steps that were taken in parts, where the objective may jump.
+    It is raised once per scene, and again each time the errors have doubled. If warnings are turned into errors,
+    `last_good` holds the motion.
+    """
+
+    def __init__(self, message: str, last_good: Any = None):
+        super().__init__(message)
+        self.last_good: Any = last_good
+
+
 class FieldSamplingWarning(UserWarning):
     """A warning about a magnetic force on a shell that is wrong by more than 1 %, raised once per solve.
 

@@ -270,6 +270,14 @@ def _solves(s: Sample) -> Iterator[Call]:
         "progress": False,
     }
     yield Call("simulate", ms.simulate, motion)
+    listed = {"scene": s.scene, "steps": 2, "time_step": [1e-3, 2e-3], "progress": False}
+    yield Call("simulate in given steps", ms.simulate, listed)
+    adaptive = {"interval": 1e-3, "tolerance": 1e-5, "max_halvings": 3}
+    yield Call(
+        "Adaptive",
+        lambda **a: ms.simulate(s.scene, steps=1, time_step=ms.Adaptive(**a), progress=False),
+        adaptive,
+    )
     yield Call(
         "simulate on",
         ms.simulate,

@@ -31,6 +31,7 @@ NOT_CALLED = {
     "SolveStep": "a result",
     "Strains": "a result",
     "LargeStrainWarning": "a warning",
+    "StepErrorWarning": "a warning",
     "FieldSamplingWarning": "a warning",
     "MeshQualityWarning": "a warning",
     "UnitWarning": "a warning",

@@ -16,9 +16,10 @@ N = MESH.n_faces
 TIME_STEP = 1e-3
 
 
-def straight(value: np.ndarray) -> np.ndarray:
-    """Return a value over time, interpolated linearly between its first and its last row."""
-    share = np.linspace(0.0, 1.0, len(value)).reshape(-1, *(1 for _ in value.shape[1:]))
+def straight(value: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """Return a value at the ends of steps of these lengths, on a line from its first to its last row."""
+    share = np.concatenate([[0.0], np.cumsum(lengths)]) / lengths.sum()
+    share = share.reshape(-1, *(1 for _ in value.shape[1:]))
     return (1.0 - share) * value[0] + share * value[-1]
 
 
@@ -26,9 +27,14 @@ def as_function(value: np.ndarray, duration: float):
     return lambda t: value[0] + t / duration * (value[-1] - value[0])
 
 
+def lengths_of_steps(name: str) -> np.ndarray:
+    time_step = {**kind(name).fixed, **kind(name).controls}["time_step"]
+    return np.broadcast_to(time_step, kind(name).in_time)
+
+
 def values_that_go(name: str) -> dict:
     every = kind(name).of_objects.items()
-    return {key: straight(value) for key, value in every if kind(name).varies_in_time(*key)}
+    return {key: straight(value, lengths_of_steps(name)) for key, value in every if kind(name).varies_in_time(*key)}
 
 
 @pytest.mark.parametrize(
@@ -44,7 +50,7 @@ def test_arrays_and_functions_of_the_time_give_the_same_motion(name, integrator)
     fixed = {key: value for key, value in kind(name).fixed.items() if key != "keep"}
     moving = replace(kind(name), fixed={**fixed, "integrator": integrator})
     rows = values_that_go(name)
-    duration = moving.in_time * float({**moving.fixed, **moving.controls}["time_step"])
+    duration = float(lengths_of_steps(name).sum())
     by_arrays = moving.found(rows)
     by_functions = moving.found({key: as_function(value, duration) for key, value in rows.items()})
     moved = np.abs(by_arrays.positions - by_arrays.positions[0]).max()

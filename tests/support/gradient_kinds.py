@@ -33,6 +33,7 @@ from gradient_kinds_skeletons import (
     thrown_skeleton,
     turning_screw,
 )
+from gradient_kinds_steps import step_makers
 from gradient_scenes import Kind
 from gradient_world import (
     BEGIN,
@@ -339,7 +340,10 @@ MAKERS = {
     "tied sheets at rest": lambda: tied(False),
     "tied sheets in motion": lambda: tied(True),
     "two sheets in motion": two_sheets_in_motion,
-    **GROWTH_MAKERS,  # last: makers draw from one stream of random numbers
+    **GROWTH_MAKERS,  # makers draw from one stream of random numbers: new ones come last
+    **step_makers(
+        moving, lambda **options: thrown(ob.Box, **options, **RUBS), motorized_skeleton_in_motion, STEPS
+    ),
 }
 
 

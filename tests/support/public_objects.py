@@ -213,6 +213,7 @@ def _options(given: Arrays) -> dict[str, object]:
             for cls in (ms.Newton, ms.MixedNewton, ms.ProjectiveDynamics, ms.AdjointStorage)
         },
         **{cls.__name__: cls() for cls in (ms.ImplicitEuler, ms.TRBDF2, ms.SDIRK2, ms.SDIRK3)},
+        "adaptive": ms.Adaptive(1e-3),
         "ink": ms.PrintableSet(
             5e4, given([[1.0, 0, 0], [0, 1.0, 0]]), levels=given([0.0, 1.0]), frames=given([np.eye(3)] * 4)
         ),

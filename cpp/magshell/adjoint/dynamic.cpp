@@ -29,6 +29,7 @@ class Backward {
           scene_(model_.parameters().registry()) {
         scene_.load_parameters = model_.parameters().zero_load_parameters();
         g_.positions = g_.velocities = g_.mass = g_.damping = VectorXd::Zero(model_.size());
+        g_.time_steps.assign(input.time_steps.size(), 0.0);
         g_.load_parameters.assign(input.load_parameters.size(), model_.parameters().zero_load_parameters());
     }
 
@@ -79,8 +80,9 @@ class Backward {
 
     // Returns the gradient by the motor forces in the state after this number of steps; empty if the loss does not depend on them.
     VectorXd by_motor_forces(Index steps) const {
-        if (by_.motor_forces.empty() || steps % input_.record_every != 0) return {};
-        const VectorXd& by = by_.motor_forces[steps / input_.record_every];
+        const Index k = input_.recorded_after(steps);
+        if (by_.motor_forces.empty() || k < 0) return {};
+        const VectorXd& by = by_.motor_forces[k];
         return by.isZero(0.0) ? VectorXd() : by;
     }
 
@@ -115,7 +117,7 @@ class Backward {
               const VectorXd& by_motor_forces) {
         const double fraction = substep.fraction();
         const StepAlgebra algebra = stepper_.algebra(
-            fraction * input_.time_step, stepper_.tableau_from(record.begin, substep.dissipative));
+            fraction * input_.time_steps[step], stepper_.tableau_from(record.begin, substep.dissipative));
         const Tableau& tableau = algebra.tableau();
         const int n = tableau.stages, first = tableau.begins_explicitly ? 1 : 0;
         const double dt = algebra.dt(), adt = algebra.stage_time();
@@ -139,7 +141,8 @@ class Backward {
                          record,
                          load_parameters,
                          {}}};
-        double by_dt = 0.0;
+        double by_dt = by_dt_before_;
+        by_dt_before_ = 0.0;
         const VectorXd by_earlier = std::move(by_v_before_);
         by_v_before_ = VectorXd();
         BeforeStage by_end{VectorXd::Zero(model_.size()), VectorXd::Zero(model_.size())};
@@ -201,7 +204,7 @@ class Backward {
                                                      viscous.joints.by_begin.d_rate, g_.positions,
                                                      g_.velocities, scene_);
         }
-        g_.time_step += fraction * by_dt;
+        g_.time_steps[step] += fraction * by_dt;
         if (by_earlier.size() > 0) g_.velocities += by_earlier;
     }
 
@@ -299,8 +302,12 @@ class Backward {
         by_v_last += end.weight_last() * pull;
         g_.velocities += end.weight_begin() * pull;
         by_v_before_ = end.weight_before() * pull;
-        // Both substeps are fractions of the time step, so their ratio does not depend on it.
-        by.dt -= pull.dot(end.acceleration_change() + at.all.back().w) / algebra.dt();
+        // The acceleration is of degree -1 in the lengths of this substep and the one before.
+        const double by_before = pull.dot(end.change_by_dt_before());
+        by.dt -=
+            (pull.dot(end.acceleration_change() + at.all.back().w) + by_before * record.begin.dt_before) /
+            algebra.dt();
+        by_dt_before_ = by_before;
     }
 
     // Returns (K + W)^T times a motion of all dofs, with the matrix assembled last.
@@ -374,8 +381,8 @@ class Backward {
 
     // Adds the gradient of the loss by the state at the beginning of a step.
     void add_state_gradient(Index step) {
-        if (step % input_.record_every != 0) return;
-        const std::size_t k = step / input_.record_every;
+        const Index k = input_.recorded_after(step);
+        if (k < 0) return;
         g_.positions += by_.q[k];
         g_.velocities += by_.v[k];
     }
@@ -392,6 +399,7 @@ class Backward {
     VectorXd by_w_;
     VectorXd
         by_v_before_;  // by the velocity at the beginning of the step before that; empty if nothing depends on it
+    double by_dt_before_ = 0.0;  // by the length of the substep before the last one processed
     ViscousGradient by_strains_;
     double progress_ = 0.0;
 };

@@ -19,7 +19,7 @@ namespace magshell {
 struct MotionGradient {
     VectorXd positions, velocities;  // at the start, of all dofs
     VectorXd mass, damping;          // of all dofs
-    double time_step = 0.0;
+    std::vector<double> time_steps;  // one number a step
     Viscosity viscosity{0.0, 0.0, 0.0};
     VectorXd values;                              // of the scene
     std::vector<LoadParameters> load_parameters;  // as MotionInput::load_parameters

@@ -63,7 +63,15 @@ def _of_shell(name: str, unit: str, per: str) -> SolveKeyword:
 
 
 _TABLE = (
-    SolveKeyword("time_step", "s", ((),), _MOTION, "s, the length of a step.", minimum="positive"),
+    SolveKeyword(
+        "time_step",
+        "s",
+        ((),),
+        _MOTION,
+        "s, the length of a step; (m,), the lengths of m steps, which may be more than `steps` if they fill as many equal "
+        "intervals; or ms.Adaptive, which chooses them.",
+        minimum="positive",
+    ),
     SolveKeyword(
         "remanent_magnetization",
         "A/m",

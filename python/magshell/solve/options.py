@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from .. import _core
 from .._input.arrays import count
 from .._input.quantity import quantity
-from .._input.scalars import not_negative
-from .._input.tensors import detached, is_tensor
+from .._input.scalars import not_negative, positive
+from .._input.tensors import detached, is_tensor, positive_number
 from .._runtime.frozen import immutable
 
 if TYPE_CHECKING:
@@ -58,6 +59,72 @@ def clock_of(state: MotionState) -> Clock:
     """Return the clock of a MotionState; if its time was set by hand, a clock that starts there."""
     clock = state.clock
     return clock if clock is not None and clock.time == state.time else Clock(float(detached(state.time)))
+
+
+SHORTEST_STEP = 1e-12  # [s] of a motion
+_DEEPEST = 20  # halvings of an interval
+
+
+@immutable
+@dataclass(frozen=True)
+class Adaptive:
+    """Time steps of a motion that keep the estimated error of each step below a tolerance: `time_step` of ms.simulate.
+
+    interval: s, of the motion's time grid, whose intervals `steps` counts. States are recorded at its times, arrays in time
+        are given at them, and no step passes one: choose it as long as a step may be, and so that controls bend or jump only
+        at these times. A tensor has a gradient.
+    tolerance: m, of the error of the positions after one step, root mean square over vertices, as Trajectory.step_errors
+        has it. By default 1e-4 of the extent (the diagonal of the largest body's bounding box): a few hundred steps together
+        are then off by a few percent of it at most.
+    max_halvings: the shortest step is interval / 2^max_halvings, at most 2^20 and at least 1e-12 s. By default as many as
+        that allows.
+
+    Steps are interval / 2^k long and begin at multiples of their length. A step whose error exceeds the tolerance, or that
+    fails, is repeated with half or a quarter of the length; the next one is doubled if that is expected to keep the error
+    below half of the tolerance. Errors of steps add up: positions at the end are off by more than the tolerance.
+
+    An impact is resolved until a step times the jump of velocity is below the tolerance. Small changes of an input leave
+    the steps as they are, and results change smoothly; where they change the steps, results jump by about the tolerance.
+    Pass Trajectory.time_steps as `time_step` to repeat a motion with the same steps, for example in a line search.
+    Gradients are those of the steps that were accepted.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    >>> move = ms.simulate(scene, steps=4, time_step=ms.Adaptive(0.02, tolerance=2e-5))
+    >>> len(move), len(move.time_steps) > 4, bool(move.step_errors.max() <= 2e-5)
+    (5, True, True)
+    """
+
+    interval: Numbers
+    tolerance: float | None = None
+    max_halvings: int | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "interval", positive_number("interval", "s", self.interval))
+        interval = float(detached(self.interval))
+        if interval < SHORTEST_STEP:
+            raise ValueError(f"interval [s] must be at least {SHORTEST_STEP:g} s, got {interval:g}")
+        if self.tolerance is not None:
+            object.__setattr__(self, "tolerance", positive("tolerance", "m", self.tolerance))
+        if self.max_halvings is None:
+            return
+        if count("max_halvings", self.max_halvings, least=0) > _DEEPEST:
+            raise ValueError(f"max_halvings must be at most {_DEEPEST}, got {self.max_halvings}")
+        if interval / 2**self.max_halvings < SHORTEST_STEP:
+            raise ValueError(
+                f"max_halvings = {self.max_halvings} of an interval of {interval:g} s would give steps below "
+                f"{SHORTEST_STEP:g} s; at most {self._deepest_possible} are possible"
+            )
+
+    @property
+    def _deepest_possible(self) -> int:
+        return min(_DEEPEST, int(math.log2(float(detached(self.interval)) / SHORTEST_STEP) + 1e-9))
+
+    @property
+    def _deepest(self) -> int:
+        return self._deepest_possible if self.max_halvings is None else self.max_halvings
 
 
 @immutable

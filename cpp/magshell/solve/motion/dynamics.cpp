@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <sstream>
 
 #include "magshell/core/errors.h"
 #include "magshell/solve/motion/edge_rotations.h"
 #include "magshell/solve/motion/energy_balance.h"
+#include "magshell/solve/motion/step_ladder.h"
 
 namespace magshell {
 namespace {
@@ -47,13 +49,17 @@ void record_state(const Model& model, const MotionInput& input, MotionResult& re
 
 class Run {
   public:
-    Run(Newton& newton, const MotionInput& input, const AdjointStorageOptions& keep, MotionResult& result)
+    // grown: the input itself if the steps are to be chosen; it receives those that are accepted. Else nullptr.
+    Run(Newton& newton, const MotionInput& input, MotionInput* grown, const AdjointStorageOptions& keep,
+        MotionResult& result)
         : newton_(newton),
           model_(newton.model()),
           input_(input),
+          grown_(grown),
           result_(result),
           stepper_(newton, input.tableau, input.inertia, input.viscosity, input.projective),
           balance_(model_, input.inertia) {
+        if (grown_) grown_->load_parameters = input_.adaptive.load_parameters(0, 0.0, 1.0);
         result_.start = result_.last = beginning(newton.model(), input);
         result_.begun = true;
         if (keep.gradients) plan(keep);
@@ -62,21 +68,91 @@ class Run {
     bool run() {
         record();
         if (result_.keep == AdjointStorage::checkpoints) result_.checkpoints[0] = result_.start;
-        while (result_.steps_done < input_.steps) {
+        return grown_ ? choose_steps() : take_steps();
+    }
+
+  private:
+    // A step, or an attempt at one.
+    struct Attempt {
+        bool succeeded = false, divided = false;
+        Substeps substeps;
+        std::vector<SubstepRecord> records;  // if they are stored
+        double error = 0.0;                  // [m], the sum of those of the substeps
+    };
+
+    bool take_steps() {
+        while (result_.steps_done < input_.steps()) {
             const Index step = result_.steps_done;
             if (step == next_checkpoint_) keep_checkpoint(step);
+            const int before = newton_.factorizations();
             MotionState state = result_.last;
-            if (!take(step, state)) return false;
-            result_.last = std::move(state);
-            if (++result_.steps_done % input_.record_every == 0) record();
+            Attempt attempt = take(step, 1.0, true, state);
+            if (!attempt.succeeded) return false;
+            result_.fraction_done = static_cast<double>(step + 1) / static_cast<double>(input_.steps());
+            finish_step(std::move(attempt), std::move(state), newton_.factorizations() - before);
         }
         return true;
     }
 
-  private:
+    // Takes steps on a ladder; only those that are accepted remain in the input and in the result.
+    bool choose_steps() {
+        const AdaptiveSteps& adaptive = input_.adaptive;
+        StepLadder ladder(adaptive.tolerance, input_.tableau.stages, adaptive.deepest);
+        const std::size_t rows = input_.tableau.stages + 1;
+        int before = newton_.factorizations();
+        for (Index interval = 0; interval < adaptive.intervals;) {
+            const Index step = result_.steps_done;
+            grown_->time_steps.resize(step);
+            grown_->time_steps.push_back(ladder.fraction() * adaptive.interval);
+            grown_->load_parameters.resize(rows * step);
+            for (LoadParameters& each : adaptive.load_parameters(interval, ladder.begin(), ladder.end()))
+                grown_->load_parameters.push_back(std::move(each));
+            MotionState state = result_.last;
+            Attempt attempt = take(step, ladder.fraction(), false, state);
+            if (!attempt.succeeded || !ladder.accepts(attempt.error)) {
+                if (ladder.reject(attempt.succeeded ? attempt.error
+                                                    : std::numeric_limits<double>::infinity()))
+                    continue;
+                if (attempt.succeeded) {
+                    std::ostringstream reason;
+                    reason << "its error is estimated to be " << attempt.error
+                           << " m, above the tolerance of " << adaptive.tolerance << " m";
+                    result_.reason = reason.str();
+                }
+                return false;
+            }
+            if (ladder.accept(attempt.error) && ++interval % adaptive.record_every == 0)
+                grown_->recorded.push_back(step + 1);
+            result_.fraction_done =
+                (static_cast<double>(interval) + ladder.begin()) / static_cast<double>(adaptive.intervals);
+            finish_step(std::move(attempt), std::move(state), newton_.factorizations() - before);
+            before = newton_.factorizations();
+            if (result_.keep != AdjointStorage::nothing) thin_out(step);
+        }
+        return true;
+    }
+
+    void finish_step(Attempt attempt, MotionState state, int factorizations) {
+        const Index step = result_.steps_done;
+        if (attempt.substeps.size() > 1 || attempt.substeps.front().dissipative)
+            result_.substeps[step] = std::move(attempt.substeps);
+        if (attempt.divided) result_.divided.push_back(step);
+        if (!attempt.records.empty()) {
+            for (const SubstepRecord& substep : attempt.records) result_.bytes += bytes_of(substep);
+            result_.steps.push_back(std::move(attempt.records));
+        }
+        result_.step_errors.push_back(attempt.error);
+        result_.step_factorizations.push_back(factorizations);
+        std::swap(result_.last, state);
+        before_last_ = std::move(state);
+        ++result_.steps_done;
+        if (input_.recorded_after(result_.steps_done) >= 0) record();
+    }
+
     // Decides what is stored: all stages, if the budget allows it. Otherwise a third of the budget is for the stages of the last
     // steps, a third for checkpoints, and a third for the steps that are repeated. Factorizations are stored on demand only:
-    // allocating memory for each costs more than the adjoint saves.
+    // allocating memory for each costs more than the adjoint saves. The number of steps that are yet to be chosen is unknown, so
+    // all stages are stored until they exceed the budget.
     void plan(const AdjointStorageOptions& keep) {
         const bool explicit_first = input_.tableau.begins_explicitly;
         const std::size_t vector = sizeof(double) * model_.size();
@@ -85,19 +161,21 @@ class Run {
         if (input_.viscosity.maxwell()) state += strains;
         if (explicit_first && input_.viscosity.any()) state += (input_.viscosity.maxwell() ? 2 : 1) * strains;
         const std::size_t step = state + input_.tableau.stages * vector;
-        const bool fits = step * static_cast<std::size_t>(input_.steps) <= keep.budget;
+        const bool fits = step * static_cast<std::size_t>(input_.steps()) <= keep.budget;
         result_.keep = keep.wanted != AdjointStorage::nothing ? keep.wanted
                        : fits                                 ? AdjointStorage::stages
                                                               : AdjointStorage::checkpoints;
-        if (result_.keep != AdjointStorage::checkpoints) return;
+        budget_ =
+            keep.wanted == AdjointStorage::nothing ? keep.budget : std::numeric_limits<std::size_t>::max();
+        if (result_.keep != AdjointStorage::checkpoints && !grown_) return;
         result_.leaf = std::max<Index>(1, static_cast<Index>(keep.budget / 3 / step));
         result_.slots = std::max<Index>(1, static_cast<Index>(keep.budget / 3 / state));
         slots_left_ = result_.slots;
-        aim(0);
+        if (!grown_) aim(0);
     }
 
     void aim(Index step) {
-        const Index ahead = next_checkpoint(input_.steps - result_.leaf - step, result_.leaf, slots_left_);
+        const Index ahead = next_checkpoint(input_.steps() - result_.leaf - step, result_.leaf, slots_left_);
         next_checkpoint_ = ahead > 0 ? step + ahead : -1;
     }
 
@@ -106,6 +184,27 @@ class Run {
         result_.bytes += bytes_of(result_.last);
         --slots_left_;
         aim(step);
+    }
+
+    // Stores the beginning of a chosen step that was just taken, at equal distances that double when all slots are taken. Exchanges
+    // stages for such checkpoints when they exceed the budget.
+    void thin_out(Index step) {
+        if (result_.keep == AdjointStorage::checkpoints) {
+            if (step % spacing_ == 0) result_.checkpoints[step] = before_last_;
+        } else if (result_.bytes > budget_) {
+            result_.keep = AdjointStorage::checkpoints;
+            for (std::size_t k = 0; k < result_.steps.size(); ++k)
+                result_.checkpoints[static_cast<Index>(k)] = std::move(result_.steps[k].front().begin);
+            result_.steps.clear();
+        } else {
+            return;
+        }
+        while (static_cast<Index>(result_.checkpoints.size()) > result_.slots) {
+            spacing_ *= 2;
+            std::erase_if(result_.checkpoints, [&](const auto& each) { return each.first % spacing_ != 0; });
+        }
+        result_.bytes = 0;
+        for (const auto& each : result_.checkpoints) result_.bytes += bytes_of(each.second);
     }
 
     // Returns true if a step starts without the rates of a previous one and has rigid bodies or skeletons: their first
@@ -123,13 +222,18 @@ class Run {
         return ahead;
     }
 
-    // Takes a step, in substeps if the whole step fails. Returns false if the shortest substep fails.
-    bool take(Index step, MotionState& state) {
-        const bool last = step >= input_.steps - result_.leaf;
-        const bool keep = result_.keep == AdjointStorage::stages || result_.keep == AdjointStorage::factors ||
-                          (result_.keep == AdjointStorage::checkpoints && last);
-        std::vector<SubstepRecord> records;
-        Substeps done, ahead = needs_short_start(state) ? short_start_substeps() : Substeps{Substep{}};
+    bool stores_stages(Index step) const {
+        if (result_.keep == AdjointStorage::checkpoints)
+            return !grown_ && step >= input_.steps() - result_.leaf;
+        return result_.keep != AdjointStorage::nothing;
+    }
+
+    // Takes a step: the given fraction of an interval. If the whole step fails, takes it in substeps if it is divisible; the attempt fails
+    // if the shortest substep fails.
+    Attempt take(Index step, double fraction, bool divisible, MotionState& state) {
+        const bool keep = stores_stages(step);
+        Attempt attempt;
+        Substeps ahead = needs_short_start(state) ? short_start_substeps() : Substeps{Substep{}};
         while (!ahead.empty()) {
             const Substep substep = ahead.back();
             ahead.pop_back();
@@ -137,8 +241,9 @@ class Run {
             const Tableau& tableau = stepper_.tableau_from(state, substep.dissipative);
             const std::vector<LoadParameters> load_parameters =
                 stage_load_parameters(input_, tableau, step, substep);
-            const double dt = substep.fraction() * input_.time_step;
-            const bool recorded = keep || balance_.applies(), shortest = substep.fraction() <= smallest_part;
+            const double dt = substep.fraction() * input_.time_steps[step];
+            const bool recorded = keep || balance_.applies(),
+                       shortest = fraction * substep.fraction() <= smallest_part;
             const bool taken =
                 stepper_.step(state, dt, substep.dissipative, load_parameters, recorded ? &record : nullptr,
                               result_.keep == AdjointStorage::factors, result_.reason);
@@ -147,26 +252,27 @@ class Run {
                 taken && balance_.applies() && !(calm && shortest) &&
                 balance_.gains_energy(stepper_.algebra(dt, tableau), record, state, load_parameters);
             if (taken && !gains_energy) {
-                done.push_back(substep);
-                if (keep) records.push_back(std::move(record));
+                attempt.error += stepper_.error();
+                attempt.substeps.push_back(substep);
+                if (keep) attempt.records.push_back(std::move(record));
                 continue;
             }
-            if (gains_energy) state = std::move(record.begin);
+            attempt.divided = true;
+            if (gains_energy) {
+                state = std::move(record.begin);
+                result_.reason = "bodies in contact gained energy";
+            }
             if (gains_energy && !calm) {
                 ahead.push_back({substep.begin, substep.end, true});
                 continue;
             }
-            if (shortest) return false;
+            if (!divisible || shortest) return attempt;
             const double middle = 0.5 * (substep.begin + substep.end);
             ahead.push_back({middle, substep.end, substep.dissipative});
             ahead.push_back({substep.begin, middle, substep.dissipative});
         }
-        if (done.size() > 1 || done.front().dissipative) result_.substeps[step] = done;
-        if (keep) {
-            for (const SubstepRecord& substep : records) result_.bytes += bytes_of(substep);
-            result_.steps.push_back(std::move(records));
-        }
-        return true;
+        attempt.succeeded = true;
+        return attempt;
     }
 
     void record() {
@@ -185,10 +291,14 @@ class Run {
     Newton& newton_;
     Model& model_;
     const MotionInput& input_;
+    MotionInput* grown_;
     MotionResult& result_;
     Stepper stepper_;
     EnergyBalance balance_;
     Index next_checkpoint_ = -1, slots_left_ = 0;
+    Index spacing_ = 1;        // steps between checkpoints of chosen steps
+    std::size_t budget_ = 0;   // [bytes] of the stages of chosen steps
+    MotionState before_last_;  // the state before the last step
 };
 
 // Returns how many steps a number of checkpoints covers if each step is repeated so often: leaf (slots + repetitions choose slots).
@@ -222,6 +332,11 @@ LoadParameters MotionInput::load_parameters_at(Index step, double fraction) cons
     return interpolate(load_parameters[first], load_parameters[first + 1], weight);
 }
 
+Index MotionInput::recorded_after(Index steps) const {
+    const auto found = std::lower_bound(recorded.begin(), recorded.end(), steps);
+    return found == recorded.end() || *found != steps ? -1 : static_cast<Index>(found - recorded.begin());
+}
+
 Substeps substeps_of(const std::map<Index, Substeps>& substeps, Index step) {
     const auto found = substeps.find(step);
     return found == substeps.end() ? Substeps{Substep{}} : found->second;
@@ -234,8 +349,8 @@ void repeat_step(Stepper& stepper, const MotionInput& input, Index step, const S
         std::string reason;
         const std::vector<LoadParameters> load_parameters =
             stage_load_parameters(input, stepper.tableau_from(state, substep.dissipative), step, substep);
-        if (!stepper.step(state, substep.fraction() * input.time_step, substep.dissipative, load_parameters,
-                          kept ? &record : nullptr, false, reason))
+        if (!stepper.step(state, substep.fraction() * input.time_steps[step], substep.dissipative,
+                          load_parameters, kept ? &record : nullptr, false, reason))
             throw InvalidInput("a step that was taken before cannot be repeated: " + reason);
         if (kept) kept->push_back(std::move(record));
     }
@@ -256,16 +371,22 @@ MotionResult simulate(Model& model, const MotionInput& input, const AdjointStora
     model.contacts().forget();
     const ScopedTimeVarying varying(model.parameters(), input.varying);
     Newton newton(model, input.newton, [&](double residual) {
-        if (watch) watch(static_cast<double>(result.steps_done) / static_cast<double>(input.steps), residual);
+        if (watch) watch(result.fraction_done, residual);
     });
+    MotionInput grown;
+    const bool chooses = input.adaptive.intervals > 0;
+    if (chooses) grown = input;
+    const MotionInput& used = chooses ? grown : input;
     try {
-        Run run(newton, input, keep, result);
+        Run run(newton, used, chooses ? &grown : nullptr, keep, result);
         result.outcome = run.run() ? Outcome::converged : Outcome::failed;
     } catch (const Interrupted&) {
         result.outcome = Outcome::interrupted;
         result.reason = "interrupted";
         if (!result.begun) record_state(model, input, result);
     }
+    result.time_steps.assign(used.time_steps.begin(), used.time_steps.begin() + result.steps_done);
+    result.steps_recorded.assign(used.recorded.begin(), used.recorded.begin() + result.recorded.size());
     result.iterations = newton.iterations();
     result.factorizations = newton.factorizations();
     result.linear_time = newton.linear_time();

@@ -1,15 +1,29 @@
-// Time integration of a motion: equal steps, which are repeated in substeps if one fails, and what is stored for the adjoint.
+// Time integration of a motion, in given steps or in steps that its error estimate chooses, and what is stored for the adjoint.
+//
+// A given step that fails is repeated in substeps; a chosen one is made shorter.
 //
 // If bodies in contact gain energy in a step that no force put in, implicit Euler repeats the step (the dissipative fallback), in substeps
 // if it gains energy as well.
 #pragma once
 
+#include <functional>
 #include <map>
 
 #include "magshell/solve/motion/stepper.h"
 #include "magshell/solve/statics.h"
 
 namespace magshell {
+
+/// Steps that are chosen by their estimated errors, on a ladder (step_ladder.h) in each of several equal intervals.
+struct AdaptiveSteps {
+    double tolerance = 0.0;  // [m] of one step
+    double interval = 0.0;   // [s]
+    Index intervals = 0;     // 0: the steps are given
+    int deepest = 0;         // the shortest step is interval / 2^deepest
+    Index record_every = 1;  // intervals between recorded states
+    /// Returns the load parameters of a step, from one fraction of an interval to another: at its beginning and at its stages.
+    std::function<std::vector<LoadParameters>(Index interval, double begin, double end)> load_parameters;
+};
 
 /// Everything a motion is computed from.
 struct MotionInput {
@@ -18,16 +32,19 @@ struct MotionInput {
     Inertia inertia;
     Viscosity viscosity;
     Tableau tableau;
-    double time_step = 0.0;  // [s]
-    Index steps = 0;
+    std::vector<double> time_steps;     // [s]; empty if they are to be chosen
+    std::vector<Index> recorded = {0};  // numbers of steps after which a state is recorded, ascending
+    AdaptiveSteps adaptive;
     /// Load parameters at the beginning of each step and at its stages, steps (stages + 1) in all; linear in between.
     std::vector<LoadParameters> load_parameters;
     TimeVaryingParameters
         varying;  // the values that vary in time; their numbers are appended to `load_parameters`
     NewtonOptions newton;
     ProjectiveOptions projective;  // used if it solves the stages
-    Index record_every = 1;        // steps between recorded states
 
+    Index steps() const { return static_cast<Index>(time_steps.size()); }
+    /// Returns the number of the state that is recorded after so many steps, or -1 if none is.
+    Index recorded_after(Index steps) const;
     /// Returns the load parameters at a fraction of a step.
     LoadParameters load_parameters_at(Index step, double fraction) const;
     /// Returns the index of the entry of `load_parameters` before a fraction of a step, and the weight of the entry after it.
@@ -61,9 +78,15 @@ struct MotionResult {
     Outcome outcome = Outcome::failed;
     std::string reason;
     Index steps_done = 0;
-    bool begun = false;                  // whether `start` has the edge rotations that the motion begins with
-    MotionState start, last;             // start: as the first step used it
-    std::vector<MotionState> recorded;   // every record_every steps, including the start
+    bool begun = false;                 // whether `start` has the edge rotations that the motion begins with
+    MotionState start, last;            // start: as the first step used it
+    double fraction_done = 0.0;         // of the motion
+    std::vector<double> time_steps;     // [s] of the steps done
+    std::vector<Index> steps_recorded;  // numbers of steps after which states were recorded
+    std::vector<double> step_errors;    // [m] estimated, of the steps done
+    std::vector<int> step_factorizations;  // of the steps done, and of attempts at them
+    std::vector<Index> divided;          // steps that failed as a whole, or that implicit Euler took instead
+    std::vector<MotionState> recorded;   // including the start
     std::vector<double> kinetic_energy;  // [J], of the recorded states
     std::vector<std::vector<double>>
         energies;  // [J], of the recorded states, term by term; NaN if interrupted before they were known

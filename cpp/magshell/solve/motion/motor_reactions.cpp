@@ -18,6 +18,9 @@ MotorReactions::MotorReactions(Newton& newton, const Inertia& inertia, const Mot
     weight_begin_ = -(1.0 + r) / dt;
     weight_before_ = r * r / (1.0 + r) / dt;
     change_ = weight_last_ * last.v + weight_begin_ * begin.v + weight_before_ * begin.v_before - last.w;
+    const double square = (1.0 + r) * (1.0 + r);
+    by_dt_before_ = -r / (begin.dt_before * dt) *
+                    (last.v / square - begin.v + (2.0 * r + r * r) / square * begin.v_before);
     const VectorXd pull = inertia.mass.cwiseProduct(change_);
     target_ -=
         (proximal.weights->array() != 0.0).select(pull.array() / proximal.weights->array(), 0.0).matrix();

@@ -26,6 +26,8 @@ class MotorReactions {
     bool converged() const { return converged_; }
     /// Returns w_e - w, empty in a first step: w_e = weight_last v_last + weight_begin v_begin + weight_before v_before [1/s].
     const VectorXd& acceleration_change() const { return change_; }
+    /// Returns the derivative of w_e by the length of the step before; empty in a first step.
+    const VectorXd& change_by_dt_before() const { return by_dt_before_; }
     double weight_last() const { return weight_last_; }
     double weight_begin() const { return weight_begin_; }
     double weight_before() const { return weight_before_; }
@@ -37,7 +39,7 @@ class MotorReactions {
 
     Newton& newton_;
     ProximalTerm proximal_;
-    VectorXd q_, target_, change_;
+    VectorXd q_, target_, change_, by_dt_before_;
     double weight_last_ = 0.0, weight_begin_ = 0.0, weight_before_ = 0.0;
     bool converged_ = true;
 };

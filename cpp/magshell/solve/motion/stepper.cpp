@@ -4,6 +4,7 @@
 
 #include "magshell/solve/globalization/contact_predictor.h"
 #include "magshell/solve/motion/motor_reactions.h"
+#include "magshell/solve/motion/step_error.h"
 
 namespace magshell {
 
@@ -200,6 +201,7 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative,
         model.set_angle_branches(state.angle_branches);
         return false;
     }
+    error_ = step_error(model, step, state.v, rates);
     MotionState end{std::move(q), rates.back().v,          model.angle_branches(), std::move(e),
                     {},           std::move(motor_forces), std::move(held)};
     if (model.dof_map().has_motors()) {

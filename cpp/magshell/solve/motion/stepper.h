@@ -85,6 +85,8 @@ class Stepper {
     /// Returns the method of a step from this state: SDIRK2 if it needs rates that the state lacks; implicit Euler if dissipative.
     const Tableau& tableau_from(const MotionState& state, bool dissipative) const;
     const StepAlgebra& algebra(double dt, const Tableau& tableau);
+    /// Returns the estimated error of the step taken last [m] (step_error.h).
+    double error() const { return error_; }
 
   private:
     /// Solves a stage of a step from q, the prediction; by standard Newton steps or a descent if the usual steps fail.
@@ -98,6 +100,7 @@ class Stepper {
     Inertia inertia_;
     Viscosity viscosity_;
     std::unique_ptr<StepAlgebra> algebra_;  // of the last step
+    double error_ = 0.0;                    // [m]
 };
 
 /// Returns the rates with which a step begins: those of the state, if the method uses them; else none.

@@ -206,6 +206,8 @@ class Scene(PlotMixin):
         self._turn, self._solving = threading.RLock(), False
         self._warned_of_obtuse_faces = False
         self._warned_of_strain = 0.0
+        self._warned_of_steps = 0.0
+        self._warned_of_jumps = False
         self._warned_of_units: set[str] = set()
         self._model = _core.Model(
             n_vertices=mesh.n_vertices,

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ... import _core
-from ...errors import NoGradient
+from ..._runtime.frozen import remember
+from ..._runtime.warning_stacklevel import callers_level
+from ...errors import NoGradient, StepErrorWarning
 from ...model.scene.values import Gradient
 from ..options import ProjectiveDynamics
 from .static import by_leaf
 
 if TYPE_CHECKING:
+    from ...model.scene.scene import Scene
     from ..dynamics.motion_inputs import MotionInputs
 
 
@@ -31,12 +35,14 @@ class MotionAdjoint:
         asked, found, inputs = self._asked, self._found, self._asked.inputs
         if found.outcome != _core.Outcome.converged:
             raise NoGradient(
-                f"no gradient here: the motion stopped after {found.steps_done} of {asked.steps} steps ({found.reason})"
+                f"no gradient here: the motion stopped after {100 * found.fraction_done:.3g} % of its {asked.steps} steps "
+                f"({found.reason})"
             )
         if isinstance(asked.integrator, ProjectiveDynamics):
             why = asked.integrator.without_gradient(inputs.scene)
             if why:
                 raise NoGradient(f"no gradient here: {why}")
+        _warn_of_jumps(inputs.scene, found.divided)
         with inputs.in_core():
             found_by = _core.pull_back_motion(inputs.scene._model, asked.core, found, *by_outputs)
         gradient = Gradient(inputs.scene, found_by.pop("values"), found_by.pop("controls"), found_by)
@@ -49,3 +55,17 @@ class MotionAdjoint:
             "no tangents of a motion: ms.simulate has gradients in reverse mode only. Use backward(), torch.func.vjp or "
             'jacrev, and GaussNewton(jacobian="backward")'
         )
+
+
+def _warn_of_jumps(scene: Scene, divided: Sequence[int]) -> None:
+    """Warn once per scene that an objective of a motion may jump, because steps that failed were taken in parts."""
+    if not len(divided) or scene._warned_of_jumps:
+        return
+    named = ", ".join(map(str, divided[:5])) + (", ..." if len(divided) > 5 else "")
+    warning = StepErrorWarning(
+        f"the motion took {len(divided)} steps in parts, or by implicit Euler instead of its integrator (step {named}): the "
+        "objective may jump here, because a small change may divide them in another way. Take shorter steps, or "
+        "time_step=ms.Adaptive(interval, tolerance) and its time_steps for a line search."
+    )
+    warnings.warn(warning, stacklevel=callers_level())
+    remember(scene, _warned_of_jumps=True)

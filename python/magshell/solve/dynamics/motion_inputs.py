@@ -17,15 +17,16 @@ from ...model.contact.contacts_to_core import check_outside, poses
 from ...model.rigid.equimomental_points import check_joints, check_rigid, own_velocities
 from ...model.scene.plausible import warn_of_field
 from ...model.scene.solve_inputs import Inputs
-from ..options import Clock, Integrator, Newton, clock_of
+from ..options import Adaptive, Clock, Integrator, Newton, clock_of
 from ..statics.equilibrium import Equilibrium
 from ..statics.start import check_faces
-from .schedule import Schedule, TimePoints
+from .schedule import Schedule
 from .scheduled_values import ScheduledValues
+from .step_errors import tolerance_of
+from .time_steps import TimePoints, TimeSteps, steps_of
 from .trajectory import MotionState, Trajectory
 
 if TYPE_CHECKING:
-    from ..._input.kinds import Numbers
     from ..options import AdjointStorage
 
 
@@ -33,6 +34,7 @@ class MotionInputs:
     """The inputs of one motion, checked. Tensors among them that require a gradient join the leaves of `inputs`.
 
     arguments: the keywords of ms.simulate that are in the table of solve_keywords.py, but those of `inputs`.
+    chosen: the lengths of the steps that an Adaptive has accepted [s]; None: it is still to choose them.
     """
 
     inputs: Inputs
@@ -41,7 +43,7 @@ class MotionInputs:
     steps: int
     keep: Any
     memory_budget: int
-    given_time_step: Numbers
+    time_steps: TimeSteps
 
     def __init__(
         self,
@@ -55,6 +57,7 @@ class MotionInputs:
         integrator: Integrator,
         solver: Newton,
         schedules: Iterable[Schedule] = (),
+        chosen: list[float] | None = None,
     ):
         self.inputs, self.integrator = inputs, integrator
         self.steps, self.record_every = count("steps", steps), count("record_every", record_every)
@@ -63,26 +66,32 @@ class MotionInputs:
                 f"record_every must be at most steps = {self.steps}, got {self.record_every}: "
                 "only the start would be recorded"
             )
+        given = arguments["time_step"]
+        adaptive = given if isinstance(given, Adaptive) else None
         check_memory(self.steps, self.record_every, len(integrator._times) + 1, inputs.scene._model.size)
         self.keep, self.memory_budget = (
             getattr(_core.Keep, adjoint_storage.what or "nothing"),
             int(adjoint_storage.memory_budget),
         )
-        self.given_time_step, self._outside = arguments["time_step"], None
-        self.time_step: float = float(inputs.keyword("time_step", arguments["time_step"]))
+        chooses = adaptive is not None and chosen is None
+        self._outside = None
+        self.tolerance: float = tolerance_of(inputs.scene, adaptive)
         self._mass = inputs.values.masses
         self._damping = self._damping_of_points(arguments["damping"])
         law = self._viscosity(arguments)
         self.start: MotionState = self._begin(start, arguments["velocities"])
-        self.clock: Clock = clock_of(self.start).going_on(self.time_step)
-        self.time_points: TimePoints = TimePoints(
-            self.steps, integrator._times, self.clock, self.given_time_step
-        )
-        self._load_parameters = {
-            name: self._controls(name, value)
+        clock = clock_of(self.start)
+        if adaptive is None or chosen is None:
+            self.time_steps: TimeSteps = steps_of(inputs, clock, self.steps, given)
+        else:
+            self.time_steps = TimeSteps.chosen(inputs, clock, self.steps, adaptive, chosen)
+        self.time_points: TimePoints = TimePoints(self.time_steps, integrator._times)
+        self._schedules = {
+            name: self._schedule_of_keyword(name, value)
             for name, value in arguments.items()
             if name in SOLVE_KEYWORDS and SOLVE_KEYWORDS[name].varies
         }
+        self._load_parameters = {name: self._controls(each) for name, each in self._schedules.items()}
         self._scheduled = ScheduledValues(self, list(schedules))
         if self._outside is not None:
             check_outside(inputs.scene, inputs.values, self._outside, 0.0)
@@ -98,42 +107,70 @@ class MotionInputs:
                 "mass": self._mass,
                 "damping": self._damping,
                 "integrator": integrator._name,
-                "time_step": self.time_step,
-                "steps": self.steps,
+                "time_steps": [] if chooses else self.time_steps.lengths,
+                "recorded": [0] if chooses else self.time_steps.grid_ends[:: self.record_every],
+                "adaptive": self._ladder(adaptive) if chooses else None,
                 "controls": self._all_controls(),
                 "varying": self._scheduled.entries,
                 "newton": solver._newton_options(),
                 "projective": getattr(integrator, "_projective", None),
-                "record_every": self.record_every,
             },
         )
 
-    def recorded(self, name: str, count: int) -> np.ndarray:
-        """Return a load parameter at the first `count` recorded states, the start among them, (count, *row)."""
-        return self._load_parameters[name][self.time_points.recorded(count, self.record_every)]
+    def recorded(self, name: str, after: np.ndarray) -> np.ndarray:
+        """Return a load parameter at the states recorded after so many steps, the start among them, (n, *row)."""
+        return self._load_parameters[name][self.time_points.recorded(after)]
 
-    def varied(self, count: int) -> dict[tuple[Any, ...], np.ndarray]:
-        """Return the varying values of objects at the first `count` recorded states, {(object, name): (count, ...)}."""
-        at = self.time_points.recorded(count, self.record_every)
+    def varied(self, after: np.ndarray) -> dict[tuple[Any, ...], np.ndarray]:
+        """Return the varying values of objects at the states recorded after so many steps, {(object, name): (n, ...)}."""
+        at = self.time_points.recorded(after)
         return {key: rows[at] for key, rows in self._scheduled.varied.items()}
+
+    def _ladder(self, adaptive: Adaptive) -> dict[str, Any]:
+        """Return the core's description of steps that are to be chosen."""
+        return {
+            "tolerance": self.tolerance,
+            "interval": self.time_steps.clock.time_step,
+            "intervals": self.steps,
+            "deepest": adaptive._deepest,
+            "record_every": self.record_every,
+            "controls": self._controls_of_step,
+        }
+
+    def _controls_of_step(self, interval: int, begin: float, end: float) -> np.ndarray:
+        """Return all load parameters at the time points of a step, from one fraction of an interval to another."""
+        points = TimePoints(self.time_steps.part(interval, begin, end), self.integrator._times)
+        numbers = {
+            name: np.ascontiguousarray(detached(each.at(points)), dtype=np.float64)
+            for name, each in self._schedules.items()
+        }
+        rows, poses = self._scheduled.at(points)
+        return self._in_layout(numbers, {**self._poses(points.times), **poses}, rows)
 
     def _all_controls(self) -> np.ndarray:
         """Return all load parameters at all time points in the core's layout, (time points, m)."""
-        layout, moving = self.inputs.scene._control_layout, {**self._poses(), **self._scheduled.poses}
-        rows = {("scene", name): array for name, array in self._load_parameters.items()}
-        rows |= {(f"obstacle {k}", "pose"): array for k, array in moving.items()}
-        return np.concatenate([layout.rows(rows, len(self.time_points)), self._scheduled.rows], axis=1)
+        moving = self._poses(self.time_points.times)
+        if moving and (time_step := self.time_steps.tensor) is not None:
+            self.inputs.refuse("time_step", time_step, "obstacles move by a function of the time")
+        return self._in_layout(
+            self._load_parameters, {**moving, **self._scheduled.poses}, self._scheduled.rows
+        )
 
-    def _poses(self) -> dict[int, np.ndarray]:
-        """Return the poses at all time points of obstacles that have a `motion`, {number: (time points, 4, 3)}."""
+    def _in_layout(
+        self, load_parameters: dict[str, np.ndarray], poses: dict[int, np.ndarray], further: np.ndarray
+    ) -> np.ndarray:
+        rows = {("scene", name): array for name, array in load_parameters.items()}
+        rows |= {(f"obstacle {k}", "pose"): array for k, array in poses.items()}
+        layout = self.inputs.scene._control_layout
+        return np.concatenate([layout.rows(rows, len(further)), further], axis=1)
+
+    def _poses(self, times: np.ndarray) -> dict[int, np.ndarray]:
+        """Return the poses at some times of obstacles that have a `motion`, {number: (n, 4, 3)}."""
         values, obstacles = self.inputs.values, self.inputs.scene.obstacles
         moving = {k: values.current(each) for k, each in enumerate(obstacles) if each.motion is not None}
-        if moving:
-            self.inputs.refuse("time_step", self.given_time_step, "obstacles move by a function of the time")
-        times = self.time_points.times
         return {k: poses(each, times) for k, each in moving.items()}
 
-    def _controls(self, name: str, value) -> np.ndarray:
+    def _schedule_of_keyword(self, name: str, value: Any) -> Schedule:
         unit, (row,) = SOLVE_KEYWORDS[name].unit, SOLVE_KEYWORDS[name].shapes
         if name == "applied_flux_density" and value is None:
             if self.inputs.scene.has_uniform_field:
@@ -141,18 +178,21 @@ class MotionInputs:
             value = np.zeros(3)
         elif name == "applied_flux_density" and not self.inputs.scene.has_uniform_field:
             raise ValueError("applied_flux_density was given, but the scene has no UniformField")
-        numbers = self.at_time_points(Schedule(self.inputs.scene, name, unit, row, value))
-        if name == "applied_flux_density":
+        return Schedule(self.inputs.scene, name, unit, row, value)
+
+    def _controls(self, schedule: Schedule) -> np.ndarray:
+        numbers = self.at_time_points(schedule)
+        if schedule.name == "applied_flux_density":
             warn_of_field(self.inputs.scene, np.asarray(detached(numbers)))
-        return np.ascontiguousarray(self.inputs.take(name, numbers), dtype=np.float64)
+        return np.ascontiguousarray(self.inputs.take(schedule.name, numbers), dtype=np.float64)
 
     def at_time_points(self, schedule: Schedule) -> Any:
         """Return a value at all time points; a tensor stays in its graph."""
-        time_step = self.given_time_step
+        time_step = self.time_steps.tensor
         numbers = schedule.at(self.time_points)
         if (
             callable(schedule.value)
-            and requires_gradient(time_step)
+            and time_step is not None
             and not _differentiable_in_time(numbers, time_step)
         ):
             why = (

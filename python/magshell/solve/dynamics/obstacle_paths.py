@@ -15,8 +15,11 @@ from ...model.supports import constraints
 from .schedule import Schedule
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from ..._input.kinds import Numbers
     from .motion_inputs import MotionInputs
+    from .time_steps import TimePoints
 
 
 class ObstaclePath:
@@ -31,17 +34,25 @@ class ObstaclePath:
     """
 
     def __init__(self, asked: MotionInputs, obstacle: Any, given: dict[str, object]):
-        self._clock, self._time_step = asked.clock, asked.given_time_step
+        self._steps = asked.time_steps
         self._given = {
             "center": given.get("center", obstacle.center),
             "rotation": given.get("rotation", obstacle.rotation),
         }
-        rows = []
-        for (name, value), unit in zip(self._given.items(), ("m", "rad"), strict=True):
-            schedule = Schedule(obstacle, name, unit, (3,), value)
-            rows.append((asked.at_time_points(schedule), self._rates(asked, schedule)))
+        self._schedules = [
+            Schedule(obstacle, name, unit, (3,), value)
+            for (name, value), unit in zip(self._given.items(), ("m", "rad"), strict=True)
+        ]
+        self.poses: Any = self.poses_at(asked.time_points, asked.at_time_points)
+
+    def poses_at(self, points: TimePoints, value_of: Callable[[Schedule], Any]) -> Any:
+        """Return the poses and their rates at time points, (time points, 4, 3).
+
+        value_of: returns the value of a schedule there.
+        """
+        rows = [(value_of(each), self._rates(points, each, value_of)) for each in self._schedules]
         xp, ((center, velocity), (rotation, rate)) = alike(rows)
-        self.poses: Any = xp.stack((center, rotation, velocity, spin(xp, rotation, rate)), 1)
+        return xp.stack((center, rotation, velocity, spin(xp, rotation, rate)), 1)
 
     def __call__(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         return self._at("center", time), self._at("rotation", time)
@@ -53,26 +64,26 @@ class ObstaclePath:
         numbers = np.asarray(detached(value), dtype=np.float64)
         if numbers.ndim == 1:
             return numbers
-        ends = self._clock.at(np.arange(len(numbers)))
-        return np.array([np.interp(time, ends, column) for column in numbers.T])
+        return np.array([np.interp(time, self._steps.grid_times, column) for column in numbers.T])
 
     def _as_given(self, time: float):
         """Return a time as it is passed to functions of the time: a tensor where the time step is one."""
-        return self._time_step.new_tensor(time).double() if is_tensor(self._time_step) else time
+        length = self._steps.interval_length
+        return length.new_tensor(time).double() if is_tensor(length) else time
 
     @staticmethod
-    def _rates(asked: MotionInputs, schedule: Schedule):
-        """Return the rate of a value at all time points, (time points, 3)."""
+    def _rates(points: TimePoints, schedule: Schedule, value_of: Callable[[Schedule], Any]):
+        """Return the rate of a value at time points, (time points, 3)."""
         name, unit, value = schedule.name, schedule.unit, schedule.value
         if callable(value):
             rate = Schedule(
                 schedule.owner, f"the rate of {name}", f"{unit}/s", (3,), lambda t: _slope(value, t)
             )
-            return asked.at_time_points(rate)
+            return value_of(rate)
         if len(shape_of(name, value)) == 1:
-            return np.zeros((len(asked.time_points), 3))
-        slopes = _slopes(value, asked.given_time_step)
-        return Schedule(schedule.owner, name, unit, (3,), slopes).at(asked.time_points)
+            return np.zeros((len(points), 3))
+        slopes = _slopes(value, points.steps.lengths_of_intervals)
+        return Schedule(schedule.owner, name, unit, (3,), slopes).at(points)
 
 
 @dataclass(frozen=True)
@@ -105,14 +116,31 @@ class ReadPath:
 
 
 def _slopes(ends, time_step):
-    """Return the slopes (steps + 1, 3) at the ends of steps of parabolas through three neighbouring ends."""
+    """Return the slopes (steps + 1, 3) at the ends of steps of parabolas through three neighbouring ends.
+
+    time_step: s, a number, or one for each step (steps,).
+    """
     xp, (ends, time_step) = alike((ends, time_step))
+    if time_step.ndim > 0:
+        return _slopes_of_unequal(xp, ends, time_step[:, None])
     if len(ends) == 2:
         slope = (ends[1:] - ends[:-1]) / time_step
         return xp.concatenate((slope, slope), 0)
     first = -1.5 * ends[:1] + 2.0 * ends[1:2] - 0.5 * ends[2:3]
     last = 1.5 * ends[-1:] - 2.0 * ends[-2:-1] + 0.5 * ends[-3:-2]
     return xp.concatenate((first, 0.5 * (ends[2:] - ends[:-2]), last), 0) / time_step
+
+
+def _slopes_of_unequal(xp: ModuleType, ends, lengths):
+    """Return the slopes as `_slopes` does at the ends of unequal steps; lengths: (steps, 1) s."""
+    slopes = (ends[1:] - ends[:-1]) / lengths
+    if len(slopes) == 1:
+        return xp.concatenate((slopes, slopes), 0)
+    before, after = lengths[:-1], lengths[1:]
+    bend = (slopes[1:] - slopes[:-1]) / (before + after)
+    first = slopes[:1] - bend[:1] * before[:1]
+    last = slopes[-1:] + bend[-1:] * after[-1:]
+    return xp.concatenate((first, slopes[:-1] + bend * before, last), 0)
 
 
 def _slope(function, time):

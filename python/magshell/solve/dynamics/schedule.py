@@ -1,4 +1,4 @@
-"""Values prescribed over the time of a motion, and the time points at which the core needs them."""
+"""Values prescribed over the time of a motion."""
 
 from __future__ import annotations
 
@@ -11,43 +11,10 @@ from ..._input.quantity import quantity, shape_of
 from ..._input.tensors import detached, is_tensor
 from ...model.contact.obstacles import Obstacle
 from ...model.scene.time_varying import may_jump, refuse_functions, row_in_time, unit_in_time
-from ..options import Clock
+from .time_steps import TimePoints
 
 if TYPE_CHECKING:
-    from ..._input.kinds import Numbers
     from ...model.scene.scene import Scene
-
-
-@dataclass(frozen=True)
-class TimePoints:
-    """The times at which the core needs values: the start and the stages of each step, one step after another.
-
-    steps: how many. stages: the times of the stages, as fractions of a step. time_step: as given; if it is a tensor,
-    functions of the time get the time as a tensor in its graph.
-    """
-
-    steps: int
-    stages: tuple[float, ...]
-    clock: Clock
-    time_step: Numbers
-
-    @property
-    def fractions(self) -> np.ndarray:
-        """The time points of each step as fractions of it, (stages + 1,)."""
-        return np.array((0.0, *self.stages))
-
-    @property
-    def times(self) -> np.ndarray:
-        """The times of all time points, (n,) s."""
-        return self.clock.at(np.arange(self.steps)[:, None], self.fractions).ravel()
-
-    def recorded(self, count: int, every: int) -> np.ndarray:
-        """Return the indices of the first `count` recorded states: the start, then the end of every so many steps."""
-        ends = len(self.fractions) * every * np.arange(1, count) - 1
-        return np.concatenate([[0], ends])
-
-    def __len__(self) -> int:
-        return self.steps * len(self.fractions)
 
 
 @dataclass(frozen=True)
@@ -93,7 +60,8 @@ class Schedule:
         if callable(value):
             return self._called(points)
         shape = shape_of(f"{name} [{unit}]", value)
-        allowed = (row, (points.steps, *row), (points.steps + 1, *row))
+        intervals = points.steps.n_intervals
+        allowed = (row, (intervals, *row), (intervals + 1, *row))
         if shape not in allowed:
             raise ValueError(
                 f"{name} [{unit}] must have shape {row if row else '() (a number)'}, (steps, ...) = {allowed[1]} or "
@@ -102,17 +70,20 @@ class Schedule:
         quantity(name, unit, detached(value), shape)
         if not is_tensor(value):
             value = np.asarray(value, dtype=np.float64)
-        fractions = points.fractions
         if shape == row:
             return _repeated(value, len(points))
-        if len(value) == points.steps:
-            count = len(fractions)
-            return value.repeat_interleave(count, 0) if is_tensor(value) else value.repeat(count, axis=0)
-        column = fractions.reshape(1, -1, *(1 for _ in row))
+        within = points.intervals
+        if len(value) == intervals:
+            return value[within]
+        column = points.fractions_of_intervals.reshape(-1, *(1 for _ in row))
+        changes = points.changes_of_fractions
         if is_tensor(value):
             column = value.new_tensor(column)
-        between = value[:-1, None] * (1.0 - column) + value[1:, None] * column
-        return between.reshape(-1, *row)
+        if changes is not None:
+            if not is_tensor(value):
+                value, column = changes.new_tensor(value), changes.new_tensor(column)
+            column = column + changes.reshape(column.shape)
+        return value[within] * (1.0 - column) + value[within + 1] * column
 
     def _called(self, points: TimePoints):
         """Return the values of a function of the time, which is called once for each time, also where two steps meet."""
@@ -121,14 +92,14 @@ class Schedule:
         def at(step: int, fraction: float):
             key = (step + 1, 0.0) if fraction == 1.0 else (step, fraction)
             if key not in known:
-                moment = points.clock.moment(*key, points.time_step)
+                moment = points.steps.moment(step, fraction)
                 known[key] = self.value(moment)
                 quantity(
                     f"{self.name} at {float(detached(moment)):g} s", self.unit, detached(known[key]), self.row
                 )
             return known[key]
 
-        values = [at(step, fraction) for step in range(points.steps) for fraction in points.fractions]
+        values = [at(step, fraction) for step in range(len(points.steps)) for fraction in points.fractions]
         if any(is_tensor(each) for each in values):
             import torch
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..._input.tensors import detached
 from ...model.actuators.actuator import Actuator
 from ...model.contact.obstacles import Obstacle
 from ...model.fields.field import AppliedField
@@ -16,6 +17,7 @@ from .schedule import Schedule
 
 if TYPE_CHECKING:
     from .motion_inputs import MotionInputs
+    from .time_steps import TimePoints
 
 
 class ScheduledValues:
@@ -28,6 +30,8 @@ class ScheduledValues:
 
     def __init__(self, asked: MotionInputs, schedules: list[Schedule]):
         self._asked = asked
+        self._of_values: list[tuple[Schedule, int]] = []  # with the number of slices of each
+        self._paths: dict[int, ObstaclePath] = {}
         self._layout = list(asked.inputs.scene._value_layout)
         self._slices: dict[tuple[int, str], list[slice]] = {}
         self.entries: list[int] = []
@@ -49,9 +53,22 @@ class ScheduledValues:
             if isinstance(each.owner, Actuator | Shell | AppliedField):
                 now = self.varied[each.owner, each.name] = numbers.reshape(-1, *each.row)
                 each.owner._check_in_time(each.name, now)
-            rows += [numbers] * self._add(each, numbers.shape[1])
+            self._of_values.append((each, self._add(each, numbers.shape[1])))
+            rows += [numbers] * self._of_values[-1][1]
         self.rows: np.ndarray = np.concatenate(rows, axis=1)
         self._add_obstacles([each for each in schedules if isinstance(each.owner, Obstacle)])
+
+    def at(self, points: TimePoints) -> tuple[np.ndarray, dict[int, np.ndarray]]:
+        """Return `rows` and `poses` at other time points."""
+        value_of = lambda schedule: schedule.at(points)  # noqa: E731
+        rows = [np.zeros((len(points), 0))]
+        for schedule, count in self._of_values:
+            numbers = np.asarray(detached(value_of(schedule)), dtype=np.float64)
+            if isinstance(schedule.owner, Actuator | Shell | AppliedField):
+                schedule.owner._check_in_time(schedule.name, numbers)
+            rows += [numbers.reshape(len(points), -1)] * count
+        poses = {k: np.asarray(detached(path.poses_at(points, value_of))) for k, path in self._paths.items()}
+        return np.concatenate(rows, axis=1), poses
 
     def _add(self, schedule: Schedule, width: int) -> int:
         """Find the slices of a value in the core's vectors and return how many there are."""
@@ -77,6 +94,7 @@ class ScheduledValues:
         for k, obstacle in enumerate(obstacles):
             if its_own := {each.name: each.value for each in schedules if each.owner is obstacle}:
                 path = ObstaclePath(self._asked, obstacle, its_own)
+                self._paths[k] = path
                 self.poses[k] = self._asked.inputs.take("center", path.poses, _Pose(k))
                 values.move(obstacle, path)
 

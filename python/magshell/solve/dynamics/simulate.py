@@ -29,6 +29,7 @@ from ..options import (
     SDIRK2,
     SDIRK3,
     TRBDF2,
+    Adaptive,
     AdjointStorage,
     ImplicitEuler,
     Integrator,
@@ -38,6 +39,7 @@ from ..options import (
 )
 from .motion_inputs import MotionInputs
 from .schedule import split_schedules
+from .step_errors import warn_of_steps
 from .trajectory import MotionState, Trajectory
 
 if TYPE_CHECKING:
@@ -51,7 +53,7 @@ def simulate(
     scene: Scene,
     *,
     steps: int,
-    time_step: Numbers,
+    time_step: Numbers | Adaptive,
     remanent_magnetization: InTime | None = None,
     applied_flux_density: InTime | None = None,
     load_factor: Any = 1.0,
@@ -79,7 +81,8 @@ def simulate(
 ) -> Trajectory:
     """Simulate the motion of a scene in time.
 
-    steps: how many.
+    steps: how many; with ms.Adaptive, or more lengths than that, the number of intervals of the time grid: states are
+        recorded at its times, and arrays in time are given at them.
     {keywords}
     start: positions (n_v, 3) m, an Equilibrium of this scene, a Trajectory or MotionState to go on from with the same
         bits. By default the rest shape.
@@ -94,14 +97,15 @@ def simulate(
     integrator: TRBDF2() by default, ImplicitEuler() where the scene has contacts; SDIRK2(), SDIRK3(), ProjectiveDynamics().
         A method of higher order makes an impact bounce, and each of its steps there is much work, unless the steps resolve
         it.
-    record_every: steps between the states that come back, the start first.
+    record_every: steps (or intervals) between the states that come back, the start first.
     adjoint_storage: for gradients; "stages" (all states), "checkpoints", "factors", or an ms.AdjointStorage,
         which says how many bytes it may
         take. By default all states if they fit into 2 GB, else checkpoints.
     solver: of a step; MixedNewton() by default, of which the load steps are not used. ProjectiveDynamics needs none.
     progress: show a bar once the motion has taken two seconds.
 
-    A step that does not converge is taken in halves, down to 1/64 of it. Raises NotConverged and Interrupted with the
+    A step that does not converge is taken in halves, down to 1/64 of it; with ms.Adaptive it is made shorter, as is one
+    whose error is too large. ms.StepErrorWarning warns of steps that are too long. Raises NotConverged and Interrupted with the
     motion until then as `last_good`; ValueError on bad input. With torch tensors among the inputs, positions,
     velocities and edge rotations come back as tensors, and gradients go back from them to every input that is
     continuous, time_step, damping, start (positions or an Equilibrium) and velocities among them. Where an input has
@@ -154,36 +158,42 @@ def simulate(
             f"{type(integrator).__name__} falls to first order where rigid parts turn, as its first stage is of first order "
             "only: take TRBDF2(), which keeps the second, or ImplicitEuler()"
         )
-    inputs = Inputs(
-        scene,
-        arguments.pop("remanent_magnetization"),
-        uniform,
-        replaced=replaced,
-        differentiable=True,
-        moving=True,
-    )
-    asked = MotionInputs(
-        inputs,
-        arguments,
-        steps=steps,
-        record_every=record_every,
-        adjoint_storage=as_adjoint_storage(adjoint_storage),
-        start=start,
-        integrator=integrator,
-        solver=solver,
-        schedules=schedules,
-    )
+    magnetization = arguments.pop("remanent_magnetization")
+
+    def prepared(chosen: list[float] | None = None) -> MotionInputs:
+        inputs = Inputs(scene, magnetization, uniform, replaced=replaced, differentiable=True, moving=True)
+        return MotionInputs(
+            inputs,
+            arguments,
+            steps=steps,
+            record_every=record_every,
+            adjoint_storage=as_adjoint_storage(adjoint_storage),
+            start=start,
+            integrator=integrator,
+            solver=solver,
+            schedules=schedules,
+            chosen=chosen,
+        )
+
+    asked = prepared()
     began = time.perf_counter()
-    with inputs.in_core(), SolveBar("simulate", progress) as bar:
+    with asked.inputs.in_core(), SolveBar("simulate", progress) as bar:
         check_apart(scene, asked.start.state)
         found = _core.simulate(
-            scene._model, asked.core, bool(inputs.leaves), asked.memory_budget, asked.keep, _advance(bar)
+            scene._model,
+            asked.core,
+            bool(asked.inputs.leaves),
+            asked.memory_budget,
+            asked.keep,
+            _advance(bar),
         )
+    if isinstance(time_step, Adaptive):
+        asked = prepared(found.time_steps)
     result = _with_strains(_trajectory(asked, found, time.perf_counter() - began))
     log.debug(
         "simulate: %s, %d of %d steps, %d in parts, %d iterations, %d factorizations, %.3g s",
         found.outcome.name,
-        found.steps_done,
+        result.steps_done,
         asked.steps,
         len(result.substeps),
         found.iterations,
@@ -191,19 +201,23 @@ def simulate(
         result.wall_time,
     )
     if found.outcome == _core.Outcome.interrupted:
-        raise Interrupted(f"interrupted after {found.steps_done} of {steps} steps", result)
+        raise Interrupted(f"interrupted after {result.steps_done} of {steps} steps", result)
     if found.outcome == _core.Outcome.failed:
+        where = f"{found.steps_done} of {len(asked.time_steps)}, at {result.end.time:.6g} s, failed even in parts of 1/64"
+        if isinstance(time_step, Adaptive):
+            shortest = asked.time_steps.clock.time_step / 2**time_step._deepest
+            where = f"{found.steps_done}, at {result.end.time:.6g} s, failed even with a length of {shortest:.3g} s"
         raise NotConverged(
-            f"step {found.steps_done} of {steps}, at {result.end.time:.6g} s, failed even in parts of 1/64: "
-            f"{found.reason}. {_advice(result)} The motion until there is in `error.last_good`.",
+            f"step {where}: {found.reason}. {_advice(result)} The motion until there is in `error.last_good`.",
             result,
         )
     bending = result.energies.get("bending", np.zeros(len(result)))
     most = int(np.argmax(bending))
     positions = np.asarray(detached(result.positions[most]), dtype=np.float64)
     where = f"the motion, at {result.times[most]:.4g} s,"
-    warn_of_obtuse_faces(scene, positions, inputs.values.all_sheets, bending[most], where)
+    warn_of_obtuse_faces(scene, positions, asked.inputs.values.all_sheets, bending[most], where)
     _warn(result)
+    warn_of_steps(result)
     try:  # a field may be a function of the caller's, in which Ctrl-C can come
         _warn_of_fields(result)
     except KeyboardInterrupt as stopped:
@@ -254,7 +268,8 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
     points, edge_rotations, velocities, driving = _outputs(asked, found)
     rigid, n_v = bool(scene.rigid_parts), scene.mesh.n_vertices
     recorded = len(found.kinetic_energy)
-    ended = asked.clock.after(found.steps_done)
+    grid, after = asked.time_steps, np.array(found.steps_recorded, dtype=np.int64)
+    ended = grid.clock_after(found.steps_done)
     thickness = values.all_sheets.thickness
     with values.growth_in_core():
         strain = StrainHistory.of(found.largest_strains(model, thickness))
@@ -262,22 +277,24 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
     return Trajectory(
         scene=scene,
         integrator=asked.integrator,
-        times=asked.clock.at(asked.record_every * np.arange(recorded)),
+        times=grid.grid_times[asked.record_every * np.arange(recorded)],
         positions=points[:, :n_v] if rigid else points,
         velocities=velocities[:, :n_v] if rigid else velocities,
         edge_rotations=edge_rotations,
         remanent_magnetization=asked.inputs.given_magnetization,
-        applied_flux_density=asked.recorded("applied_flux_density", recorded),
+        applied_flux_density=asked.recorded("applied_flux_density", after),
         kinetic_energy=np.array(found.kinetic_energy),
         energies=_by_name(model.term_names, by_term),
         largest_membrane_strain=strain.membrane,
         largest_bending_strain=strain.bending,
         steps=asked.steps,
-        steps_done=found.steps_done,
+        steps_done=int(np.searchsorted(grid.grid_ends, found.steps_done, side="right")) - 1,
         substeps={step: len(parts) for step, parts in found.substeps.items() if len(parts) > 1},
         fallback_steps=tuple(
             step for step, parts in found.substeps.items() if any(calm for _, _, calm in parts)
         ),
+        time_steps=np.array(found.time_steps),
+        step_errors=np.array(found.step_errors),
         end=MotionState(
             ended.time,
             found.last_state,
@@ -296,9 +313,10 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         bytes=found.bytes,
         wall_time=wall_time,
         linear_time=found.linear_time,
-        _field_factors=asked.recorded("field_factor", recorded),
-        _load_factors=asked.recorded("load_factor", recorded),
-        _varied=asked.varied(recorded),
+        _field_factors=asked.recorded("field_factor", after),
+        _load_factors=asked.recorded("load_factor", after),
+        _varied=asked.varied(after),
+        _step_factorizations=np.array(found.step_factorizations, dtype=np.int64),
         _thickness=thickness,
         _values=values,
         _directions=found.directions(model),

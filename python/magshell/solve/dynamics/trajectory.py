@@ -34,6 +34,7 @@ from ...model.shells.strains import StrainHistory, strains_of
 from ...model.supports.supports import Clamp, Pin, SymmetryPlane
 from ..options import Clock, Integrator, clock_of
 from .obstacle_paths import ObstaclePath, ReadPath
+from .step_errors import describe_steps
 
 if TYPE_CHECKING:
     from ..._input.kinds import Computed
@@ -126,7 +127,13 @@ class Trajectory(AnimateMixin, OfOneBody):
     remanent_magnetization: as given, A/m, or None; applied_flux_density: (n, 3) T, the uniform part at those times.
     largest_membrane_strain, largest_bending_strain: (n,), magnitudes, 1, of what `strains` has. Beyond 0.2 the sheet
         leaves the model, of which ms.LargeStrainWarning warns.
-    steps_done: equal to `steps` unless the simulation stopped early. substeps: {step: number of parts that it was taken in}.
+    steps: as given, the intervals of the time grid. steps_done: equal to `steps` unless the simulation stopped early.
+    time_steps: (m,) s, of the steps done: one for each interval, or more if ms.Adaptive or the caller divided them.
+        Passed as `time_step`, they repeat the motion.
+    step_errors: (m,) m, the estimated errors of the positions after each step, if it began without one: root mean squares
+        over vertices and points of rigid bodies, of an embedded formula of one order more. Beyond 1 % of the extent,
+        ms.StepErrorWarning warns.
+    substeps: {step: number of parts that it was taken in}.
         fallback_steps: the steps of which implicit Euler took all or a part instead of the integrator, because bodies were
         in contact and the step would have gained energy without a source.
     end: the last state, from which another simulation continues. bytes: stored for gradients.
@@ -148,6 +155,8 @@ class Trajectory(AnimateMixin, OfOneBody):
     steps_done: int
     substeps: dict[int, int]
     fallback_steps: tuple[int, ...]
+    time_steps: np.ndarray
+    step_errors: np.ndarray
     end: MotionState
     iterations: int
     factorizations: int
@@ -160,6 +169,7 @@ class Trajectory(AnimateMixin, OfOneBody):
     _varied: dict[Any, Any] = field(
         repr=False
     )  # {(actuator, shell or field, name): (n, ...)}, of the recorded states
+    _step_factorizations: np.ndarray = field(repr=False)  # (m,), of each step
     _thickness: np.ndarray = field(repr=False)
     _values: Any = field(repr=False)
     _directions: np.ndarray = field(repr=False)  # (n, 3 n_d), of what clamps and symmetry planes hold
@@ -312,10 +322,14 @@ class Trajectory(AnimateMixin, OfOneBody):
         halved += f", {len(self.fallback_steps)} by implicit Euler" if self.fallback_steps else ""
         strain = StrainHistory(self.largest_membrane_strain, self.largest_bending_strain)
         crossings = describe_self_intersections(self.scene.mesh, detached(self.positions))
-        a_step = 1e3 * self.wall_time / max(self.steps_done, 1)
+        taken = len(self.time_steps)
+        a_step = 1e3 * self.wall_time / max(taken, 1)
+        if taken > self.steps:
+            halved = f" in {taken}{halved}"
         return (
             f"Trajectory: {self.steps_done}{stopped} steps{halved}, {self.times[-1]:.4g} s, {len(self)} states, "
             f"{type(self.integrator).__name__}\n"
+            f"  {describe_steps(self)}\n"
             f"  {describe_strains(self, strain)}\n"
             f"  {crossings}\n"
             f"  {self.iterations} iterations, {self.factorizations} factorizations\n"

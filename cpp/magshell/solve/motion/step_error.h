@@ -1,0 +1,28 @@
+// Estimates the error of the positions after one time step by an embedded formula, without a further solve.
+//
+// The positions at the end of a step are x = x_0 + dt sum_j b_j v_j. A second set of weights, over the velocity v_0 at the beginning
+// as well, integrates linear motions to one order more; A has a row of zeros for the beginning:
+//
+//   b^ . A^k c = 1 / (k + 2)!,  k = -1 ... stages - 1  (A^-1 c = 1),     e = dt sum_j (b_j - b^_j) v_j  [m]
+//
+// Positions take only such conditions of order up to the third, because their rate, the velocity, is linear in the state: implicit Euler
+// has e = dt/2 (v_1 - v_0), and TR-BDF2 the estimate of Hosea and Shampine, Appl. Numer. Math. 20 (1996). Across a jump of
+// velocity e is of the size dt |dv|.
+#pragma once
+
+#include <span>
+
+#include "magshell/solve/motion/stepper.h"
+
+namespace magshell {
+
+/// Returns b - b^ for the velocity at the beginning of a step and those of its stages, stages + 1 numbers.
+VectorXd error_weights(const Tableau& tableau);
+
+/// Returns the estimate of a step, root mean square over all vertices and points of rigid bodies [m]. Prescribed positions have no error.
+/// begin: the velocity at its
+/// beginning. rates: as the step left them, with those at its beginning if the method begins explicitly.
+double step_error(const Model& model, const StepAlgebra& step, const VectorXd& begin,
+                  std::span<const StageRates> rates);
+
+}  // namespace magshell
