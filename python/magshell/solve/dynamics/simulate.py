@@ -105,7 +105,8 @@ def simulate(
     progress: show a bar once the motion has taken two seconds.
 
     A step that does not converge is taken in halves, down to 1/64 of it; with ms.Adaptive it is made shorter, as is one
-    whose error is too large. ms.StepErrorWarning warns of steps that are too long. Raises NotConverged and Interrupted with the
+    whose error is too large. ms.StepErrorWarning warns of steps that are too long. Raises NotConverged and Interrupted with
+    the
     motion until then as `last_good`; ValueError on bad input. With torch tensors among the inputs, positions,
     velocities and edge rotations come back as tensors, and gradients go back from them to every input that is
     continuous, time_step, damping, start (positions or an Equilibrium) and velocities among them. Where an input has
