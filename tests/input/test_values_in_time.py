@@ -34,7 +34,11 @@ def lengths_of_steps(name: str) -> np.ndarray:
 
 def values_that_go(name: str) -> dict:
     every = kind(name).of_objects.items()
-    return {key: straight(value, lengths_of_steps(name)) for key, value in every if kind(name).varies_in_time(*key)}
+    return {
+        key: straight(value, lengths_of_steps(name))
+        for key, value in every
+        if kind(name).varies_in_time(*key)
+    }
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,8 @@
 parameter, and the noise of an objective.
 """
 
+from itertools import pairwise
+
 import numpy as np
 
 import magshell as ms
@@ -12,13 +14,17 @@ DROP = 0.02  # [m]
 BOUNCE = 0.32  # [s]
 
 
-def swinging_strip(steps: int, time_step, integrator=None, **options) -> ms.Trajectory:
-    """Simulate a clamped strip that falls under its weight, without damping."""
+def strip_scene() -> ms.Scene:
+    """Build a clamped strip under its weight."""
     mesh = ms.meshes.rectangle(0.1, 0.02, cells=(6, 2))
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
-    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    return ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+
+
+def swinging_strip(steps: int, time_step, integrator=None, **options) -> ms.Trajectory:
+    """Simulate a clamped strip that falls under its weight, without damping."""
     return ms.simulate(
-        scene, steps=steps, time_step=time_step, integrator=integrator, progress=False, **options
+        strip_scene(), steps=steps, time_step=time_step, integrator=integrator, progress=False, **options
     )
 
 
@@ -57,9 +63,7 @@ def bounces(speed: float, tolerance: float, change: float, count: int = 34) -> l
 
 def changes(moves: list[ms.Trajectory]) -> int:
     """Return how often the steps of neighbouring motions differ."""
-    return sum(
-        not np.array_equal(a.time_steps, b.time_steps) for a, b in zip(moves[:-1], moves[1:], strict=True)
-    )
+    return sum(not np.array_equal(one.time_steps, other.time_steps) for one, other in pairwise(moves))
 
 
 def noise(moves: list[ms.Trajectory]) -> float:

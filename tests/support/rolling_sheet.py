@@ -1,6 +1,7 @@
 """Hu et al.'s sheet rolls over a plane in a field that turns.
 
-`PYTHONPATH=. python tests/support/rolling_sheet.py [MS ...]` prints counts and travel for steps of these lengths.
+`PYTHONPATH=. python tests/support/rolling_sheet.py [MS ...]` prints counts and travel for steps of these lengths, and
+`... rolling_sheet.py adaptive` for steps that are chosen by tolerances.
 """
 
 import sys
@@ -19,8 +20,10 @@ def flux_density(t: float) -> np.ndarray:
     return 8e-3 * min(1.0, t / 0.05) * np.array([np.cos(angle), 0.0, np.sin(angle)])
 
 
-def rolling_sheet(time_step: float, factor: float = 1.0, duration: float = DURATION) -> ms.Trajectory:
-    """Simulate the sheet by implicit Euler, with the field times a factor."""
+def rolling_sheet(
+    time_step: float | ms.Adaptive, factor: float = 1.0, duration: float = DURATION
+) -> ms.Trajectory:
+    """Simulate the sheet by implicit Euler, with the field times a factor; on straight lines between given steps."""
     mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells=(20, 8)).transformed(translation=(0, 0, THICKNESS / 2))
     angle = 2 * np.pi * mesh.face_barycenters[:, 0] / LENGTH - np.pi / 4
     sheet = ms.Shell(
@@ -34,14 +37,18 @@ def rolling_sheet(time_step: float, factor: float = 1.0, duration: float = DURAT
     scene = ms.Scene(
         sheet, contacts=[ground], field=ms.UniformField(), gravity=(0, 0, -9.81), allow_rigid_motions=True
     )
-    steps = round(duration / time_step)
+    if isinstance(time_step, ms.Adaptive):
+        steps, field = round(duration / time_step.interval), lambda t: factor * flux_density(t)
+    else:
+        steps = round(duration / time_step)
+        field = factor * np.array([flux_density(k * time_step) for k in range(steps + 1)])
     return ms.simulate(
         scene,
         steps=steps,
         time_step=time_step,
         integrator=ms.ImplicitEuler(),
         stiffness_damping=2e-3,
-        applied_flux_density=factor * np.array([flux_density(k * time_step) for k in range(steps + 1)]),
+        applied_flux_density=field,
     )
 
 
@@ -52,6 +59,15 @@ def travel(move: ms.Trajectory) -> float:
 
 def main() -> None:
     """Print counts and travel for steps of the given lengths [ms]."""
+    if sys.argv[1:] == ["adaptive"]:
+        for tolerance in (1e-4, 3e-5, 1e-5, None):
+            move = rolling_sheet(ms.Adaptive(8e-3, tolerance))
+            print(
+                f"{tolerance or 'default'}: {move.factorizations} factorizations, {len(move.time_steps)} steps of "
+                f"{move.time_steps.min():.2g} to {move.time_steps.max():.2g} s, {travel(move):.9f} mm",
+                flush=True,
+            )
+        return
     for step in [float(word) for word in sys.argv[1:]] or [8.0, 4.0, 2.0, 1.0]:
         move = rolling_sheet(1e-3 * step)
         print(
