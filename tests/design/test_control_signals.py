@@ -19,6 +19,11 @@ DURATION = torch.tensor(0.3, dtype=torch.float64)
 
 def test_step_times_are_those_of_a_simulation():
     np.testing.assert_allclose(control.step_times(4, 0.5), [0, 0.5, 1, 1.5, 2])
+    np.testing.assert_allclose(control.step_times(4, ms.Adaptive(0.5)), [0, 0.5, 1, 1.5, 2])
+    np.testing.assert_allclose(control.step_times(2, [0.5, 0.25, 0.25]), [0, 0.5, 1])
+    lengths = torch.tensor([0.5, 0.3], dtype=torch.float64, requires_grad=True)
+    control.step_times(2, lengths).sum().backward()
+    np.testing.assert_array_equal(lengths.grad, [2, 1])
 
 
 def test_held_values_last_equally_long():

@@ -126,26 +126,46 @@ def test_steps_that_take_many_factorizations_are_warned_of() -> None:
             assert "Take steps of 0.0005 s" in str(caught[0].message)
 
 
-def test_gradient_through_steps_in_parts_warns_that_objectives_may_jump() -> None:
+def motion_in_parts():
+    """Simulate a strip in a field that jumps by more than four iterations of Newton's method can follow in one step."""
     torch = pytest.importorskip("torch")
     mesh = ms.meshes.rectangle(0.05, 0.01, cells=(6, 2))
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
     scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
-    field = torch.zeros((6, 3), dtype=torch.float64)
-    field[2:, 2] = 0.08
+    jump = torch.zeros((6, 3), dtype=torch.float64)
+    jump[2:, 2] = 0.08
     options = {"steps": 6, "time_step": 5e-3, "remanent_magnetization": (4e4, 0, 1e4), "damping": 1e-5}
-    move = ms.simulate(
-        scene,
-        applied_flux_density=field.requires_grad_(),
-        solver=ms.Newton(max_iterations=4),
-        progress=False,
-        **options,
-    )
-    assert move.substeps
-    with pytest.warns(ms.StepErrorWarning, match="the objective may jump here"):
-        move.positions.sum().backward()
-    whole = ms.simulate(scene, applied_flux_density=field, progress=False, **options)
-    assert not whole.substeps
+
+    def move(factor, **others):
+        field = factor * jump
+        return ms.simulate(scene, applied_flux_density=field, progress=False, **options, **others)
+
+    return move
+
+
+def test_gradient_through_steps_in_parts_warns_that_objectives_may_jump() -> None:
+    move = motion_in_parts()
+    torch = pytest.importorskip("torch")
+    factor = torch.ones((), dtype=torch.float64, requires_grad=True)
+    divided, whole = move(factor, solver=ms.Newton(max_iterations=4)), move(factor)
+    assert divided.substeps and not whole.substeps
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         whole.positions.sum().backward()
+    with pytest.warns(ms.StepErrorWarning, match="the objective may jump here"):
+        divided.positions.sum().backward()
+
+
+def test_minimize_warns_once_that_objectives_may_jump() -> None:
+    move = motion_in_parts()
+    torch = pytest.importorskip("torch")
+    factor = torch.tensor([0.99], dtype=torch.float64, requires_grad=True)
+
+    def objective(factor):
+        return (move(factor, solver=ms.Newton(max_iterations=4)).positions[-1, :, 2].mean() - 0.02) ** 2
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        ms.minimize(objective, [factor], ms.optim.LBFGS([factor]), max_iterations=3, progress=False)
+    jumps = [each for each in caught if "the objective may jump here" in str(each.message)]
+    assert len(jumps) == 1 and jumps[0].category is ms.StepErrorWarning

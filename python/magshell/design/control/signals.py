@@ -14,9 +14,10 @@ import numpy as np
 
 from ..._input.arrays import count
 from ..._input.quantity import quantity, shape_of
-from ..._input.tensors import detached, positive_number, require_torch
+from ..._input.tensors import detached, is_tensor, positive_number, require_torch
+from ...solve.dynamics.time_steps import TimeSteps
 from ...solve.dynamics.trajectory import MotionState, Trajectory
-from ...solve.options import Clock, clock_of
+from ...solve.options import Adaptive, Clock, clock_of
 from ._arguments import tensor
 
 if TYPE_CHECKING:
@@ -25,23 +26,32 @@ if TYPE_CHECKING:
     from ..._input.kinds import Numbers
 
 
-def step_times(steps: int, time_step: Numbers, start: Trajectory | MotionState | None = None) -> torch.Tensor:
+def step_times(
+    steps: int, time_step: Numbers | Adaptive, start: Trajectory | MotionState | None = None
+) -> torch.Tensor:
     """Return the times of the ends of all steps, the start first: (steps + 1,) s.
 
-    time_step: s. start: the motion that these steps continue, with its times; by default times begin at 0.
+    time_step: s, as in ms.simulate: a number, the lengths of the steps (m,), or ms.Adaptive; then these are the times of its
+    grid. start: the motion that these steps continue, with its times; by default times begin at 0.
 
     >>> import magshell as ms
     >>> ms.control.step_times(3, 0.5)
     tensor([0.0000, 0.5000, 1.0000, 1.5000], dtype=torch.float64)
     """
     torch = require_torch("ms.control.step_times")
-    time_step, steps = positive_number("time_step", "s", time_step), count("steps", steps)
+    steps = count("steps", steps)
     if not isinstance(start, Trajectory | MotionState | None):
         raise ValueError(f"start must be a Trajectory, a MotionState or None, got {type(start).__name__}")
     state = start.end if isinstance(start, Trajectory) else start
     began = Clock(0.0) if state is None else clock_of(state)
-    clock = began.going_on(float(detached(time_step)))
-    return clock.moment(torch.arange(steps + 1, dtype=torch.float64), 0.0, time_step)
+    length = time_step.interval if isinstance(time_step, Adaptive) else time_step
+    if shape_of("time_step [s]", length) == ():
+        length = positive_number("time_step", "s", length)
+        clock = began.going_on(float(detached(length)))
+        return clock.moment(torch.arange(steps + 1, dtype=torch.float64), 0.0, length)
+    ends = TimeSteps.from_list(began, steps, length).grid_ends
+    lengths = length.double() if is_tensor(length) else torch.tensor(np.array(length, dtype=np.float64))
+    return began.time + torch.nn.functional.pad(lengths.cumsum(0), (1, 0))[ends]
 
 
 # plain-words: ok (the field's term)

@@ -105,9 +105,8 @@ def simulate(
     progress: show a bar once the motion has taken two seconds.
 
     A step that does not converge is taken in halves, down to 1/64 of it; with ms.Adaptive it is made shorter, as is one
-    whose error is too large. ms.StepErrorWarning warns of steps that are too long. Raises NotConverged and Interrupted with
-    the
-    motion until then as `last_good`; ValueError on bad input. With torch tensors among the inputs, positions,
+    whose error is too large. ms.StepErrorWarning warns of steps that are too long. Raises NotConverged and Interrupted
+    with the motion until then as `last_good`; ValueError on bad input. With torch tensors among the inputs, positions,
     velocities and edge rotations come back as tensors, and gradients go back from them to every input that is
     continuous, time_step, damping, start (positions or an Equilibrium) and velocities among them. Where an input has
     none (a Trajectory as start; time_step where a function of the time leaves torch), they raise NoGradient; so do
@@ -208,9 +207,9 @@ def simulate(
         if isinstance(time_step, Adaptive):
             shortest = asked.time_steps.clock.time_step / 2**time_step._deepest
             where = f"{found.steps_done}, at {result.end.time:.6g} s, failed even with a length of {shortest:.3g} s"
+        advice = _advice(result, isinstance(time_step, Adaptive))
         raise NotConverged(
-            f"step {where}: {found.reason}. {_advice(result)} The motion until there is in `error.last_good`.",
-            result,
+            f"step {where}: {found.reason}. {advice} The motion until there is in `error.last_good`.", result
         )
     bending = result.energies.get("bending", np.zeros(len(result)))
     most = int(np.argmax(bending))
@@ -226,11 +225,17 @@ def simulate(
     return result
 
 
-def _advice(result: Trajectory) -> str:
-    """Return the advice for an error message about a step that failed."""
+def _advice(result: Trajectory, chosen: bool) -> str:
+    """Return the advice for an error message about a step that failed. chosen: by ms.Adaptive."""
     fields = map(result._values_at(len(result) - 1).current, result.scene.fields)
     positions = np.asarray(detached(result.positions[-1]), dtype=np.float64)
-    return describe_magnet_overlap(fields, positions, result.scene.mesh.edge_lengths) or "Take shorter steps."
+    overlap = describe_magnet_overlap(fields, positions, result.scene.mesh.edge_lengths)
+    if overlap or not chosen:
+        return overlap or "Take shorter steps."
+    return (
+        "Take a larger tolerance, or more halvings; errors that do not fall with the step come from motors that jump, from "
+        "contacts that open and close in every step, or from round-off."
+    )
 
 
 def _with_strains(result: Trajectory) -> Trajectory:

@@ -48,12 +48,12 @@ class TimeSteps:
         return cls(start.going_on(length), steps, np.arange(steps), 0.0 * one, one, length * one, time_step)
 
     @classmethod
-    def from_list(cls, inputs: Inputs, start: Clock, steps: int, time_step: Any) -> TimeSteps:
+    def from_list(cls, start: Clock, steps: int, time_step: Any) -> TimeSteps:
         """Return steps of given lengths (m,): one for each interval, or more that fill equal intervals.
 
         Raises ValueError if they do not.
         """
-        lengths = quantity("time_step", "s", inputs.take("time_step", time_step), ("m",))
+        lengths = quantity("time_step", "s", detached(time_step), ("m",))
         if lengths.size and lengths.min() <= 0.0:
             raise ValueError(f"time_step [s] must be positive, but the smallest is {lengths.min():g}")
         if len(lengths) < steps:
@@ -242,7 +242,8 @@ def steps_of(inputs: Inputs, start: Clock, steps: int, time_step: Any) -> TimeSt
         return TimeSteps.undivided(inputs, start, steps, time_step)
     if shape_of("time_step [s]", time_step) == ():
         return TimeSteps.equal(inputs, start, steps, time_step)
-    return TimeSteps.from_list(inputs, start, steps, time_step)
+    inputs.take("time_step", time_step)
+    return TimeSteps.from_list(start, steps, time_step)
 
 
 @dataclass(frozen=True)
