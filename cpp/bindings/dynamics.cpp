@@ -115,6 +115,7 @@ MotionInput input_of(Model& model, const py::dict& given) {
         input.projective = {true, iterations, tolerance, history, coulomb};
         if (tolerance > 0.0) input.newton.tolerance = tolerance;
     }
+    input.watched = given["watched"].cast<std::vector<WatchedObstacle>>();
     if (const py::object adaptive = given["adaptive"]; !adaptive.is_none())
         input.adaptive = adaptive_of(model, input.varying, adaptive.cast<py::dict>());
     return input;

@@ -281,6 +281,19 @@ def test_supports_that_pull_a_sheet_over_a_small_ball_are_an_error():
             lifted(1.0, partial(ms.follow_path, max_points=100, progress=False))
 
 
+def test_a_motion_in_which_a_small_ball_slips_between_contact_points_is_an_error():
+    mesh = sheet().mesh
+    heavy = ms.Shell(mesh, thickness=2e-3, young_modulus=1e6, poisson_ratio=0.45, mass_density=1e3)
+    ball = ob.Sphere(0.002, center=(0.006, 0.003, -0.004))
+    contact = ms.Contact(ball, contact_stiffness=1e4, face_samples=0)
+    scene = ms.Scene(heavy, contacts=[contact], gravity=(0.0, 0.0, -9.81), allow_rigid_motions=True)
+    with pytest.warns(ms.MeshQualityWarning, match="may enter the faces of the mesh between the points"):
+        with pytest.raises(ms.NotConverged, match="passes between the points in contact") as caught:
+            ms.simulate(scene, steps=60, time_step=1e-3, progress=False)
+    fallen = 0.5 * 9.81 * caught.value.last_good.times[-1] ** 2
+    assert fallen == pytest.approx(0.004, rel=0.1)  # where its flat middle meets that of the ball
+
+
 @pytest.mark.parametrize(
     "radius, face_samples, small", [(6e-3, 0, True), (6e-3, 3, False), (3e-3, 3, True), (8e-3, 0, False)]
 )

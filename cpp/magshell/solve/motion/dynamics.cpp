@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "magshell/core/errors.h"
+#include "magshell/solve/globalization/obstacle_sides.h"
 #include "magshell/solve/motion/edge_rotations.h"
 #include "magshell/solve/motion/energy_balance.h"
 #include "magshell/solve/motion/step_ladder.h"
@@ -370,6 +371,7 @@ MotionResult simulate(Model& model, const MotionInput& input, const AdjointStora
     result.last = input.start;
     model.contacts().forget();
     const ScopedTimeVarying varying(model.parameters(), input.varying);
+    const ScopedWatch while_watching(model, input.watched);
     Newton newton(model, input.newton, [&](double residual) {
         if (watch) watch(result.fraction_done, residual);
     });

@@ -40,7 +40,8 @@ struct MotionInput {
     TimeVaryingParameters
         varying;  // the values that vary in time; their numbers are appended to `load_parameters`
     NewtonOptions newton;
-    ProjectiveOptions projective;  // used if it solves the stages
+    ProjectiveOptions projective;          // used if it solves the stages
+    std::vector<WatchedObstacle> watched;  // small ones, which no face may slip over
 
     Index steps() const { return static_cast<Index>(time_steps.size()); }
     /// Returns the number of the state that is recorded after so many steps, or -1 if none is.

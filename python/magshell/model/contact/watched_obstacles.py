@@ -27,10 +27,13 @@ if TYPE_CHECKING:
 _GAPS = {0: 1.0 / np.sqrt(3.0), 1: 1.0 / 3.0, 3: 0.5 / np.sqrt(3.0)}
 
 
-def watched_obstacles(scene: Scene, moving: Iterable[Obstacle]) -> list[_core.WatchedObstacle]:
-    """Return the given obstacles, which move, for the core, with the faces that they may not slip through.
+def watched_obstacles(
+    scene: Scene, moving: Iterable[Obstacle], only_small: bool = False
+) -> list[_core.WatchedObstacle]:
+    """Return the given obstacles, which move, or the mesh over them, for the core, with the faces not to slip through.
 
-    Warns if an obstacle is so small that it fits between the points in contact.
+    Warns if an obstacle is so small that it fits between the points in contact. only_small: leaves out the others, which
+    no short step can pass through.
     """
     ids = {id(each) for each in moving}
     watched = []
@@ -44,8 +47,10 @@ def watched_obstacles(scene: Scene, moving: Iterable[Obstacle]) -> list[_core.Wa
             if id(obstacle) not in ids or not any(obstacle is each for each in contact.obstacles):
                 continue
             middles, radius = obstacle._middle
-            if len(middles):
-                _warn_if_small(contact, obstacle, radius, edge)
+            gap = _GAPS[contact.face_samples] * edge
+            if len(middles) and radius < gap:
+                _warn_of_gap(contact, obstacle, radius, edge)
+            if len(middles) and (radius < gap or not only_small):
                 watched.append(_core.WatchedObstacle(number, middles, faces))
     return watched
 
@@ -58,13 +63,11 @@ def _faces_in_contact(scene: Scene, contact: Contact) -> np.ndarray:
     return faces[np.isin(faces, alone).all(axis=1)].astype(np.int32)
 
 
-def _warn_if_small(contact: Contact, obstacle: Obstacle, radius: float, edge: float) -> None:
+def _warn_of_gap(contact: Contact, obstacle: Obstacle, radius: float, edge: float) -> None:
     gap = _GAPS[contact.face_samples] * edge
-    if radius >= gap:
-        return
     samples = ", or face_samples=3 in the Contact" if contact.face_samples != 3 else ""
     warnings.warn(
-        f"{obstacle!r} moves, and may enter the faces of the mesh between the points in contact without a force: a ball of "
+        f"{obstacle!r} may enter the faces of the mesh between the points in contact without a force: a ball of "
         f"up to {gap:.3g} m radius fits between them (edges of {edge:.3g} m), and the obstacle's radius is {radius:.3g} m. "
         f"Use shorter edges{samples}",
         MeshQualityWarning,

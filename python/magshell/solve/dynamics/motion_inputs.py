@@ -14,6 +14,7 @@ from ..._input.tensors import detached, is_tensor, requires_gradient
 from ..._runtime.memory import check_memory
 from ..._runtime.solve_keywords import SOLVE_KEYWORDS
 from ...model.contact.contacts_to_core import check_outside, poses
+from ...model.contact.watched_obstacles import watched_obstacles
 from ...model.rigid.equimomental_points import check_joints, check_rigid, own_velocities
 from ...model.scene.plausible import warn_of_field
 from ...model.scene.solve_inputs import Inputs
@@ -114,6 +115,7 @@ class MotionInputs:
                 "varying": self._scheduled.entries,
                 "newton": solver._newton_options(),
                 "projective": getattr(integrator, "_projective", None),
+                "watched": watched_obstacles(inputs.scene, inputs.scene.obstacles, only_small=True),
             },
         )
 
