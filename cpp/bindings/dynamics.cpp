@@ -3,6 +3,7 @@
 #include <memory>
 #include <string>
 #include <tuple>
+#include <utility>
 
 #include "bindings/arrays.h"
 #include "bindings/call_python.h"
@@ -103,6 +104,14 @@ MotionInput input_of(Model& model, const py::dict& given) {
     input.viscosity = {given["stiffness_damping"].cast<double>(), given["maxwell_modulus"].cast<double>(),
                        given["maxwell_time"].cast<double>()};
     input.tableau = tableau_of(given["integrator"].cast<std::string>());
+    input.tableau.implicit_contact = given["implicit_contact"].cast<bool>() && model.contacts().any();
+    if (VectorXd by_contact = to_vector(array("contact_acceleration"));
+        by_contact.size() > 0 && !input.start.rates.empty()) {
+        if (input.tableau.implicit_contact)
+            input.start.rates.c = std::move(by_contact);
+        else
+            input.start.rates.w += by_contact;
+    }
     input.time_steps = given["time_steps"].cast<std::vector<double>>();
     input.recorded = given["recorded"].cast<std::vector<Index>>();
     input.varying =
@@ -272,6 +281,8 @@ void register_dynamics(py::module_& module) {
         .def_property_readonly("last_state", [](const MotionResult& r) { return r.last.q; })
         .def_property_readonly("last_velocity", [](const MotionResult& r) { return r.last.v; })
         .def_property_readonly("last_acceleration", [](const MotionResult& r) { return r.last.rates.w; })
+        .def_property_readonly("last_contact_acceleration",
+                               [](const MotionResult& r) { return r.last.rates.c; })
         .def("last_maxwell_strains",
              [](const MotionResult& r, const Model& m) { return numbers_of(m, r.last.e); })
         .def("last_strain_rates",

@@ -18,7 +18,7 @@ from gradient_kinds_bodies import (
     two_sheets_at_rest,
     two_sheets_in_motion,
 )
-from gradient_kinds_contact import CONTACT_MAKERS
+from gradient_kinds_contact import CONTACT_MAKERS, sheets_rubbing
 from gradient_kinds_growth import GROWTH_MAKERS
 from gradient_kinds_muscles import muscles_at_rest, muscles_in_motion
 from gradient_kinds_pressure import pressed_sheet, pressed_solid
@@ -26,6 +26,7 @@ from gradient_kinds_six_nodes import six_nodes_at_rest, six_nodes_in_motion
 from gradient_kinds_skeletons import (
     motorized_skeleton_at_rest,
     motorized_skeleton_in_motion,
+    motorized_skeleton_on_a_plane,
     screws_at_rest,
     screws_in_motion,
     skeleton_at_rest,
@@ -344,6 +345,19 @@ MAKERS = {
     **step_makers(
         moving, lambda **options: thrown(ob.Box, **options, **RUBS), motorized_skeleton_in_motion, STEPS
     ),
+    "onto a Plane, contact implicit": lambda: thrown(
+        ob.Plane, ms.TRBDF2(implicit_contact=True), extra=VISCOUS, face_samples=1, **RUBS
+    ),
+    "onto a Box that is carried, late, contact implicit": lambda: thrown(
+        ob.Box, ms.TRBDF2(implicit_contact=True), in_time=6, lagged_friction=True, **RUBS
+    ),
+    "sheets rubbing, contact implicit": lambda: sheets_rubbing(
+        ms.TRBDF2(implicit_contact=True), 1e-5, activation_distance=1.4e-4
+    ),
+    "sheets rubbing late, contact implicit": lambda: sheets_rubbing(
+        ms.TRBDF2(implicit_contact=True), 1e-5, activation_distance=1.4e-4, lagged_friction=True
+    ),
+    "a driven skeleton on a Plane, contact implicit": motorized_skeleton_on_a_plane,
 }
 
 

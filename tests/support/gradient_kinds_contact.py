@@ -33,7 +33,7 @@ def sheets_at_rest_on_each_other(**contact) -> Kind:
     return Kind(scene, {"gravity_factor": 0.9, "support_factor": 0.8}, fixed=EXACT, step=5e-5, reach=REACH)
 
 
-def sheets_rubbing(integrator, **contact) -> Kind:
+def sheets_rubbing(integrator, step=1e-6, **contact) -> Kind:
     """Build a motion of the upper sheet thrown onto the lower one, which is held at a side."""
     lower, upper, touch = _two_sheets(5e6, **{**RUBS, **contact})
     scene = ms.Scene(
@@ -49,7 +49,7 @@ def sheets_rubbing(integrator, **contact) -> Kind:
     velocities[MESH.n_vertices :] = (0.1, 0.05, -0.15)
     controls = {"velocities": velocities, "time_step": 1e-3, "support_factor": np.linspace(0, 0.7, 6)}
     fixed = {**EXACT, "steps": 6, "integrator": integrator, "progress": False}
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-6, reach=REACH)
+    return Kind(scene, controls, ms.simulate, fixed=fixed, step=step, reach=REACH)
 
 
 FLAT = ms.meshes.rectangle(0.12, 0.03, cells=(8, 1))

@@ -4,9 +4,10 @@ import numpy as np
 from adjoint_scenes import DEFAULTS, DIPOLES, MESH, N_V
 from gradient_kinds_bodies import CORNER
 from gradient_scenes import Kind
-from gradient_world import EXACT, FACTORS, IN_TIME, MIDDLE, REACH, RNG, STEPS
+from gradient_world import EXACT, FACTORS, IN_TIME, MIDDLE, REACH, RNG, STEPS, under
 
 import magshell as ms
+from magshell import obstacles as ob
 
 _LIMITS = {"lower_limit": -1.0, "upper_limit": -1e-3, "limit_stiffness": 1e-2, "limit_smoothing": 5e-3}
 
@@ -89,7 +90,7 @@ def _skeleton_on_a_sheet(free: bool):
     )
 
 
-def _motorized_skeleton(moves: bool):
+def _motorized_skeleton(moves: bool, **more):
     """Build a skeleton with motors on the free end of a sheet, and a moment in a ball joint; dampers if it moves."""
     base = MESH.rest_positions[CORNER].mean(axis=0)
 
@@ -148,6 +149,7 @@ def _motorized_skeleton(moves: bool):
         field=[ms.UniformField(), DIPOLES],
         gravity=(0.1, 0.2, -9.81),
         allow_rigid_motions=moves,
+        **more,
     )
 
 
@@ -166,6 +168,21 @@ def motorized_skeleton_in_motion(integrator, **options) -> Kind:
     return Kind(
         _motorized_skeleton(True), controls, ms.simulate, fixed=fixed, step=step, reach=_REACH, **in_time
     )
+
+
+def motorized_skeleton_on_a_plane() -> Kind:
+    """Build the same in contact with a plane, which the corner of the sheet on the root link touches too."""
+    floor = ms.Contact(
+        under(ob.Plane, -3e-3),
+        contact_stiffness=20.0,
+        offset=1.6e-3,
+        smoothing=1e-3,
+        friction_coefficient=0.4,
+    )
+    controls = {**IN_TIME, "time_step": 3e-3}
+    fixed = {**EXACT, "steps": STEPS, "integrator": ms.TRBDF2(implicit_contact=True), "progress": False}
+    scene = _motorized_skeleton(True, contacts=[floor])
+    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-4, reach=_REACH)
 
 
 def skeleton_at_rest() -> Kind:

@@ -146,12 +146,22 @@ class Backward {
         const VectorXd by_earlier = std::move(by_v_before_);
         by_v_before_ = VectorXd();
         BeforeStage by_end{VectorXd::Zero(model_.size()), VectorXd::Zero(model_.size())};
+        // By w of the last stage and by c of it, beside those through the rates; by c of the present stage.
+        VectorXd by_w_last = VectorXd::Zero(model_.size()), by_c_last = by_w_last, by_c;
         if (by_motor_forces.size() > 0)
             back_through_motors(algebra, at, record, step, substep, by_motor_forces, viscous, by_v.back(),
-                                by_w.back(), by_end);
+                                by_w_last, by_c_last, by_end);
         for (int i = n - 1; i >= 0; --i) {
-            const VectorXd &v = at.all[first + i].v, &w = at.all[first + i].w;
-            const VectorXd &by_vi = by_v[first + i] += by_w[first + i] / adt, &by_wi = by_w[first + i];
+            const VectorXd& v = at.all[first + i].v;
+            const VectorXd w = algebra.stage_acceleration(at.all[first + i], at.v_hat[i]);
+            // By w_i without contact, and by that with it.
+            const VectorXd& by_ei = by_w[first + i];
+            const VectorXd by_wi = i == n - 1 ? VectorXd(by_ei + by_w_last) : by_ei;
+            const VectorXd& by_vi = by_v[first + i] += by_wi / adt;
+            if (tableau.implicit_contact) {
+                by_c = -tableau.contact_factor(i) * by_ei;
+                if (i == n - 1) by_c += by_c_last;
+            }
             BeforeStage by{VectorXd::Zero(model_.size()), VectorXd::Zero(model_.size())};
             if (i == n - 1) by = std::move(by_end);
             by.dt -= (by_wi.dot(w) + by_vi.dot(v)) / dt;
@@ -160,7 +170,7 @@ class Backward {
             by.x_hat.head(coordinates) -= by_vi.head(coordinates) / adt;
 
             const auto [lambda, by_forces] =
-                back_through(algebra, at, i, record, step, substep, by_x, viscous);
+                back_through(algebra, at, i, record, step, substep, by_x, by_c, viscous);
             through_rates(algebra, lambda, by_forces, v, w, by);
 
             by_dt += by.dt;
@@ -223,53 +233,90 @@ class Backward {
     }
 
     // Sets the model to the conditions under which a stage was solved.
-    void set_stage(const SubstepRecord& record, int i, Index step, const Substep& substep,
-                   const LoadParameters& load_parameters, const Viscous& viscous) {
+    void set_stage(const StepAlgebra& algebra, const SubstepRecord& record, int i, Index step,
+                   const Substep& substep, const LoadParameters& load_parameters, const Viscous& viscous) {
         model_.parameters().set_time_varying(load_parameters);
         model_.set_angle_branches(record.stages[i].angle_branches);
         model_.begin_step(record.begin.q, input_.load_parameters_at(step, substep.begin));
+        model_.contacts().set_factor(algebra.tableau().contact_factor(i));
         viscous.strains.set_history(i);
         viscous.joints.set_history(i);
     }
 
+    // Goes back through the acceleration by contact, c = J (J^T M J)^-1 J^T f, at the evaluated stage. by_c: gradient by it. Adds the
+    // gradients by the masses, and by the state: by_x, and as forces on free dofs alone by_free. Returns the gradient by - f over the
+    // factor of contact forces.
+    VectorXd back_through_contact(const VectorXd& q, const VectorXd& c, double factor, const VectorXd& by_c,
+                                  const LoadParameters& load_parameters, VectorXd& by_x, VectorXd& by_free) {
+        const VectorXd& mass = input_.inertia.mass;
+        const DofMap& dof_map = model_.dof_map();
+        const VectorXd force = model_.contact_forces(q, load_parameters) / factor;
+        const VectorXd moved = dof_map.acceleration(mass, by_c);
+        g_.mass -= moved.cwiseProduct(c);
+        const VectorXd by_forces = -moved / factor;
+        by_x += model_.multiply_contact_transposed(q, load_parameters, by_forces);
+        if (dof_map.has_reduced_coordinates()) {
+            // dc = J (J^T M J)^-1 [dJ^T (f - M c)] + (I - J (J^T M J)^-1 J^T M) dJ z, with c = J z
+            const VectorXd from_c = by_c - mass.cwiseProduct(moved),
+                           from_force = force - mass.cwiseProduct(c);
+            dof_map.add_curvature_forces(from_c, c, by_free);
+            dof_map.add_curvature_forces(from_force, moved, by_free);
+            if (dof_map.has_values()) {
+                const VectorXd nothing = VectorXd::Zero(q.size());
+                dof_map.vjp(nothing, c, from_c, load_parameters, scene_);
+                dof_map.vjp(nothing, moved, from_force, load_parameters, scene_);
+            }
+        }
+        return by_forces;
+    }
+
     // Returns lambda of a stage and the gradient by the kinematics of its forces. Adds the gradients by the scene and the load parameters.
+    // by_c: gradient by the acceleration by contact; empty if contact is not implicit.
     std::pair<VectorXd, KinematicsGradient> back_through(const StepAlgebra& algebra, const StepRates& at,
                                                          int i, const SubstepRecord& record, Index step,
                                                          const Substep& substep, VectorXd& by_x,
-                                                         Viscous& viscous) {
+                                                         const VectorXd& by_c, Viscous& viscous) {
         const StageState& stage = record.stages[i];
         const ScopedStrainHistory elastic_afterwards(model_);
+        const ScopedContactFactor usual_contact_afterwards(model_);
         const double fraction = substep.begin + algebra.tableau().time(i) * substep.fraction();
         const LoadParameters load_parameters = input_.load_parameters_at(step, fraction);
         const VectorXd target = algebra.target(at.x_hat[i], at.v_hat[i]);
         const StageMotion motion{&at.x_hat[i], &at.v_hat[i], algebra.stage_time()};
-        set_stage(record, i, step, substep, load_parameters, viscous);
+        set_stage(algebra, record, i, step, substep, load_parameters, viscous);
         const ProximalTerm proximal{&algebra.weights(), &target, &motion};
         newton_.evaluate(stage.q, load_parameters, proximal);
+        VectorXd by_free = VectorXd::Zero(by_x.size()), by_contact;
+        if (by_c.size() > 0)
+            by_contact = back_through_contact(stage.q, stage.contact, algebra.tableau().contact_factor(i),
+                                              by_c, load_parameters, by_x, by_free);
         viscous.strains.before_solve(i, by_x, scene_);
         viscous.joints.before_solve(i, by_x, scene_);
-        const VectorXd lambda = solve(stage.q, stage.factor.get(), load_parameters, proximal, -by_x);
+        const VectorXd lambda =
+            solve(stage.q, stage.factor.get(), load_parameters, proximal, -(by_x + by_free));
         viscous.strains.after_solve(i, lambda);
         viscous.joints.after_solve(i, lambda);
-        return {lambda,
-                by_scene(stage.q, load_parameters, proximal, step, substep, fraction, lambda, {}, by_x)};
+        return {lambda, by_scene(stage.q, load_parameters, proximal, step, substep, fraction, lambda, {},
+                                 by_x, by_contact)};
     }
 
     // Adds the gradients through the motor forces at the end of a substep: by the scene and the load parameters, by the state next to the
     // last stage at which they are evaluated, and by the velocities that enter its acceleration (solve/motion/motor_reactions.h).
     void back_through_motors(const StepAlgebra& algebra, const StepRates& at, const SubstepRecord& record,
                              Index step, const Substep& substep, const VectorXd& by_motor_forces,
-                             Viscous& viscous, VectorXd& by_v_last, VectorXd& by_w_last, BeforeStage& by) {
+                             Viscous& viscous, VectorXd& by_v_last, VectorXd& by_w_last, VectorXd& by_c_last,
+                             BeforeStage& by) {
         const int i = algebra.tableau().stages - 1;
         const StageState& stage = record.stages[i];
         const ScopedStrainHistory elastic_afterwards(model_);
         const LoadParameters load_parameters = input_.load_parameters_at(step, substep.end);
         const VectorXd target = algebra.target(at.x_hat[i], at.v_hat[i]);
         const StageMotion motion{&at.x_hat[i], &at.v_hat[i], algebra.stage_time()};
-        set_stage(record, i, step, substep, load_parameters, viscous);
+        const ScopedContactFactor usual_contact_afterwards(model_);
+        set_stage(algebra, record, i, step, substep, load_parameters, viscous);
         const ProximalTerm there{&algebra.weights(), &target, &motion};
-        const MotorReactions end(newton_, input_.inertia, record.begin, algebra.dt(), stage.q,
-                                 load_parameters, there, at.all.back());
+        const MotorReactions end(newton_, input_.inertia, record.begin, algebra, stage.q, load_parameters,
+                                 there, at.v_hat[i], at.all.back());
         if (!end.converged())
             throw InvalidInput(
                 "the motor forces have no gradient in a step in which they could not be computed (NaN)");
@@ -298,15 +345,19 @@ class Backward {
         if (end.acceleration_change().size() == 0) return;
         const VectorXd pull = input_.inertia.mass.cwiseProduct(all);
         g_.mass += all.cwiseProduct(end.acceleration_change());
+        if (end.is_first_step()) {
+            by_c_last += end.contact_weight() * pull;
+            return;
+        }
         by_w_last -= pull;
         by_v_last += end.weight_last() * pull;
         g_.velocities += end.weight_begin() * pull;
         by_v_before_ = end.weight_before() * pull;
         // The acceleration is of degree -1 in the lengths of this substep and the one before.
         const double by_before = pull.dot(end.change_by_dt_before());
+        const VectorXd last = algebra.stage_acceleration(at.all.back(), at.v_hat[i]);
         by.dt -=
-            (pull.dot(end.acceleration_change() + at.all.back().w) + by_before * record.begin.dt_before) /
-            algebra.dt();
+            (pull.dot(end.acceleration_change() + last) + by_before * record.begin.dt_before) / algebra.dt();
         by_dt_before_ = by_before;
     }
 
@@ -319,11 +370,12 @@ class Backward {
     }
 
     // Adds the gradients by the scene and the load parameters for an adjoint at the evaluated state, plus the motion along the motors if the
-    // loss depends on their forces. Returns the gradient by the kinematics.
+    // loss depends on their forces. by_contact: gradient by minus the contact forces, beside that by lambda. Returns the gradient by the
+    // kinematics.
     KinematicsGradient by_scene(const VectorXd& q, const LoadParameters& load_parameters,
                                 const ProximalTerm& proximal, Index step, const Substep& substep,
                                 double fraction, const VectorXd& lambda, const VectorXd& by_motor_forces,
-                                const VectorXd& by_q) {
+                                const VectorXd& by_q, const VectorXd& by_contact = {}) {
         const DofMap& dof_map = model_.dof_map();
         const VectorXd all =
             by_motor_forces.size() > 0 ? VectorXd(lambda + dof_map.motor_motion(by_motor_forces)) : lambda;
@@ -332,6 +384,8 @@ class Backward {
         KinematicsGradient by_forces;
         if (model_.capabilities().has_velocity_forces)
             by_forces = model_.parameters().forces_vjp(model_.kinematics(), load_parameters, all, scene_);
+        if (by_contact.size() > 0)
+            model_.contacts().vjp(q, model_.kinematics(), load_parameters, by_contact, by_forces, scene_);
         if (dof_map.has_values()) {
             // Assembles again, because the factorization has rotated the blocks of rotated nodes.
             model_.assemble(q, load_parameters, false);

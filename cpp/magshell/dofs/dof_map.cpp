@@ -283,6 +283,18 @@ VectorXd DofMap::project(const VectorXd& full) const {
     return own;
 }
 
+VectorXd DofMap::acceleration(const VectorXd& mass, const VectorXd& force) const {
+    VectorXd reduced = vector(force);
+    for (std::size_t k = 0; k < free_unknowns_.size(); ++k) {
+        const double m = mass[free_unknowns_[k]];
+        reduced[static_cast<Index>(k)] = m != 0.0 ? reduced[static_cast<Index>(k)] / m : 0.0;
+    }
+    reduced.tail(reduced.size() - static_cast<Index>(free_unknowns_.size())).setZero();
+    VectorXd full = expand(reduced);
+    if (reduced_) reduced_->accelerate(mass, force, full);
+    return full;
+}
+
 void DofMap::retract(VectorXd& q, const VectorXd& p) const {
     if (reduced_)
         reduced_->retract(q, p);

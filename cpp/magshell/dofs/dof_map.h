@@ -122,6 +122,14 @@ class DofMap {
     VectorXd weights(const VectorXd& full) const;
     /// Projects a vector of all dofs onto the motions of the free dofs.
     VectorXd project(const VectorXd& full) const;
+    /// Returns the acceleration of all dofs under forces [N] alone, for masses [kg] of all dofs, which are the same along the three
+    /// axes of a node: J (J^T M J)^-1 J^T f with the motions J of the free dofs. Zero where prescribed or without mass.
+    VectorXd acceleration(const VectorXd& mass, const VectorXd& force) const;
+    /// Adds what the rotation of reduced nodes adds to the forces of B^T g: f with B^T f = sum_i g_i d2x_i/dz2 z for a motion
+    /// of all nodes with free coordinates z.
+    void add_curvature_forces(const VectorXd& gradient, const VectorXd& motion, VectorXd& forces) const {
+        if (reduced_) reduced_->add_curvature_forces(gradient, motion, forces);
+    }
     /// Moves a state by p, a vector of all dofs; reduced nodes move along their coordinates.
     void retract(VectorXd& q, const VectorXd& p) const;
     /// See ReducedCoordinates; empty without reduced coordinates.

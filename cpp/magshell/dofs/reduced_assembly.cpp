@@ -340,6 +340,26 @@ void ReducedAssembly::replace(const VectorXd& from, VectorXd& to) const {
     for (const System& system : systems_) system.map->scatter(system.map->gather(from), to);
 }
 
+void ReducedAssembly::accelerate(const VectorXd& mass, const VectorXd& force, VectorXd& full) const {
+    for (const System& system : systems_) {
+        const Index n = system.map->coordinates();
+        if (n == 0) continue;
+        const MatrixXd inertia = system.twists.product(system.map->gather(mass)).topLeftCorner(n, n);
+        const VectorXd z = inertia.ldlt().solve(pull_back_free(system, system.map->gather(force)));
+        system.map->scatter(system.twists.motion(z), full);
+    }
+}
+
+void ReducedAssembly::add_curvature_forces(const VectorXd& gradient, const VectorXd& motion,
+                                           VectorXd& forces) const {
+    for (const System& system : systems_) {
+        const Index n = system.map->coordinates();
+        if (n == 0) continue;
+        const MatrixXd curvature = system.map->curvature(at_, gradient).topLeftCorner(n, n);
+        add_forces_of(system, curvature * free_part(system, motion), forces);
+    }
+}
+
 void ReducedAssembly::retract(VectorXd& q, const VectorXd& p) const {
     const VectorXd from = q;
     q += p;

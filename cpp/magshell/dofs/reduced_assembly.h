@@ -77,6 +77,12 @@ class ReducedAssembly {
     /// Copies the rows of the reduced nodes from one vector of all dofs to another.
     void replace(const VectorXd& from, VectorXd& to) const;
 
+    /// Writes into the rows of the reduced nodes the motion B z whose generalized inertia B^T M B z balances B^T f, for masses [kg] and
+    /// forces [N] of all dofs; motors stay.
+    void accelerate(const VectorXd& mass, const VectorXd& force, VectorXd& full) const;
+    /// Adds forces f on the nodes with B^T f = sum_i g_i d2x_i/dz2 z, for the free coordinates z of a motion of all nodes.
+    void add_curvature_forces(const VectorXd& gradient, const VectorXd& motion, VectorXd& forces) const;
+
     /// Moves q by p; reduced nodes follow the motion along their coordinates that is nearest to p (retraction).
     void retract(VectorXd& q, const VectorXd& p) const;
     /// See ReducedCoordinates; of all dofs, zero for nodes that are not reduced.

@@ -200,12 +200,7 @@ void Model::assemble(const VectorXd& q, const LoadParameters& load_parameters, b
         term->set_psd_projection(project_psd);
         term->prepare_assembly(q.data(), load_parameters);
     }
-    if (const std::int64_t coupled =
-            terms_.contact_layer && terms_.contact_layer->used() ? terms_.contact_layer->version() : 0;
-        coupled != coupled_) {
-        dof_map_.set_pattern(matrix_, coupled > 0 ? &terms_.contact_layer->matrix() : nullptr);
-        coupled_ = coupled;
-    }
+    update_contact_pattern();
     terms_.coloring.scatter([&](const ElementBlock& element_block) {
         clear(element_block.number);
         for (const Term* term : terms_.of_body[element_block.body])
@@ -216,6 +211,34 @@ void Model::assemble(const VectorXd& q, const LoadParameters& load_parameters, b
     low_rank_.clear();
     for (const LowRankTerm* term : terms_.low_rank) term->add_low_rank(load_parameters, low_rank_);
     collect_nonsymmetric_tangent(q, load_parameters);
+}
+
+void Model::update_contact_pattern() {
+    const std::int64_t coupled =
+        terms_.contact_layer && terms_.contact_layer->used() ? terms_.contact_layer->version() : 0;
+    if (coupled == coupled_) return;
+    dof_map_.set_pattern(matrix_, coupled > 0 ? &terms_.contact_layer->matrix() : nullptr);
+    coupled_ = coupled;
+}
+
+VectorXd Model::contact_forces(const VectorXd& q, const LoadParameters& load_parameters) const {
+    Residual residual;
+    residual.reset(size());
+    terms_.contacts.evaluate(q, kinematics_, load_parameters, residual);
+    return -residual.gradient;
+}
+
+VectorXd Model::multiply_contact_transposed(const VectorXd& q, const LoadParameters& load_parameters,
+                                            const VectorXd& x) {
+    matrix_.clear_columns(0, matrix_.size());
+    low_rank_.clear();
+    nonsymmetric_.clear();
+    terms_.contacts.assemble(q, kinematics_, load_parameters, matrix_, nonsymmetric_);
+    update_contact_pattern();
+    VectorXd product(size());
+    multiply(x, product);
+    nonsymmetric_.add_product(x, true, product);
+    return product;
 }
 
 SystemMatrix* Model::contact_matrix() {

@@ -89,6 +89,11 @@ class Model {
     void begin_step(const VectorXd& q, const LoadParameters& load_parameters);
     void evaluate_forces(const VectorXd& q, const LoadParameters& load_parameters, const StageMotion& stage);
     void assemble_forces(const LoadParameters& load_parameters, bool project_psd = false);
+    /// Returns the forces of contact and friction on all dofs [N] at the last evaluated state, with their factor (Contacts::set_factor).
+    VectorXd contact_forces(const VectorXd& q, const LoadParameters& load_parameters) const;
+    /// Returns the product of the derivative of minus these forces, transposed, with x. Overwrites the assembled Hessian.
+    VectorXd multiply_contact_transposed(const VectorXd& q, const LoadParameters& load_parameters,
+                                         const VectorXd& x);
     /// Freezes the normal forces of friction, or releases them.
     void freeze_normal_forces(bool held);
     const NonsymmetricTangent& nonsymmetric_tangent() const { return nonsymmetric_; }
@@ -132,6 +137,7 @@ class Model {
 
   private:
     void assign_columns();
+    void update_contact_pattern();
     void collect_nonsymmetric_tangent(const VectorXd& q, const LoadParameters& load_parameters);
     bool skew_blocks_act(std::size_t from) const;  // nonsymmetric_, from that block on
 

@@ -333,8 +333,10 @@ void Builder::add_contacts(const SceneInput& input) {
         rubs.push_back(each.has_friction);
         lagged.push_back(each.lagged);
     }
-    if (std::find(rubs.begin(), rubs.end(), true) != rubs.end())
+    if (std::find(rubs.begin(), rubs.end(), true) != rubs.end()) {
         out_.forces.push_back(std::make_unique<FrictionTerm>(touched, std::move(rubs), std::move(lagged)));
+        out_.contacts.add(out_.forces.back().get());
+    }
 }
 
 void Builder::add_body_contacts(const SceneInput& input) {
@@ -349,9 +351,11 @@ void Builder::add_body_contacts(const SceneInput& input) {
         rubs.push_back(each.has_friction);
         lagged.push_back(each.lagged);
     }
-    if (std::find(rubs.begin(), rubs.end(), true) != rubs.end())
+    if (std::find(rubs.begin(), rubs.end(), true) != rubs.end()) {
         out_.forces.push_back(
             std::make_unique<BodyFrictionTerm>(touched, std::move(rubs), std::move(lagged)));
+        out_.contacts.add(out_.forces.back().get());
+    }
 }
 
 }  // namespace

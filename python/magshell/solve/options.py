@@ -297,7 +297,7 @@ class ImplicitEuler:
 
 
 @immutable
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class TRBDF2:
     """Second order, two solves a step, L-stable: the trapezoidal rule, then BDF2. The default.
 
@@ -305,6 +305,12 @@ class TRBDF2:
     a strip by a third of its length. A field that jumps between two steps is felt half over the first 0.59 of the step
     after it. The first step is one of SDIRK2; with rigid parts, only the first 64th of it is.
     R. E. Bank et al., IEEE Trans. Electron Devices 32 (1985); M. E. Hosea and L. F. Shampine, Appl. Numer. Math. 20 (1996).
+
+    implicit_contact: let contact and friction act over the whole step as they are at its end, as C. Kane et al., Int. J.
+        Numer. Methods Eng. 49 (2000) do within Newmark's method. False: they act at the stages as all other forces do, and
+        an impact that no step resolves rebounds at any speed. True: it loses energy, and an impact of 20 steps rebounds with
+        0.93 to 0.95 of its speed, of 100 steps with 0.97 to 0.98. The order is one in contact, and two without. Water
+        may have no added mass then.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -314,8 +320,17 @@ class TRBDF2:
     2
     """
 
+    implicit_contact: bool = False
+
     _name = "tr_bdf2"
     _times = (2.0 - 2.0**0.5, 1.0)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.implicit_contact, bool):
+            raise ValueError(f"implicit_contact must be True or False, got {self.implicit_contact!r:.60}")
+
+    def __repr__(self) -> str:
+        return "TRBDF2(implicit_contact=True)" if self.implicit_contact else "TRBDF2()"
 
 
 @immutable

@@ -17,14 +17,16 @@ namespace {
 constexpr double smallest_part = 1.0 / 64.0;  // [-] of a step; see test_a_step_that_fails_is_taken_in_parts
 
 std::size_t bytes_of(const MotionState& state) {
-    return sizeof(double) * (state.q.size() + state.v.size() + state.rates.v.size() + state.rates.w.size()) +
+    return sizeof(double) * (state.q.size() + state.v.size() + state.rates.v.size() + state.rates.w.size() +
+                             state.rates.c.size()) +
            state.e.bytes() + state.rates.elastic.d.bytes() + state.rates.elastic.e.bytes();
 }
 
 std::size_t bytes_of(const SubstepRecord& substep) {
     std::size_t bytes = bytes_of(substep.begin);
     for (const StageState& stage : substep.stages)
-        bytes += sizeof(double) * stage.q.size() + (stage.factor ? stage.factor->own_bytes() : 0);
+        bytes += sizeof(double) * (stage.q.size() + stage.contact.size()) +
+                 (stage.factor ? stage.factor->own_bytes() : 0);
     return bytes;
 }
 
@@ -59,7 +61,7 @@ class Run {
           grown_(grown),
           result_(result),
           stepper_(newton, input.tableau, input.inertia, input.viscosity, input.projective),
-          balance_(model_, input.inertia) {
+          balance_(model_, input.inertia, input.tableau) {
         if (grown_) grown_->load_parameters = input_.adaptive.load_parameters(0, 0.0, 1.0);
         result_.start = result_.last = beginning(newton.model(), input);
         result_.begun = true;
@@ -158,10 +160,11 @@ class Run {
         const bool explicit_first = input_.tableau.begins_explicitly;
         const std::size_t vector = sizeof(double) * model_.size();
         const std::size_t strains = sizeof(double) * model_.elastic().size();
-        std::size_t state = (explicit_first ? 4 : 2) * vector;
+        const bool implicit_contact = input_.tableau.implicit_contact;
+        std::size_t state = ((explicit_first ? 4 : 2) + (implicit_contact ? 1 : 0)) * vector;
         if (input_.viscosity.maxwell()) state += strains;
         if (explicit_first && input_.viscosity.any()) state += (input_.viscosity.maxwell() ? 2 : 1) * strains;
-        const std::size_t step = state + input_.tableau.stages * vector;
+        const std::size_t step = state + (implicit_contact ? 2 : 1) * input_.tableau.stages * vector;
         const bool fits = step * static_cast<std::size_t>(input_.steps()) <= keep.budget;
         result_.keep = keep.wanted != AdjointStorage::nothing ? keep.wanted
                        : fits                                 ? AdjointStorage::stages
@@ -211,7 +214,7 @@ class Run {
     // Returns true if a step starts without the rates of a previous one and has rigid bodies or skeletons: their first
     // SDIRK2 stage is of first order. A short first substep makes this error small; each further substep is as long as all before it.
     bool needs_short_start(const MotionState& state) const {
-        return input_.tableau.begins_explicitly && state.rates.empty() &&
+        return input_.tableau.begins_explicitly && !stepper_.tableau_from(state, false).begins_explicitly &&
                model_.dof_map().has_reduced_coordinates();
     }
 

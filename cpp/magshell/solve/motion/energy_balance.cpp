@@ -29,19 +29,20 @@ EnergyBalance::StateEnergy EnergyBalance::state_energy(const MotionState& state,
         return end_;
     const double all = energy(state.q, state.angle_branches, load_parameters);
     return {state.q, state.angle_branches, load_parameters, all,
-            model_.contacts().pair_energy(state.q, load_parameters)};
+            model_.contacts().energy(state.q, load_parameters)};
 }
 
-bool EnergyBalance::has_contact(const StepAlgebra& step, const SubstepRecord& record) const {
+bool EnergyBalance::has_contact(const StepAlgebra& step, const SubstepRecord& record,
+                                std::span<const LoadParameters> load_parameters) const {
     const Contacts& contact = model_.contacts();
-    for (const StageState& stage : record.stages)
-        if (contact.has_active_pairs(stage.q)) return true;
-    return step.tableau().begins_explicitly && contact.has_active_pairs(record.begin.q);
+    for (std::size_t i = 0; i < record.stages.size(); ++i)
+        if (contact.acts(record.stages[i].q, load_parameters[i + 1])) return true;
+    return step.tableau().begins_explicitly && contact.acts(record.begin.q, load_parameters.front());
 }
 
 bool EnergyBalance::gains_energy(const StepAlgebra& step, const SubstepRecord& record, const MotionState& end,
                                  std::span<const LoadParameters> load_parameters) {
-    if (!has_contact(step, record)) return false;
+    if (!has_contact(step, record, load_parameters)) return false;
     const MotionState& begin = record.begin;
     const LoadParameters &first = load_parameters.front(), &last = load_parameters.back();
     const StateEnergy at_first = state_energy(begin, first);
@@ -65,6 +66,8 @@ double EnergyBalance::work(const StepAlgebra& step, const SubstepRecord& record,
     const Tableau& tableau = step.tableau();
     const int first = tableau.begins_explicitly ? 1 : 0;
     const StepRates at(model_, step, record);
+    const ScopedContactFactor usual_contact_afterwards(model_);
+    if (tableau.implicit_contact) model_.contacts().set_factor(0.0);
     double sum = 0.0;
     for (int j = 0; j < first + tableau.stages; ++j) {
         const bool begins = j < first;
@@ -77,6 +80,14 @@ double EnergyBalance::work(const StepAlgebra& step, const SubstepRecord& record,
         const StageRates& rates = at.all[j];
         sum += tableau.a[tableau.stages - 1][j] *
                rates.v.dot(mass_.cwiseProduct(rates.w) + model_.residual().gradient);
+    }
+    if (tableau.implicit_contact) {
+        const StageRates& last = at.all.back();
+        VectorXd forces = mass_.cwiseProduct(last.c) - model_.residual().gradient;
+        model_.contacts().set_factor(1.0);
+        model_.evaluate(record.stages.back().q, load_parameters.back());
+        forces += model_.residual().gradient;
+        sum += 0.5 * (record.begin.v + last.v).dot(forces);
     }
     return step.dt() * sum;
 }

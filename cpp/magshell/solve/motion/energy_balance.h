@@ -1,4 +1,4 @@
-// Detects whether a step with bodies in contact has gained energy that no force put in.
+// Detects whether a step with contact has gained energy that no force put in.
 //
 // Methods of higher order than implicit Euler can gain energy in an impact that the time step does not resolve, since contact forces
 // that have ended or only begun act over most of the step. The energy that forces without potential and supports put in is
@@ -6,8 +6,9 @@
 //
 //   W = dt sum_j b_j v_j . (M w_j + dE/dx_j)  +  change of the energy with the load parameters
 //
-// It comprises supports, friction, drag and viscosity. With follower loads the test does not apply: their work cannot be told from
-// a gain.
+// It comprises supports, friction, drag and viscosity. Where contact is implicit (tableau.h), w and E of the sum are without contact, whose
+// impulse dt C acts at the mean velocity: dt (v_begin + v_end)/2 . (M C + dE_C/dx) is added. With follower loads the test does
+// not apply: their work cannot be told from a gain.
 #pragma once
 
 #include <span>
@@ -18,11 +19,13 @@ namespace magshell {
 
 class EnergyBalance {
   public:
-    EnergyBalance(Model& model, const Inertia& inertia) : model_(model), mass_(inertia.mass) {}
+    EnergyBalance(Model& model, const Inertia& inertia, const Tableau& tableau)
+        : model_(model), mass_(inertia.mass), euler_(tableau.stages == 1) {}
 
-    /// Returns true if the test applies: there is contact between bodies, and no load without potential.
+    /// Returns true if the test applies: there is contact, and no load without potential. Implicit Euler gains no energy from obstacles.
     bool applies() const {
-        return model_.capabilities().has_barrier && !model_.capabilities().has_unsymmetric_tangent;
+        const bool contact = euler_ ? model_.capabilities().has_barrier : model_.contacts().any();
+        return contact && !model_.capabilities().has_unsymmetric_tangent;
     }
     /// Returns true if a step to `end` gained energy; load_parameters: load parameters at its beginning and at its stages. Leaves the model
     /// evaluated at another state.
@@ -38,16 +41,18 @@ class EnergyBalance {
         VectorXd q;
         Model::AngleBranches angle_branches;
         LoadParameters load_parameters;
-        double energy, of_contact;  // [J] of all terms, and of the contact between bodies
+        double energy, of_contact;  // [J] of all terms, and of contact
     };
     StateEnergy state_energy(const MotionState& state, const LoadParameters& load_parameters);
-    bool has_contact(const StepAlgebra& step, const SubstepRecord& record) const;
+    bool has_contact(const StepAlgebra& step, const SubstepRecord& record,
+                     std::span<const LoadParameters> load_parameters) const;
     /// Returns the work of supports and of forces without potential over the step [J].
     double work(const StepAlgebra& step, const SubstepRecord& record,
                 std::span<const LoadParameters> load_parameters);
 
     Model& model_;
     const VectorXd& mass_;
+    const bool euler_;
     StateEnergy end_;  // of the last step
 };
 

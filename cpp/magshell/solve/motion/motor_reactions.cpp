@@ -4,26 +4,37 @@
 
 namespace magshell {
 
-MotorReactions::MotorReactions(Newton& newton, const Inertia& inertia, const MotionState& begin, double dt,
-                               const VectorXd& q, const LoadParameters& load_parameters,
-                               const ProximalTerm& proximal, const StageRates& last)
+MotorReactions::MotorReactions(Newton& newton, const Inertia& inertia, const MotionState& begin,
+                               const StepAlgebra& step, const VectorXd& q,
+                               const LoadParameters& load_parameters, const ProximalTerm& proximal,
+                               const VectorXd& v_hat, const StageRates& last)
     : newton_(newton), proximal_(proximal), q_(q), target_(*proximal.target) {
     Model& model = newton_.model();
+    model.contacts().set_factor(1.0);
+    const auto move_target = [&] {
+        const VectorXd pull = inertia.mass.cwiseProduct(change_);
+        target_ -=
+            (proximal.weights->array() != 0.0).select(pull.array() / proximal.weights->array(), 0.0).matrix();
+    };
     if (begin.dt_before == 0.0) {
-        newton_.evaluate(q_, load_parameters, proximal_);
+        if (last.c.size() > 0) {
+            contact_weight_ = 1.0 - step.tableau().contact_factor(step.tableau().stages - 1);
+            change_ = contact_weight_ * last.c;
+            move_target();
+        }
+        newton_.evaluate(q_, load_parameters, this->proximal());
         return;
     }
-    const double r = dt / begin.dt_before;
+    const double dt = step.dt(), r = dt / begin.dt_before;
     weight_last_ = (1.0 + 2.0 * r) / (1.0 + r) / dt;
     weight_begin_ = -(1.0 + r) / dt;
     weight_before_ = r * r / (1.0 + r) / dt;
-    change_ = weight_last_ * last.v + weight_begin_ * begin.v + weight_before_ * begin.v_before - last.w;
+    change_ = weight_last_ * last.v + weight_begin_ * begin.v + weight_before_ * begin.v_before -
+              step.stage_acceleration(last, v_hat);
     const double square = (1.0 + r) * (1.0 + r);
     by_dt_before_ = -r / (begin.dt_before * dt) *
                     (last.v / square - begin.v + (2.0 * r + r * r) / square * begin.v_before);
-    const VectorXd pull = inertia.mass.cwiseProduct(change_);
-    target_ -=
-        (proximal.weights->array() != 0.0).select(pull.array() / proximal.weights->array(), 0.0).matrix();
+    move_target();
     const Model::AngleBranches angle_branches = model.angle_branches();
     converged_ = solve(load_parameters);
     model.set_angle_branches(angle_branches);

@@ -26,11 +26,12 @@ void StepAlgebra::start_of_stage(int i, const MotionState& begin, const std::vec
     }
 }
 
-void StepAlgebra::finish_stage(const VectorXd& q, const VectorXd& x_hat, const VectorXd& v_hat,
+void StepAlgebra::finish_stage(int i, const VectorXd& q, const VectorXd& x_hat, const VectorXd& v_hat,
                                Index coordinates, StageRates& rates) const {
     rates.v = VectorXd::Zero(q.size());
     rates.v.head(coordinates) = (q - x_hat).head(coordinates) / stage_time_;
-    rates.w = (rates.v - v_hat) / stage_time_;
+    rates.w = stage_acceleration(rates, v_hat);
+    if (rates.c.size() > 0) rates.w -= tableau_.contact_factor(i) * rates.c;
 }
 
 VectorXd StepAlgebra::target(const VectorXd& x_hat, const VectorXd& v_hat) const {
@@ -40,6 +41,7 @@ VectorXd StepAlgebra::target(const VectorXd& x_hat, const VectorXd& v_hat) const
 Stepper::Stepper(Newton& newton, const Tableau& tableau, Inertia inertia, const Viscosity& viscosity,
                  const ProjectiveOptions& projective)
     : newton_(newton), tableau_(tableau), inertia_(std::move(inertia)), viscosity_(viscosity) {
+    starter_.implicit_contact = dissipative_.implicit_contact = tableau.implicit_contact;
     if (projective.on) projective_ = std::make_unique<ProjectiveSolver>(newton, projective);
 }
 
@@ -80,7 +82,8 @@ NewtonReport Stepper::solve(VectorXd& q, const MotionState& begin, const LoadPar
 
 const Tableau& Stepper::tableau_from(const MotionState& state, bool dissipative) const {
     if (dissipative) return dissipative_;
-    return tableau_.begins_explicitly && state.rates.empty() ? starter_ : tableau_;
+    const bool known = !state.rates.empty() && (!tableau_.implicit_contact || state.rates.c.size() > 0);
+    return tableau_.begins_explicitly && !known ? starter_ : tableau_;
 }
 
 const StepAlgebra& Stepper::algebra(double dt, const Tableau& tableau) {
@@ -104,7 +107,9 @@ StepRates::StepRates(const Model& model, const StepAlgebra& step, const SubstepR
       all(first_rates(model, step.tableau(), substep.begin)) {
     for (int i = 0; i < static_cast<int>(substep.stages.size()); ++i) {
         step.start_of_stage(i, substep.begin, all, x_hat[i], v_hat[i]);
-        step.finish_stage(substep.stages[i].q, x_hat[i], v_hat[i], model.n_coordinates(), all.emplace_back());
+        StageRates& now = all.emplace_back();
+        now.c = substep.stages[i].contact;
+        step.finish_stage(i, substep.stages[i].q, x_hat[i], v_hat[i], model.n_coordinates(), now);
     }
 }
 
@@ -118,6 +123,7 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative,
     model.set_angle_branches(state.angle_branches);
     model.begin_step(state.q, load_parameters.front());
     const ScopedStrainHistory elastic_afterwards(model);
+    const ScopedContactFactor usual_contact_afterwards(model);
     const bool damped = model.capabilities().has_own_viscosity;
     if (viscosity_.any()) model.parameters().set_time_varying(load_parameters.front());
     const StrainSet at_begin = viscosity_.any() ? model.elastic().strains(state.q) : StrainSet(),
@@ -129,6 +135,8 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative,
     VectorXd motor_forces, held;
     for (int i = 0; i < tableau.stages; ++i) {
         step.start_of_stage(i, state, rates, x_hat, v_hat);
+        const double contact_factor = tableau.contact_factor(i);
+        model.contacts().set_factor(contact_factor);
         model.parameters().set_time_varying(load_parameters[i + 1]);
         const VectorXd target = step.target(x_hat, v_hat);
         // Predicts constant velocity; dofs without velocity begin where they were.
@@ -175,16 +183,24 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative,
             model.set_angle_branches(state.angle_branches);
             return false;
         }
-        // At the solution the residual of the stage, evaluated last, vanishes except for the support forces.
-        if (i + 1 == tableau.stages && model.dof_map().has_supports())
-            held = model.dof_map().along_supports(model.residual().gradient +
-                                                  step.weights().cwiseProduct(q - target));
         StageRates& now = rates.emplace_back();
-        step.finish_stage(q, x_hat, v_hat, coordinates, now);
+        VectorXd reactions;  // to contact forces beyond the real ones, where contact is implicit
+        if (tableau.implicit_contact) {
+            const VectorXd force = model.contact_forces(q, load_parameters[i + 1]) / contact_factor;
+            now.c = model.dof_map().acceleration(inertia_.mass, force);
+            reactions = (contact_factor - 1.0) * (force - inertia_.mass.cwiseProduct(now.c));
+        }
+        // At the solution the residual of the stage, evaluated last, vanishes except for the support forces.
+        if (i + 1 == tableau.stages && model.dof_map().has_supports()) {
+            held = model.residual().gradient + step.weights().cwiseProduct(q - target);
+            if (tableau.implicit_contact) held += reactions;
+            held = model.dof_map().along_supports(held);
+        }
+        step.finish_stage(i, q, x_hat, v_hat, coordinates, now);
         if (i + 1 == tableau.stages && model.dof_map().has_motors())
-            motor_forces =
-                MotorReactions(newton_, inertia_, state, dt, q, load_parameters[i + 1], proximal, now)
-                    .motor_forces(load_parameters[i + 1]);
+            motor_forces = MotorReactions(newton_, inertia_, state, step, q, load_parameters[i + 1], proximal,
+                                          v_hat, now)
+                               .motor_forces(load_parameters[i + 1]);
         if (viscosity_.any()) {
             viscous.finish(viscosity_, T, model.elastic().strains(q), now.elastic);
             e = std::move(viscous.e);
@@ -192,7 +208,8 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative,
         if (damped) joints.finish(damper_law, T, model.dampers().strains(q), now.joints);
         if (kept) {
             const bool factorized = with_factors && report.iterations > 0;
-            stages.push_back({q, model.angle_branches(), factorized ? newton_.release_factor() : nullptr});
+            stages.push_back(
+                {q, model.angle_branches(), factorized ? newton_.release_factor() : nullptr, now.c});
         }
     }
     reason =

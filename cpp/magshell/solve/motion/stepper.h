@@ -38,6 +38,7 @@ struct StageState {
     VectorXd q;
     Model::AngleBranches angle_branches;
     std::shared_ptr<const Factor> factor;  // of the last Newton iteration, if it was to be stored
+    VectorXd contact = {};                 // StageRates::c
 };
 
 /// A step or substep, with all that its adjoint needs.
@@ -54,9 +55,13 @@ class StepAlgebra {
     /// Computes x^ and v^ of stage i from all rates before it.
     void start_of_stage(int i, const MotionState& begin, const std::vector<StageRates>& rates,
                         VectorXd& x_hat, VectorXd& v_hat) const;
-    /// Computes v and w of a stage from its solution.
-    void finish_stage(const VectorXd& q, const VectorXd& x_hat, const VectorXd& v_hat, Index coordinates,
-                      StageRates& rates) const;
+    /// Computes v and w of stage i from its solution and rates.c.
+    void finish_stage(int i, const VectorXd& q, const VectorXd& x_hat, const VectorXd& v_hat,
+                      Index coordinates, StageRates& rates) const;
+    /// Returns w_i of a stage with its contact forces: (v_i - v^_i)/(a dt).
+    VectorXd stage_acceleration(const StageRates& rates, const VectorXd& v_hat) const {
+        return (rates.v - v_hat) / stage_time_;
+    }
     VectorXd target(const VectorXd& x_hat, const VectorXd& v_hat) const;
     const VectorXd& weights() const { return weights_; }
     /// a dt [s]
@@ -68,6 +73,18 @@ class StepAlgebra {
     Tableau tableau_;
     double dt_, stage_time_;
     VectorXd weights_, velocity_share_;
+};
+
+/// RAII guard that gives contact forces their usual factor, 1, again at the end of its scope.
+class ScopedContactFactor {
+  public:
+    explicit ScopedContactFactor(const Model& model) : model_(model) {}
+    ScopedContactFactor(const ScopedContactFactor&) = delete;
+    ScopedContactFactor& operator=(const ScopedContactFactor&) = delete;
+    ~ScopedContactFactor() { model_.contacts().set_factor(1.0); }
+
+  private:
+    const Model& model_;
 };
 
 class Stepper {
@@ -82,7 +99,8 @@ class Stepper {
               std::span<const LoadParameters> load_parameters, SubstepRecord* kept, bool with_factors,
               std::string& reason);
 
-    /// Returns the method of a step from this state: SDIRK2 if it needs rates that the state lacks; implicit Euler if dissipative.
+    /// Returns the method of a step from this state: SDIRK2 if it needs rates that the state lacks; implicit Euler if dissipative. Contact
+    /// is implicit in all three or in none.
     const Tableau& tableau_from(const MotionState& state, bool dissipative) const;
     const StepAlgebra& algebra(double dt, const Tableau& tableau);
     /// Returns the estimated error of the step taken last [m] (step_error.h).

@@ -35,9 +35,10 @@ struct StrainRates {
     StrainSet d, e;
 };
 
-/// Rates at a stage: of positions, velocities, elastic strains, and strains of joint dampers.
+/// Rates at a stage: of positions, velocities, elastic strains, and strains of joint dampers. If contact is implicit (tableau.h), w is the
+/// acceleration without contact, and c that of contact and friction; else c is empty.
 struct StageRates {
-    VectorXd v, w;
+    VectorXd v, w, c = {};
     StrainRates elastic, joints;
 
     bool empty() const { return v.size() == 0; }

@@ -22,6 +22,7 @@ BodyContactTerm::BodyContactTerm(const Nodes& nodes, const std::vector<ContactSu
                                  const std::vector<BodyContactInput>& contacts, ContactLayer& layer,
                                  Registry& registry)
     : laws_(contacts.size()),
+      stiffness_(contacts.size(), 0.0),
       friction_(contacts.size()),
       least_(contacts.size(), 0.0),
       candidates_(nodes, surfaces, contacts),
@@ -44,7 +45,8 @@ bool BodyContactTerm::set_values(const Values& values) {
     for (std::size_t c = 0; c < laws_.size(); ++c) {
         const ParameterSlices& slices = slices_[c];
         BarrierLaw& law = laws_[c];
-        law.stiffness = values.number(slices.stiffness);
+        stiffness_[c] = values.number(slices.stiffness);
+        law.stiffness = factor_ * stiffness_[c];
         law.reach = values.number(slices.reach);
         law.thickness = values.number(slices.distance);
         law.smoothing = values.number(slices.smoothing);
@@ -56,6 +58,13 @@ bool BodyContactTerm::set_values(const Values& values) {
     candidates_.set_distances(distances);
     found_.clear();
     return false;  // none of its forces cancel in add_cancelling_forces
+}
+
+void BodyContactTerm::set_factor(double factor) {
+    if (factor == factor_) return;
+    factor_ = factor;
+    for (std::size_t c = 0; c < laws_.size(); ++c) laws_[c].stiffness = factor * stiffness_[c];
+    found_.clear();
 }
 
 BodyContactTerm::ActiveContacts BodyContactTerm::found(const double* q) const {
@@ -230,13 +239,13 @@ void BodyContactTerm::finish_assembly(const double*, const LoadParameters&, Syst
 
 void BodyContactTerm::vjp(const double*, const LoadParameters&, const double* lambda, Gradient& out) {
     for (const ActiveContact& active : evaluated_contacts())
-        add_vjp(active, active.at.vjp(positions_of(active.near.pair, lambda)), {}, out.values);
+        add_vjp(active, active.at.vjp(positions_of(active.near.pair, lambda)), {}, factor_, out.values);
 }
 
 void BodyContactTerm::add_vjp(const ActiveContact& active, const PairEnergy::ByLaw& by,
-                              const FrictionLaw& by_friction, VectorXd& by_values) const {
+                              const FrictionLaw& by_friction, double factor, VectorXd& by_values) const {
     const ParameterSlices& slices = slices_[active.near.contact];
-    by_values[slices.stiffness.first] += by.stiffness;
+    by_values[slices.stiffness.first] += factor * by.stiffness;
     by_values[slices.reach.first] += by.reach;
     by_values[slices.distance.first] += by.thickness;
     by_values[slices.smoothing.first] += by.smoothing;

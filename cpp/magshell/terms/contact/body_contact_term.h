@@ -51,6 +51,9 @@ class BodyContactTerm final : public Term {
     double curvature(const double* p) const;
     /// Adds the stiffness along the normal of every active pair at the last evaluated state.
     void add_stiffness(std::vector<PairStiffness>& out) const;
+    /// Multiplies the energy, and with it all forces, by a factor from now on; see Tableau::contact_factor().
+    void set_factor(double factor);
+    double factor() const { return factor_; }
     /// Switches the smooth contact law off while another method enforces contact. Steps are limited as before,
     /// so that no pair passes through each other.
     void set_switched_off(bool off) const { switched_off_ = off; }
@@ -81,9 +84,10 @@ class BodyContactTerm final : public Term {
     void set_psd_projection(bool project_psd) override { psd_projection_ = project_psd; }
     /// Adds the magnitude [N] of the forces that cancel within pair forces at the last evaluated state.
     void add_cancelling_normal_forces(VectorXd& out) const;
-    /// Adds the gradient by the parameters of a pair's contact.
+    /// Adds the gradient by the parameters of a pair's contact. factor: the factor of the stiffness that `active` was
+    /// computed with.
     void add_vjp(const ActiveContact& active, const PairEnergy::ByLaw& by, const FrictionLaw& by_friction,
-                 VectorXd& by_values) const;
+                 double factor, VectorXd& by_values) const;
     ContactLayer& layer() const { return layer_; }
     /// Resets all stored searches and couplings, so that the bits of a solve do not depend on earlier ones.
     void forget() const {
@@ -142,7 +146,9 @@ class BodyContactTerm final : public Term {
     void each_limit(const double* q, const double* p, const Found& found) const;
 
     std::vector<ParameterSlices> slices_;
-    std::vector<BarrierLaw> laws_;
+    std::vector<BarrierLaw> laws_;  // with the stiffness times factor_
+    double factor_ = 1.0;
+    std::vector<double> stiffness_;  // [Pa] of each contact, without the factor
     std::vector<FrictionLaw> friction_;
     std::vector<double> least_;  // minimum separation of each contact [m]
     mutable ContactCandidates candidates_;

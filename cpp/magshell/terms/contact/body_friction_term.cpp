@@ -18,9 +18,14 @@ void BodyFrictionTerm::evaluate(const Kinematics& at, const LoadParameters&, Res
     now_ = frozen_ ? frozen_contacts_ : contact_.evaluated_contacts();
     const auto add_friction = [&](const ActiveContact& active, bool lagged) {
         if (!has_friction_[active.near.contact] || lagged_[active.near.contact] != lagged) return;
-        friction_contacts_.push_back({&active, lagged,
-                                      PairFriction(active.at, positions_of(active.near.pair, at.v.data()),
-                                                   contact_.friction(active))});
+        // Lagged normal forces are those of the beginning of the step, without the factor of the contact forces.
+        const double factor = lagged ? contact_.factor() : 1.0;
+        FrictionLaw law = contact_.friction(active);
+        law.kinetic *= factor;
+        law.fixed *= factor;
+        friction_contacts_.push_back(
+            {&active, lagged, factor,
+             PairFriction(active.at, positions_of(active.near.pair, at.v.data()), law)});
         const PairVectors force = friction_contacts_.back().friction.force();
         for (int k = 0; k < active.at.count(); ++k)
             for (int axis = 0; axis < 3; ++axis)
@@ -68,8 +73,10 @@ void BodyFrictionTerm::vjp(const Kinematics&, const LoadParameters&, const Vecto
             if (each.lagged) by.begin.segment<3>(first) += of.by_position[k];
         }
         const PairVectors none = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
-        contact_.add_vjp(active, active.at.vjp(none, -of.by_normal_force),
-                         {-of.by_law.kinetic, -of.by_law.fixed, -of.by_law.sticking_speed}, out.values);
+        contact_.add_vjp(
+            active, active.at.vjp(none, -of.by_normal_force),
+            {-each.factor * of.by_law.kinetic, -each.factor * of.by_law.fixed, -of.by_law.sticking_speed},
+            each.lagged ? 1.0 : contact_.factor(), out.values);
     }
 }
 

@@ -37,6 +37,7 @@ class BodyFrictionTerm final : public ForceTerm {
     struct FrictionContact {
         const ActiveContact* active;
         bool lagged;
+        double factor;  // of both coefficients of friction
         PairFriction friction;
     };
 

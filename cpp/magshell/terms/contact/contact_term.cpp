@@ -32,7 +32,7 @@ SimdMat3 to_simd(const Mat3& block) {
 ContactTerm::ContactTerm(const Nodes& nodes, const SystemMatrix& matrix,
                          const std::vector<ContactInput>& contacts,
                          const std::vector<std::shared_ptr<const Obstacle>>& obstacles, Registry& registry)
-    : laws_(contacts.size()) {
+    : laws_(contacts.size()), stiffness_(contacts.size(), 0.0) {
     for (const ContactInput& given : contacts) {
         const std::string owner = "contact " + std::to_string(contacts_.size());
         const auto number = [&](const char* name, const char* unit) {
@@ -67,14 +67,19 @@ ContactTerm::ContactTerm(const Nodes& nodes, const SystemMatrix& matrix,
 bool ContactTerm::set_values(const Values& values) {
     for (std::size_t c = 0; c < contacts_.size(); ++c) {
         const Contact& contact = contacts_[c];
-        laws_[c] = {values.number(contact.stiffness), values.number(contact.smoothing),
-                    values.number(contact.offset), values.number(contact.friction),
-                    values.number(contact.sticking_speed)};
+        stiffness_[c] = values.number(contact.stiffness);
+        laws_[c] = {factor_ * stiffness_[c], values.number(contact.smoothing), values.number(contact.offset),
+                    values.number(contact.friction), values.number(contact.sticking_speed)};
     }
     for (std::size_t o = 0; o < obstacles_.size(); ++o)
         obstacles_[o].placement = {values.vector(obstacle_slices_[o].center),
                                    values.vector(obstacle_slices_[o].rotation)};
     return false;  // none of its forces cancel in add_cancelling_forces
+}
+
+void ContactTerm::set_factor(double factor) {
+    factor_ = factor;
+    for (std::size_t c = 0; c < contacts_.size(); ++c) laws_[c].stiffness = factor * stiffness_[c];
 }
 
 ObstacleState ContactTerm::obstacle_state(Index obstacle, const LoadParameters& load_parameters) const {
@@ -87,7 +92,7 @@ void ContactTerm::add_vjp(const ActiveContact& active, double by_force, const Co
                           const ObstacleGradient& by_obstacle, VectorXd& by_values,
                           LoadParameters& by_load_parameters) const {
     const Contact& contact = contacts_[active.contact];
-    by_values[contact.stiffness.first] += by_force * active.force / law(active).stiffness;
+    by_values[contact.stiffness.first] += by_force * active.force / stiffness_[active.contact];
     by_values[contact.smoothing.first] += by_force * active.by_smoothing;
     by_values[contact.offset.first] += by_force * active.stiffness;
     by_values[contact.friction.first] += by_friction.friction;

@@ -70,11 +70,18 @@ class ContactTerm final : public Term {
     };
     /// Returns all vertices under hard contact. Throws InvalidInput if points on faces are in contact as well.
     std::vector<HardContact> hard_contacts() const;
+    /// Multiplies the energy, and with it all forces, by a factor from now on; see Tableau::contact_factor().
+    void set_factor(double factor);
+    double factor() const { return factor_; }
     /// Switches the penalty law off while another method enforces contact.
     void set_switched_off(bool off) { switched_off_ = off; }
 
     /// Returns the points in contact at q, in the order of contacts, obstacles and points.
     std::vector<ActiveContact> active_contacts(const double* q, const LoadParameters& load_parameters) const;
+    /// Returns true if any point is in contact at q.
+    bool acts(const double* q, const LoadParameters& load_parameters) const {
+        return !active_contacts(q, load_parameters).empty();
+    }
     /// Returns the points in contact at the last evaluated state.
     const std::vector<ActiveContact>& evaluated_contacts() const { return evaluated_contacts_; }
 
@@ -145,7 +152,9 @@ class ContactTerm final : public Term {
     };
 
     std::vector<Contact> contacts_;
-    std::vector<ContactLaw> laws_;
+    std::vector<ContactLaw> laws_;  // with the stiffness times factor_
+    double factor_ = 1.0;
+    std::vector<double> stiffness_;  // [N/m] of each contact, without the factor
     std::vector<PositionedObstacle> obstacles_;
     std::vector<ObstacleSlices> obstacle_slices_;
     std::vector<ActiveContact> evaluated_contacts_;

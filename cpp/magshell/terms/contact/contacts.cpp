@@ -4,6 +4,41 @@
 
 namespace magshell {
 
+void Contacts::set_factor(double factor) const {
+    if (obstacles_) obstacles_->set_factor(factor);
+    if (bodies_) bodies_->set_factor(factor);
+}
+
+void Contacts::evaluate(const VectorXd& q, const Kinematics& at, const LoadParameters& load_parameters,
+                        Residual& out) const {
+    if (obstacles_) obstacles_->evaluate(q.data(), load_parameters, out);
+    if (bodies_) bodies_->evaluate(q.data(), load_parameters, out);
+    for (ForceTerm* friction : frictions_) friction->evaluate(at, load_parameters, out);
+}
+
+void Contacts::assemble(const VectorXd& q, const Kinematics& at, const LoadParameters& load_parameters,
+                        SystemMatrix& out, NonsymmetricTangent& rest) const {
+    if (obstacles_) obstacles_->finish_assembly(q.data(), load_parameters, out);
+    if (bodies_) {
+        bodies_->set_psd_projection(false);
+        bodies_->prepare_assembly(q.data(), load_parameters);
+        bodies_->finish_assembly(q.data(), load_parameters, out);
+    }
+    for (const ForceTerm* friction : frictions_) friction->assemble(at, load_parameters, false, out, rest);
+}
+
+void Contacts::vjp(const VectorXd& q, const Kinematics& at, const LoadParameters& load_parameters,
+                   const VectorXd& lambda, KinematicsGradient& by, Gradient& out) const {
+    if (obstacles_) obstacles_->vjp(q.data(), load_parameters, lambda.data(), out);
+    if (bodies_) bodies_->vjp(q.data(), load_parameters, lambda.data(), out);
+    for (const ForceTerm* friction : frictions_) friction->vjp(at, load_parameters, lambda, by, out);
+}
+
+double Contacts::energy(const VectorXd& q, const LoadParameters& load_parameters) const {
+    return (obstacles_ ? obstacles_->energy(q.data(), load_parameters) : 0.0) +
+           (bodies_ ? bodies_->energy(q.data(), load_parameters) : 0.0);
+}
+
 std::vector<Contacts::ObstaclePoint> Contacts::obstacle_points() const {
     return obstacles_ ? obstacles_->evaluated_contacts() : std::vector<ObstaclePoint>();
 }

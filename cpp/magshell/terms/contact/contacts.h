@@ -7,6 +7,7 @@
 
 #include "magshell/terms/contact/body_contact_term.h"
 #include "magshell/terms/contact/contact_term.h"
+#include "magshell/terms/force_term.h"
 
 namespace magshell {
 
@@ -17,6 +18,22 @@ class Contacts {
     /// Adds the term of contact with obstacles, or that of contact between bodies.
     void add(ContactTerm* obstacles) { obstacles_ = obstacles; }
     void add(BodyContactTerm* bodies) { bodies_ = bodies; }
+    /// Adds the friction of one of them.
+    void add(ForceTerm* friction) { frictions_.push_back(friction); }
+    /// Returns true if there is any contact.
+    bool any() const { return obstacles_ || bodies_; }
+
+    /// Multiplies all contact forces, with friction, by a factor from now on, until it is set to 1 again.
+    void set_factor(double factor) const;
+    /// Adds to `out` minus the forces of contact and friction at q, the last evaluated state, with their factor.
+    void evaluate(const VectorXd& q, const Kinematics& at, const LoadParameters& load_parameters,
+                  Residual& out) const;
+    /// Adds their Hessian and the derivatives of friction at that state, as the assembly of a model does.
+    void assemble(const VectorXd& q, const Kinematics& at, const LoadParameters& load_parameters,
+                  SystemMatrix& out, NonsymmetricTangent& rest) const;
+    /// Add what Term::vjp of contact, and ForceTerm::vjp of friction, add at that state.
+    void vjp(const VectorXd& q, const Kinematics& at, const LoadParameters& load_parameters,
+             const VectorXd& lambda, KinematicsGradient& by, Gradient& out) const;
 
     /// Returns the points in contact with obstacles at the last evaluated state; with q, those at q.
     std::vector<ObstaclePoint> obstacle_points() const;
@@ -45,13 +62,15 @@ class Contacts {
     Passage first_crossing(const VectorXd& q, const LoadParameters& load_parameters, const VectorXd& end,
                            const LoadParameters& load_parameters_at_end) const;
 
+    /// Returns true if anything is in contact at q.
+    bool acts(const VectorXd& q, const LoadParameters& load_parameters) const {
+        return has_active_pairs(q) || (obstacles_ && obstacles_->acts(q.data(), load_parameters));
+    }
+    /// Returns the energy of all contact [J].
+    double energy(const VectorXd& q, const LoadParameters& load_parameters) const;
     /// Returns true if a pair of faces or edges is in contact at the last evaluated state; with q, at q.
     bool has_active_pairs() const { return bodies_ && !bodies_->evaluated_contacts().empty(); }
     bool has_active_pairs(const VectorXd& q) const { return bodies_ && bodies_->acts(q.data()); }
-    /// Returns the energy of contact between bodies [J].
-    double pair_energy(const VectorXd& q, const LoadParameters& load_parameters) const {
-        return bodies_ ? bodies_->energy(q.data(), load_parameters) : 0.0;
-    }
     /// Returns the directional derivative of that energy along p [J] at the last evaluated state; with q, at q.
     double slope(const VectorXd& p) const { return bodies_ ? bodies_->slope(p.data()) : 0.0; }
     double slope(const VectorXd& q, const VectorXd& p) const {
@@ -88,6 +107,7 @@ class Contacts {
   private:
     ContactTerm* obstacles_ = nullptr;
     BodyContactTerm* bodies_ = nullptr;
+    std::vector<ForceTerm*> frictions_;
 };
 
 }  // namespace magshell

@@ -35,10 +35,11 @@ void FrictionTerm::evaluate(const Kinematics& at, const LoadParameters& load_par
             contact_.obstacle_state(active.obstacle, lagged ? load_parameters_before_ : load_parameters);
         const Vec3 velocity = contact_.at_point(active, at.v.data()) - obstacle.velocity(active.position);
         const ContactLaw& law = contact_.law(active);
+        const double factor = lagged ? contact_.factor() : 1.0;
         friction_contacts_.push_back(
-            {active, lagged, obstacle,
+            {active, lagged, factor, obstacle,
              Friction(active.force, active.at.normal, velocity, law.sticking_speed)});
-        contact_.distribute(active, -law.friction * friction_contacts_.back().friction.force, out);
+        contact_.distribute(active, -factor * law.friction * friction_contacts_.back().friction.force, out);
     };
     for (const ContactTerm::ActiveContact& active :
          frozen_ ? frozen_contacts_ : contact_.evaluated_contacts())
@@ -55,7 +56,7 @@ void FrictionTerm::set_frozen(bool frozen) {
 void FrictionTerm::assemble(const Kinematics& at, const LoadParameters&, bool positive_definite,
                             SystemMatrix& out, NonsymmetricTangent& rest) const {
     for (const FrictionContact& each : friction_contacts_) {
-        const double coefficient = contact_.law(each.active).friction;
+        const double coefficient = each.factor * contact_.law(each.active).friction;
         const Mat3& by_velocity = positive_definite ? each.friction.secant : each.friction.by_velocity;
         contact_.add_block(each.active, -coefficient * at.rate * by_velocity, out);
         if (each.lagged || frozen_) continue;
@@ -76,22 +77,21 @@ void FrictionTerm::vjp(const Kinematics&, const LoadParameters&, const VectorXd&
     for (const FrictionContact& each : friction_contacts_) {
         const ContactTerm::ActiveContact& active = each.active;
         const Friction& friction = each.friction;
-        const ContactLaw& law = contact_.law(active);
+        const double coefficient = each.factor * contact_.law(active).friction;
         const Vec3 along = contact_.at_point(active, lambda.data());
-        const Vec3 by_velocity = law.friction * (friction.by_velocity * along);
+        const Vec3 by_velocity = coefficient * (friction.by_velocity * along);
         contact_.distribute(active, by_velocity, by.velocity);
         if (each.lagged) {
-            const Mat3 by_begin = law.friction * by_position(friction, active, each.obstacle.spin());
+            const Mat3 by_begin = coefficient * by_position(friction, active, each.obstacle.spin());
             contact_.distribute(active, by_begin.transpose() * along, by.begin);
         }
-        const double by_force = -law.friction * along.dot(friction.by_normal_force);
+        const double by_force = -coefficient * along.dot(friction.by_normal_force);
         ObstacleGradient by_obstacle;
         each.obstacle.vjp(active.position, active.at, -active.stiffness * by_force,
-                          -law.friction * (friction.by_normal.transpose() * along), -by_velocity,
-                          by_obstacle);
+                          -coefficient * (friction.by_normal.transpose() * along), -by_velocity, by_obstacle);
         contact_.add_vjp(active, by_force,
-                         {.friction = -along.dot(friction.force),
-                          .sticking_speed = -law.friction * along.dot(friction.by_sticking_speed)},
+                         {.friction = -each.factor * along.dot(friction.force),
+                          .sticking_speed = -coefficient * along.dot(friction.by_sticking_speed)},
                          by_obstacle, out.values,
                          each.lagged ? by.begin_load_parameters : out.load_parameters);
     }
@@ -102,7 +102,8 @@ void FrictionTerm::vjp(const Kinematics&, const LoadParameters&, const VectorXd&
 void FrictionTerm::add_cancelling_forces(const Kinematics& at, VectorXd& out) const {
     for (const FrictionContact& each : friction_contacts_) {
         const double stiffness = at.rate * each.friction.by_velocity.norm();
-        contact_.add_cancelling_force(each.active, contact_.law(each.active).friction * stiffness, out);
+        contact_.add_cancelling_force(each.active,
+                                      each.factor * contact_.law(each.active).friction * stiffness, out);
     }
 }
 

@@ -35,6 +35,8 @@ class FrictionTerm final : public ForceTerm {
     struct FrictionContact {
         ContactTerm::ActiveContact active;
         bool lagged;
+        /// Factor of the coefficient of friction: that of the contact forces where `active` does not have it yet.
+        double factor;
         ObstacleState obstacle;
         Friction friction;
     };

@@ -67,6 +67,7 @@ class MotionInputs:
                 f"record_every must be at most steps = {self.steps}, got {self.record_every}: "
                 "only the start would be recorded"
             )
+        _check_contact_method(inputs, integrator)
         given = arguments["time_step"]
         adaptive = given if isinstance(given, Adaptive) else None
         check_memory(self.steps, self.record_every, len(integrator._times) + 1, inputs.scene._model.size)
@@ -108,6 +109,7 @@ class MotionInputs:
                 "mass": self._mass,
                 "damping": self._damping,
                 "integrator": integrator._name,
+                "implicit_contact": getattr(integrator, "implicit_contact", False),
                 "time_steps": [] if chooses else self.time_steps.lengths,
                 "recorded": [0] if chooses else self.time_steps.grid_ends[:: self.record_every],
                 "adaptive": self._ladder(adaptive) if chooses else None,
@@ -222,6 +224,7 @@ class MotionInputs:
         return {
             "maxwell_strains": start.maxwell_strains if maxwell else nothing,
             "acceleration": start.acceleration if known else nothing,
+            "contact_acceleration": start.contact_acceleration,
             "strain_rates": start.strain_rates,
             "maxwell_strain_rates": start.maxwell_strain_rates,
         }
@@ -307,9 +310,10 @@ def _checked_state(start: MotionState, size: int, n_strains: int) -> MotionState
         raise ValueError(
             f"start is a state of {len(start.state)} degrees of freedom, but the scene has {size}"
         )
-    given = {name: getattr(start, name) for name in ("state", "velocity", "acceleration")}
-    for name, values in given.items():
-        optional = name == "acceleration" and np.shape(values) == (0,)
+    rates = ("acceleration", "contact_acceleration")
+    for name in ("state", "velocity", *rates):
+        values = getattr(start, name)
+        optional = name in rates and np.shape(values) == (0,)
         quantity(f"start.{name}", "SI", values, (0,) if optional else (size,))
     for name in ("strain_rates", "maxwell_strains", "maxwell_strain_rates"):
         values = getattr(start, name)
@@ -324,6 +328,19 @@ def _checked_state(start: MotionState, size: int, n_strains: int) -> MotionState
     if not isinstance(start.clock, Clock | None):
         raise ValueError(f"start.clock must be that of a motion, or None, got {type(start.clock).__name__}")
     return start
+
+
+def _check_contact_method(inputs: Inputs, integrator: Integrator) -> None:
+    """Raise ValueError if contact cannot be implicit in a motion for which the integrator asks so."""
+    scene = inputs.scene
+    if not getattr(integrator, "implicit_contact", False) or not scene.contacts or scene.water is None:
+        return
+    added_mass = float(detached(inputs.values.current(scene.water).added_mass))
+    if added_mass > 0.0:
+        raise ValueError(
+            "TRBDF2(implicit_contact=True) needs water without added mass, which contact forces would accelerate as "
+            f"well; the water has added_mass = {added_mass:g} kg/m2. Take TRBDF2() or ImplicitEuler()"
+        )
 
 
 def _differentiable_in_time(numbers, time_step) -> bool:

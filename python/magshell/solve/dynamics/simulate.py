@@ -96,7 +96,7 @@ def simulate(
         parabolas through three neighbouring ends, on straight lines between those: of second order, as its places are.
     integrator: TRBDF2() by default, ImplicitEuler() where the scene has contacts; SDIRK2(), SDIRK3(), ProjectiveDynamics().
         A method of higher order makes an impact bounce, and each of its steps there is much work, unless the steps resolve
-        it.
+        it. TRBDF2(implicit_contact=True) bounces right where steps resolve an impact, and loses energy where they do not.
     record_every: steps (or intervals) between the states that come back, the start first.
     adjoint_storage: for gradients; "stages" (all states), "checkpoints", "factors", or an ms.AdjointStorage,
         which says how many bytes it may
@@ -312,6 +312,7 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
             found.last_maxwell_strain_rates(model),
             ended,
             found.begun or asked.start.rotations_known,
+            found.last_contact_acceleration,
         ),
         iterations=found.iterations,
         factorizations=found.factorizations,

@@ -52,7 +52,8 @@ class MotionState:
     state, velocity, acceleration: of all degrees of freedom in the core's order, (n,). angle_branches: the full turns of
     dihedral and joint angles. strain_rates, maxwell_strains, maxwell_strain_rates: of faces.
     Arrays that the motion did not need are empty: accelerations and strain rates are those of TRBDF2, Maxwell strains those
-    of a Maxwell branch.
+    of a Maxwell branch. contact_acceleration: the share of contact and friction, which `acceleration` does not contain; only
+    with TRBDF2(implicit_contact=True).
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -73,6 +74,7 @@ class MotionState:
     maxwell_strain_rates: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
     clock: Clock | None = field(repr=False, default=None)
     rotations_known: bool = field(repr=False, default=True)
+    contact_acceleration: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
 
     def save(self, path: str | Path) -> None:
         """Write the state to an .npz file."""
@@ -98,7 +100,8 @@ class MotionState:
                 remembered = quantity("angle_branches", "SI", file["angle_branches"], ("n",))
                 lengths = index_array("branch_lengths", file["branch_lengths"])
                 known = bool(file["rotations_known"])
-                arrays = {name: file[name] for name in _ARRAYS}
+                # Files of earlier versions have no contact_acceleration.
+                arrays = {name: file[name] for name in _ARRAYS if name in file or name in _REQUIRED}
             clock = Clock(origin, time_step, int(steps))
             parts = np.split(remembered, np.cumsum(lengths)[:-1]) if len(lengths) else []
         except (KeyError, ValueError, TypeError, EOFError) as error:
@@ -112,7 +115,8 @@ class MotionState:
         )
 
 
-_ARRAYS = ("state", "velocity", "acceleration", "strain_rates", "maxwell_strains", "maxwell_strain_rates")
+_REQUIRED = ("state", "velocity", "acceleration", "strain_rates", "maxwell_strains", "maxwell_strain_rates")
+_ARRAYS = (*_REQUIRED, "contact_acceleration")
 
 
 @immutable
@@ -134,8 +138,8 @@ class Trajectory(AnimateMixin, OfOneBody):
         over vertices and points of rigid bodies, of an embedded formula of one order more. Beyond 1 % of the extent,
         ms.StepErrorWarning warns.
     substeps: {step: number of parts that it was taken in}.
-        fallback_steps: the steps of which implicit Euler took all or a part instead of the integrator, because bodies were
-        in contact and the step would have gained energy without a source.
+        fallback_steps: the steps of which implicit Euler took all or a part instead of the integrator, because a step in
+        contact would have gained energy without a source.
     end: the last state, from which another simulation continues. bytes: stored for gradients.
     """
 
