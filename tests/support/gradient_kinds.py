@@ -346,7 +346,7 @@ MAKERS = {
         moving, lambda **options: thrown(ob.Box, **options, **RUBS), motorized_skeleton_in_motion, STEPS
     ),
     "onto a Plane, contact implicit": lambda: thrown(
-        ob.Plane, ms.TRBDF2(implicit_contact=True), extra=VISCOUS, face_samples=1, **RUBS
+        ob.Plane, ms.TRBDF2(implicit_contact=True), extra=VISCOUS, step=2e-6, face_samples=1, **RUBS
     ),
     "onto a Box that is carried, late, contact implicit": lambda: thrown(
         ob.Box, ms.TRBDF2(implicit_contact=True), in_time=6, lagged_friction=True, **RUBS
