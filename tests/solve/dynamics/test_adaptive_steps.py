@@ -1,6 +1,7 @@
 """Tests of time steps that are given one by one or chosen by their errors: accuracy, grid, repetition, refusals."""
 
 import pickle
+from itertools import count
 
 import numpy as np
 import pytest
@@ -212,3 +213,42 @@ def test_steps_that_miss_the_grid_are_refused() -> None:
     words = r"add up to 0.004 s, but not to steps = 4 equal intervals of 0.001 s: none ends at 0.001 s"
     with pytest.raises(ValueError, match=words):
         swinging_strip(4, [6e-4, 8e-4, 6e-4, 1e-3, 1e-3])
+
+
+def test_tolerance_beyond_a_percent_of_the_extent_is_warned_of() -> None:
+    with pytest.warns(ms.StepErrorWarning, match=r"Take a tolerance of at most 0.001 m"):
+        swinging_strip(5, ms.Adaptive(0.04, 5e-3), ms.ImplicitEuler())
+
+
+@pytest.mark.parametrize("storage", ["checkpoints", "factors", None])
+def test_gradient_by_the_interval_does_not_depend_on_the_storage(storage) -> None:
+    """Give the stages so little memory that checkpoints replace them during the motion."""
+    torch = pytest.importorskip("torch")
+    slopes = []
+    for kept in (ms.AdjointStorage("stages"), ms.AdjointStorage(storage, memory_budget=3e4)):
+        interval = torch.tensor(0.02, dtype=torch.float64, requires_grad=True)
+        move = swinging_strip(5, ms.Adaptive(interval, 1e-5), ms.ImplicitEuler(), adjoint_storage=kept)
+        assert move.adjoint_storage == (kept.what or "checkpoints") and len(move.time_steps) > 40
+        (move.positions**2).sum().backward()
+        slopes.append(float(interval.grad))
+    assert slopes[1] == pytest.approx(slopes[0], rel=1e-9)
+
+
+def test_interrupted_motion_has_the_steps_until_then() -> None:
+    """Let a field interrupt the motion, after the 81 calls by which the inputs are checked before it."""
+    calls = count()
+
+    def field(t):
+        if next(calls) == 150:
+            raise KeyboardInterrupt
+        return (0, 0, 4e-3 * np.sin(40 * t))
+
+    mesh = ms.meshes.rectangle(0.05, 0.01, cells=(6, 2))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
+    given = {"remanent_magnetization": (4e4, 0, 0), "progress": False, "time_step": ms.Adaptive(0.01, 1e-5)}
+    with pytest.raises(ms.Interrupted) as caught:
+        ms.simulate(scene, steps=40, applied_flux_density=field, **given)
+    move = caught.value.last_good
+    assert 0 < move.steps_done < 40 and len(move) == move.steps_done + 1
+    assert move.time_steps.sum() == pytest.approx(move.end.time)

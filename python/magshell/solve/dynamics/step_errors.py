@@ -20,7 +20,7 @@ LARGEST_ERROR = 0.01  # [-] of the extent, of one step; see test_coarse_steps_of
 DEFAULT_TOLERANCE = 1e-4  # [-] of the extent; see test_default_tolerance_is_a_fraction_of_the_extent
 MANY_FACTORIZATIONS = 20  # of one step; see test_steps_that_take_many_factorizations_are_warned_of
 _OFTEN = 0.1  # [-] of all steps; see test_steps_that_take_many_factorizations_are_warned_of
-_FEWEST = 10  # steps with many factorizations, below which a share says little
+_FEWEST = 3  # steps with many factorizations: one or two may be an impact; see the same test
 _ROUND_OFF = 1e-10  # [-] of the largest coordinate; see test_tolerance_below_round_off_is_refused
 
 
@@ -73,7 +73,8 @@ def warn_of_steps(move: Trajectory) -> None:
     limit = LARGEST_ERROR * extent
     worst = int(np.argmax(errors))
     dear = np.flatnonzero(move._step_factorizations > MANY_FACTORIZATIONS)
-    is_dear = len(dear) >= _FEWEST and len(dear) > _OFTEN * len(errors)
+    were_divided = len(errors) > move.steps  # by ms.Adaptive or by the caller
+    is_dear = len(dear) >= _FEWEST and len(dear) > _OFTEN * len(errors) and not were_divided
     badness = max(errors[worst] / limit, float(is_dear))
     if not badness >= 1.0 or badness < 2.0 * scene._warned_of_steps:
         return
@@ -91,6 +92,8 @@ def warn_of_steps(move: Trajectory) -> None:
         enough = _rounded(0.5 * float(move.time_steps[dear].min()))
         what = f"{len(dear)} of {len(errors)} steps took more than {MANY_FACTORIZATIONS} factorizations, as too long ones do"
     advice = f"Take steps of {enough:g} s, or time_step=ms.Adaptive(interval, tolerance)"
+    if were_divided:
+        advice = f"Take a tolerance of at most {limit:.2g} m, or steps of {enough:g} s"
     warnings.warn(StepErrorWarning(f"the motion's {what}. {advice}.", move), stacklevel=callers_level())
     remember(scene, _warned_of_steps=badness)
 
