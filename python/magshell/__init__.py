@@ -9,6 +9,10 @@ from . import envs
 from ._core import __version__
 from ._runtime.threads import num_threads, set_num_threads, show_config
 from .design import control, objectives, optim, parametrize
+from .design.fitting.fit import fit
+from .design.fitting.fit_parameter import FitParameter
+from .design.fitting.fit_result import FitResult, Prediction
+from .design.fitting.residual_tests import ResidualTests
 from .design.minimize import minimize
 from .design.minimum import MinimizeResult
 from .design.multistart.multistart import multistart
@@ -144,6 +148,8 @@ __all__ = [
     "Extrapolation",
     "Fibres",
     "FieldSamplingWarning",
+    "FitParameter",
+    "FitResult",
     "Fixed",
     "Guccione",
     "ImplicitEuler",
@@ -175,6 +181,7 @@ __all__ = [
     "PlacedField",
     "PneumaticCells",
     "PointLoad",
+    "Prediction",
     "Pressure",
     "PrintableMinimum",
     "PrintableSet",
@@ -184,6 +191,7 @@ __all__ = [
     "ProjectiveMaterial",
     "QuadraticTriangleMesh",
     "Reaction",
+    "ResidualTests",
     "Revolute",
     "RigidBody",
     "RigidBodyResult",
@@ -226,6 +234,7 @@ __all__ = [
     "equilibrium",
     "fibres_along",
     "find_equilibria",
+    "fit",
     "follow_path",
     "forces",
     "free_motions",

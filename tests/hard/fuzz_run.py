@@ -65,7 +65,7 @@ def documented(call: Call, error: BaseException) -> bool:
     if isinstance(error, ImportError):
         return call.name in ("MagpylibField", "read_mesh", "read_fields", "write_mesh")
     if isinstance(error, FloatingPointError):
-        return call.name.startswith(("optim.", "minimize"))
+        return call.name.startswith(("optim.", "minimize", "fit"))
     if isinstance(error, IndexError):
         return "index" in call.arguments
     return isinstance(error, DOCUMENTED)

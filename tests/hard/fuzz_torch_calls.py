@@ -320,3 +320,10 @@ def _optimizers() -> Iterator[Call]:
         },
         cost=2,
     )
+
+    fitting = {"max_iterations": 3, "first_step": 1.0, "jacobian": "auto", "level": 0.9, "stateful": ()}
+    files = {"checkpoint": None, "resume": False, "progress": False}
+    data = {"data": [1.0, 1.2], "parameters": {"a": 1.0}, "noise": 0.1}
+    yield Call("fit", ms.fit, {"model": lambda a: a.expand(2), **data, **fitting, **files}, cost=2)
+    known = {"lower": 0.0, "upper": 2.0, "log": False, "size": 1.0, "prior": (1.0, 0.1), "unit": "m"}
+    yield Call("FitParameter", ms.FitParameter, {"start": 1.0, **known})

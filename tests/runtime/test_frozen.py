@@ -14,7 +14,7 @@ from magshell.design.content_hash import content_hash
 
 MADE = made_objects(Arrays())
 OBJECTS = {**MADE, **found_results(Arrays(), MADE)}
-NO_COPIES = (ms.Picture, ms.shapes.Shape, ms.WarmStart, ms.EquilibriumPath)  # and no digest
+NO_COPIES = (ms.Picture, ms.shapes.Shape, ms.WarmStart, ms.EquilibriumPath, ms.FitResult)  # no digest
 ABSTRACT = {
     "AppliedField",
     "Joint",

@@ -180,6 +180,7 @@ def _around(given: Arrays, bodies: dict[str, object]) -> dict[str, object]:
             velocity=given([0.1, 0, 0]),
             attack_table=(given([0, 0.5, np.pi / 2]), given([0, 1.0, 2.0])),
         ),
+        "parameter of a fit": ms.FitParameter(given([1.0, 2.0]), prior=(given([1.0, 2.0]), 0.1)),
         "plane": plane,
         "sphere": ms.obstacles.Sphere(0.1, **place),
         "box": ms.obstacles.Box(given([0.1, 0.1, 0.1]), **place),
@@ -336,6 +337,11 @@ def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
         "windows": ms.control.Windows(np.zeros(3), [(ms.control.Window(1, 0, 1.0), record)]),
         "horizon": ms.control.Horizon(0, 1, 2),
     }
+    if importlib.util.find_spec("torch"):
+        fit = ms.fit(lambda a: a.expand(3), given([1.0, 1.1, 0.9]), {"a": 1.0}, noise=0.1, progress=False)
+        prediction = fit.predict(lambda a: a.expand(2))
+        found |= {"fit": fit, "prediction": prediction, "residual tests": fit.tests}
+        found["uncertainty of a fit"] = fit.uncertainty
     rare = (
         ms.Buckling,
         ms.CriticalPoint,

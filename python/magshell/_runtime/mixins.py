@@ -22,6 +22,11 @@ def register_method(function: F) -> F:
     return function
 
 
+def call_registered(name: str, *arguments: Any) -> Any:
+    """Call a registered function by its name."""
+    return _FUNCTIONS[name](*arguments)
+
+
 class PlotMixin(Frozen):
     """A mixin for objects that ms.plot can draw."""
 

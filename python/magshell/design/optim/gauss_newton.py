@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..._input.scalars import positive
 from ..._runtime.solver_entry_point import grouped
 from ...errors import DesignRejected
 from .base import BoxOptimizer
@@ -92,11 +93,8 @@ class GaussNewton(BoxOptimizer):
             isinstance(max_evaluations, int) and max_evaluations > 0
         ):
             raise ValueError(f"max_evaluations must be a positive integer, got {max_evaluations!r}")
-        if isinstance(first_step, bool) or not (
-            isinstance(first_step, int | float) and 0 < first_step < math.inf
-        ):
-            raise ValueError(f"first_step must be a positive number, got {first_step!r}")
-        self.jacobian, self.first_step, self.max_evaluations = jacobian, float(first_step), max_evaluations
+        self.jacobian, self.first_step = jacobian, positive("first_step", "", first_step)
+        self.max_evaluations = max_evaluations
         super().__init__(params, {"lower": lower, "upper": upper, "scale": scale}, max_backtracks)
 
     def trial_of(self, closure: Callable[..., Any]) -> ResidualTrial:

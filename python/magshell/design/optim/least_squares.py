@@ -20,6 +20,9 @@ _CLOSE = 0.1
 # Smallest damping that is tried, relative to an upper bound of it, while no lower bound is known [More 1978, (5.5)].
 _SMALLEST = 1e-3
 _DAMPINGS = 60  # dampings that are tried; their interval is halved (its logarithm) at each
+# Singular values below this fraction (1) of the largest are round-off of a Jacobian, whose products are exact to 1e-10; a
+# step has no part along them. Tested by test_sheet_without_weight_tells_the_ratio_only.
+_SINGULAR = 1e-9
 # Changes of the set of entries at a bound, after which scipy's slower method takes over. Tested by
 # test_bounded_step_agrees_with_scipy.
 _SETS = 30
@@ -96,7 +99,7 @@ class DenseModel:
         if self._factored is None or not np.array_equal(self._factored[0], free):
             self._factored = free, np.linalg.svd(self._jacobian[:, free], full_matrices=False)
         left, sizes, right = self._factored[1]
-        known = sizes > np.finfo(float).eps * max(left.shape[0], right.shape[1]) * sizes.max(initial=0.0)
+        known = sizes > _SINGULAR * sizes.max(initial=0.0)
         sizes = sizes[known]
         return -right[known].T @ ((sizes / (sizes**2 + damping)) * (left[:, known].T @ rest))
 

@@ -59,7 +59,7 @@ class ResidualTrial:
         if self.takes_products:
             empty = np.zeros((0, count))
             return ResidualSample(self.objective, gradient, np.zeros(0), empty, self.values, empty, self)
-        slopes = self._jacobian()
+        slopes = self.matrix()
         require_finite("the Jacobian of the residuals", slopes)
         empty = np.zeros(0), np.zeros((0, count))
         return ResidualSample(self.objective, gradient, *empty, self.values, slopes)
@@ -100,7 +100,7 @@ class ResidualTrial:
         require_finite("the gradient of the objective", row)
         return row
 
-    def _jacobian(self) -> np.ndarray:
+    def matrix(self) -> np.ndarray:
         """Return the Jacobian (m, n), by rows or by columns, whichever are fewer."""
         n_parameters = sum(parameter.numel() for parameter in self._parameters)
         if self._how == "forward" or (self._how == "auto" and n_parameters < self.values.size):
@@ -126,7 +126,8 @@ class ResidualTrial:
                 rows = products([self._residuals], self._parameters, [weights], differentiable=True)
             self._transposed = weights, rows
         weights, rows = self._transposed
-        return products(rows, [weights], tangents)[0]
+        used = [(row, tangent) for row, tangent in zip(rows, tangents, strict=True) if row is not None]
+        return products([row for row, _ in used], [weights], [tangent for _, tangent in used])[0]
 
     _transposed: tuple[torch.Tensor, tuple[torch.Tensor, ...]] | None = None  # weights, and their products
     model: Any = None  # made of products once: the graph cannot be used once the parameters were changed

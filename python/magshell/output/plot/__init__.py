@@ -2,6 +2,7 @@
 
 from .animation import animate
 from .drawing import plot
+from .fits import plot_fit as _  # noqa: F401 - registers FitResult.plot
 from .page import write_page
 from .picture import Picture
 from .style import Color, Style
