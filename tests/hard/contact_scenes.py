@@ -242,9 +242,11 @@ class Watch:
         return None
 
 
-def verdict(seed: int) -> str | None:
-    """Return None, or a sentence about what went wrong with the scene of this seed."""
+def verdict(seed: int, integrator=None) -> str | None:
+    """Return None, or a sentence about what went wrong with the scene of this seed; by its own integrator or a given one."""
     each = drawn(seed)
+    if integrator is not None:
+        each.arguments["integrator"] = integrator
 
     def too_long(*_):
         raise TooLong

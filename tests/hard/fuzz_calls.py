@@ -293,6 +293,7 @@ def _solves(s: Sample) -> Iterator[Call]:
     }
     for kind in (ms.Newton, ms.MixedNewton):
         yield Call(kind.__name__, lambda kind=kind, **a: ms.equilibrium(s.scene, solver=kind(**a)), newton)
+    yield Call("TRBDF2", ms.TRBDF2, {"implicit_contact": True})
     yield Call(
         "ProjectiveDynamics",
         ms.ProjectiveDynamics,

@@ -50,7 +50,6 @@ NOT_CALLED = {
     "shapes.Shape": "abstract",
     "SDIRK2": "takes nothing",
     "SDIRK3": "takes nothing",
-    "TRBDF2": "takes nothing",
     "ImplicitEuler": "takes nothing",
     "UniformField": "takes nothing",
     "envs.Episode": "a result",

@@ -8,9 +8,16 @@ import os
 import pytest
 from contact_scenes import verdict
 
+import magshell as ms
+
 SCENES = int(os.environ.get("MAGSHELL_CONTACT_SCENES", "30"))
 
 
 @pytest.mark.parametrize("seed", range(SCENES))
 def test_a_random_contact_ends_well(seed) -> None:
     assert verdict(seed) is None
+
+
+@pytest.mark.parametrize("seed", range(SCENES // 3))
+def test_a_random_contact_ends_well_if_contact_is_implicit(seed) -> None:
+    assert verdict(seed, ms.TRBDF2(implicit_contact=True)) is None
