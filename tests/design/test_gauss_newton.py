@@ -131,6 +131,20 @@ def test_many_residuals_of_many_parameters_take_products(monkeypatch):
     assert kinds == [(10, False), (0, True)]
 
 
+@pytest.mark.parametrize("count", [7, 5])
+def test_few_parameters_of_many_residuals_take_columns(monkeypatch, count):
+    from magshell.design.optim.residual_sample import ResidualTrial
+
+    x = torch.ones(2, dtype=torch.float64, requires_grad=True)
+    rows = []
+    once = ResidualTrial.transposed_times
+    monkeypatch.setattr(ResidualTrial, "transposed_times", lambda *each: rows.append(1) or once(*each))
+    matrix = torch.arange(2.0 * count, dtype=torch.float64).reshape(count, 2)
+    sample = ms.optim.GaussNewton([x]).evaluate(lambda: matrix @ x)
+    np.testing.assert_allclose(sample.slopes, matrix.numpy())
+    assert len(rows) == (0 if count > 6 else count)
+
+
 def test_rejected_designs_shorten_the_step():
     x = torch.zeros(2, dtype=torch.float64, requires_grad=True)
     tried = []

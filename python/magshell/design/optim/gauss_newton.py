@@ -41,8 +41,8 @@ class GaussNewton(BoxOptimizer):
     lower, upper: bounds of a group: a number, a tensor that fits each parameter, or a list with one of these each.
     scale: the typical size of a variable, in the same forms; by default upper - lower where both are finite, else 1.
     jacobian: how J is found. "backward" by rows, m gradients; "forward" by columns, n tangents (not through motions);
-        "products" not at all: conjugate gradients with products J s and J^T r. "auto" takes the smaller of m and n,
-        and products if both exceed 2000.
+        "products" not at all: conjugate gradients with products J s and J^T r. "auto" takes columns if 3 n < m, as
+        a tangent costs about three gradients, else rows; and products if both m and n exceed 2000.
     first_step: first radius of the trust region: the root mean square of the steps of all variables, in sizes.
     max_evaluations: of the closure in one step; after as many without a lower design the search ends.
     max_backtracks: how often a step to a design that the closure rejects is shortened, each time to a quarter.

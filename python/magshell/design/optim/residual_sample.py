@@ -101,9 +101,11 @@ class ResidualTrial:
         return row
 
     def matrix(self) -> np.ndarray:
-        """Return the Jacobian (m, n), by rows or by columns, whichever are fewer."""
+        """Return the Jacobian (m, n), by rows or by columns, whichever cost less."""
         n_parameters = sum(parameter.numel() for parameter in self._parameters)
-        if self._how == "forward" or (self._how == "auto" and n_parameters < self.values.size):
+        if self._how == "forward" or (
+            self._how == "auto" and COST_OF_TANGENTS * n_parameters < self.values.size
+        ):
             try:
                 return self._by_columns(n_parameters)
             except (NoGradient, NotImplementedError):
@@ -141,6 +143,10 @@ class ResidualTrial:
 # Back-substitutions up to which a Jacobian is computed as a matrix. Conjugate gradients take about a hundred a step, each of
 # which costs two. Tested by test_many_residuals_of_many_parameters_take_products.
 MOST_BACK_SUBSTITUTIONS = 2000
+
+# Cost of a column of a Jacobian over that of a row (1): a tangent of an equilibrium takes more evaluations than a gradient.
+# Tested by test_few_parameters_of_many_residuals_take_columns.
+COST_OF_TANGENTS = 3
 
 
 def _checked_residuals(residuals) -> torch.Tensor:
