@@ -4,25 +4,27 @@
 
 namespace magshell {
 
-VectorXd error_weights(const Tableau& tableau) {
+ErrorWeights error_weights(const Tableau& tableau) {
+    constexpr int most = Tableau::max_stages + 1;
+    using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most, most>;
     const int n = tableau.stages + 1, shift = tableau.begins_explicitly ? 0 : 1;
-    Eigen::MatrixXd a = Eigen::MatrixXd::Zero(n, n);
+    Square a = Square::Zero(n, n);
     for (int i = 0; i < tableau.stages; ++i)
         for (int j = 0; j + shift <= i + 1; ++j) a(i + 1, j + shift) = tableau.a[i][j];
-    Eigen::MatrixXd moments(n, n);
-    VectorXd column = VectorXd::Ones(n), wanted(n);
+    Square moments(n, n);
+    ErrorWeights column = ErrorWeights::Ones(n), wanted(n);
     double factorial = 1.0;
     for (int k = 0; k < n; ++k) {
         moments.row(k) = column.transpose();
         wanted(k) = 1.0 / (factorial *= k + 1);
-        column = a * column;
+        column = (a * column).eval();
     }
     return a.row(n - 1).transpose() - moments.partialPivLu().solve(wanted);
 }
 
 double step_error(const Model& model, const StepAlgebra& step, const VectorXd& begin,
                   std::span<const StageRates> rates) {
-    const VectorXd weights = error_weights(step.tableau());
+    const ErrorWeights weights = error_weights(step.tableau());
     const std::size_t stages = step.tableau().stages, first = rates.size() - stages;
     VectorXd error = weights(0) * begin;
     for (std::size_t i = 0; i < stages; ++i) error += weights(i + 1) * rates[first + i].v;

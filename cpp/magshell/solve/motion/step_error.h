@@ -16,8 +16,11 @@
 
 namespace magshell {
 
-/// Returns b - b^ for the velocity at the beginning of a step and those of its stages, stages + 1 numbers.
-VectorXd error_weights(const Tableau& tableau);
+/// Numbers for the velocity at the beginning of a step and for those of its stages.
+using ErrorWeights = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, Tableau::max_stages + 1, 1>;
+
+/// Returns b - b^, stages + 1 numbers.
+ErrorWeights error_weights(const Tableau& tableau);
 
 /// Returns the estimate of a step, root mean square over all vertices and points of rigid bodies [m]. Prescribed positions have no error.
 /// begin: the velocity at its
