@@ -11,6 +11,7 @@
 #include "bindings/strains.h"
 #include "magshell/core/errors.h"
 #include "magshell/solve/linear_response.h"
+#include "magshell/terms/magnetic/own_field_term.h"
 
 namespace magshell::bindings {
 namespace {
@@ -71,6 +72,7 @@ py::tuple hessian(Model& model, const VectorXd& q, const LoadParameters& load_pa
         model.evaluate(q, load_parameters);
         model.assemble(q, load_parameters, false);
         model.require_symmetric();
+        model.require_sparse();
         if (reduced) {
             model.reduce_matrix(values);
             model.dof_map().add_curvature(model.residual().gradient, values);
@@ -106,6 +108,16 @@ PrincipalStrains strains_at(const Model& model, const VectorXd& q, const VectorX
 
 py::tuple largest_at(const Model& model, const VectorXd& q, const VectorXd& thickness) {
     return to_tuple(largest_of(strains_at(model, q, thickness)));
+}
+
+Rows3 own_flux_density(const Model& model, const VectorXd& q, const Rows3& at) {
+    std::vector<Vec3> points(at.rows());
+    for (Eigen::Index k = 0; k < at.rows(); ++k) points[k] = at.row(k).transpose();
+    Rows3 flux = Rows3::Zero(at.rows(), 3);
+    if (!model.terms().own_field) return flux;
+    const std::vector<Vec3> found = model.terms().own_field->field().flux_density(q.data(), points);
+    for (Eigen::Index k = 0; k < at.rows(); ++k) flux.row(k) = found[k].transpose();
+    return flux;
 }
 
 }  // namespace
@@ -274,6 +286,45 @@ void register_model(py::module_& module) {
             },
             "Gradient and Hessian, left in the core: what `python -m benchmarks kernels` times.",
             py::call_guard<py::gil_scoped_release>())
+        .def(
+            "hessian_product",
+            [](Model& model, const VectorXd& q, const LoadParameters& load_parameters, const VectorXd& p) {
+                const std::lock_guard lock(model.in_use());
+                model.evaluate(q, load_parameters);
+                model.assemble(q, load_parameters, false);
+                model.require_symmetric();
+                VectorXd product(p.size());
+                model.multiply(p, product);
+                return product;
+            },
+            py::arg("q"), py::arg("controls"), py::arg("direction"), py::call_guard<py::gil_scoped_release>(),
+            "The product of the Hessian with a direction, of all unknowns (n,), with the own field.")
+        .def(
+            "term_gradient",
+            [](Model& model, const std::string& name, const VectorXd& q,
+               const LoadParameters& load_parameters) {
+                const std::lock_guard lock(model.in_use());
+                return model.term_gradient(name, q, load_parameters);
+            },
+            py::arg("name"), py::arg("q"), py::arg("controls"), py::call_guard<py::gil_scoped_release>(),
+            "The gradient of the terms of one name, of all unknowns (n,) [N].")
+        .def(
+            "own_flux_density",
+            [](const Model& model, const VectorXd& q, const Array& points) {
+                const Rows3 at = to_rows3(points);
+                const py::gil_scoped_release unlocked;
+                return own_flux_density(model, q, at);
+            },
+            py::arg("q"), py::arg("points"),
+            "The flux density of the magnetized shells at points outside of them, (n, 3) [T].")
+        .def(
+            "own_energies",
+            [](const Model& model, const VectorXd& q) {
+                return model.terms().own_field ? model.terms().own_field->own_energies(q.data())
+                                               : std::vector<double>();
+            },
+            py::arg("q"), py::call_guard<py::gil_scoped_release>(),
+            "The energy of each shell of the own field in its own field alone, (n,) [J].")
         .def(
             "low_rank",
             [](Model& model, bool reduced) {

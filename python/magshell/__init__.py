@@ -65,6 +65,7 @@ from .model.rigid.link import Link
 from .model.rigid.rigid import RigidBody, RigidBodyResult
 from .model.rigid.skeleton import Skeleton
 from .model.scene.contact_state import ContactState
+from .model.scene.own_field import OwnField
 from .model.scene.reactions import Reaction
 from .model.scene.scene import Scene
 from .model.shells.shell import Shell
@@ -108,6 +109,7 @@ from .solve.statics.energies_at import energies, energy, forces, free_motions, h
 from .solve.statics.equilibria import EquilibriumSet
 from .solve.statics.equilibrium import Equilibrium
 from .solve.statics.extrapolation import Extrapolation, richardson_extrapolation
+from .solve.statics.magnetic_state import MagneticState, field_of
 from .solve.statics.multistable import find_equilibria
 from .solve.statics.path import CriticalPoint, EquilibriumPath, follow_path
 from .solve.statics.path_events import PathEvent
@@ -160,6 +162,7 @@ __all__ = [
     "LinearResponse",
     "Link",
     "LoopClosure",
+    "MagneticState",
     "MagpylibField",
     "MeshQualityWarning",
     "MinimizeResult",
@@ -175,6 +178,7 @@ __all__ = [
     "NoGradient",
     "NotConverged",
     "ObjectiveFailed",
+    "OwnField",
     "PathEvent",
     "Picture",
     "Pin",
@@ -233,6 +237,7 @@ __all__ = [
     "envs",
     "equilibrium",
     "fibres_along",
+    "field_of",
     "find_equilibria",
     "fit",
     "follow_path",

@@ -103,6 +103,12 @@ def _in_scenes(s: Sample) -> Iterator[Call]:
 
     yield Call("BodyContact", lambda **a: together(ms.BodyContact, **a), {"a": s.shell, "b": other, **law})
     yield Call("SelfContact", lambda **a: together(ms.SelfContact, **a), {"a": other, **law})
+
+    def with_own_field(**a):
+        clamp = ms.Clamp(s.mesh.edges_at(x=0.0))
+        return ms.Scene(s.shell, supports=clamp, own_field=ms.OwnField(**a))
+
+    yield Call("OwnField", with_own_field, {"bodies": s.shell, "max_points": 100})
     table = (np.linspace(0.0, np.pi / 2, 4), np.arange(4.0))
     flow = {
         "fluid_density": 1e3,

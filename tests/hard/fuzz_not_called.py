@@ -14,6 +14,8 @@ NOT_CALLED = {
     "BodyResult": "a result",
     "RigidBodyResult": "a result",
     "Joint": "abstract",
+    "MagneticState": "a result",
+    "field_of": "takes a result only",
     "JointResult": "a result",
     "MuscleResult": "a result",
     "LinearResponse": "a result",

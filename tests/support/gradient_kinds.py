@@ -21,6 +21,7 @@ from gradient_kinds_bodies import (
 from gradient_kinds_contact import CONTACT_MAKERS, sheets_rubbing
 from gradient_kinds_growth import GROWTH_MAKERS
 from gradient_kinds_muscles import muscles_at_rest, muscles_in_motion
+from gradient_kinds_own_field import own_field
 from gradient_kinds_pressure import pressed_sheet, pressed_solid
 from gradient_kinds_six_nodes import six_nodes_at_rest, six_nodes_in_motion
 from gradient_kinds_skeletons import (
@@ -358,6 +359,9 @@ MAKERS = {
         ms.TRBDF2(implicit_contact=True), 1e-5, activation_distance=1.4e-4, lagged_friction=True
     ),
     "a driven skeleton on a Plane, contact implicit": motorized_skeleton_on_a_plane,
+    "two sheets with their own field at rest": lambda: own_field(False),
+    "two sheets with their own field in motion": lambda: own_field(True),
+    **GROWTH_MAKERS,  # last: makers draw from one stream of random numbers
 }
 
 

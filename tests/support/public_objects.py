@@ -170,6 +170,7 @@ def _around(given: Arrays, bodies: dict[str, object]) -> dict[str, object]:
         "body contact": ms.Contact(shell, other),
         "self contact": ms.SelfContact(shell),
         "uniform": ms.UniformField(),
+        "own field": ms.OwnField(shell),
         "dipoles": ms.Dipoles(given([[0, 0, -0.1]]), given([[0, 0, 1.0]])),
         "sampled": sampled,
         "custom": ms.CustomField(_same, length_scale=1.0),
@@ -304,6 +305,7 @@ def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
     record = ms.MinimizeResult([np.zeros(3)], 1.0, 0.0)
     found = {
         "equilibrium": rest,
+        "magnetic state": ms.field_of(rest),
         "equilibria": ms.EquilibriumSet([rest, rest]),
         "log of a solve": rest.log,
         "step of a solve": rest.log[0],

@@ -9,6 +9,7 @@
 #include "bindings/testing/testing.h"
 #include "magshell/core/errors.h"
 #include "magshell/core/simd_functions.h"
+#include "magshell/linalg/krylov/operator_factor.h"
 #include "magshell/linalg/loaded_part.h"
 #include "magshell/linalg/pattern_checks.h"
 
@@ -59,11 +60,28 @@ py::tuple loaded(Index size, const IndexArray& column_starts, const IndexArray& 
                           given_away(std::move(part.pattern.rows)), given_away(std::move(part.values)));
 }
 
+// Factorizes a sparse matrix plus a dense symmetric one that is known by its products only, and solves with it. Returns (report,
+// solution).
+py::tuple solve_with_operator(Index size, const IndexArray& column_starts, const IndexArray& rows,
+                              const Array& values, const Eigen::MatrixXd& added, VectorXd rhs) {
+    std::shared_ptr<SparsePattern> pattern = std::make_shared<SparsePattern>(
+        SparsePattern{size, to_indices(column_starts, "column_starts"), to_indices(rows, "rows")});
+    check_pattern(*pattern);
+    OperatorFactor factor(analyze(pattern));
+    std::copy_n(values.data(), values.size(), factor.values().begin());
+    factor.set_operator([added](const VectorXd& x) { return VectorXd(added * x); });
+    const FactorReport report = factor.factorize();
+    factor.solve(rhs);
+    return py::make_tuple(report, rhs);
+}
+
 }  // namespace
 
 void register_kernels(py::module_& module) {
     module.def("lane_logarithms", &lane_logarithms, py::arg("numbers"),
                "ln of an array's numbers as the element kernels take it, to be tested.");
+    module.def("solve_with_operator", &solve_with_operator, py::arg("size"), py::arg("column_starts"),
+               py::arg("rows"), py::arg("values"), py::arg("added"), py::arg("rhs"));
     module.def("vjp", &by_values, py::arg("model"), py::arg("q"), py::arg("controls"), py::arg("adjoint"),
                "adjoint . dg/dk at a state q, g the gradient of the energy and k every value, (n,).");
     module.def("loaded_part", &loaded, py::arg("size"), py::arg("column_starts"), py::arg("rows"),

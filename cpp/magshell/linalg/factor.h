@@ -90,6 +90,9 @@ class Factor {
     /// succeeded.
     virtual void solve(Eigen::Ref<Eigen::MatrixXd> rhs) const = 0;
 
+    /// Does the same for one column where a residual of `tolerance` over the norm of rhs is enough; direct methods solve exactly.
+    virtual void solve_approximately(VectorXd& rhs, double /*tolerance*/) const { solve(rhs); }
+
     /// Returns another factor for the same pattern, not factorized yet. Both share the analysis if the backend
     /// can.
     virtual std::unique_ptr<Factor> sibling() const = 0;

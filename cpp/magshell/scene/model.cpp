@@ -6,10 +6,12 @@
 
 #include "magshell/core/errors.h"
 #include "magshell/dofs/skeleton_coordinates.h"
+#include "magshell/linalg/krylov/operator_factor.h"
 #include "magshell/linalg/low_rank_factor.h"
 #include "magshell/scene/scene_input.h"
 #include "magshell/terms/joint/damper_term.h"
 #include "magshell/terms/low_rank_term.h"
+#include "magshell/terms/operator_term.h"
 
 namespace magshell {
 namespace {
@@ -74,6 +76,8 @@ Model::Model(const SceneInput& input)
       metric_(bodies_.area_metric()),
       extent_(bodies_.extent()),
       rest_reach_(bodies_.reach()) {
+    if (!terms_.operators.empty() && !terms_.low_rank.empty())
+        throw InvalidInput("own_field cannot be combined with cavities, cells or tendons yet");
     assign_columns();
 }
 
@@ -126,6 +130,7 @@ std::shared_ptr<Factor> Model::new_factor(const std::function<void()>& watch) {
         std::unique_ptr<Factor> analysed =
             analyze(dof_map_.pattern(), {.points = free_points(), .watch = watch});
         if (!terms_.low_rank.empty()) analysed = std::make_unique<LowRankFactor>(std::move(analysed));
+        if (!terms_.operators.empty()) analysed = std::make_unique<OperatorFactor>(std::move(analysed));
         return analysed;
     });
 }
@@ -210,6 +215,10 @@ void Model::assemble(const VectorXd& q, const LoadParameters& load_parameters, b
         term->finish_assembly(q.data(), load_parameters, matrix_);
     low_rank_.clear();
     for (const LowRankTerm* term : terms_.low_rank) term->add_low_rank(load_parameters, low_rank_);
+    operators_.clear();
+    for (const OperatorTerm* term : terms_.operators)
+        if (std::shared_ptr<const HessianOperator> each = term->hessian_operator(q.data(), load_parameters))
+            operators_.push_back(std::move(each));
     collect_nonsymmetric_tangent(q, load_parameters);
 }
 
@@ -249,6 +258,7 @@ void Model::multiply(const VectorXd& x, VectorXd& out) const {
     matrix_.multiply(x.data(), out.data());
     if (coupled_ > 0) terms_.contact_layer->matrix().add_product(x.data(), out.data());
     low_rank_.add_product(x, out);
+    for (const std::shared_ptr<const HessianOperator>& each : operators_) each->add_product(x, out);
 }
 
 VectorXd Model::diagonal() const {
@@ -268,6 +278,17 @@ void Model::reduce_matrix(Factor& factor) {
     if (!terms_.low_rank.empty())
         static_cast<LowRankFactor&>(factor).set_low_rank(low_rank_.reduced(dof_map_, size()),
                                                          low_rank_.stiffness());
+    if (terms_.operators.empty()) return;
+    OperatorFactor::Operator product;
+    if (!operators_.empty())
+        product = [this, operators = operators_](const VectorXd& x) {
+            const VectorXd full = dof_map_.expand(x);
+            VectorXd image = VectorXd::Zero(full.size());
+            for (const std::shared_ptr<const HessianOperator>& each : operators)
+                each->add_product(full, image);
+            return dof_map_.vector(image);
+        };
+    static_cast<OperatorFactor&>(factor).set_operator(std::move(product));
 }
 
 void Model::assign_columns() {
@@ -365,6 +386,25 @@ void Model::require_symmetric() const {
         "faces have different pressures. Equilibria, paths, motions and their gradients can be "
         "computed; vibrations and buckling loads "
         "cannot: close the surface, hold its border, or give one pressure to all of it");
+}
+
+void Model::require_sparse() const {
+    if (operators_.empty()) return;
+    throw InvalidInput(
+        "the own field couples all magnetized vertices, so the stiffness is not a sparse matrix. Equilibria, "
+        "paths, motions by "
+        "time steps and their gradients can be computed with own_field; vibrations, buckling loads, small "
+        "deflections and "
+        "Hessians as matrices cannot: leave own_field out of the scene for these");
+}
+
+VectorXd Model::term_gradient(std::string_view name, const VectorXd& q,
+                              const LoadParameters& load_parameters) {
+    Residual sum;
+    sum.reset(size());
+    for (const std::unique_ptr<Term>& term : terms_.energies)
+        if (term->name() == name) term->evaluate(q.data(), load_parameters, sum);
+    return sum.gradient;
 }
 
 void Model::begin_step(const VectorXd& q, const LoadParameters& load_parameters) {

@@ -8,9 +8,11 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
+#include "magshell/assembly/hessian_operator.h"
 #include "magshell/linalg/multifrontal/factor_store.h"
 #include "magshell/scene/model_capabilities.h"
 #include "magshell/scene/model_parameters.h"
@@ -38,14 +40,17 @@ class Model {
     /// Linearizes the reduced coordinates at q, as evaluate() does, and nothing else.
     void linearize(const VectorXd& q) { dof_map_.linearize(q); }
     SystemMatrix& matrix() { return matrix_; }
-    /// Compute the product with x, the diagonal and the free entries of the Hessian: matrix() plus contact between bodies plus low_rank().
+    /// Compute the product with x, the diagonal and the free entries of the Hessian: matrix() plus contact between bodies plus low_rank()
+    /// plus, except in the diagonal, operators().
     void multiply(const VectorXd& x, VectorXd& out) const;
     VectorXd diagonal() const;
     void reduce_matrix(LargeVector<double>& values);
-    /// Writes the free entries of the Hessian, including its low-rank part, into a factorization.
+    /// Writes the free entries of the Hessian, including its low-rank part and its operators, into a factorization.
     void reduce_matrix(Factor& factor);
     /// The low-rank part of the Hessian assembled last, which matrix() does not contain.
     const LowRank& low_rank() const { return low_rank_; }
+    /// The parts of the Hessian assembled last that are known by their products only; matrix() does not contain them.
+    const std::vector<std::shared_ptr<const HessianOperator>>& operators() const { return operators_; }
     SystemMatrix* contact_matrix();
     const Residual& residual() const { return residual_; }
     Index size() const { return nodes().n_dofs(); }
@@ -69,6 +74,8 @@ class Model {
 
     /// Evaluates the residual at q, and stores what assemble and extrapolate need.
     void evaluate(const VectorXd& q, const LoadParameters& load_parameters);
+    /// Returns the gradient of all terms of this name at q [N].
+    VectorXd term_gradient(std::string_view name, const VectorXd& q, const LoadParameters& load_parameters);
     /// Returns a sentence that names the term and vertex whose force is not finite at q; empty if all forces are finite.
     std::string not_finite(const VectorXd& q, const LoadParameters& load_parameters);
     /// Assembles the Hessian at the last evaluated state. project_psd: contact between bodies and low-rank terms contribute positive semidefinite parts.
@@ -79,6 +86,8 @@ class Model {
     bool unsymmetric() const { return unsymmetric_; }
     /// Throws InvalidInput with an explanation if the Hessian assembled last is nonsymmetric.
     void require_symmetric() const;
+    /// Throws InvalidInput with an explanation if the Hessian assembled last is not a sparse matrix, because operators() belong to it.
+    void require_sparse() const;
     /// Extrapolates the stresses of the last evaluated state by a step p (mixed iterations).
     void extrapolate(const VectorXd& p);
 
@@ -147,6 +156,7 @@ class Model {
     DofMap dof_map_;
     SceneTerms terms_;
     LowRank low_rank_;
+    std::vector<std::shared_ptr<const HessianOperator>> operators_;
     ModelParameters parameters_;
     ModelCapabilities capabilities_;
     bool unsymmetric_ = false;

@@ -104,6 +104,12 @@ struct ClosureInput {
     Vec3 place;           // at rest [m]
 };
 
+/// The shells whose own magnetic field acts, by their numbers in SceneInput::shells; none: it does not act.
+struct OwnFieldInput {
+    std::vector<Index> shells;
+    Index max_points = 0;
+};
+
 /// The whole scene. Nodes of supports count the vertices first, then directions.
 struct SceneInput {
     Index n_vertices = 0;  // of shells and solids
@@ -132,6 +138,7 @@ struct SceneInput {
     std::vector<BodyContactInput> body_contacts;
     std::vector<std::shared_ptr<const Obstacle>> obstacles;
     std::shared_ptr<const Water> water;
+    OwnFieldInput own_field;
 };
 
 }  // namespace magshell

@@ -20,6 +20,7 @@
 #include "magshell/terms/magnetic/magnetic_solid_term.h"
 #include "magshell/terms/magnetic/magnetic_term.h"
 #include "magshell/terms/magnetic/moment_term.h"
+#include "magshell/terms/magnetic/own_field_term.h"
 #include "magshell/terms/shell/bending_term.h"
 #include "magshell/terms/shell/membrane_term.h"
 #include "magshell/terms/shell6/bending_six_term.h"
@@ -104,6 +105,7 @@ class Builder {
     void add_magnetic_terms(const SceneInput& input);
     void add_moments(const SceneInput& input);
     void add_muscles(const SceneInput& input);
+    void add_own_field(const SceneInput& input);
     void add_six_node_shell(std::size_t number, const GrowthForm& growth);
     void add_solids(const SceneInput& input);
     void add_volumes(const SceneInput& input);
@@ -146,6 +148,7 @@ void Builder::add_terms(const SceneInput& input) {
     for (std::size_t k = 0; k < input.six_node_shells.size(); ++k)
         add_six_node_shell(k, input.six_node_shells[k].growth);
     add_magnetic_terms(input);
+    if (!input.own_field.shells.empty()) add_own_field(input);
     add_solids(input);
     add_muscles(input);
     for (const FaceEnergyInput& given : input.face_energies) {
@@ -218,6 +221,16 @@ void Builder::add_magnetic_terms(const SceneInput& input) {
             out_.energies.push_back(make_magnetic_solid_term(
                 *bodies_.solids()[k], body, out_.coloring.of(body), matrix_, out_.field_sources, registry_));
     }
+}
+
+void Builder::add_own_field(const SceneInput& input) {
+    std::vector<const Surface*> surfaces;
+    for (const Index shell : input.own_field.shells) surfaces.push_back(bodies_.faces()[shell].surface);
+    std::unique_ptr<OwnFieldTerm> term = std::make_unique<OwnFieldTerm>(
+        std::move(surfaces), input.own_field.max_points, bodies_.nodes().n_dofs(), registry_);
+    out_.own_field = term.get();
+    out_.operators.push_back(term.get());
+    out_.energies.push_back(std::move(term));
 }
 
 void Builder::add_volumes(const SceneInput& input) {

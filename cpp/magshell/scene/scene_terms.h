@@ -20,6 +20,8 @@ namespace magshell {
 class DamperTerm;
 class LowRankTerm;
 class MuscleTerm;
+class OperatorTerm;
+class OwnFieldTerm;
 class SolidTerm;
 
 struct SceneTerms {
@@ -44,6 +46,8 @@ struct SceneTerms {
     std::vector<std::vector<const Term*>> of_body;  // those that are assembled by the blocks of each body
     std::vector<const Term*> restricting;           // those without an energy in some states
     std::vector<LowRankTerm*> low_rank;
+    std::vector<const OperatorTerm*> operators;
+    const OwnFieldTerm* own_field = nullptr;
     ViscousTerms elastic, dampers;  // those to which viscosity applies; there may be no dampers of joints
     const DamperTerm* damper = nullptr;
     std::vector<const SolidTerm*> solids;

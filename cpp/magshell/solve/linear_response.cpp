@@ -77,6 +77,7 @@ VectorXd stiffness_times(const VectorXd& motion, Model& model, const VectorXd& q
                          const LoadParameters& load_parameters) {
     model.assemble(q, load_parameters, false);
     model.require_symmetric();
+    model.require_sparse();
     VectorXd forces(motion.size());
     model.matrix().multiply(motion.data(), forces.data());
     if (const SystemMatrix* touching = model.contact_matrix())
@@ -120,6 +121,7 @@ SmallDeflection small_deflection(Model& model, const VectorXd& q, const LoadPara
     const RotationsFromRest counted(model);
     model.assemble(q, unloaded, false);
     model.require_symmetric();
+    model.require_sparse();
     const VectorXd free_forces = model.dof_map().vector(counted.forces(std::move(forces)));
     LoadedPart part = part_of_model(model, free_forces);
     const std::unique_ptr<Factor> factor = analysed(model, part.unknowns, std::move(part.pattern));

@@ -325,12 +325,12 @@ VectorXd Newton::solve_with_factor(const VectorXd& rhs, double tolerance) const 
     if (unsymmetric_)
         solve_unsymmetric(model_, *factor_, false, {tolerance, to_round_off.max_iterations}, reduced);
     else
-        factor_->solve(reduced);
+        factor_->solve_approximately(reduced, tolerance);
     return model_.dof_map().expand(reduced);
 }
 
 VectorXd Newton::solve_transposed(const VectorXd& rhs) const {
-    if (!unsymmetric_) return solve_with_factor(rhs);
+    if (!unsymmetric_) return solve_with_factor(rhs, to_round_off.tolerance);
     const Stopwatch running(linear_time_);
     VectorXd reduced = model_.dof_map().vector(rhs);
     const GmresReport report = solve_unsymmetric(model_, *factor_, true, to_round_off, reduced);

@@ -22,7 +22,7 @@ _NAME = "remanent_magnetization"
 def check_given_once(scene: Scene, given: Any, replaced: dict[object, dict[Any, Any]]) -> None:
     """Raise ValueError if the magnetization is given twice, or without a field, or not for every shell and skin."""
     replacing = any(_NAME in replaced.get(each, {}) for _, each, _ in magnetized_bodies(scene))
-    if not scene.fields:
+    if not scene.is_magnetic:
         if given is not None or replacing:
             raise ValueError(
                 "remanent_magnetization was given, but the scene has no field: Scene(..., field=...)"
@@ -81,7 +81,10 @@ def gradient_by_all(scene: Scene, gradient: Any) -> np.ndarray:
     labels = {id(each): label for each, label in scene._labels}
     found = np.zeros((scene._bodies.n_magnetized, 3))
     for _, body, faces in magnetized_bodies(scene):
-        found[faces] = gradient.value(labels[id(body)], _NAME)
+        if gradient.has(
+            labels[id(body)], _NAME
+        ):  # not of bodies outside of the own field where no other field acts
+            found[faces] = gradient.value(labels[id(body)], _NAME)
     return found
 
 
@@ -92,7 +95,7 @@ def of_all_bodies(scene: Scene, replaced: dict[object, dict[Any, Any]]) -> Any:
     graph.
     The values must have been checked before.
     """
-    if not scene.fields or not scene.bodies:
+    if not scene.is_magnetic or not scene.bodies:
         return None
     parts = [
         (replaced.get(body, {}).get(_NAME, body.remanent_magnetization), faces)

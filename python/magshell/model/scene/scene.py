@@ -46,6 +46,7 @@ from ..solids.solid import Solid
 from ..supports.constraints import free_rigid_motions, gather
 from ..supports.supports import Clamp, Pin, SymmetryPlane
 from .new_scene_checks import check_new_scene
+from .own_field import OwnField, own_field_inputs
 from .parameter_layout import Layout
 from .scene_to_core import (
     actuator_inputs,
@@ -79,6 +80,8 @@ class Scene(PlotMixin):
     loads: PointLoad, EdgeLoad, AreaLoad, EdgeCouple, Pressure and SurfaceTension objects; with several bodies likewise.
     actuators: Muscle, Cavity, PneumaticCells and Tendon objects.
     field: None, an applied field, or several that superpose. A UniformField takes its value when the scene is solved.
+    own_field: an OwnField, with which magnetized shells attract and repel each other and themselves. None: bodies feel the
+        applied field only.
     gravity: (3,), m/s2; needs the mass density of all bodies.
     contacts: Contact objects, each with its obstacles or its bodies, and SelfContact objects. Bodies pass through each
         other, and through themselves, where there is no contact.
@@ -115,6 +118,7 @@ class Scene(PlotMixin):
         loads: Load | Iterable[Load] = (),
         actuators: Actuator | Iterable[Actuator] = (),
         field: Fielded | None = None,
+        own_field: OwnField | None = None,
         gravity: Numbers | None = None,
         contacts: Contact | BodyContact | Iterable[Contact | BodyContact] = (),
         water: Water | None = None,
@@ -136,6 +140,9 @@ class Scene(PlotMixin):
         if water is not None and not isinstance(water, Water):
             raise ValueError(f"water must be a Water, got {type(water).__name__}")
         self.water = water
+        if own_field is not None and not isinstance(own_field, OwnField):
+            raise ValueError(f"own_field must be an OwnField, got {type(own_field).__name__}")
+        self.own_field: OwnField | None = own_field
         _refuse_idle_magnetization(self)
         self.gravity: np.ndarray = (
             np.zeros(3) if gravity is None else quantity("gravity", "m/s2", gravity, (3,))
@@ -160,6 +167,7 @@ class Scene(PlotMixin):
             "loads": self.loads,
             "actuators": self.actuators,
             "field": self.fields,
+            "own_field": self.own_field,
             "gravity": self.gravity,
             "contacts": self.contacts,
             "water": self.water,
@@ -232,6 +240,7 @@ class Scene(PlotMixin):
             body_contacts=body_contacts,
             obstacles=[each._core for each in self.obstacles],
             water=None if self.water is None else self.water._core,
+            **own_field_inputs(self),
         )
         self._value_layout = Layout(self._model.parameters)
         self._control_layout = Layout(self._model.controls)
@@ -344,6 +353,11 @@ class Scene(PlotMixin):
         return any(isinstance(f, UniformField) for f in self.fields)
 
     @property
+    def is_magnetic(self) -> bool:
+        """Return whether magnetization acts: in an applied field, in the bodies' own field, or both."""
+        return bool(self.fields) or self.own_field is not None
+
+    @property
     def has_forces_of_motion(self) -> bool:
         """Return whether there are forces without an energy, which act on moving bodies only: friction, water."""
         has_friction = any(contact.friction_coefficient is not None for contact in self.contacts)
@@ -368,6 +382,8 @@ class Scene(PlotMixin):
         lines += [f"  loaded by {type(load).__name__}{self._whose(load)}" for load in self.loads]
         lines += [f"  driven by {each!r}{self._whose(each)}" for each in self.actuators]
         lines += [f"  in {field!r}" for field in self.fields]
+        if self.own_field is not None:
+            lines.append(f"  with an {self.own_field!r}")
         lines += [f"  kept out by {contact!r}{self._whose(contact)}" for contact in self.contacts]
         if self.water is not None:
             lines.append(f"  in {self.water!r}")

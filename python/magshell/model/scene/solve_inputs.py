@@ -88,6 +88,8 @@ class Inputs:
             check_on_skins(scene, np.asarray(numbers))
         controls = {("scene", name): float(self.keyword(name, value)) for name, value in factors.items()}
         controls["scene", "applied_flux_density"] = flux_density
+        if scene.own_field is not None:
+            controls["scene", "own_field_factor"] = 1.0
         self.controls: np.ndarray = scene._control_layout.packed(controls, scene._control_layout.zeros())
         self.values: Values = self._values(replaced)
         given = of_all_bodies(scene, replaced) if remanent_magnetization is None else remanent_magnetization

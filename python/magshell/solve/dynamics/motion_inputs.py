@@ -165,6 +165,8 @@ class MotionInputs:
     ) -> np.ndarray:
         rows = {("scene", name): array for name, array in load_parameters.items()}
         rows |= {(f"obstacle {k}", "pose"): array for k, array in poses.items()}
+        if self.inputs.scene.own_field is not None:
+            rows["scene", "own_field_factor"] = np.ones(len(further))
         layout = self.inputs.scene._control_layout
         return np.concatenate([layout.rows(rows, len(further)), further], axis=1)
 

@@ -15,6 +15,7 @@ from .stiffness import Stiffness
 
 def idle_inputs(scene: Scene, replaced: dict[Any, Any], flux_density: Any = None, **factors: Any) -> Inputs:
     """Return inputs without loads and field unless they are given; shells and skins without magnetization get zero."""
+    _refuse_own_field(scene)
     if scene.fields:
         nothing = {"remanent_magnetization": np.zeros(3)}
         magnetic = (*scene._bodies.sheets, *scene._bodies.skins)
@@ -22,6 +23,15 @@ def idle_inputs(scene: Scene, replaced: dict[Any, Any], flux_density: Any = None
     if flux_density is None and scene.has_uniform_field and not factors:
         flux_density = np.zeros(3)
     return Inputs(scene, None, flux_density, replaced=replaced, **factors)
+
+
+def _refuse_own_field(scene: Scene) -> None:
+    """Raise ValueError for a scene with an OwnField, whose stiffness is not a sparse matrix."""
+    if scene.own_field is not None:
+        raise ValueError(
+            "vibrations, buckling loads and linear responses do not support own_field, which couples all vertices. "
+            "Equilibria, paths and motions by time steps can be computed with own_field; or leave it out of the scene"
+        )
 
 
 def inputs_about(
@@ -64,7 +74,9 @@ def asked_inputs(
     Raises ValueError for what does not fit.
     """
     if equilibrium is None:
-        return plain_inputs(scene, **arguments)
+        inputs = plain_inputs(scene, **arguments)
+        _refuse_own_field(scene)
+        return inputs
     inputs = inputs_about(scene, equilibrium, **arguments)
     refuse_what_cannot_be(function, equilibrium, inputs)
     return inputs

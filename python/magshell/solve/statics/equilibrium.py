@@ -21,10 +21,13 @@ from ...model.scene.scene import Scene
 from ...model.scene.values import Values
 from ...model.shells.strains import Largest, strains_of
 from ...model.supports.supports import Clamp, Pin, SymmetryPlane
+from .magnetic_state import MagneticState
 from .solve_log import SolveLog, SolveStep
 
 if TYPE_CHECKING:
-    from ..._input.kinds import Computed
+    from ..._input.kinds import Computed, Numbers
+    from ...model.shells.shell import Shell
+    from ...model.solids.solid import Solid
 
 
 @immutable
@@ -154,6 +157,14 @@ class Equilibrium(SaveMixin, OfOneBody):
         with self._values.in_core():
             held = self.scene._model.held_forces(self._state, self._angle_branches, self._controls)
         return reaction_in(self.scene, support, self._state, held.reshape(-1, 3))
+
+    def magnetic_force(self, body: Shell | Solid) -> np.ndarray:
+        """Return the magnetic force on a shell or solid, (3,) N, as ms.field_of(result).magnetic_force does."""
+        return MagneticState(self).magnetic_force(body)
+
+    def magnetic_torque(self, body: Shell | Solid, center: Numbers | None = None) -> np.ndarray:
+        """Return the torque of these forces about `center` (3,) m, by default the mean position of the body, (3,) N m."""
+        return MagneticState(self).magnetic_torque(body, center)
 
     def self_intersections(self) -> np.ndarray:
         """Return the pairs of faces that intersect, (k, 2), as TriangleMesh.self_intersections does."""

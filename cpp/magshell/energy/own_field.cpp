@@ -1,0 +1,114 @@
+#include "magshell/energy/own_field.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "magshell/core/errors.h"
+#include "magshell/mesh/half_edges.h"
+
+namespace magshell {
+namespace {
+
+// Writes the numbers for which `first` holds before the others into `order` and returns how many they are.
+template <class First>
+Index partition_numbers(Index count, std::vector<Index>& order, const First& first) {
+    order.clear();
+    for (Index k = 0; k < count; ++k)
+        if (first(k)) order.push_back(k);
+    const Index found = static_cast<Index>(order.size());
+    for (Index k = 0; k < count; ++k)
+        if (!first(k)) order.push_back(k);
+    return found;
+}
+
+}  // namespace
+
+OwnField::OwnField(Faces faces) {
+    const Index n = static_cast<Index>(faces.nodes.size());
+    for (const std::array<Index, 3>& corners : faces.nodes)
+        nodes_.insert(nodes_.end(), corners.begin(), corners.end());
+    std::sort(nodes_.begin(), nodes_.end());
+    nodes_.erase(std::unique(nodes_.begin(), nodes_.end()), nodes_.end());
+    Rows3i corners(n, 3);
+    faces_.resize(n);
+    for (Index f = 0; f < n; ++f) {
+        Face& face = faces_[f];
+        const std::array<Vec3, 3>& x = faces.rest[f];
+        const Vec3 across = (x[1] - x[0]).cross(x[2] - x[0]);
+        face.area = 0.5 * across.norm();
+        face.normal = across.normalized();
+        for (int i = 0; i < 3; ++i) {
+            corners(f, i) = face.nodes[i] = static_cast<Index>(
+                std::lower_bound(nodes_.begin(), nodes_.end(), faces.nodes[f][i]) - nodes_.begin());
+            const Vec3 along = x[(i + 2) % 3] - x[(i + 1) % 3];
+            face.conormals[i] = along.cross(face.normal);
+            face.size = std::max(face.size, along.norm());
+        }
+    }
+    for (const HalfEdge& half : sorted_half_edges(corners, static_cast<Index>(nodes_.size()))) {
+        const std::array<Index, 2> ends{half.low, half.high};
+        if (edges_.empty() || edges_.back().nodes != ends) {
+            const double length = faces_[half.face].conormals[half.corner].norm();
+            edges_.push_back({ends, {half.face, -1}, {half.forward ? 1.0 : -1.0, 0.0}, {1.0, 0.0}, length});
+        } else {
+            Edge& edge = edges_.back();
+            if (edge.faces[1] >= 0)
+                throw InvalidInput(
+                    "own_field: three magnetized faces meet at one edge, as where shells are tied; exclude "
+                    "one "
+                    "of the shells: ms.OwnField(bodies=...)");
+            edge.faces[1] = half.face;
+            edge.turns[1] = half.forward ? 1.0 : -1.0;
+            edge.normals[1] = edge.turns[0] * edge.turns[1] < 0.0 ? 1.0 : -1.0;
+        }
+        faces_[half.face].edges[half.corner] = static_cast<Index>(edges_.size()) - 1;
+    }
+}
+
+void OwnField::set(const std::vector<Vec3>& magnetization, const std::vector<double>& thickness) {
+    // [-] Charges and normal components below this part of the largest one are round-off; see
+    // test_uniform_tangential_magnetization_has_sources_on_the_border_only.
+    constexpr double round_off = 1e-12;
+    magnetization_ = magnetization;
+    thickness_ = thickness;
+    const Index n_faces = static_cast<Index>(faces_.size()), n_edges = static_cast<Index>(edges_.size());
+    rest_currents_.assign(n_faces, 0.0);
+    side_charges_.assign(n_faces, 0.0);
+    edge_charges_.assign(n_edges, 0.0);
+    edge_thickness_.assign(n_edges, 0.0);
+    std::vector<double> largest(n_edges, 0.0);
+    for (Index f = 0; f < n_faces; ++f) {
+        const Face& face = faces_[f];
+        const Vec3& m = magnetization[f];
+        const double along = m.dot(face.normal);
+        if (std::abs(along) > round_off * m.norm()) {
+            rest_currents_[f] = thickness[f] * along;
+            side_charges_[f] = face.area * along;
+        }
+        for (int i = 0; i < 3; ++i) {
+            edge_charges_[face.edges[i]] += thickness[f] * m.dot(face.conormals[i]);
+            largest[face.edges[i]] =
+                std::max(largest[face.edges[i]], thickness[f] * m.norm() * face.conormals[i].norm());
+        }
+    }
+    has_charges_ = false;
+    for (Index e = 0; e < n_edges; ++e) {
+        const std::array<Index, 2>& at = edges_[e].faces;
+        edge_thickness_[e] = at[1] < 0 ? thickness[at[0]] : 0.5 * (thickness[at[0]] + thickness[at[1]]);
+        if (std::abs(edge_charges_[e]) <= round_off * largest[e]) edge_charges_[e] = 0.0;
+        has_charges_ |= edge_charges_[e] != 0.0;
+    }
+    active_faces_ = partition_numbers(n_faces, face_order_, [&](Index f) { return side_charges_[f] != 0.0; });
+    active_edges_ = partition_numbers(n_edges, edge_order_, [&](Index e) {
+        const std::array<Index, 2>& at = edges_[e].faces;
+        return edge_charges_[e] != 0.0 || side_charges_[at[0]] != 0.0 ||
+               (at[1] >= 0 && side_charges_[at[1]] != 0.0);
+    });
+}
+
+std::size_t OwnField::bytes() const {
+    return nodes_.size() * sizeof(Index) + edges_.size() * (sizeof(Edge) + 2 * sizeof(double)) +
+           faces_.size() * (sizeof(Face) + sizeof(Vec3) + 3 * sizeof(double));
+}
+
+}  // namespace magshell

@@ -1,0 +1,170 @@
+#include "magshell/linalg/krylov/operator_factor.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "magshell/core/errors.h"
+#include "magshell/linalg/krylov/gmres.h"
+#include "magshell/linalg/pattern_checks.h"
+
+namespace magshell {
+namespace {
+
+// [-] Residual of solves, relative to the right-hand side, the largest one that is accepted, and iterations; fixed by
+// test_operator_factor_solves_and_counts_as_the_dense_matrix.
+constexpr double tight = 1e-13, acceptable = 1e-9;
+constexpr int most_iterations = 300;  // see test_operator_factor_solves_and_counts_as_the_dense_matrix
+// [-] Residual above which a product with A after a solve with A is taken for the identity; fixed by
+// test_operator_factor_solves_and_counts_as_the_dense_matrix.
+constexpr double rounding_matters = 1e-10;
+
+// The outcome of Lanczos' method.
+struct Count {
+    Index below = 0;       // eigenvalues below the bound
+    bool settled = false;  // whether the next one is known to lie above it
+};
+
+// Counts the eigenvalues of A^-1 H below `bound` by Lanczos' method in the inner product of A, with full orthogonalization. Vectors v and
+// images z = A v are stored, so that products with A are not needed.
+Count count_below(const Factor& positive, const OperatorFactor::Operator& product, double bound) {
+    // Steps at least and at most, and the error of a Ritz value over its distance from the bound [-]; fixed by
+    // test_operator_factor_solves_and_counts_as_the_dense_matrix.
+    constexpr int fewest = 6, most = 200;
+    constexpr double certain = 0.1;  // [-] see test_operator_factor_solves_and_counts_as_the_dense_matrix
+    // [-] Length of a new vector, over the largest entry, at which the vectors span an invariant subspace; fixed by
+    // test_operator_factor_solves_and_counts_as_the_dense_matrix.
+    constexpr double negligible = 1e-12;
+    const Index n = positive.size();
+    VectorXd z(n);
+    std::uint64_t state = 88172645463325252ull;
+    for (double& each : z) {  // pseudo-random, the same in every run
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        each = static_cast<double>(state >> 11) * 0x1p-53 - 0.5;
+    }
+    std::vector<VectorXd> images, vectors;
+    std::vector<double> diagonal, beside;
+    VectorXd v = z;
+    positive.solve(v);
+    double length = std::sqrt(std::max(0.0, z.dot(v))), largest = 0.0;
+    Count count;
+    for (int step = 1; step <= std::min<Index>(most, n) && !count.settled; ++step) {
+        images.push_back(z / length);
+        vectors.push_back(v / length);
+        z = product(vectors.back());
+        diagonal.push_back(z.dot(vectors.back()));
+        for (int sweep = 0; sweep < 2; ++sweep)
+            for (std::size_t k = vectors.size(); k-- > 0;) z -= z.dot(vectors[k]) * images[k];
+        v = z;
+        positive.solve(v);
+        length = std::sqrt(std::max(0.0, z.dot(v)));
+        largest = std::max({largest, std::abs(diagonal.back()), length});
+        const bool invariant = length <= negligible * largest || step == n;
+        if (step >= fewest || invariant) {
+            const Index size = static_cast<Index>(step);
+            Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> ritz;
+            ritz.computeFromTridiagonal(Eigen::Map<const VectorXd>(diagonal.data(), size),
+                                        Eigen::Map<const VectorXd>(beside.data(), size - 1));
+            count.below = 0;
+            while (count.below < size && ritz.eigenvalues()[count.below] < bound) ++count.below;
+            // The Ritz values below the bound and the next one must be known well enough to tell their sides.
+            bool certain_of_all = count.below < size;
+            for (Index k = 0; k <= count.below && certain_of_all; ++k)
+                certain_of_all = length * std::abs(ritz.eigenvectors()(size - 1, k)) <=
+                                 certain * std::abs(ritz.eigenvalues()[k] - bound);
+            count.settled = invariant || certain_of_all;
+        }
+        beside.push_back(length);
+    }
+    return count;
+}
+
+}  // namespace
+
+OperatorFactor::OperatorFactor(std::unique_ptr<Factor> sparse)
+    : Factor(sparse->pattern()), sparse_(std::move(sparse)) {}
+
+std::unique_ptr<Factor> OperatorFactor::shifted(const LargeVector<double>& values, VectorXd& shift) const {
+    // [-] Parts of the diagonal that are tried, each ten times the last; see
+    // test_operator_factor_solves_and_counts_as_the_dense_matrix.
+    constexpr double first = 1e-7, factor = 10.0, last = 10.0;
+    shift.resize(size());
+    std::unique_ptr<Factor> positive = sparse_->sibling();
+    for (double part = first; part <= last; part *= factor) {
+        LargeVector<double>& entries = positive->values();
+        std::copy(values.begin(), values.end(), entries.begin());
+        for (Index j = 0; j < size(); ++j) {
+            double& own = entries[pattern_->column_starts[j]];
+            shift[j] = part * std::abs(own);
+            own += shift[j];
+        }
+        const FactorReport report = positive->factorize();
+        if (report.succeeded && report.negative_pivots == 0 && report.perturbed_pivots == 0) return positive;
+    }
+    return nullptr;
+}
+
+FactorReport OperatorFactor::factorize() {
+    const LargeVector<double> values = operator_ ? values_ : LargeVector<double>();
+    std::swap(sparse_->values(), values_);
+    report_ = sparse_->factorize();
+    if (!report_.succeeded || !operator_) return report_;
+    Count count;
+    if (report_.negative_pivots == 0 && report_.perturbed_pivots == 0) {
+        count = count_below(*sparse_, operator_, -1.0);
+    } else {
+        VectorXd shift;
+        // K x = 0 means (A + D)^-1 (H - D) x = - x, with the shift D.
+        if (const std::unique_ptr<Factor> positive = shifted(values, shift))
+            count = count_below(
+                *positive, [&](const VectorXd& x) { return VectorXd(operator_(x) - shift.cwiseProduct(x)); },
+                -1.0);
+    }
+    report_.negative_pivots = count.below;
+    report_.perturbed_pivots = count.settled ? 0 : 1;
+    return report_;
+}
+
+VectorXd OperatorFactor::image(const VectorXd& x) const {
+    VectorXd out = sparse_->image(x);
+    if (operator_) out += operator_(x);
+    return out;
+}
+
+void OperatorFactor::solve_approximately(VectorXd& rhs, double tolerance) const {
+    if (!operator_) return sparse_->solve(rhs);
+    const bool identity = tolerance > rounding_matters;
+    VectorXd before;
+    const auto product = [&](const VectorXd& x) {
+        return VectorXd((identity ? before : sparse_->image(x)) + operator_(x));
+    };
+    const auto precondition = [&](VectorXd& x) {
+        if (identity) before = x;
+        sparse_->solve(x);
+    };
+    const GmresReport report = gmres(product, precondition, rhs, {tolerance, most_iterations});
+    if (!report.converged && !(report.residual <= std::max(tolerance, acceptable)))
+        throw InvalidInput("a linear solve with the own field did not converge: its relative residual is " +
+                           std::to_string(report.residual) + " after " + std::to_string(report.iterations) +
+                           " iterations");
+}
+
+void OperatorFactor::solve(Eigen::Ref<Eigen::MatrixXd> rhs) const {
+    check_solvable(report_, size(), rhs);
+    for (Eigen::Index c = 0; c < rhs.cols(); ++c) {
+        VectorXd column = rhs.col(c);
+        solve_approximately(column, tight);
+        rhs.col(c) = column;
+    }
+}
+
+std::unique_ptr<Factor> OperatorFactor::sibling() const {
+    return std::make_unique<OperatorFactor>(sparse_->sibling());
+}
+
+}  // namespace magshell

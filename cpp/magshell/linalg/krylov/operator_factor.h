@@ -1,0 +1,46 @@
+// OperatorFactor: a factorization of a sparse matrix A plus a symmetric operator H that is known by its products only, K = A + H.
+//
+// Solves use GMRES, preconditioned with A. The inertia is that of K. If A is positive definite, the negative eigenvalues of K are those of
+// A^-1 H below -1, which Lanczos' method finds in the inner product of A (Parlett, The Symmetric Eigenvalue Problem, 15.11). Otherwise A is
+// replaced by A plus a multiple of its diagonal that makes it positive definite.
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "magshell/linalg/factor.h"
+
+namespace magshell {
+
+class OperatorFactor final : public Factor {
+  public:
+    /// Returns H x.
+    using Operator = std::function<VectorXd(const VectorXd&)>;
+
+    explicit OperatorFactor(std::unique_ptr<Factor> sparse);
+
+    /// Sets H until it is set again; an empty function is zero.
+    void set_operator(Operator product) { operator_ = std::move(product); }
+    FactorReport factorize() override;
+    VectorXd image(const VectorXd& x) const override;
+    /// Throws InvalidInput if GMRES does not converge.
+    void solve(Eigen::Ref<Eigen::MatrixXd> rhs) const override;
+    void solve_approximately(VectorXd& rhs, double tolerance) const override;
+    std::unique_ptr<Factor> sibling() const override;
+
+    std::string name() const override { return sparse_->name(); }
+    std::int64_t nonzeros() const override { return sparse_->nonzeros(); }
+    double flops() const override { return sparse_->flops(); }
+    std::size_t bytes() const override { return sparse_->bytes(); }
+    std::size_t own_bytes() const override { return sparse_->own_bytes(); }
+
+  private:
+    /// Returns a positive definite factorization of A plus a multiple of its diagonal, which replaces `values`, and the multiple times
+    /// the diagonal; nullptr if there is none.
+    std::unique_ptr<Factor> shifted(const LargeVector<double>& values, VectorXd& shift) const;
+
+    std::unique_ptr<Factor> sparse_;
+    Operator operator_;
+};
+
+}  // namespace magshell

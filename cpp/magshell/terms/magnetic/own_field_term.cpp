@@ -1,0 +1,141 @@
+#include "magshell/terms/magnetic/own_field_term.h"
+
+#include <string>
+
+#include "magshell/core/errors.h"
+
+namespace magshell {
+namespace {
+
+class OwnFieldHessian final : public HessianOperator {
+  public:
+    OwnFieldHessian(std::shared_ptr<const OwnField> field, const double* q, Index n_dofs, double factor)
+        : field_(std::move(field)),
+          q_(Eigen::Map<const VectorXd>(q, n_dofs)),
+          near_(field_->neighbours(q)),
+          factor_(factor) {}
+
+    void add_product(const VectorXd& x, VectorXd& y) const override {
+        VectorXd product = VectorXd::Zero(y.size());
+        field_->add_hessian_product(q_.data(), near_, x.data(), product.data());
+        y += factor_ * product;
+    }
+
+  private:
+    std::shared_ptr<const OwnField> field_;
+    VectorXd q_;
+    OwnField::Neighbours near_;
+    double factor_;
+};
+
+void add_faces(const Surface& surface, OwnField::Faces& faces) {
+    for (Index f = 0; f < surface.n_faces(); ++f) {
+        faces.nodes.push_back(surface.corners[f]);
+        faces.rest.push_back(surface.rest_corners(f));
+    }
+}
+
+}  // namespace
+
+OwnFieldTerm::OwnFieldTerm(std::vector<const Surface*> surfaces, Index max_points, Index n_dofs,
+                           Registry& registry)
+    : surfaces_(std::move(surfaces)),
+      max_points_(max_points),
+      n_dofs_(n_dofs),
+      factor_(registry.load_parameters.add("scene", "own_field_factor", "1", 1, 1)) {
+    OwnField::Faces faces;
+    for (const Surface* surface : surfaces_) {
+        add_faces(*surface, faces);
+        magnetization_.push_back(registry.values.add(surface->owner, "remanent_magnetization", "A/m",
+                                                     surface->n_faces(), 3, &surface->faces));
+        thickness_.push_back(
+            registry.values.add(surface->owner, "thickness", "m", surface->n_faces(), 1, &surface->faces));
+    }
+    field_ = std::make_shared<const OwnField>(std::move(faces));
+}
+
+bool OwnFieldTerm::set_values(const Values& values) {
+    bool changed = false;
+    for (std::size_t k = 0; k < surfaces_.size(); ++k)
+        changed |= values.changed(magnetization_[k], thickness_[k]);
+    if (!changed) return false;
+    magnetizations_.clear();
+    thicknesses_.clear();
+    for (std::size_t k = 0; k < surfaces_.size(); ++k)
+        for (Index f = 0; f < surfaces_[k]->n_faces(); ++f) {
+            magnetizations_.push_back(values.vector(magnetization_[k], f));
+            thicknesses_.push_back(values.number(thickness_[k], f));
+        }
+    OwnField field = *field_;
+    field.set(magnetizations_, thicknesses_);
+    if (field.n_points() > max_points_)
+        throw InvalidInput("the own field has " + std::to_string(field.n_points()) +
+                           " source points, more than max_points = " + std::to_string(max_points_) +
+                           " of the OwnField: each product with its Hessian takes time in proportion to the "
+                           "square of that number. Use a "
+                           "coarser mesh, fewer bodies, a uniform tangential magnetization (whose sources "
+                           "lie on the border only), or "
+                           "ms.OwnField(max_points=...)");
+    field_ = std::make_shared<const OwnField>(std::move(field));
+    return true;
+}
+
+double OwnFieldTerm::energy(const double* q, const LoadParameters& load_parameters) const {
+    const double factor = load_parameters[factor_.first];
+    if (!field_->acts() || factor == 0.0) return 0.0;
+    std::vector<Vec3> by_position;
+    return factor * field_->gradient(q, field_->neighbours(q), by_position);
+}
+
+void OwnFieldTerm::evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) {
+    const double factor = load_parameters[factor_.first];
+    if (!field_->acts() || factor == 0.0) return;
+    std::vector<Vec3> by_position;
+    field_->gradient(q, field_->neighbours(q), by_position);
+    for (std::size_t k = 0; k < by_position.size(); ++k)
+        for (int i = 0; i < 3; ++i) out.add(3 * field_->nodes()[k] + i, factor * by_position[k][i]);
+}
+
+std::shared_ptr<const HessianOperator> OwnFieldTerm::hessian_operator(
+    const double* q, const LoadParameters& load_parameters) const {
+    const double factor = load_parameters[factor_.first];
+    if (!field_->acts() || factor == 0.0) return nullptr;
+    return std::make_shared<const OwnFieldHessian>(field_, q, n_dofs_, factor);
+}
+
+std::vector<double> OwnFieldTerm::own_energies(const double* q) const {
+    std::vector<double> energies;
+    std::ptrdiff_t first = 0;
+    for (const Surface* surface : surfaces_) {
+        OwnField::Faces faces;
+        add_faces(*surface, faces);
+        OwnField alone(std::move(faces));
+        const std::ptrdiff_t last = first + surface->n_faces();
+        alone.set({magnetizations_.begin() + first, magnetizations_.begin() + last},
+                  {thicknesses_.begin() + first, thicknesses_.begin() + last});
+        std::vector<Vec3> by_position;
+        energies.push_back(alone.gradient(q, alone.neighbours(q), by_position));
+        first = last;
+    }
+    return energies;
+}
+
+void OwnFieldTerm::vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
+                       Gradient& out) {
+    const double factor = load_parameters[factor_.first];
+    const OwnField::FaceGradient by = field_->vjp(q, lambda);
+    std::size_t face = 0;
+    for (std::size_t k = 0; k < surfaces_.size(); ++k)
+        for (Index f = 0; f < surfaces_[k]->n_faces(); ++f, ++face) {
+            out.values.segment<3>(magnetization_[k].at(f)) += factor * by.magnetization[face];
+            out.values[thickness_[k].at(f)] += factor * by.thickness[face];
+        }
+    if (!field_->acts()) return;
+    std::vector<Vec3> by_position;
+    field_->gradient(q, field_->neighbours(q), by_position);
+    for (std::size_t k = 0; k < by_position.size(); ++k)
+        out.load_parameters[factor_.first] +=
+            by_position[k].dot(Eigen::Map<const Vec3>(lambda + 3 * field_->nodes()[k]));
+}
+
+}  // namespace magshell

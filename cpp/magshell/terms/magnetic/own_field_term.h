@@ -1,0 +1,42 @@
+// OwnFieldTerm: the energy of magnetized shells of linear triangles in the field that they make themselves (energy/own_field.h).
+#pragma once
+
+#include "magshell/body/nodes.h"
+#include "magshell/body/surface.h"
+#include "magshell/energy/own_field.h"
+#include "magshell/terms/operator_term.h"
+
+namespace magshell {
+
+class OwnFieldTerm final : public OperatorTerm {
+  public:
+    /// max_points: number of source points beyond which set_values() throws InvalidInput. The surfaces must outlive the term.
+    OwnFieldTerm(std::vector<const Surface*> surfaces, Index max_points, Index n_dofs, Registry& registry);
+
+    std::string_view name() const override { return "own field"; }
+    bool set_values(const Values& values) override;
+    double energy(const double* q, const LoadParameters& load_parameters) const override;
+    void evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) override;
+    std::shared_ptr<const HessianOperator> hessian_operator(
+        const double* q, const LoadParameters& load_parameters) const override;
+    bool add_projective_stiffness(NodeMatrix&) const override { return false; }
+    void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
+             Gradient& out) override;
+    std::size_t bytes() const override { return field_->bytes(); }
+
+    const OwnField& field() const { return *field_; }
+    /// Returns the energy of each surface in its own field alone [J].
+    std::vector<double> own_energies(const double* q) const;
+
+  private:
+    const std::vector<const Surface*> surfaces_;
+    const Index max_points_, n_dofs_;
+    std::vector<ParameterSlice> magnetization_, thickness_;  // of each surface
+    ParameterSlice factor_;
+    std::vector<Vec3> magnetizations_;  // of all faces [A/m]
+    std::vector<double> thicknesses_;   // [m]
+    std::shared_ptr<const OwnField>
+        field_;  // shared with the Hessians of earlier solves, so it is replaced, never changed
+};
+
+}  // namespace magshell
