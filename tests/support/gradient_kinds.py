@@ -361,7 +361,6 @@ MAKERS = {
     "a driven skeleton on a Plane, contact implicit": motorized_skeleton_on_a_plane,
     "two sheets with their own field at rest": lambda: own_field(False),
     "two sheets with their own field in motion": lambda: own_field(True),
-    **GROWTH_MAKERS,  # last: makers draw from one stream of random numbers
 }
 
 
