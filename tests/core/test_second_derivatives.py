@@ -71,12 +71,12 @@ def test_a_gradient_penalty_is_refused_but_the_gradient_can_be_read(way, loss):
         (value + (first**2).sum()).backward()
 
 
-def test_second_derivative_by_a_loss_weight_is_refused_too():
-    """Check the weight of a loss, on which the gradient depends only through what comes back to the solve."""
-    field, weight = FIELD.clone().requires_grad_(), torch.ones((), dtype=torch.float64, requires_grad=True)
-    (first,) = torch.autograd.grad(weight * height(at_rest(field)), field, create_graph=True)
-    with pytest.raises(ms.NoGradient):
-        torch.autograd.grad(first.sum(), weight)
+def test_a_derivative_by_a_loss_weight_of_the_gradient_is_the_gradient():
+    """Check the weight of a loss, in which the gradient is linear: its derivative is one more tangent of the solve."""
+    field, weight = FIELD.clone().requires_grad_(), torch.full((), 2.0, dtype=torch.float64, requires_grad=True)
+    (first,) = torch.autograd.grad(weight**3 * height(at_rest(field)), field, create_graph=True)
+    (by_weight,) = torch.autograd.grad(first.sum(), weight)
+    assert by_weight.item() == pytest.approx(1.5 * first.sum().item(), rel=1e-9)
 
 
 def test_design_variables_in_front_of_a_solve():
