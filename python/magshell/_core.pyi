@@ -51,10 +51,14 @@ __all__: list[str] = [
     "drag_gradients",
     "factor_backends",
     "factor_orderings",
+    "fibre_states",
     "find_equilibrium",
     "first_order_change",
     "follow_path",
     "lane_logarithms",
+    "loaded_part",
+    "lowest_modes",
+    "moved",
     "nearest_neighbours",
     "num_threads",
     "pair_energies",
@@ -71,6 +75,7 @@ __all__: list[str] = [
     "shell_stresses",
     "simulate",
     "solid_point_states",
+    "solve_with_operator",
     "touching_pairs",
     "vacuum_permeability",
     "vjp",
@@ -117,10 +122,6 @@ class Factor:
         """
         Factorizes the matrix with these values (nnz,), in the order of the pattern's rows, and with columns u (n, k) of stiffnesses s (k,) beside it: plus the sum of s u u^T.
         """
-    def solve(self, rhs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
-        """
-        The solution for the right-hand side (n,) or (n, k).
-        """
     def residual(
         self,
         values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
@@ -129,6 +130,10 @@ class Factor:
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
         rhs (n,) minus the matrix with these values (nnz,) times a solution (n,), added up in as many digits as the machine has.
+        """
+    def solve(self, rhs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
+        """
+        The solution for the right-hand side (n,) or (n, k).
         """
     @property
     def bytes(self) -> int: ...
@@ -327,46 +332,6 @@ class Water:
         thrust_curve: AttackCurve,
     ) -> None: ...
 
-class BroadPhase:
-    def __init__(
-        self,
-        rest_positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        surfaces: collections.abc.Sequence[
-            collections.abc.Sequence[
-                typing.Annotated[
-                    collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"
-                ]
-            ]
-        ],
-        contacts: collections.abc.Sequence[
-            typing.Annotated[
-                collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(2)"
-            ]
-        ],
-    ) -> None: ...
-    def crossings(
-        self, positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-    ) -> dict[str, typing.Any]: ...
-    def make_room(
-        self,
-        rest_positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        near_at_rest: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-    ) -> None: ...
-    def near(
-        self,
-        positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        margins: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-    ) -> dict[str, typing.Any]:
-        """
-        Columns of the pairs that are nearer than the margins [m].
-        """
-    def near_on_the_way(
-        self,
-        positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        end: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        margins: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-    ) -> dict[str, typing.Any]: ...
-
 class FaceEnergy:
     pass
 
@@ -403,6 +368,25 @@ class Model:
         """
         Gradient and Hessian, left in the core: what `python -m benchmarks kernels` times.
         """
+    def driven_increment(
+        self,
+        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        How far from a state what motors and supports prescribe at these controls is, of all unknowns, (n,); zero elsewhere.
+        """
+    def driving(
+        self,
+        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        turns: collections.abc.Sequence[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]
+        ],
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        What the motors of joints do in an equilibrium q, N and N m, one after another.
+        """
     def edge_rotations(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
@@ -437,17 +421,6 @@ class Model:
         """
         Rows of the caller's vertices (n_v, 3) among all unknowns, zero elsewhere.
         """
-    def driving(
-        self,
-        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        turns: collections.abc.Sequence[
-            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]
-        ],
-    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
-        """
-        What the motors of joints do in an equilibrium q, N and N m, one after another.
-        """
     def gradient(
         self,
         arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
@@ -470,46 +443,56 @@ class Model:
         controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         reduced: bool = True,
     ) -> tuple[typing.Any, ...]: ...
-    def small_deflection(
+    def hessian_product(
         self,
         q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        unloaded: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        at_rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None = None,
-    ) -> SmallDeflection:
+        direction: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
-        The motion from the rest shape q, of all unknowns, to first order in the controls. at_rest (n,): the gradient there, unless it is that without controls.
-        """
-    def linearize(self, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None:
-        """
-        How nodes of links and rigid parts move, at a state: evaluations begin with it.
+        The product of the Hessian with a direction, of all unknowns (n,), with the own field.
         """
     def largest_strains(
         self,
         q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         thickness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     ) -> tuple[typing.Any, ...]: ...
+    def linearize(self, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None:
+        """
+        How nodes of links and rigid parts move, at a state: evaluations begin with it.
+        """
+    def low_rank(
+        self, reduced: bool = True
+    ) -> tuple[
+        typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"],
+        typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"],
+    ]:
+        """
+        What hessian(), called last, leaves out: columns u (n, k) and stiffnesses s (k,), the sum of s u u^T. Of cavities, cells and tendons, which couple all of their nodes.
+        """
+    def own_energies(
+        self, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
+    ) -> list[float]:
+        """
+        The energy of each shell of the own field in its own field alone, (n,) [J].
+        """
+    def own_flux_density(
+        self,
+        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
+        """
+        The flux density of the magnetized shells at points outside of them, (n, 3) [T].
+        """
     def points(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
         """
         Positions, then the own points of rigid parts (10 each).
         """
-    def low_rank(self, reduced: bool = True) -> tuple[typing.Any, ...]:
-        """
-        What hessian(), called last, leaves out: columns u (n, k) and stiffnesses s (k,), the sum of s u u^T. Of cavities, cells and tendons, which couple all of their nodes.
-        """
     def positions(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
-    def driven_increment(
-        self,
-        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
-        """
-        How far from a state what motors and supports prescribe at these controls is, of all unknowns, (n,); zero elsewhere.
-        """
     def prescribed_rate(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
@@ -541,6 +524,16 @@ class Model:
         """
         Velocities of all unknowns, with those of rigid parts as their vertices say.
         """
+    def small_deflection(
+        self,
+        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        unloaded: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        at_rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None = None,
+    ) -> SmallDeflection:
+        """
+        The motion from the rest shape q, of all unknowns, to first order in the controls. at_rest (n,): the gradient there, unless it is that without controls.
+        """
     def state(
         self,
         arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
@@ -556,6 +549,15 @@ class Model:
     ) -> list[typing.Any]:
         """
         [(name, J)] of each term, at a state with these turns.
+        """
+    def term_gradient(
+        self,
+        name: str,
+        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        The gradient of the terms of one name, of all unknowns (n,) [N].
         """
     @property
     def analyses(self) -> int: ...
@@ -612,12 +614,9 @@ class StaticsOptions:
     newton: NewtonOptions
     require_stable: bool
     start_at_rest: bool
-    watched: list[WatchedObstacle]
     def __init__(self) -> None: ...
     @property
-    def away_from(
-        self,
-    ) -> list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]]: ...
+    def away_from(self) -> list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]]: ...
     @away_from.setter
     def away_from(
         self,
@@ -643,6 +642,10 @@ class StaticsOptions:
     def smallest_step(self) -> float: ...
     @smallest_step.setter
     def smallest_step(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def watched(self) -> list[WatchedObstacle]: ...
+    @watched.setter
+    def watched(self, arg0: collections.abc.Sequence[WatchedObstacle]) -> None: ...
 
 class Outcome:
     """
@@ -728,17 +731,21 @@ class StaticsResult:
     @property
     def failed_factorizations(self) -> int: ...
     @property
+    def field_sampling_error(self) -> float: ...
+    @property
     def iterations(self) -> int: ...
     @property
     def linear_time(self) -> float: ...
+    @property
+    def load_fraction(self) -> float: ...
     @property
     def load_steps(self) -> int: ...
     @property
     def log(self) -> list[SolveStep]: ...
     @property
-    def outcome(self) -> Outcome: ...
+    def n_negative_eigenvalues(self) -> int: ...
     @property
-    def load_fraction(self) -> float: ...
+    def outcome(self) -> Outcome: ...
     @property
     def reason(self) -> str: ...
     @property
@@ -748,29 +755,25 @@ class StaticsResult:
     @property
     def saddles_escaped(self) -> int: ...
     @property
-    def symmetric_saddles(self) -> int: ...
-    @property
     def stable(self) -> bool: ...
     @property
     def state(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @property
+    def symmetric_saddles(self) -> int: ...
+    @property
     def turns(self) -> list[list[float]]: ...
+
+class PathPoint:
     @property
     def field_sampling_error(self) -> float: ...
     @property
     def n_negative_eigenvalues(self) -> int: ...
-
-class PathPoint:
     @property
     def parameter(self) -> float: ...
     @property
     def state(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @property
     def turns(self) -> list[list[float]]: ...
-    @property
-    def field_sampling_error(self) -> float: ...
-    @property
-    def n_negative_eigenvalues(self) -> int: ...
 
 class CriticalKind:
     """
@@ -822,7 +825,6 @@ class PathOptions:
     branch_at: CriticalPoint | None
     locate_critical: bool
     newton: NewtonOptions
-    watched: list[WatchedObstacle]
     def __init__(self) -> None: ...
     @property
     def branch_side(self) -> float: ...
@@ -837,6 +839,10 @@ class PathOptions:
     @highest_parameter.setter
     def highest_parameter(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     @property
+    def max_points(self) -> int: ...
+    @max_points.setter
+    def max_points(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
     def max_step(self) -> float: ...
     @max_step.setter
     def max_step(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
@@ -845,9 +851,9 @@ class PathOptions:
     @min_parameter.setter
     def min_parameter(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     @property
-    def max_points(self) -> int: ...
-    @max_points.setter
-    def max_points(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def watched(self) -> list[WatchedObstacle]: ...
+    @watched.setter
+    def watched(self, arg0: collections.abc.Sequence[WatchedObstacle]) -> None: ...
 
 class PathResult:
     @property
@@ -940,8 +946,6 @@ class MotionResult:
     @property
     def factorizations(self) -> int: ...
     @property
-    def substeps(self) -> dict[int, list[tuple[float, float, bool]]]: ...
-    @property
     def fraction_done(self) -> float: ...
     @property
     def iterations(self) -> int: ...
@@ -976,7 +980,49 @@ class MotionResult:
     @property
     def steps_recorded(self) -> list[int]: ...
     @property
+    def substeps(self) -> dict[int, list[tuple[float, float, bool]]]: ...
+    @property
     def time_steps(self) -> list[float]: ...
+
+class BroadPhase:
+    def __init__(
+        self,
+        rest_positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        surfaces: collections.abc.Sequence[
+            collections.abc.Sequence[
+                typing.Annotated[
+                    collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"
+                ]
+            ]
+        ],
+        contacts: collections.abc.Sequence[
+            typing.Annotated[
+                collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(2)"
+            ]
+        ],
+    ) -> None: ...
+    def crossings(
+        self, positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
+    ) -> dict[str, typing.Any]: ...
+    def make_room(
+        self,
+        rest_positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        near_at_rest: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+    ) -> None: ...
+    def near(
+        self,
+        positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        margins: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+    ) -> dict[str, typing.Any]:
+        """
+        Columns of the pairs that are nearer than the margins [m].
+        """
+    def near_on_the_way(
+        self,
+        positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        end: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        margins: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+    ) -> dict[str, typing.Any]: ...
 
 def analyze(
     size: typing.SupportsInt | typing.SupportsIndex,
@@ -1019,17 +1065,6 @@ def drag_gradients(
     For each face the gradient of multiplier . f by what describes the water; f is the force on the face, multipliers are (n, 3).
     """
 
-def loaded_part(
-    size: typing.SupportsInt | typing.SupportsIndex,
-    column_starts: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-    rows: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
-    values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    forces: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-) -> tuple[typing.Any, ...]:
-    """
-    Of a symmetric matrix, given as to analyze(), the part that forces (n,) act on: its unknowns, column_starts, rows and values, without zeros off its diagonal. Nothing couples it with the rest. All of the matrix where no force acts.
-    """
-
 def factor_backends() -> list[str]: ...
 def factor_orderings() -> list[str]: ...
 def fibre_states(
@@ -1049,30 +1084,9 @@ def find_equilibrium(
     from_: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     to: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     options: StaticsOptions,
-    load_fraction: typing.Any = None,
+    progress: typing.Any = None,
     varying: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = [],
 ) -> StaticsResult: ...
-def lowest_modes(
-    model: Model,
-    state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-    turns: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
-    controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-    count: typing.SupportsInt | typing.SupportsIndex,
-    load_fraction: typing.Any = None,
-) -> tuple[typing.Any, ...]:
-    """
-    Eigenvalues, shapes of all unknowns (largest displacement 1) nearest to zero, and the number of unstable directions of an equilibrium; none where it is neutral.
-    """
-
-def moved(
-    model: Model,
-    state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-    step: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
-    """
-    A state after a step of all unknowns, as far as bodies in contact let it.
-    """
-
 def first_order_change(
     model: Model,
     equilibrium: StaticsResult,
@@ -1091,11 +1105,45 @@ def follow_path(
     options: PathOptions,
     varying: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
     until: typing.Any = None,
-    load_fraction: typing.Any = None,
+    progress: typing.Any = None,
 ) -> PathResult: ...
-def lane_logarithms(numbers: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
+def lane_logarithms(
+    numbers: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+) -> numpy.typing.NDArray[numpy.float64]:
     """
     ln of an array's numbers as the element kernels take it, to be tested.
+    """
+
+def loaded_part(
+    size: typing.SupportsInt | typing.SupportsIndex,
+    column_starts: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+    rows: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+    values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    forces: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+) -> tuple[typing.Any, ...]:
+    """
+    Of a symmetric matrix, given as to analyze(), the part that forces (n,) act on: its unknowns, column_starts, rows and values, without zeros off its diagonal. Nothing couples it with the rest. All of the matrix where no force acts.
+    """
+
+def lowest_modes(
+    model: Model,
+    state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    turns: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
+    controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    count: typing.SupportsInt | typing.SupportsIndex,
+    progress: typing.Any = None,
+) -> tuple[typing.Any, ...]:
+    """
+    Eigenvalues, shapes of all unknowns (largest displacement 1) nearest to zero, and the number of unstable directions of an equilibrium; none where it is neutral.
+    """
+
+def moved(
+    model: Model,
+    state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    step: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    """
+    A state after a step of all unknowns, as far as bodies in contact let it.
     """
 
 def nearest_neighbours(model: Model, contact: typing.SupportsInt | typing.SupportsIndex) -> tuple[float, str]:
@@ -1196,7 +1244,7 @@ def pull_back_motion(
     by_edge_rotations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     by_velocities: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     by_driving: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"] = ...,
-    load_fraction: typing.Any = None,
+    progress: typing.Any = None,
 ) -> dict[str, typing.Any]: ...
 def push_forward(
     model: Model,
@@ -1235,7 +1283,7 @@ def simulate(
     gradients: bool,
     budget: typing.SupportsInt | typing.SupportsIndex,
     keep: Keep,
-    load_fraction: typing.Any = None,
+    progress: typing.Any = None,
 ) -> MotionResult: ...
 def solid_point_states(
     model: Model,
@@ -1246,6 +1294,14 @@ def solid_point_states(
     (F, Cauchy stress [Pa], rest volumes [m3]) at the points of integration of a solid's elements: (n_t, p, 3, 3) twice and (n_t, p).
     """
 
+def solve_with_operator(
+    size: typing.SupportsInt | typing.SupportsIndex,
+    column_starts: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+    rows: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+    values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    added: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    rhs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+) -> tuple[typing.Any, ...]: ...
 def touching_pairs(
     model: Model,
     q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
@@ -1265,5 +1321,5 @@ def vjp(
     adjoint . dg/dk at a state q, g the gradient of the energy and k every value, (n,).
     """
 
-__version__: str = "0+dev"
+__version__: str = "0.1.0"
 vacuum_permeability: float = 1.25663706127e-06

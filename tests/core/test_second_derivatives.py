@@ -73,7 +73,10 @@ def test_a_gradient_penalty_is_refused_but_the_gradient_can_be_read(way, loss):
 
 def test_a_derivative_by_a_loss_weight_of_the_gradient_is_the_gradient():
     """Check the weight of a loss, in which the gradient is linear: its derivative is one more tangent of the solve."""
-    field, weight = FIELD.clone().requires_grad_(), torch.full((), 2.0, dtype=torch.float64, requires_grad=True)
+    field, weight = (
+        FIELD.clone().requires_grad_(),
+        torch.full((), 2.0, dtype=torch.float64, requires_grad=True),
+    )
     (first,) = torch.autograd.grad(weight**3 * height(at_rest(field)), field, create_graph=True)
     (by_weight,) = torch.autograd.grad(first.sum(), weight)
     assert by_weight.item() == pytest.approx(1.5 * first.sum().item(), rel=1e-9)

@@ -47,6 +47,36 @@ def test_linear_fit_is_linear_regression():
     )
 
 
+def test_a_perfect_fit_leaves_no_noise():
+    found = fitted(lambda a: a.expand(4), np.ones(4), {"a": 2.0})
+    assert found.values["a"] == pytest.approx(1.0, rel=1e-12)
+    assert found.noise.max() < 1e-12 and found.upper["a"] - found.lower["a"] < 1e-12
+
+
+def test_directions_that_data_leave_open_use_up_no_degree_of_freedom():
+    data = 1.0 + 0.1 * np.random.default_rng(3).standard_normal(6)
+    found = fitted(lambda a, b: (a + b).expand(6), data, {"a": 0.3, "b": 0.4})
+    np.testing.assert_allclose(found.noise, data.std(ddof=1), rtol=1e-6)
+
+
+def test_size_of_residuals_counts_priors_as_data():
+    """Check a right model whose parameters their priors nearly fix: the mean square is that of the noise."""
+    rng, design = np.random.default_rng(5), np.random.default_rng(6).standard_normal((10, 9))
+    doubtful = 0
+    for _ in range(20):
+        truth, noise = rng.standard_normal(9), rng.standard_normal(10)
+        parameters = {f"p{k}": ms.FitParameter(0.5, prior=(0.0, 1.0)) for k in range(9)}
+        found = fitted(
+            lambda **p: torch.tensor(design) @ torch.stack(list(p.values())),
+            design @ truth + noise,
+            parameters,
+            noise=1.0,
+        )
+        assert found.tests.degrees_of_freedom == 10
+        doubtful += found.tests.size < 0.01
+    assert doubtful <= 2
+
+
 def test_estimated_noise_gives_intervals_of_student():
     data = data_of_line(0.1)
     found = fitted(line, data, {"offset": 0.5, "slope": -1.0}, level=0.9)

@@ -92,6 +92,8 @@ class SolidModel:
             body_contacts=[],
             obstacles=[],
             water=None,
+            own_field_shells=[],
+            own_field_max_points=0,
         )
         self.layout = Layout(self.core.parameters)
         self.others = {key: np.zeros(1) for key in self.layout if key[0] != "body 0"}

@@ -242,6 +242,7 @@ VectorXd Model::multiply_contact_transposed(const VectorXd& q, const LoadParamet
     matrix_.clear_columns(0, matrix_.size());
     low_rank_.clear();
     nonsymmetric_.clear();
+    operators_.clear();  // the matrix is that of contact alone until the next assembly
     terms_.contacts.assemble(q, kinematics_, load_parameters, matrix_, nonsymmetric_);
     update_contact_pattern();
     VectorXd product(size());

@@ -96,7 +96,8 @@ class Follower {
         return true;
     }
 
-    // Begins at a bifurcation, along its mode, which is perpendicular to the path through it [Crisfield 21.7; Keller 1977].
+    // Begins at a bifurcation, along its mode [Crisfield 21.7; Keller 1977], which is perpendicular to the path through it if the
+    // bifurcation is symmetric.
     bool begin_branch(Tangent& tangent) {
         const CriticalPoint& from = *options_.branch_at;
         psi_ = from.psi;
@@ -157,7 +158,7 @@ class Follower {
         Eigen::MatrixXd pull = held;
         const FactorReport factor = newton_.factorize(point.state, at, false, {}, pull);
         if (!factor.succeeded) return false;
-        point.unstable_directions = count_unstable_directions(newton_, point.state, at, factor);
+        point.unstable_directions = count_unstable_directions(newton_, factor);
         tangent = {response(point.state, at, held, pull.col(0)), 1.0};
         return true;
     }
@@ -228,7 +229,10 @@ class Follower {
                 turn = -turn;
             }
             if (turn < min_tangent_cosine) continue;
-            if (options_.locate_critical && next.unstable_directions != base.unstable_directions)
+            const bool on_branch =
+                options_.branch_at && result_.points.size() == 1;  // begins at a critical point
+            if (options_.locate_critical && !on_branch &&
+                next.unstable_directions != base.unstable_directions)
                 locate({0.0, base}, {step_, next}, tangent);
             model_.set_angle_branches(next.angle_branches);
             model_.evaluate(next.state, load_parameters(next.parameter));
@@ -251,24 +255,22 @@ class Follower {
     }
 
     // Returns the mode with the eigenvalue nearest to zero of the tangent factorized last, by its real part. transposed: the mode of K^T,
-    // which is the same if K is symmetric. Sets whether the eigenvalue is one of a complex pair.
-    Mode nearest_mode(bool transposed, bool* complex = nullptr) {
-        if (complex) *complex = false;
+    // which is the same if K is symmetric. Empty if no eigenvalue could be computed.
+    Mode nearest_mode(bool transposed) {
         if (!newton_.is_unsymmetric()) return modes_near_zero(newton_, 1).front();
         const std::vector<NonsymmetricMode> modes = spectrum_near_zero(newton_, 0.0, transposed).modes;
-        if (modes.empty()) return {0.0, VectorXd::Zero(model_.size())};
+        if (modes.empty()) return {0.0, {}};
         const NonsymmetricMode& nearest =
             *std::min_element(modes.begin(), modes.end(), [](const auto& a, const auto& b) {
                 return std::abs(a.eigenvalue.real()) < std::abs(b.eigenvalue.real());
             });
-        if (complex) *complex = nearest.eigenvalue.imag() != 0.0;
         return {nearest.eigenvalue.real(), nearest.shape};
     }
 
     // Returns the size of the eigenvalue nearest to zero at the point factorized last, with a sign that changes at the critical point:
     // positive as long as the point has `count` unstable directions, negative otherwise. Sets the mode too.
     double signed_eigenvalue(const PathPoint& point, Index count) {
-        nearest_ = nearest_mode(false, &oscillates_);
+        nearest_ = nearest_mode(false);
         const double size = std::abs(nearest_.eigenvalue);
         return point.unstable_directions == count ? size : -size;
     }
@@ -333,21 +335,34 @@ class Follower {
                 side = -1;
             }
         }
+        if (nearest_.shape.size() == 0)
+            return;  // the numbers of unstable directions of the points tell of it
+        // [-] Eigenvalue at a critical point, over those at the ends of the interval, above which no real one passes through zero there:
+        // a complex pair passes the imaginary axis. See test_a_path_passes_the_limit_point_of_a_live_pressure.
+        constexpr double no_crossing = 0.1;
+        const bool flutters = newton_.is_unsymmetric() &&
+                              std::abs(nearest_.eigenvalue) > no_crossing / eigenvalue_tolerance * tolerance;
+        const Mode mode = nearest_;
+        const CriticalKind kind = flutters ? CriticalKind::flutter : kind_of(best);
         result_.critical.push_back(
-            {best, kind_of(best), nearest_.shape, static_cast<Index>(result_.points.size()) - 1, psi_});
+            {best, kind, mode.shape, static_cast<Index>(result_.points.size()) - 1, psi_});
     }
 
-    // Returns the kind of the critical point located last. At a limit point the loads act on the left mode, so that the path has no
-    // tangent with a change of the loads; at a bifurcation they do not.
-    CriticalKind kind_of(PathPoint point) {
-        if (oscillates_) return CriticalKind::flutter;
+    // Returns the kind of the critical point located last. At a limit point the loads and supports act on the left mode, so that the path
+    // has no tangent with a change of the loads; at a bifurcation they do not.
+    CriticalKind kind_of(const PathPoint& point) {
         const LoadParameters at = load_parameters(point.parameter);
-        const VectorXd drive = model_.parameters().gradient_rate(point.state, at, rate_);
-        VectorXd left = nearest_.shape;
-        if (newton_.is_unsymmetric()) {
-            newton_.factorize_at(point.state, at);
-            left = nearest_mode(true).shape;
+        model_.set_angle_branches(point.angle_branches);
+        model_.evaluate(point.state, at);
+        VectorXd drive = model_.parameters().gradient_rate(point.state, at, rate_), left = nearest_.shape;
+        const VectorXd held = model_.parameters().prescribed_rate(point.state, at, rate_);
+        if (newton_.is_unsymmetric() || !held.isZero(0.0)) {
+            Eigen::MatrixXd pull = held;
+            newton_.factorize(point.state, at, false, {}, pull);
+            drive += pull.col(0);
+            if (newton_.is_unsymmetric()) left = nearest_mode(true).shape;
         }
+        if (left.size() == 0) return CriticalKind::bifurcation;
         const VectorXd free_drive = model_.dof_map().vector(drive), free_mode = model_.dof_map().vector(left);
         const double alignment =
             std::abs(free_drive.dot(free_mode)) / (free_drive.norm() * free_mode.norm() + no_norm);
@@ -360,12 +375,11 @@ class Follower {
     const PathOptions& options_;
     const Until& until_;
     PathResult& result_;
-    Mode nearest_;             // the mode nearest to zero at the point examined last
-    bool oscillates_ = false;  // whether its eigenvalue is one of a complex pair
-    ObstacleSides sides_;      // at the last accepted point
-    VectorXd weight_;          // diagonal matrix of |dx|^2 / extent^2
-    double psi_ = 1.0;         // weight of the path parameter in the arc length
-    double step_ = 0.0;        // arc length of the next or current step
+    Mode nearest_;         // the mode nearest to zero at the point examined last
+    ObstacleSides sides_;  // at the last accepted point
+    VectorXd weight_;      // diagonal matrix of |dx|^2 / extent^2
+    double psi_ = 1.0;     // weight of the path parameter in the arc length
+    double step_ = 0.0;    // arc length of the next or current step
 };
 
 }  // namespace

@@ -318,8 +318,7 @@ class Statics {
     bool check_stability() { return judge(newton_.factorize_at(result_.state, result_.load_parameters)); }
 
     bool judge(const FactorReport& factor) {
-        return judge(factor,
-                     count_unstable_directions(newton_, result_.state, result_.load_parameters, factor));
+        return judge(factor, count_unstable_directions(newton_, factor));
     }
 
     bool judge(const FactorReport& factor, Index unstable_directions) {

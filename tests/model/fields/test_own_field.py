@@ -8,6 +8,8 @@ from magshell import _core
 from magshell.model.scene.solve_inputs import Inputs
 from tests.support.magnet_forces import VACUUM_PERMEABILITY, cuboid_force
 
+torch = pytest.importorskip("torch")
+
 SIZE, THICKNESS = 0.01, 2e-4  # [m], of the plates
 POLARIZATION = 0.0754  # [T]
 MANY = ms.OwnField(max_points=10**5)
@@ -248,6 +250,40 @@ def test_motion_and_path_have_the_own_field():
         motion[scene.bodies[1]].positions[5, :, 2].sum() - motion[scene.bodies[1]].positions[0, :, 2].sum()
     )
     assert begins > 0  # parallel tangential plates repel each other
+
+
+@pytest.mark.parametrize("implicit_contact", [False, True])
+def test_gradient_of_a_motion_on_a_plane_with_the_own_field(implicit_contact):
+    mesh = ms.meshes.rectangle(0.02, 0.01, cells=(4, 2))
+    sheet = ms.Shell(mesh, thickness=5e-4, young_modulus=1e5, mass_density=2e3)
+    plane = ms.Contact(ms.obstacles.Plane(center=(0, 0, -1e-5)), friction_coefficient=0.3)
+    scene = ms.Scene(
+        sheet, contacts=[plane], gravity=(0, 0, -9.81), allow_rigid_motions=True, own_field=ms.OwnField()
+    )
+    slope = 0.1 * mesh.rest_positions[:, [0]] * [0.0, 0.0, 1.0]
+
+    def moved(magnetization):
+        motion = ms.simulate(
+            scene,
+            start=mesh.rest_positions + slope,
+            remanent_magnetization=magnetization,
+            steps=10,
+            time_step=2e-4,
+            integrator=ms.TRBDF2(implicit_contact=implicit_contact),
+            solver=ms.MixedNewton(tolerance=1e-12),
+            progress=False,
+        )
+        return motion, (1e3 * torch.as_tensor(motion.positions[-1]) ** 2).sum()
+
+    at = torch.tensor([5e4, 3e4, 4e4], dtype=torch.float64, requires_grad=True)
+    motion, loss = moved(at)
+    assert motion.contact_state(plane).normal_forces.sum() > 0
+    loss.backward()
+    for k in range(3):
+        step = torch.zeros(3, dtype=torch.float64)
+        step[k] = 50.0
+        ends = [moved((at.detach() + sign * step).numpy())[1].item() for sign in (1, -1)]
+        assert at.grad[k].item() == pytest.approx((ends[0] - ends[1]) / 100.0, rel=1e-4)
 
 
 def test_without_own_field_nothing_acts_between_shells():

@@ -64,3 +64,30 @@ def test_a_path_lists_contacts_that_are_made_and_lost(straight):
     assert [event.kind for event in lifted.events] == ["contact lost"]
     assert [event.kind for event in straight.events] == ["bifurcation"]
     assert "contact made at" in repr(pressed)
+
+
+def test_a_path_that_a_rotating_clamp_drives_turns_at_limit_points():
+    """Check a buckled strip one end of which is rotated until it snaps: the rotation turns back at limit points."""
+    mesh = ms.meshes.rectangle(LENGTH, 0.02, cells=(20, 2))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0)
+    ends = [ms.Clamp(mesh.edges_at(x=0.0)), ms.Clamp(mesh.edges_at(x=LENGTH), displacement=(-0.01, 0, 0))]
+    push = ms.AreaLoad((0.0, 0.0, 1.0))
+    scene = ms.Scene(sheet, supports=ends, loads=[push])
+    up = ms.equilibrium(scene, start=ms.equilibrium(scene), load_factor=0.0)
+    turned = {ends[1]: {"displacement": (-0.01, 0, 0), "rotation": (0.0, -1.5, 0.0)}}
+    path = ms.follow_path(
+        scene,
+        start=up,
+        values=turned,
+        load_factor=0.0,
+        until=lambda parameter, positions: parameter < 0.0,
+        progress=False,
+    )
+    (limit,) = path.critical
+    assert limit.kind == "limit" and limit.after_point in (
+        np.argmax(path.parameters) - 1,
+        np.argmax(path.parameters),
+    )
+    assert limit.parameter == pytest.approx(path.parameters.max(), rel=0.01)
+    with pytest.raises(ValueError, match="critical must be a bifurcation"):
+        path.switch_branch(limit)

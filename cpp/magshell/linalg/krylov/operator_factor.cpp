@@ -18,7 +18,7 @@ namespace {
 // test_operator_factor_solves_and_counts_as_the_dense_matrix.
 constexpr double tight = 1e-13, acceptable = 1e-9;
 constexpr int most_iterations = 300;  // see test_operator_factor_solves_and_counts_as_the_dense_matrix
-// [-] Residual above which a product with A after a solve with A is taken for the identity; fixed by
+// [-] Tolerance of a solve above which a product with A after a solve with A is taken for the identity; fixed by
 // test_operator_factor_solves_and_counts_as_the_dense_matrix.
 constexpr double rounding_matters = 1e-10;
 
@@ -125,7 +125,8 @@ FactorReport OperatorFactor::factorize() {
                 *positive, [&](const VectorXd& x) { return VectorXd(operator_(x) - shift.cwiseProduct(x)); },
                 -1.0);
     }
-    report_.negative_pivots = count.below;
+    // Without a settled count K may be indefinite, so it is not called stable.
+    report_.negative_pivots = count.settled ? count.below : std::max<Index>(count.below, 1);
     report_.perturbed_pivots = count.settled ? 0 : 1;
     return report_;
 }

@@ -1,7 +1,8 @@
 // OperatorFactor: a factorization of a sparse matrix A plus a symmetric operator H that is known by its products only, K = A + H.
 //
 // Solves use GMRES, preconditioned with A. The inertia is that of K. If A is positive definite, the negative eigenvalues of K are those of
-// A^-1 H below -1, which Lanczos' method finds in the inner product of A (Parlett, The Symmetric Eigenvalue Problem, 15.11). Otherwise A is
+// A^-1 H below -1, which Lanczos' method finds in the inner product of A (Parlett, The Symmetric Eigenvalue Problem, 15.11). A multiple
+// eigenvalue is counted once, so the number of negative pivots is a lower bound, and zero only if there are none. Otherwise A is
 // replaced by A plus a multiple of its diagonal that makes it positive definite.
 #pragma once
 

@@ -129,9 +129,9 @@ class ProximalContinuation {
                         factor_.reason + ")");
         }
         const bool stable =
-            factor_.succeeded && (factor_.negative_pivots == 0 ||
-                                  (at_rest && !has_potential() &&
-                                   count_unstable_directions(newton_, q_, load_parameters_, factor_) == 0));
+            factor_.succeeded &&
+            (factor_.negative_pivots == 0 ||
+             (at_rest && !has_potential() && count_unstable_directions(newton_, factor_) == 0));
         if (stable) {
             shift_ = 0.0;
             report_.descent_direction.resize(0);

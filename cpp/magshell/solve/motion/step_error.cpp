@@ -5,6 +5,7 @@
 namespace magshell {
 
 ErrorWeights error_weights(const Tableau& tableau) {
+    // Rows at most, for memory on the stack; see test_estimate_agrees_with_the_error_of_one_step.
     constexpr int most = Tableau::max_stages + 1;
     using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most, most>;
     const int n = tableau.stages + 1, shift = tableau.begins_explicitly ? 0 : 1;

@@ -213,14 +213,19 @@ def _result(task: _Task, coordinates: Sequence[torch.Tensor], minimum, level: fl
     ]
     at_bounds = (flat <= bounds[0]) | (flat >= bounds[1])
     residuals, jacobian = _with_jacobian(task.residuals, coordinates)
-    freedom = len(residuals) - int((~at_bounds).sum())
+    # Directions that the data leave open use up no degree of freedom.
+    rank = int(np.linalg.matrix_rank(jacobian[:, ~at_bounds])) if (~at_bounds).any() else 0
+    freedom = len(residuals) - rank
     spread = float(np.sqrt(residuals @ residuals / freedom)) if task.estimated else 1.0
-    residuals, jacobian = (each / (spread or 1.0) for each in (residuals, jacobian))
+    if task.estimated:  # a perfect fit leaves no noise: round-off of the data stands for it
+        largest = max(np.abs(each).max(initial=0.0) for each in task.data.values())
+        spread = max(spread, float(np.finfo(float).eps * (largest or 1.0)))
+    residuals, jacobian = (each / spread for each in (residuals, jacobian))
     uncertainty = Uncertainty(jacobian, sizes, at_bounds)
     deviations = uncertainty.deviations_of(np.eye(flat.size))
     wide = quantile(level, freedom if task.estimated else None) * deviations
     of_data = residuals[: task.n_data]
-    noise = (spread or 1.0) * np.concatenate([each.ravel() for each in task.noise.values()])
+    noise = spread * np.concatenate([each.ravel() for each in task.noise.values()])
     data = np.concatenate([each.ravel() for each in task.data.values()])
     return FitResult(
         values=_by_name(task, flat),
@@ -234,7 +239,7 @@ def _result(task: _Task, coordinates: Sequence[torch.Tensor], minimum, level: fl
         predictions=data + noise * of_data,
         noise=noise,
         residuals=of_data,
-        tests=tested(of_data, int((~at_bounds).sum()), task.estimated),
+        tests=tested(residuals, task.n_data, rank, task.estimated),
         minimum=minimum,
         uncertainty=uncertainty,
         parameters=task.parameters,

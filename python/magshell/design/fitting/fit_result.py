@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import scipy.stats
+import scipy
 
 from ..._runtime.frozen import immutable
 from ..._runtime.mixins import call_registered

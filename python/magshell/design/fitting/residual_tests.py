@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.stats
+import scipy
 
 from ..._runtime.frozen import immutable
 
@@ -19,7 +19,7 @@ _LEAST = 8  # residuals from which the tests of signs and shape say anything
 class ResidualTests:
     """Probabilities of residuals like these, or worse ones, if the model and the noise are right.
 
-    chi_square: sum of squares over the variance, and its number of degrees of freedom.
+    chi_square: sum of squares over the variance, those of priors included, and its number of degrees of freedom.
     size: probability of a sum of squares as far from its expectation; None if the noise was estimated from the residuals.
     signs: probability of as unusual a number of runs of one sign in the order of the data (A. Wald, J. Wolfowitz, Ann.
         Math. Statist. 11 (1940)).
@@ -62,10 +62,10 @@ class ResidualTests:
         return "; ".join(self.doubts) or "the residuals look like the noise"
 
 
-def tested(residuals: np.ndarray, count: int, estimated: bool) -> ResidualTests:
-    """Test residuals over their standard deviations, (m,), of a fit of so many parameters."""
-    m = residuals.size
-    free, chi_square = m - count, float(residuals @ residuals)
+def tested(every: np.ndarray, m: int, count: int, estimated: bool) -> ResidualTests:
+    """Test residuals over their standard deviations, m of data and then those of priors, of a fit of so many parameters."""
+    residuals = every[:m]
+    free, chi_square = every.size - count, float(every @ every)
     size = None
     if free > 0 and not estimated:
         below = scipy.stats.chi2.cdf(chi_square, free)

@@ -13,7 +13,7 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-import scipy.optimize
+import scipy
 
 # Largest difference between the length of a step and the radius, relative to the radius [More 1978, section 5].
 _CLOSE = 0.1
