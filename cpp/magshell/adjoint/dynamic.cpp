@@ -146,7 +146,7 @@ class Backward {
         const VectorXd by_earlier = std::move(by_v_before_);
         by_v_before_ = VectorXd();
         BeforeStage by_end{VectorXd::Zero(model_.size()), VectorXd::Zero(model_.size())};
-        // By w of the last stage and by c of it, beside those through the rates; by c of the present stage.
+        // Gradients by w and c of the last stage that come from the motor forces; by_c: by c of the present stage.
         VectorXd by_w_last = VectorXd::Zero(model_.size()), by_c_last = by_w_last, by_c;
         if (by_motor_forces.size() > 0)
             back_through_motors(algebra, at, record, step, substep, by_motor_forces, viscous, by_v.back(),
@@ -244,8 +244,8 @@ class Backward {
     }
 
     // Goes back through the acceleration by contact, c = J (J^T M J)^-1 J^T f, at the evaluated stage. by_c: gradient by it. Adds the
-    // gradients by the masses, and by the state: by_x, and as forces on free dofs alone by_free. Returns the gradient by - f over the
-    // factor of contact forces.
+    // gradients by the masses, and by the state: by_x, and as forces on free dofs alone by_free. Returns the gradient by minus the
+    // scaled contact forces.
     VectorXd back_through_contact(const VectorXd& q, const VectorXd& c, double factor, const VectorXd& by_c,
                                   const LoadParameters& load_parameters, VectorXd& by_x, VectorXd& by_free) {
         const VectorXd& mass = input_.inertia.mass;

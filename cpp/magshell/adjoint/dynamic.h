@@ -1,7 +1,8 @@
 // The adjoint of a motion, backwards through its stages. In the notation of solve/motion/stepper.h, with primes for gradients of the loss:
 //
 //   v_i = (x_i - x^_i)/(a dt),  w_i = (v_i - v^_i)/(a dt):
-//       v'_i += w'_i/(a dt),  v^'_i -= w'_i/(a dt),  x'_i += v'_i/(a dt),  x^'_i -= v'_i/(a dt)
+//       v'_i += w'_i/(a dt),  v^'_i -= w'_i/(a dt)   (with implicit contact w_i = e_i + F c_i, so that c'_i -= F e'_i),
+//       x'_i += v'_i/(a dt),  x^'_i -= v'_i/(a dt)
 //   (W + H) lambda_i = - x'_i:
 //       x^'_i -= W lambda_i,  v^'_i -= M/(a dt) lambda_i,  k' += lambda_i . dg/dk
 //   (with viscosity, the strains d and e are treated likewise, see solve/motion/viscosity.h)

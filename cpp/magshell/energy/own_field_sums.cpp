@@ -47,7 +47,7 @@ BlendWeight blend(const Blend& range, double t) {
             60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / (width * width)};
 }
 
-// Lifts the weight and its slope to the kind of number of t.
+// Converts the weight and its slope to the type of t: a double, or a dual number.
 void lift(const BlendWeight& weight, double, double& value, double& slope) {
     value = weight.value;
     slope = weight.slope;
@@ -57,7 +57,7 @@ void lift(const BlendWeight& weight, const Dual& t, Dual& value, Dual& slope) {
     slope = {weight.slope, weight.curvature * t.rate};
 }
 
-// The solid angle of the triangle with corners r - p, positive on the side of its normal [Van Oosterom, Strackee 1983], and its
+// The solid angle of the triangle with corners r, seen from the origin, positive on the side of its normal [Van Oosterom, Strackee 1983], and its
 // derivatives by the corners.
 template <class T>
 T solid_angle(const Triple<T> r[3], Triple<T> by_corner[3]) {

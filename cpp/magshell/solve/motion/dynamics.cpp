@@ -100,6 +100,7 @@ class Run {
     // Takes steps on a ladder; only those that are accepted remain in the input and in the result.
     bool choose_steps() {
         const AdaptiveSteps& adaptive = input_.adaptive;
+        // The order of every method here is its number of stages.
         StepLadder ladder(adaptive.tolerance, input_.tableau.stages, adaptive.deepest);
         const std::size_t rows = input_.tableau.stages + 1;
         int before = newton_.factorizations();

@@ -5,7 +5,7 @@
 //
 //   b^ . A^k c = 1 / (k + 2)!,  k = -1 ... stages - 1  (A^-1 c = 1),     e = dt sum_j (b_j - b^_j) v_j  [m]
 //
-// Positions take only such conditions of order up to the third, because their rate, the velocity, is linear in the state: implicit Euler
+// Up to the third order these are all conditions on positions, because dx/dt = v is linear in the state. Implicit Euler
 // has e = dt/2 (v_1 - v_0), and TR-BDF2 the estimate of Hosea and Shampine, Appl. Numer. Math. 20 (1996). Across a jump of
 // velocity e is of the size dt |dv|.
 #pragma once
@@ -22,9 +22,8 @@ using ErrorWeights = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, Tableau::max_st
 /// Returns b - b^, stages + 1 numbers.
 ErrorWeights error_weights(const Tableau& tableau);
 
-/// Returns the estimate of a step, root mean square over all vertices and points of rigid bodies [m]. Prescribed positions have no error.
-/// begin: the velocity at its
-/// beginning. rates: as the step left them, with those at its beginning if the method begins explicitly.
+/// Returns the estimate of a step, root mean square over all vertices and points of rigid bodies [m], each counted alike whatever area it
+/// stands for. Prescribed positions have no error. begin: the velocity at the beginning of the step. rates: as the step left them, with those at its beginning if the method begins explicitly.
 double step_error(const Model& model, const StepAlgebra& step, const VectorXd& begin,
                   std::span<const StageRates> rates);
 

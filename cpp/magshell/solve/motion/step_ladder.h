@@ -2,7 +2,7 @@
 //
 // Steps are interval / 2^level long and begin at multiples of their length. A controller with continuous lengths changes all later steps
 // with every change of an input, so that the result of a motion jumps by many tolerances; the steps of a ladder stay the same unless an
-// estimate crosses one of its three bounds.
+// estimate crosses a bound: the tolerance, or those for a step of a quarter or of twice the length.
 #pragma once
 
 #include <cstdint>

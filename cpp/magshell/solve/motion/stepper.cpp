@@ -184,7 +184,7 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative,
             return false;
         }
         StageRates& now = rates.emplace_back();
-        VectorXd reactions;  // to contact forces beyond the real ones, where contact is implicit
+        VectorXd reactions;  // of supports, only because implicit contact is scaled by the factor
         if (tableau.implicit_contact) {
             const VectorXd force = model.contact_forces(q, load_parameters[i + 1]) / contact_factor;
             now.c = model.dof_map().acceleration(inertia_.mass, force);

@@ -44,7 +44,8 @@ class FitResult:
     FitParameter has log=True. lower, upper: the intervals at `level`; infinite where the data do not determine a value.
     labels: names of all n entries, (n,). correlation: of all entries, (n, n).
     undetermined: combinations of parameters that the data do not determine, in words; empty if there is none.
-    at_bounds: labels of the entries that a bound holds; their intervals leave the bound out, and are zero wide.
+    at_bounds: labels of the entries that a bound holds; their intervals are zero wide, as if the bound were known. The
+        intervals of the others take no notice of bounds.
     data, predictions: (m,). noise: standard deviations of the data, as given or estimated, (m,).
     residuals: (model - data) / noise, (m,). tests: of the residuals. minimum: the MinimizeResult of the search.
     """
@@ -125,7 +126,7 @@ class FitResult:
         left = int((np.abs(direction) > _SMALL).sum()) - len(chosen)
         parts = [self._change_in_words(k, direction[k]) for k in chosen]
         others = f", and {left} others change" if left else ""
-        return f"The data change by {change:.2g} of their noise only if {' and '.join(parts)}{others}."
+        return f"The data change by only {change:.2g} of their noise if {' and '.join(parts)}{others}."
 
     def _change_in_words(self, entry: int, size: float) -> str:
         name = self.labels[entry]

@@ -22,7 +22,7 @@ from .stagnation import STAGNATION
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
 
-# [Nocedal and Wright 2006, algorithm 4.1]: a step is taken if the decrease is at least the first fraction (1) of the one
+# [Nocedal and Wright 2006, algorithm 4.1]: a step is taken if the decrease is at least the first fraction [-] of the one
 # expected; the radius shrinks to a quarter below the second, and doubles above the third.
 _ACCEPTED, _POOR, _GOOD = 1e-4, 0.25, 0.75
 _SHORTER, _LONGER = 0.25, 2.0
@@ -36,7 +36,8 @@ class GaussNewton(BoxOptimizer):
 
     The closure returns residuals r, a tensor (m,), and the objective is |r|^2 / 2. Each step minimizes the linear model
     |r + J s|^2 within the bounds and within a trust region, whose radius follows how well the model predicts the decrease.
-    Near a minimum with small residuals it converges quadratically; a fit takes ten evaluations where L-BFGS takes a hundred.
+    Near a minimum with zero residuals it converges quadratically, with small ones fast; a fit takes ten evaluations where
+    L-BFGS takes a hundred.
 
     lower, upper: bounds of a group: a number, a tensor that fits each parameter, or a list with one of these each.
     scale: the typical size of a variable, in the same forms; by default upper - lower where both are finite, else 1.
@@ -147,6 +148,7 @@ class GaussNewton(BoxOptimizer):
         self._leave_gradients(sample.gradient)
 
     def _full_step(self, sample: Sample, box: Box, x: np.ndarray) -> None:
+        """Take the step of the model at the present radius, even if the objective grows."""
         size, lower, upper = _in_sizes(box, x)
         radius = self._run.get("radius", self.first_step * math.sqrt(size.size))
         step = _model(sample, box, size).step(lower, upper, radius)

@@ -20,8 +20,8 @@ _CLOSE = 0.1
 # Smallest damping that is tried, relative to an upper bound of it, while no lower bound is known [More 1978, (5.5)].
 _SMALLEST = 1e-3
 _DAMPINGS = 60  # dampings that are tried; their interval is halved (its logarithm) at each
-# Singular values below this fraction (1) of the largest are round-off of a Jacobian, whose products are exact to 1e-10; a
-# step has no part along them. Tested by test_sheet_without_weight_tells_the_ratio_only.
+# Singular values below this fraction [-] of the largest are round-off, since the entries of a Jacobian are exact to 1e-10; a
+# step has no part along their vectors. Tested by test_sheet_without_weight_tells_the_ratio_only.
 _SINGULAR = 1e-9
 # Changes of the set of entries at a bound, after which scipy's slower method takes over. Tested by
 # test_bounded_step_agrees_with_scipy.
