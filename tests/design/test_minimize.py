@@ -122,6 +122,8 @@ def test_an_error_at_the_start_comes_through_as_it_is():
         (lambda x: (x.sum(), 3), {}, TypeError, "one of each at most"),
         (None, {}, ValueError, "function of the parameters"),
         (rosenbrock, {"max_iterations": -1}, ValueError, "max_iterations"),
+        (rosenbrock, {"max_iterations": float("nan")}, ValueError, "max_iterations must be an integer"),
+        (rosenbrock, {"patience": float("nan")}, ValueError, "patience must be an integer"),
         (rosenbrock, {"tolerance": -1.0}, ValueError, "tolerance"),
         (lambda x: (x.sum(), x - 1, x - 2), {}, TypeError, "one of each at most"),
         (lambda x: {"a": x.sum(), "b": x}, {}, ValueError, "term 'b' must be a number or a scalar"),

@@ -10,6 +10,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .._input.arrays import count
 from .._input.tensors import require_torch
 from .._runtime.log import log
 from .._runtime.progress import progress_bar
@@ -140,12 +141,10 @@ class _Ends:
     callback: Callable[[Record], bool | None] | None
 
     def __post_init__(self) -> None:
-        if self.max_iterations < 0:
-            raise ValueError(f"max_iterations must not be negative, got {self.max_iterations}")
+        count("max_iterations", self.max_iterations, least=0)
+        count("patience", self.patience)
         if not self.tolerance >= 0:
             raise ValueError(f"tolerance must not be negative, got {self.tolerance}")
-        if self.patience < 1:
-            raise ValueError(f"patience must be positive, got {self.patience}")
 
     def reason(self, history: list[Record], stagnation: str | None = None) -> str | None:
         """Return why to end after the last iteration, None to continue. stagnation: why its step changed nothing, if
