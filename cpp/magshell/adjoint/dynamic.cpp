@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "magshell/adjoint/checkpointed_reverse.h"
+#include "magshell/adjoint/free_flight_adjoint.h"
 #include "magshell/adjoint/viscous.h"
 #include "magshell/core/errors.h"
 #include "magshell/solve/motion/edge_rotations.h"
@@ -122,12 +123,15 @@ class Backward {
         const int n = tableau.stages, first = tableau.begins_explicitly ? 1 : 0;
         const double dt = algebra.dt(), adt = algebra.stage_time();
         const Index coordinates = model_.n_coordinates();
-        const StepRates at(model_, algebra, record);
+        const StepRates at(model_, algebra, stepper_.free_bodies(), record);
+        FreeFlightAdjoint flight(at.flight);
 
         std::vector<VectorXd> by_v(first + n, VectorXd::Zero(model_.size())), by_w = by_v;
         VectorXd by_x = std::move(g_.positions);
         by_v.back() = std::move(g_.velocities);
         if (by_w_.size() > 0) by_w.back() = std::move(by_w_);
+        flight.through_finish(record.stages.back().q, at.all.back().v, by_w.back(), by_v.back(), by_x,
+                              g_.mass);
         g_.positions = g_.velocities = VectorXd::Zero(model_.size());
         const std::vector<LoadParameters> load_parameters =
             stage_load_parameters(input_, tableau, step, substep);
@@ -176,6 +180,7 @@ class Backward {
             by_dt += by.dt;
             g_.positions += by.x_hat;
             g_.velocities += by.v_hat;
+            flight.add_stage(i, by.x_hat, by.v_hat);
             for (int j = 0; j < first + i; ++j) {
                 const double a = tableau.a[i][j];
                 by_v[j] += (dt * a) * by.x_hat;
@@ -189,6 +194,7 @@ class Backward {
             g_.velocities += by_v.front();
             by_w_ = std::move(by_w.front());
         }
+        flight.add_by_begin(record.begin.q, record.begin.v, g_.positions, g_.velocities, g_.mass, by_dt);
         if (input_.viscosity.any()) {
             model_.parameters().set_time_varying(load_parameters.front());
             model_.evaluate(record.begin.q, model_.parameters().zero_load_parameters());

@@ -100,6 +100,10 @@ class DofMap {
 
     /// Returns true if there are rigid bodies or skeletons. All of the following is linear at the state linearized last.
     bool has_reduced_coordinates() const { return reduced_ != nullptr; }
+    /// Returns the rigid bodies that no joint holds.
+    std::vector<const RigidNodes*> free_bodies() const {
+        return reduced_ ? reduced_->free_bodies() : std::vector<const RigidNodes*>();
+    }
     void linearize(const VectorXd& q) {
         if (reduced_) reduced_->linearize(q);
     }

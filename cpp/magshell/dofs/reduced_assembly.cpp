@@ -199,6 +199,15 @@ void ReducedAssembly::add_curvature_product(const VectorXd& gradient, const Vect
     }
 }
 
+std::vector<const RigidNodes*> ReducedAssembly::free_bodies() const {
+    std::vector<const RigidNodes*> found;
+    for (const System& system : systems_) {
+        const std::vector<const RigidNodes*> own = system.map->free_bodies();
+        found.insert(found.end(), own.begin(), own.end());
+    }
+    return found;
+}
+
 void ReducedAssembly::set_values(const Values& values) {
     for (System& system : systems_) system.map->set_values(values);
 }

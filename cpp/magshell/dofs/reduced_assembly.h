@@ -48,6 +48,8 @@ class ReducedAssembly {
 
     /// Motors prescribe some of the coordinates, which are not among the free dofs then. Returns true if there are motors.
     bool has_motors() const { return has_motors_; }
+    /// Returns the rigid bodies that no joint holds.
+    std::vector<const RigidNodes*> free_bodies() const;
     /// Returns true if the origins and axes of joints are parameters.
     bool has_joint_parameters() const { return has_joint_parameters_; }
     void set_values(const Values& values);

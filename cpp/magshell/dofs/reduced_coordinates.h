@@ -15,6 +15,8 @@
 
 namespace magshell {
 
+class RigidNodes;
+
 class ReducedCoordinates {
   public:
     explicit ReducedCoordinates(std::vector<Index> nodes) : nodes_(std::move(nodes)) {}
@@ -54,6 +56,9 @@ class ReducedCoordinates {
     virtual void joint_parameters_vjp(const VectorXd& /*q*/, const VectorXd& /*by_state*/,
                                       const VectorXd& /*z*/, const VectorXd& /*gradient*/,
                                       Gradient& /*out*/) const {}
+
+    /// Returns the rigid bodies that no joint holds.
+    virtual std::vector<const RigidNodes*> free_bodies() const { return {}; }
 
     /// Moves its nodes in q along z, which has all coordinates.
     virtual void retract(VectorXd& q, const VectorXd& z) const = 0;

@@ -32,6 +32,10 @@ class RigidNodes {
     double length() const { return length_; }
     /// Returns c in the reference configuration [m].
     const Vec3& middle() const { return middle_; }
+    /// Returns rho of each node [m].
+    const std::vector<Vec3>& offsets() const { return offsets_; }
+    /// Returns rho_k / (4 l^2) of a corner [1/m]: R is nearest to the sum of x_k times this.
+    Vec3 corner_weight(Index k) const { return offsets_[k] / (corners * length_ * length_); }
 
     /// Returns c at q [m], the mean of the four corners.
     Vec3 center(const VectorXd& q) const;

@@ -25,6 +25,8 @@ constexpr double motor_round_off = 1e-14;
 // test_long_chains_of_links_move_at_the_usual_tolerance.
 constexpr double rotation_round_off = 0.125;
 
+constexpr Index free_coordinates = 6;  // of a link that no joint holds
+
 // Returns the nodes of all links, link by link.
 std::vector<Index> nodes_of(const std::vector<RigidNodes>& links) {
     std::vector<Index> all;
@@ -70,6 +72,16 @@ SkeletonCoordinates::SkeletonCoordinates(std::vector<RigidNodes> links, std::vec
         for (Index n = vertices ? links_[k].own() : 0; n < (vertices ? links_[k].size() : RigidNodes::points);
              ++n)
             leading_.push_back(row_[k] + n);
+}
+
+std::vector<const RigidNodes*> SkeletonCoordinates::free_bodies() const {
+    std::vector<const RigidNodes*> found;
+    for (Index k = 0; k < n_links(); ++k) {
+        const auto is_child = [&](const Joint& joint) { return joint.parent == k; };
+        const bool is_root = joints_[k].parent < 0 && joints_[k].freedom() == free_coordinates;
+        if (is_root && std::ranges::none_of(joints_, is_child)) found.push_back(&links_[k]);
+    }
+    return found;
 }
 
 std::vector<SkeletonCoordinates::Pose> SkeletonCoordinates::poses(const VectorXd& q) const {

@@ -46,6 +46,7 @@ class SkeletonCoordinates final : public ReducedCoordinates {
     bool has_joint_parameters() const override;
     void joint_parameters_vjp(const VectorXd& q, const VectorXd& by_state, const VectorXd& z,
                               const VectorXd& gradient, Gradient& out) const override;
+    std::vector<const RigidNodes*> free_bodies() const override;
     LinkTwists twists(const VectorXd& q) const override;
     Eigen::MatrixXd curvature(const VectorXd& q, const VectorXd& gradient) const override;
     void retract(VectorXd& q, const VectorXd& z) const override;

@@ -67,33 +67,20 @@ def test_table_of_rates_is_that_of_jacobi():
     assert jacobi(list(RATES)) == pytest.approx(np.array(list(RATES.values())), abs=1e-8)
 
 
-def test_a_flipping_top_is_of_second_order():
-    found = []
-    for a_second in (40, 80, 160):
-        motion, part = spinning(a_second)
-        found.append(errors(part.rotation, a_second))
-        rates = np.einsum("nij,ni->nj", part.rotation, part.angular_velocity)
-        once = slice(0, 5 * a_second)  # it flips at 3 s, and again at 8.5 s
-        assert np.abs(rates - jacobi(motion.times))[once].max() < 10.0 / a_second**2
-        momenta = np.einsum("nij,nj->ni", part.rotation, INERTIA * rates)
-        assert np.linalg.norm(momenta - momenta[0], axis=1).max() < 1.0 / a_second**2 * np.linalg.norm(
-            momenta[0]
-        )
-        assert np.abs(motion.kinetic_energy / motion.kinetic_energy[0] - 1.0).max() < 2.0 / a_second**2
-    orders = np.log2(found[1] / found[2])
-    assert (orders > 1.9).all() and (orders < 2.3).all()
-    assert found[2].max() < 2e-4
-
-
-def test_implicit_euler_is_of_first_order():
-    coarse, fine = (errors(spinning(n, 1, ms.ImplicitEuler())[1].rotation, n, (1,)) for n in (80, 160))
-    assert np.log2(coarse / fine) == pytest.approx(1.0, abs=0.1)
+@pytest.mark.parametrize("method", [ms.TRBDF2(), ms.ImplicitEuler(), ms.SDIRK2(), ms.SDIRK3()])
+def test_free_top_follows_jacobi_by_every_method(method):
+    motion, part = spinning(40, integrator=method)
+    assert errors(part.rotation, 40).max() < 1e-6
+    rates = np.einsum("nij,ni->nj", part.rotation, part.angular_velocity)
+    assert np.abs(rates - jacobi(motion.times)).max() < 1e-6
 
 
 @pytest.mark.parametrize("method", [ms.SDIRK2(), ms.SDIRK3()])
-def test_methods_that_fall_to_first_order_are_refused(method):
-    with pytest.raises(ValueError, match=r"first order where rigid parts turn.*TRBDF2"):
-        spinning(10, 1, method)
+def test_methods_that_fall_to_first_order_in_joints_are_refused(method):
+    arm = ms.Link(mass=0.1, inertia=1e-4, center=(0.1, 0, 0))
+    scene = ms.Scene(ms.Skeleton([arm], [ms.Revolute(arm, origin=(0, 0, 0), axis=(0, 1, 0))]))
+    with pytest.raises(ValueError, match=r"first order where rigid parts with joints .*TRBDF2"):
+        ms.simulate(scene, steps=1, time_step=0.1, integrator=method)
 
 
 def test_rotation_stays_orthogonal_in_a_long_run():

@@ -61,7 +61,7 @@ class Run {
           grown_(grown),
           result_(result),
           stepper_(newton, input.tableau, input.inertia, input.viscosity, input.projective),
-          balance_(model_, input.inertia, input.tableau) {
+          balance_(model_, input.inertia, stepper_.free_bodies(), input.tableau) {
         if (grown_) grown_->load_parameters = input_.adaptive.load_parameters(0, 0.0, 1.0);
         result_.start = result_.last = beginning(newton.model(), input);
         result_.begun = true;

@@ -65,7 +65,7 @@ double EnergyBalance::work(const StepAlgebra& step, const SubstepRecord& record,
                            std::span<const LoadParameters> load_parameters) {
     const Tableau& tableau = step.tableau();
     const int first = tableau.begins_explicitly ? 1 : 0;
-    const StepRates at(model_, step, record);
+    const StepRates at(model_, step, free_bodies_, record);
     const ScopedContactFactor usual_contact_afterwards(model_);
     if (tableau.implicit_contact) model_.contacts().set_factor(0.0);
     double sum = 0.0;

@@ -19,8 +19,10 @@ namespace magshell {
 
 class EnergyBalance {
   public:
-    EnergyBalance(Model& model, const Inertia& inertia, const Tableau& tableau)
-        : model_(model), mass_(inertia.mass), euler_(tableau.stages == 1) {}
+    /// All arguments but the tableau must outlive it.
+    EnergyBalance(Model& model, const Inertia& inertia, const std::vector<FreeBody>& free_bodies,
+                  const Tableau& tableau)
+        : model_(model), mass_(inertia.mass), free_bodies_(free_bodies), euler_(tableau.stages == 1) {}
 
     /// Returns true if the test applies: there is contact, and no load without potential. Implicit Euler gains no energy from obstacles.
     bool applies() const {
@@ -52,6 +54,7 @@ class EnergyBalance {
 
     Model& model_;
     const VectorXd& mass_;
+    const std::vector<FreeBody>& free_bodies_;
     const bool euler_;
     StateEnergy end_;  // of the last step
 };

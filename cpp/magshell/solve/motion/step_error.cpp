@@ -23,12 +23,13 @@ ErrorWeights error_weights(const Tableau& tableau) {
     return a.row(n - 1).transpose() - moments.partialPivLu().solve(wanted);
 }
 
-double step_error(const Model& model, const StepAlgebra& step, const VectorXd& begin,
-                  std::span<const StageRates> rates) {
+double step_error(const Model& model, const StepAlgebra& step, const FreeFlight& flight,
+                  const VectorXd& begin, std::span<const StageRates> rates) {
     const ErrorWeights weights = error_weights(step.tableau());
     const std::size_t stages = step.tableau().stages, first = rates.size() - stages;
     VectorXd error = weights(0) * begin;
     for (std::size_t i = 0; i < stages; ++i) error += weights(i + 1) * rates[first + i].v;
+    flight.subtract_velocities({weights.data(), stages + 1}, error);
     const DofMap& dof_map = model.dof_map();
     if (dof_map.has_supports() || dof_map.has_motors()) error = dof_map.project(error);
     const Rows3 of_points = model.bodies().points(error);

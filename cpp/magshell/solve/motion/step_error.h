@@ -23,8 +23,9 @@ using ErrorWeights = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, Tableau::max_st
 ErrorWeights error_weights(const Tableau& tableau);
 
 /// Returns the estimate of a step, root mean square over all vertices and points of rigid bodies [m], each counted alike whatever area it
-/// stands for. Prescribed positions have no error. begin: the velocity at the beginning of the step. rates: as the step left them, with those at its beginning if the method begins explicitly.
-double step_error(const Model& model, const StepAlgebra& step, const VectorXd& begin,
-                  std::span<const StageRates> rates);
+/// stands for. Prescribed positions have no error, and torque-free rotations none to be seen (free_flight.h). begin: the velocity at the
+/// beginning of the step. rates: as the step left them, with those at its beginning if the method begins explicitly.
+double step_error(const Model& model, const StepAlgebra& step, const FreeFlight& flight,
+                  const VectorXd& begin, std::span<const StageRates> rates);
 
 }  // namespace magshell

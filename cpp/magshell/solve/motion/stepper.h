@@ -8,6 +8,7 @@
 
 #include <span>
 
+#include "magshell/solve/motion/free_flight.h"
 #include "magshell/solve/motion/tableau.h"
 #include "magshell/solve/motion/viscosity.h"
 #include "magshell/solve/newton/newton.h"
@@ -103,6 +104,8 @@ class Stepper {
     /// is implicit in all three or in none.
     const Tableau& tableau_from(const MotionState& state, bool dissipative) const;
     const StepAlgebra& algebra(double dt, const Tableau& tableau);
+    /// Returns the rigid bodies whose free flight is known (free_flight.h).
+    const std::vector<FreeBody>& free_bodies() const { return free_bodies_; }
     /// Returns the estimated error of the step taken last [m] (step_error.h).
     double error() const { return error_; }
 
@@ -116,6 +119,7 @@ class Stepper {
     std::unique_ptr<ProjectiveSolver> projective_;  // nullptr: stages are solved by Newton
     Tableau tableau_, starter_ = sdirk2(), dissipative_ = implicit_euler();
     Inertia inertia_;
+    std::vector<FreeBody> free_bodies_;
     Viscosity viscosity_;
     std::unique_ptr<StepAlgebra> algebra_;  // of the last step
     double error_ = 0.0;                    // [m]
@@ -126,10 +130,12 @@ std::vector<StageRates> first_rates(const Model& model, const Tableau& tableau, 
 
 /// The rates of a step, recomputed from its stored states: those it began with, and those of its stages.
 struct StepRates {
+    FreeFlight flight;
     std::vector<VectorXd> x_hat, v_hat;
     std::vector<StageRates> all;
 
-    StepRates(const Model& model, const StepAlgebra& step, const SubstepRecord& substep);
+    StepRates(const Model& model, const StepAlgebra& step, const std::vector<FreeBody>& free_bodies,
+              const SubstepRecord& substep);
 };
 
 }  // namespace magshell

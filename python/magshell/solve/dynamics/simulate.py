@@ -153,10 +153,13 @@ def simulate(
     uniform = np.zeros(3) if scene.has_uniform_field else None
     if integrator is None:
         integrator = ImplicitEuler() if scene.contacts else TRBDF2()
-    if scene.rigid_parts and isinstance(integrator, SDIRK2 | SDIRK3):
+    held = [
+        part for part in scene.rigid_parts if part.vertices is not None or scene._bodies.skeleton_of(part)
+    ]
+    if held and isinstance(integrator, SDIRK2 | SDIRK3):
         raise ValueError(
-            f"{type(integrator).__name__} falls to first order where rigid parts turn, as its first stage is of first order "
-            "only: take TRBDF2(), which keeps the second, or ImplicitEuler()"
+            f"{type(integrator).__name__} falls to first order where rigid parts with joints or vertices turn, as its first "
+            "stage is of first order only: take TRBDF2(), which keeps the second, or ImplicitEuler()"
         )
     magnetization = arguments.pop("remanent_magnetization")
 
