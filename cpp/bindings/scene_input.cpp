@@ -123,7 +123,8 @@ std::vector<RigidInput> rigid_of(const py::list& given) {
     std::vector<RigidInput> rigid;
     for (const py::handle each : given)
         rigid.push_back({each["owner"].cast<std::string>(), to_rows3(each["points"].cast<Array>()),
-                         each["vertices"].cast<std::vector<Index>>(), each["magnetic"].cast<bool>()});
+                         each["vertices"].cast<std::vector<Index>>(), each["magnetic"].cast<bool>(),
+                         each["has_force"].cast<bool>(), each["has_torque"].cast<bool>()});
     return rigid;
 }
 

@@ -16,6 +16,8 @@ def rigid_calls(s: Sample) -> Iterator[Call]:
         "inertia": (1e-8, 1e-8, 2e-8),
         "center": (0.09, 0, 0),
         "magnetic_moment": (1e-3, 0, 0),
+        "force": (0, 0, 1e-3),
+        "torque": (0, 1e-5, 0),
     }
     yield Call(
         "RigidBody",

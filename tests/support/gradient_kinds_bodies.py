@@ -21,12 +21,15 @@ def with_rigid_parts(free: bool, **own):
         "inertia": np.array([1.2e-6, 0.9e-6, 1.5e-6]),
         "center": MESH.rest_positions[CORNER].mean(axis=0) + np.array([1e-3, 2e-3, 4e-3]),
         "magnetic_moment": (4e-3, 2e-3, 1e-2),
+        "force": (1e-3, -5e-4, 5e-4),
+        "torque": (2e-5, -1e-5, 3e-5),
     }
     parts = [ms.RigidBody(CORNER, **{**carried, **own})]
     if free:
         spin = {"velocity": (0.01, -0.02, 0.1), "angular_velocity": (3.0, 40.0, -5.0)}
         place = {"center": (0.05, 0.03, 0.04), "magnetic_moment": (2e-3, 1e-3, -1e-3)}
-        parts.append(ms.RigidBody(mass=2e-3, inertia=(0.7e-6, 1.0e-6, 1.4e-6), **place, **spin))
+        wrench = {"force": (2e-3, 1e-3, -3e-3), "torque": (1e-5, 2e-5, -4e-5)}
+        parts.append(ms.RigidBody(mass=2e-3, inertia=(0.7e-6, 1.0e-6, 1.4e-6), **place, **spin, **wrench))
     return ms.Scene(
         [sheet, *parts],
         supports=[ms.Clamp(MESH.edges_at(x=0.0))],
@@ -52,7 +55,7 @@ def rigid_in_motion(integrator, own=None, **options) -> Kind:
     controls = {**IN_TIME, "start": begin, "velocities": moves, "time_step": 3e-3}
     fixed = {**EXACT, "steps": STEPS, "integrator": integrator, "progress": False, **options}
     reach = {**REACH, "velocity": 0.1, "angular_velocity": 10.0}
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=reach)
+    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=reach, in_time=STEPS)
 
 
 def two_sheets():

@@ -22,7 +22,8 @@ def _skeleton_on_a_sheet(free: bool):
         own = {"mass": 2e-3, "inertia": (4e-7, 5e-7, 6e-7), "magnetic_moment": (1e-3, 2e-3, 5e-3), **own}
         return ms.Link(center=base + np.array(off), **own)
 
-    root = ms.Link(CORNER, mass=1e-3, inertia=1e-7, center=np.add(base, (0.001, 0, 0.002)))
+    wrench = {"force": (1e-3, -5e-4, 5e-4), "torque": (2e-5, -1e-5, 3e-5)}
+    root = ms.Link(CORNER, mass=1e-3, inertia=1e-7, center=np.add(base, (0.001, 0, 0.002)), **wrench)
     arm, slider, bob = link(0.02, 0, 0.01), link(0.0, 0.02, 0.01), link(0.04, 0.0, 0.02)
     stone, sled = link(0.02, 0, 0.03), link(0.01, 0.03, 0.02)
     springs = {"spring_stiffness": 3e-3, "servo_stiffness": 2e-3}
@@ -210,6 +211,8 @@ def thrown_skeleton() -> Kind:
         center=(0.01, 0.02, 0.0),
         velocity=(0.02, 0.01, -0.1),
         angular_velocity=(2.0, 5.0, -1.0),
+        force=(1e-3, -2e-3, 5e-3),
+        torque=(2e-5, 1e-5, -3e-5),
     )
     hand = ms.Link(mass=1e-3, center=(0.03, 0.02, 0.01), magnetic_moment=(1e-3, 2e-3, 5e-3))
     spring = {"spring_stiffness": 1e-4, "torque": 1e-5}

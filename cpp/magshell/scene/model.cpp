@@ -378,7 +378,8 @@ void Model::require_symmetric() const {
     if (std::none_of(terms_.energies.begin(), terms_.energies.end(),
                      [](const auto& term) { return term->name() == "pressure"; }))
         throw InvalidInput(
-            "the torque of a Ball has no potential, so the stiffness is not symmetric. Equilibria, paths, "
+            "the torque of a Ball or of a rigid body has no potential, so the stiffness is not symmetric. "
+            "Equilibria, paths, "
             "motions and their gradients "
             "can be computed; vibrations and buckling loads cannot: use torques of Revolute joints instead");
     throw InvalidInput(

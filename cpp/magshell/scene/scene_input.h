@@ -84,7 +84,7 @@ struct RigidInput {
     Rows3
         points;  // (10, 3) at rest [m], then the points of its surface; in the scene the tens of all rigid bodies come first
     std::vector<Index> vertices;  // of the scene
-    bool magnetic = false;
+    bool magnetic = false, has_force = false, has_torque = false;
 
     static constexpr Index own = 10;
 };

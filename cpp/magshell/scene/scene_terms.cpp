@@ -10,9 +10,10 @@
 #include "magshell/terms/contact/body_contact_term.h"
 #include "magshell/terms/contact/body_friction_term.h"
 #include "magshell/terms/contact/friction_term.h"
-#include "magshell/terms/joint/ball_torque_term.h"
 #include "magshell/terms/joint/damper_term.h"
 #include "magshell/terms/joint/joint_term.h"
+#include "magshell/terms/joint/torque_term.h"
+#include "magshell/terms/load/body_force_term.h"
 #include "magshell/terms/load/edge_moment_term.h"
 #include "magshell/terms/load/load_term.h"
 #include "magshell/terms/load/pressure_term.h"
@@ -102,6 +103,7 @@ class Builder {
     void add_contacts(const SceneInput& input);
     void add_edge_moments(const SceneInput& input);
     void add_joints(const SceneInput& input);
+    void add_wrenches(const SceneInput& input);
     void add_magnetic_terms(const SceneInput& input);
     void add_moments(const SceneInput& input);
     void add_muscles(const SceneInput& input);
@@ -163,6 +165,7 @@ void Builder::add_terms(const SceneInput& input) {
     add_volumes(input);
     add_moments(input);
     add_joints(input);
+    add_wrenches(input);
     if (input.gravity)
         out_.energies.push_back(
             std::make_unique<LoadTerm>("gravity", "gravity_factor", bodies_.nodes(), registry_));
@@ -259,7 +262,7 @@ void Builder::add_joints(const SceneInput& input) {
     const auto corners = [&](Index part) { return part < 0 ? nullptr : bodies_.rigid_nodes()[part].data(); };
     std::vector<JointTerm::Input> joints;
     std::vector<DamperTerm::Input> damped;
-    std::vector<BallTorqueTerm::Input> twisted;
+    std::vector<TorqueTerm::Input> twisted;
     for (const SkeletonInput& skeleton : input.skeletons)
         for (std::size_t k = 0; k < skeleton.links.size(); ++k) {
             if (skeleton.owners[k].empty()) continue;
@@ -288,7 +291,23 @@ void Builder::add_joints(const SceneInput& input) {
         out_.energies.push_back(std::move(term));
     }
     if (twisted.empty()) return;
-    out_.energies.push_back(std::make_unique<BallTorqueTerm>(twisted, bodies_.nodes().rest, registry_));
+    out_.energies.push_back(std::make_unique<TorqueTerm>("joints", twisted, bodies_.nodes().rest, registry_));
+}
+
+void Builder::add_wrenches(const SceneInput& input) {
+    std::vector<BodyForceTerm::Input> forced;
+    std::vector<TorqueTerm::Input> twisted;
+    for (std::size_t k = 0; k < input.rigid.size(); ++k) {
+        const RigidInput& body = input.rigid[k];
+        const Index* corners = bodies_.rigid_nodes()[k].data();
+        if (body.has_force) forced.push_back({body.owner, corners});
+        if (body.has_torque) twisted.push_back({body.owner, nullptr, corners});
+    }
+    if (!forced.empty())
+        out_.energies.push_back(std::make_unique<BodyForceTerm>(forced, bodies_.nodes().rest, registry_));
+    if (!twisted.empty())
+        out_.energies.push_back(
+            std::make_unique<TorqueTerm>("wrenches", twisted, bodies_.nodes().rest, registry_));
 }
 
 void Builder::add_solids(const SceneInput& input) {

@@ -57,7 +57,7 @@ def test_moment_in_a_ball_joint_is_refused_by_linear_theory():
     bob = ms.Link(mass=1.0, inertia=0.1, center=(0, 0, -1.0))
     ball = ms.Ball(bob, origin=(0, 0, 0), spring_stiffness=2.0, torque=(0.6, -0.2, 0.9))
     scene = ms.Scene(ms.Skeleton([bob], [ball]), gravity=(0, 0, -G))
-    with pytest.raises(ValueError, match="torque of a Ball has no potential"):
+    with pytest.raises(ValueError, match="torque of a Ball or of a rigid body has no potential"):
         ms.vibration_modes(scene, ms.equilibrium(scene), count=1)
     path = ms.follow_path(scene, gravity_factor=1.0)
     found = path.equilibrium(-1)

@@ -131,7 +131,11 @@ def test_rigid_bodies_and_skeletons_take_chosen_steps(jointed) -> None:
             ms.Skeleton([arm], [ms.Revolute(arm, origin=(0, 0, 0), axis=(0, 1, 0))]), gravity=(0, 0, -9.81)
         )
     else:
-        top = ms.RigidBody(mass=1.0, inertia=(1.0, 2.0, 3.0), angular_velocity=(0.1, 2.0, 0.0))
+        spin = {
+            "angular_velocity": (0.1, 2.0, 0.0),
+            "torque": (0.5, -0.2, 1.0),
+        }  # without a torque any step would do
+        top = ms.RigidBody(mass=1.0, inertia=(1.0, 2.0, 3.0), **spin)
         scene = ms.Scene(top, allow_rigid_motions=True)
     coarse, fine = (
         ms.simulate(scene, steps=4, time_step=ms.Adaptive(0.25, tolerance), progress=False)

@@ -92,10 +92,16 @@ class RigidBodyPoints(NamedTuple):
         turning = np.cross(or_zero(part.angular_velocity), points - self.center_of(part))
         return or_zero(part.velocity) + turning
 
-    def as_input(self, owner: str, magnetic: bool) -> dict[Any, Any]:
+    def as_input(self, owner: str, part: RigidBody, magnetic: bool) -> dict[Any, Any]:
         """Return the input of the core."""
-        points = np.concatenate([self.rest, self.surface])
-        return {"owner": owner, "points": points, "vertices": self.vertices.tolist(), "magnetic": magnetic}
+        return {
+            "owner": owner,
+            "points": np.concatenate([self.rest, self.surface]),
+            "vertices": self.vertices.tolist(),
+            "magnetic": magnetic,
+            "has_force": part.force is not None,
+            "has_torque": part.torque is not None,
+        }
 
 
 def rigid_body_points(bodies: Bodies) -> list[RigidBodyPoints]:

@@ -19,7 +19,7 @@ class Link(RigidBody):
     The arguments are those of `RigidBody`; without vertices it needs its center. Pictures show a link without a `shape`
     as rods between its joints. Link.of computes mass, inertia and center from a shape.
 
-    magnetic_moment, velocity, angular_velocity, body: as in `RigidBody`.
+    magnetic_moment, force, torque, velocity, angular_velocity, body: as in `RigidBody`.
 
     >>> import magshell as ms
     >>> bob = ms.Link(mass=1.0, center=(0, 0, -1.0))
@@ -36,6 +36,8 @@ class Link(RigidBody):
         inertia: Numbers | None = None,
         center: Numbers | None = None,
         magnetic_moment: Numbers | None = None,
+        force: Numbers | None = None,
+        torque: Numbers | None = None,
         velocity: Numbers | None = None,
         angular_velocity: Numbers | None = None,
         body: Shell | Solid | None = None,
@@ -46,6 +48,8 @@ class Link(RigidBody):
             inertia=inertia,
             center=center,
             magnetic_moment=magnetic_moment,
+            force=force,
+            torque=torque,
             velocity=velocity,
             angular_velocity=angular_velocity,
             body=body,

@@ -73,6 +73,9 @@ class RigidBody(Owner):
     center: (3,) m, of its own mass and of its magnetic moment, at rest; by default the mean of the vertices, or the
         origin.
     magnetic_moment: (3,) A m2 at rest, in a scene with a field; it turns with the body.
+    force, torque: (3,) N at the center, and (3,) N m, in the world's axes: they keep their direction as the body turns, so
+        that a torque has no potential. They may change in ms.simulate, values={body: {"force": ...}}, one value a step or
+        at the ends of steps.
     velocity, angular_velocity: (3,) m/s of the center, (3,) rad/s in the world's axes: initial values of a free body in a
         motion that starts at rest positions. Vertices take theirs from the `velocities` of ms.simulate.
     body: the Shell or Solid whose vertices they are, in a scene of several.
@@ -81,9 +84,10 @@ class RigidBody(Owner):
         from a shape.
 
     Supports cannot hold its vertices. `result[body]` has its center, rotation and velocities. ms.simulate integrates it
-    by TRBDF2, with the first step in seven parts, or by ImplicitEuler; viscous damping acts on vertices only. Faces with
-    only some corners in the rigid body still bend at its border: if that half of a face matters, give them a larger
-    modulus too.
+    by TRBDF2, with the first step in seven parts, or by ImplicitEuler; without vertices and joints also by SDIRK2 and
+    SDIRK3. Without a torque it keeps its angular momentum and energy by each of them, to round-off. Viscous damping acts
+    on vertices only. Faces with only some corners in the rigid body still bend at its border: if that half of a face
+    matters, give them a larger modulus too.
 
     >>> import numpy as np
     >>> import magshell as ms
@@ -95,7 +99,8 @@ class RigidBody(Owner):
     """
 
     _for_all = False
-    _replaceable = ("mass", "inertia", "center", "magnetic_moment", "velocity", "angular_velocity")
+    _in_time = ("force", "torque")
+    _replaceable = ("mass", "inertia", "center", "magnetic_moment", *_in_time, "velocity", "angular_velocity")
 
     @grouped()
     def __init__(
@@ -106,6 +111,8 @@ class RigidBody(Owner):
         inertia: Numbers | None = None,
         center: Numbers | None = None,
         magnetic_moment: Numbers | None = None,
+        force: Numbers | None = None,
+        torque: Numbers | None = None,
         velocity: Numbers | None = None,
         angular_velocity: Numbers | None = None,
         body: Shell | Solid | None = None,
@@ -128,6 +135,9 @@ class RigidBody(Owner):
             raise ValueError("inertia [kg m2] was given without a mass [kg]")
         self.center: np.ndarray | None = _vector("center", "m", center)
         self.magnetic_moment: np.ndarray | None = _vector("magnetic_moment", "A m2", magnetic_moment)
+        self.force: np.ndarray | None = _vector("force", "N", force)
+        self.torque: np.ndarray | None = _vector("torque", "N m", torque)
+        self._in_time = tuple(name for name in type(self)._in_time if getattr(self, name) is not None)
         self.velocity: np.ndarray | None = _vector("velocity", "m/s", velocity)
         self.angular_velocity: np.ndarray | None = _vector("angular_velocity", "rad/s", angular_velocity)
         if vertices is None:
@@ -184,22 +194,33 @@ class RigidBody(Owner):
             raise ValueError("shape must be a TriangleMesh or one of ms.shapes, got None")
         return cls(shape=surface, **mass_properties(surface, mass_density), **others)
 
+    @property
+    def _resting(self) -> RigidBody:
+        """Return the rigid body without the force and torque that act on it."""
+        acting = {name: np.zeros(3) for name in self._in_time if getattr(self, name).any()}
+        return self.replaced(**acting) if acting else self
+
     def _again(self, values: dict[Any, Any]) -> RigidBody:
         return type(self)(self.vertices, body=self.body, shape=self.shape, **values)
 
     def _add_numbers(self, label: str, values: Values, numbers: dict[Any, Any]) -> None:
-        if self.magnetic_moment is not None:
-            numbers[label, "magnetic_moment"] = self.magnetic_moment
+        acting = {name: getattr(self, name) for name in ("magnetic_moment", "force", "torque")}
+        for name, value in acting.items():
+            if value is not None:
+                numbers[label, name] = value
+        if self.magnetic_moment is not None or self.force is not None:
             numbers[label, "center"] = values.rigid_points(self).center_of(self)
 
     def _gradients(self, label: str, values: Values, gradient: Gradient) -> dict[str, np.ndarray]:
         own_points, found = values.rigid_points(self), {}
         by_center = np.zeros(3)
-        if gradient.has(label, "magnetic_moment"):
-            found["magnetic_moment"] = gradient.value(label, "magnetic_moment")[0]
+        for name in ("magnetic_moment", "force", "torque"):
+            if gradient.has(label, name):
+                found[name] = gradient.value(label, name)[0]
+            elif getattr(self, name) is not None:
+                found[name] = np.zeros(3)
+        if gradient.has(label, "center"):
             by_center += gradient.value(label, "center")[0]
-        elif self.magnetic_moment is not None:
-            found["magnetic_moment"] = np.zeros(3)
         by_masses = values.by_masses(gradient)
         if self.mass is not None and by_masses is not None:
             by_own_masses = by_masses[own_points.points]

@@ -56,7 +56,7 @@ def body_inputs(scene: Scene, directed_edges: np.ndarray) -> dict[str, list[dict
         "solids": _solids(scene),
         "skins": _skins(scene),
         "rigid": [
-            points.as_input(f"rigid {k}", bool(scene.fields) and part.magnetic_moment is not None)
+            points.as_input(f"rigid {k}", part, bool(scene.fields) and part.magnetic_moment is not None)
             for k, (part, points) in enumerate(zip(scene.rigid_parts, scene._rigid, strict=True))
         ],
     }

@@ -10,13 +10,14 @@ from ..._runtime.keywords import nearest_first
 from ..actuators.actuator import Actuator
 from ..fields.field import AppliedField
 from ..rigid.joints import Joint
+from ..rigid.rigid import RigidBody
 from ..shells.shell import UNITS as _GROWTH_UNITS
 from ..shells.shell import Shell
 from ..supports.supports import Support
 
 # Parameters of these classes may jump between steps. Those of supports and obstacles may not: a jump would be an infinite
 # velocity.
-_MAY_JUMP = (AppliedField, Joint, Actuator, Shell)
+_MAY_JUMP = (AppliedField, Joint, RigidBody, Actuator, Shell)
 
 _UNITS = {
     "positions": "m",
@@ -26,6 +27,8 @@ _UNITS = {
     "rotation": "rad",
     "displacement": "m",
     "pressure": "Pa",
+    "force": "N",
+    "torque": "N m",
     **_GROWTH_UNITS,
 }
 

@@ -233,6 +233,7 @@ class Values:
         """
         other = copy(self)
         other._now = {**self._now, **now}
+        other.rigid = tuple(other.current(each) for each in self.scene.rigid_parts)
         other._others = now, self.numbers
         del other.numbers
         return other

@@ -19,7 +19,7 @@ from ...model.scene.solve_inputs import Inputs
 from ..statics.equilibrium import Equilibrium
 from .base_state import StiffnessAbout, asked_inputs
 from .mode_shapes import mode_shapes
-from .rest import RestStiffness, pulling_joints, refuse_springs
+from .rest import RestStiffness, pulling_parts, refuse_springs
 from .stiffness import Stiffness
 
 if TYPE_CHECKING:
@@ -120,7 +120,7 @@ def linear_buckling(
             "follows it as it opens and closes, or leave it out"
         )
     driven = [joint for joint in map(inputs.values.current, scene.joints) if joint._driven]
-    if equilibrium is None and (acting := [*pulling_joints(inputs), *driven]):
+    if equilibrium is None and (acting := [*pulling_parts(inputs), *driven]):
         raise ValueError(
             f"linear buckling multiplies the controls, and {acting[0]!r:.80} acts whatever they are: ms.follow_path has it"
         )

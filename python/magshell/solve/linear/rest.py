@@ -56,18 +56,20 @@ def refuse_springs(inputs: Inputs) -> None:
         )
 
 
-def pulling_joints(inputs: Inputs) -> dict[Any, Any]:
-    """Return the joints that pull at rest, {joint of the scene: the same joint without what pulls}."""
-    joints = {own: inputs.values.current(own) for own in inputs.scene.joints}
-    return {own: joint._resting for own, joint in joints.items() if joint._resting is not joint}
+def pulling_parts(inputs: Inputs) -> dict[Any, Any]:
+    """Return the joints and rigid bodies that pull at rest, {object of the scene: the same without what pulls}."""
+    scene = inputs.scene
+    parts = {own: inputs.values.current(own) for own in (*scene.joints, *scene.rigid_parts)}
+    return {own: part._resting for own, part in parts.items() if part._resting is not part}
 
 
 def forces_at_rest(inputs: Inputs) -> np.ndarray | None:
-    """Return g(0) of all degrees of freedom at the rest shape without what pulls in joints, so that this becomes a load.
+    """Return g(0) of all degrees of freedom at the rest shape without what pulls in joints and on rigid bodies, so that
+    this becomes a load.
 
-    Return None if no joint pulls.
+    Return None if nothing pulls.
     """
-    if not (pulling := pulling_joints(inputs)):
+    if not (pulling := pulling_parts(inputs)):
         return None
     scene = inputs.scene
     with inputs.values.with_objects(pulling).in_core():

@@ -22,6 +22,7 @@ _OTHER_TERMS = frozenset(
         "moments",
         "pressure",
         "volume",
+        "wrenches",
     )
 )
 

@@ -1,12 +1,13 @@
-#include "magshell/terms/joint/ball_torque_term.h"
+#include "magshell/terms/joint/torque_term.h"
 
 #include <algorithm>
 
 namespace magshell {
 
-BallTorqueTerm::BallTorqueTerm(const std::vector<Input>& joints, const std::vector<Vec3>& rest,
-                               Registry& registry) {
-    for (const Input& input : joints) {
+TorqueTerm::TorqueTerm(std::string_view name, const std::vector<Input>& moments,
+                       const std::vector<Vec3>& rest, Registry& registry)
+    : name_(name) {
+    for (const Input& input : moments) {
         const ParameterSlice slice = registry.values.add(input.owner, "torque", "N m", 1, 3);
         for (const Index* corners : {input.child, input.parent}) {
             if (!corners) continue;
@@ -22,12 +23,12 @@ BallTorqueTerm::BallTorqueTerm(const std::vector<Input>& joints, const std::vect
     }
 }
 
-bool BallTorqueTerm::set_values(const Values& values) {
+bool TorqueTerm::set_values(const Values& values) {
     for (Side& side : sides_) side.moment = side.sign * side.share * values.vector(side.slice);
     return false;
 }
 
-std::array<Vec3, 4> BallTorqueTerm::Side::arms(const double* q) const {
+std::array<Vec3, 4> TorqueTerm::Side::arms(const double* q) const {
     std::array<Vec3, 4> at;
     Vec3 center = Vec3::Zero();
     for (int k = 0; k < 4; ++k) {
@@ -38,7 +39,7 @@ std::array<Vec3, 4> BallTorqueTerm::Side::arms(const double* q) const {
     return at;
 }
 
-void BallTorqueTerm::evaluate(const double* q, const LoadParameters&, Residual& out) {
+void TorqueTerm::evaluate(const double* q, const LoadParameters&, Residual& out) {
     for (const Side& side : sides_) {
         const std::array<Vec3, 4> arms = side.arms(q);
         for (int k = 0; k < 4; ++k) {
@@ -49,8 +50,8 @@ void BallTorqueTerm::evaluate(const double* q, const LoadParameters&, Residual& 
 }
 
 // Adds d(-f_i)/dx_j = -[m]x (delta_ij - 1/4) / (8 l^2), because x_i - c depends on all four corners.
-void BallTorqueTerm::add_nonsymmetric_tangent(const double*, const LoadParameters&,
-                                              NonsymmetricTangent& out) const {
+void TorqueTerm::add_nonsymmetric_tangent(const double*, const LoadParameters&,
+                                          NonsymmetricTangent& out) const {
     for (const Side& side : sides_)
         for (int i = 0; i < 4; ++i)
             for (int j = 0; j <= i; ++j)
@@ -58,7 +59,7 @@ void BallTorqueTerm::add_nonsymmetric_tangent(const double*, const LoadParameter
                                                        ((i == j ? 0.75 : -0.25) * -side.moment).eval()});
 }
 
-void BallTorqueTerm::vjp(const double* q, const LoadParameters&, const double* lambda, Gradient& out) {
+void TorqueTerm::vjp(const double* q, const LoadParameters&, const double* lambda, Gradient& out) {
     for (const Side& side : sides_) {
         const std::array<Vec3, 4> arms = side.arms(q);
         for (int k = 0; k < 4; ++k)

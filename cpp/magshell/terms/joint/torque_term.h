@@ -1,5 +1,5 @@
-// BallTorqueTerm: prescribed moments in ball joints, m on the child link and -m on the parent. m is given in world axes and does not rotate
-// with the links. Such a moment has no potential, so its tangent has a nonsymmetric part.
+// TorqueTerm: prescribed moments on links: m on one link and -m on another, such as the two of a ball joint, or m on one alone. m is given
+// in world axes and does not rotate with the links. Such a moment has no potential, so its tangent has a nonsymmetric part.
 //
 // It acts as forces on the four corners of the tetrahedron that represents a link (dofs/rigid_nodes.h):
 //
@@ -17,17 +17,19 @@
 
 namespace magshell {
 
-class BallTorqueTerm final : public Term {
+class TorqueTerm final : public Term {
   public:
     struct Input {
         std::string owner;
-        const Index* parent;  // the four corners of the link; nullptr for the world
+        const Index* parent;  // the four corners of the link; nullptr for none
         const Index* child;   // the four corners of the link
     };
 
-    BallTorqueTerm(const std::vector<Input>& joints, const std::vector<Vec3>& rest, Registry& registry);
+    /// Registers the "torque" of every owner.
+    TorqueTerm(std::string_view name, const std::vector<Input>& moments, const std::vector<Vec3>& rest,
+               Registry& registry);
 
-    std::string_view name() const override { return "joints"; }
+    std::string_view name() const override { return name_; }
     Capabilities capabilities() const override { return {.has_unsymmetric_tangent = true}; }
     bool set_values(const Values& values) override;
     bool depends_on_loads() const override { return false; }
@@ -40,7 +42,7 @@ class BallTorqueTerm final : public Term {
     std::size_t bytes() const override { return sides_.capacity() * sizeof(Side); }
 
   private:
-    struct Side {  // one of the two links of a joint
+    struct Side {  // one of the two links
         std::array<Index, 4> corners;
         double sign;   // 1 for the child, -1 for the parent
         double share;  // 1/(8 l^2) [1/m2]
@@ -50,6 +52,7 @@ class BallTorqueTerm final : public Term {
         /// Returns x_k - c at q.
         std::array<Vec3, 4> arms(const double* q) const;
     };
+    std::string_view name_;
     std::vector<Side> sides_;
 };
 
