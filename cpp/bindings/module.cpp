@@ -1,5 +1,6 @@
 // Defines the extension module: errors first, then one register function per family.
 #include "bindings/bindings.h"
+#include "bindings/group_energy.h"
 #ifdef MAGSHELL_TESTING
 #include "bindings/testing/testing.h"
 #endif
@@ -19,6 +20,7 @@ PYBIND11_MODULE(_core, module) {
     b::register_obstacle(module);  // MeshObstacle takes a mesh
     b::register_force(module);
     b::register_face_energies(module);
+    b::register_group_energy(module);
     b::register_model(module);
     b::register_sheet(module);
     b::register_body_contact(module);  // takes models

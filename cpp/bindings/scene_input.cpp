@@ -3,6 +3,7 @@
 #include <string>
 
 #include "bindings/arrays.h"
+#include "bindings/group_energy.h"
 #include "bindings/muscle.h"
 #include "bindings/solid.h"
 
@@ -187,6 +188,7 @@ SceneInput scene_input(const py::kwargs& given) {
     input.pressures = pressures_of(given["pressures"]);
     input.volumes = volumes_of(given["volumes"]);
     input.tendons = tendons_of(given["tendons"]);
+    input.group_energies = group_energies_of(given["group_energies"]);
     input.gravity = given["gravity"].cast<bool>();
     input.loads = given["loads"].cast<bool>();
     for (const py::handle source : given["field_sources"])

@@ -54,6 +54,7 @@ from .model.fields.adapters import CustomField, MagpylibField
 from .model.fields.field import AppliedField, Dipoles, SampledField, UniformField, residual_to_remanent
 from .model.fields.magnets import CuboidMagnet, CylinderMagnet
 from .model.fields.posed_field import PlacedField
+from .model.loads.custom_energy import CustomEnergy
 from .model.loads.face_energies import SurfaceTension
 from .model.loads.loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
 from .model.loads.pressure import Pressure
@@ -137,6 +138,7 @@ __all__ = [
     "Corotated",
     "CriticalPoint",
     "CuboidMagnet",
+    "CustomEnergy",
     "CustomField",
     "CylinderMagnet",
     "DesignRejected",

@@ -23,6 +23,7 @@ __all__: list[str] = [
     "Factor",
     "FactorReport",
     "FailedAttempt",
+    "GroupEnergy",
     "Keep",
     "Model",
     "MotionInput",
@@ -35,6 +36,7 @@ __all__: list[str] = [
     "PathResult",
     "PlacedField",
     "PythonField",
+    "PythonGroupEnergy",
     "SampledField",
     "SmallDeflection",
     "SolveStep",
@@ -337,6 +339,16 @@ class FaceEnergy:
 
 class SurfaceTension(FaceEnergy):
     def __init__(self) -> None: ...
+
+class GroupEnergy:
+    pass
+
+class PythonGroupEnergy(GroupEnergy):
+    def __init__(
+        self,
+        sample: collections.abc.Callable[..., typing.Any],
+        rate_by_values: collections.abc.Callable[..., typing.Any],
+    ) -> None: ...
 
 class SmallDeflection:
     """

@@ -19,6 +19,7 @@ from gradient_kinds_bodies import (
     two_sheets_in_motion,
 )
 from gradient_kinds_contact import CONTACT_MAKERS, sheets_rubbing
+from gradient_kinds_custom import custom_energies_at_rest, custom_energies_in_motion
 from gradient_kinds_growth import GROWTH_MAKERS
 from gradient_kinds_muscles import muscles_at_rest, muscles_in_motion
 from gradient_kinds_own_field import own_field
@@ -361,6 +362,8 @@ MAKERS = {
     "a driven skeleton on a Plane, contact implicit": motorized_skeleton_on_a_plane,
     "two sheets with their own field at rest": lambda: own_field(False),
     "two sheets with their own field in motion": lambda: own_field(True),
+    "custom energies at rest": custom_energies_at_rest,
+    "custom energies in motion": custom_energies_in_motion,
 }
 
 

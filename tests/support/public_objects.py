@@ -194,6 +194,10 @@ def _around(given: Arrays, bodies: dict[str, object]) -> dict[str, object]:
             given(ball.rest_positions), given(ball.faces, np.int64), 8, **place
         ),
     }
+    if importlib.util.find_spec("torch"):
+        found["own energy"] = ms.CustomEnergy(
+            _squared, of=given.numbers(0, 1), values={"stiffness": given([1.0])}
+        )
     if importlib.util.find_spec("magpylib"):
         import magpylib
 
@@ -204,6 +208,10 @@ def _around(given: Arrays, bodies: dict[str, object]) -> dict[str, object]:
 
 def _same(points):
     return 0.1 * points
+
+
+def _squared(x, stiffness):
+    return stiffness * (x[1] - x[0]).square().sum()
 
 
 def _options(given: Arrays) -> dict[str, object]:

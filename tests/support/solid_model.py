@@ -65,6 +65,7 @@ class SolidModel:
             pressures=[],
             volumes=[],
             tendons=[],
+            group_energies=[],
             solids=[
                 {
                     "owner": "body 0",

@@ -37,6 +37,14 @@ Bodies::Bodies(const SceneInput& input) {
     add_link_couplings(input);
     nodes_ = numbering.finish(input.directions, input.original);
     add_volume_and_tendon_couplings(input);
+    for (const GroupEnergyInput& energy : input.group_energies)
+        for (std::size_t first = 0; first < energy.vertices.size(); first += energy.group_size) {
+            std::vector<Index>& nodes = coupled_.emplace_back();
+            for (Index k = 0; k < energy.group_size; ++k)
+                nodes.push_back(nodes_.vertices.core[energy.vertices[first + k]]);
+            std::sort(nodes.begin(), nodes.end());
+            nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+        }
     for (const EdgeMomentInput& couple : input.couples) {
         if (couple.shell < static_cast<Index>(owned_.size())) continue;
         const std::size_t k = couple.shell - owned_.size();

@@ -18,6 +18,7 @@
 #include "magshell/terms/contact/body_contact_input.h"
 #include "magshell/terms/contact/contact_term.h"
 #include "magshell/terms/load/face_energy.h"
+#include "magshell/terms/load/group_energy_term.h"
 #include "magshell/terms/load/pressure_term.h"
 #include "magshell/terms/shell/shell_growth.h"
 #include "magshell/terms/solid/solid_term.h"
@@ -131,6 +132,7 @@ struct SceneInput {
     std::vector<PressureInput> pressures;
     std::vector<VolumeInput> volumes;
     std::vector<TendonInput> tendons;
+    std::vector<GroupEnergyInput> group_energies;
     bool gravity = false, loads = false;
     std::vector<std::shared_ptr<const AppliedField>> field_sources;
     std::vector<ContactInput> contacts;

@@ -162,6 +162,9 @@ void Builder::add_terms(const SceneInput& input) {
         out_.energies.push_back(
             std::make_unique<PressureTerm>(input.pressures, bodies_.nodes(), matrix_, registry_));
     }
+    for (const GroupEnergyInput& given : input.group_energies)
+        out_.energies.push_back(
+            std::make_unique<GroupEnergyTerm>(given, bodies_.nodes(), matrix_, registry_));
     add_volumes(input);
     add_moments(input);
     add_joints(input);

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from ..mesh.triangles.six_node_mesh import QuadraticTriangleMesh
     from ..mesh.triangles.triangle_mesh import TriangleMesh
     from ..model.fields.field import AppliedField
+    from ..model.loads.custom_energy import CustomEnergy
     from ..model.loads.face_energies import FaceEnergy
     from ..model.loads.loads import DeadLoad, EdgeCouple
     from ..model.loads.pressure import Pressure
@@ -77,7 +78,7 @@ if TYPE_CHECKING:
     Cutting: TypeAlias = str | Sequence[Any]
 
     Fielded: TypeAlias = AppliedField | Iterable[AppliedField]
-    Load: TypeAlias = DeadLoad | EdgeCouple | FaceEnergy | Pressure
+    Load: TypeAlias = DeadLoad | EdgeCouple | FaceEnergy | Pressure | CustomEnergy
     EnvActuator: TypeAlias = Action
 
     # An optimizer, or a function that makes one for a list of parameters.

@@ -32,6 +32,7 @@ from ..contact.contacts_to_core import (
     split_contacts,
 )
 from ..fields.field import FIELDS, AppliedField, UniformField
+from ..loads.custom_energy import CustomEnergy
 from ..loads.face_energies import FaceEnergy
 from ..loads.loads import AreaLoad, DeadLoad, EdgeCouple, EdgeLoad, PointLoad
 from ..loads.pressure import Pressure
@@ -62,7 +63,7 @@ if TYPE_CHECKING:
     from ..._input.kinds import Fielded, Load, Numbers
     from ..supports.supports import Support
 
-_LOADS = (PointLoad, EdgeLoad, AreaLoad, EdgeCouple, FaceEnergy, Pressure)
+_LOADS = (PointLoad, EdgeLoad, AreaLoad, EdgeCouple, FaceEnergy, Pressure, CustomEnergy)
 _SUPPORTS = (Pin, Clamp, SymmetryPlane)
 _ACTUATORS = "Muscle, Cavity, PneumaticCells and Tendon objects"
 
@@ -77,7 +78,8 @@ class Scene(PlotMixin):
         only. Positions and faces of a result are those of one body after another, `result[body]` has those of one.
     ties: Tie objects: bodies that are welded to each other.
     supports: Pin, Clamp and SymmetryPlane objects; with several bodies `body=` says which one a support holds.
-    loads: PointLoad, EdgeLoad, AreaLoad, EdgeCouple, Pressure and SurfaceTension objects; with several bodies likewise.
+    loads: PointLoad, EdgeLoad, AreaLoad, EdgeCouple, Pressure, SurfaceTension and CustomEnergy objects; with several bodies
+        likewise.
     actuators: Muscle, Cavity, PneumaticCells and Tendon objects.
     field: None, an applied field, or several that superpose. A UniformField takes its value when the scene is solved.
     own_field: an OwnField, with which magnetized shells attract and repel each other and themselves. None: bodies feel the

@@ -13,6 +13,7 @@ from ..actuators.cavity import Cavity
 from ..actuators.cells import PneumaticCells
 from ..actuators.muscle import Muscle
 from ..actuators.tendon import Tendon
+from ..loads.custom_energy import CustomEnergy
 from ..loads.face_energies import FaceEnergy
 from ..loads.loads import EdgeCouple
 from ..loads.pressure import Pressure
@@ -73,7 +74,7 @@ def muscle_inputs(scene: Scene) -> list[dict[Any, Any]]:
 
 
 def face_inputs(scene: Scene) -> dict[str, list[dict[Any, Any]]]:
-    """Return the input of face energies and of pressures."""
+    """Return the input of face energies, of pressures and of energies of groups of vertices."""
     bodies, n_skins = scene._bodies, len(_skins(scene))
     return {
         "face_energies": [
@@ -83,6 +84,9 @@ def face_inputs(scene: Scene) -> dict[str, list[dict[Any, Any]]]:
         ],
         "pressures": [
             load._core_input(label, bodies) for load, label in scene._labels if isinstance(load, Pressure)
+        ],
+        "group_energies": [
+            load._core_input(label, bodies) for load, label in scene._labels if isinstance(load, CustomEnergy)
         ],
     }
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ... import _core
 from ...model.actuators.muscle import FibreStates, muscles_in
+from ...model.loads.custom_energy import CustomEnergy
 from ...model.scene.solve_inputs import Inputs
 from .stiffness import Stiffness, refuse_indefinite
 
@@ -77,8 +78,9 @@ def forces_at_rest(inputs: Inputs) -> np.ndarray | None:
 
 
 def refuse_what_acts(inputs: Inputs) -> None:
-    """Raise ValueError if a muscle pulls at the rest shape or a shell has grown: the rest shape is no equilibrium then."""
+    """Raise ValueError if the rest shape is no equilibrium: a muscle or a CustomEnergy pulls there, or a shell has grown."""
     model = inputs.scene._model
+    _refuse_custom_forces(inputs)
     for body in map(inputs.values.current, inputs.scene._bodies.sheets):
         if body._has_grown:
             raise ValueError(
@@ -91,4 +93,21 @@ def refuse_what_acts(inputs: Inputs) -> None:
             raise ValueError(
                 f"{muscle!r} pulls at the rest shape, which is no equilibrium then: find one with ms.equilibrium, and hand "
                 "it over as `equilibrium`; without activation its stiffness at rest counts"
+            )
+
+
+def _refuse_custom_forces(inputs: Inputs) -> None:
+    """Raise ValueError if a CustomEnergy that is no load has forces at the rest shape that are more than round-off."""
+    scene = inputs.scene
+    own = [each for each in scene.loads if isinstance(each, CustomEnergy) and not each.is_load]
+    if not own:
+        return
+    model, state, controls = scene._model, scene._model.rest_state(), scene._control_layout.zeros()
+    forces = [np.abs(model.term_gradient(each.name, state, controls)).max() for each in own]
+    _, _, _, stiffness = model.hessian(state, controls, reduced=False)
+    for each, force in zip(own, forces, strict=True):
+        if force > _ROUND_OFF * np.abs(stiffness).max() * scene._bodies.extent:
+            raise ValueError(
+                f"{each!r} pulls at the rest shape, which is no equilibrium then: find one with ms.equilibrium, and hand "
+                "it over as `equilibrium`"
             )
