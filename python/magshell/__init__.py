@@ -61,6 +61,13 @@ from .model.loads.pressure import Pressure
 from .model.loads.water import Water
 from .model.results.body_result import BodyResult
 from .model.results.joint_result import JointResult
+from .model.rigid.joint_dynamics import (
+    bias_forces,
+    coordinate_slices,
+    forward_dynamics,
+    inverse_dynamics,
+    mass_matrix,
+)
 from .model.rigid.joints import Ball, Fixed, Joint, LoopClosure, Prismatic, Revolute, Screw
 from .model.rigid.link import Link
 from .model.rigid.rigid import RigidBody, RigidBodyResult
@@ -233,7 +240,9 @@ __all__ = [
     "Yeoh",
     "__version__",
     "animate",
+    "bias_forces",
     "control",
+    "coordinate_slices",
     "energies",
     "energy",
     "envs",
@@ -244,11 +253,14 @@ __all__ = [
     "fit",
     "follow_path",
     "forces",
+    "forward_dynamics",
     "free_motions",
     "hessian",
+    "inverse_dynamics",
     "linear_buckling",
     "linear_response",
     "load",
+    "mass_matrix",
     "meshes",
     "minimize",
     "minimize_printable",

@@ -65,3 +65,13 @@ def rigid_calls(s: Sample) -> Iterator[Call]:
     yield Call(
         "Skeleton", lambda **a: ms.Skeleton(**a), {"links": [link, base], "joints": [ms.Fixed(link, base)]}
     )
+    hinges = [ms.Revolute(link, base, origin=(0.1, 0, 0), axis=(0, 1, 0)), ms.Fixed(base)]
+    at = {"skeleton": ms.Skeleton([link, base], hinges), "coordinates": [0.3]}
+    forces, gravity = {"rates": [1.0], "forces": [0.1]}, {"gravity": (0, 0, -9.81)}
+    yield Call("coordinate_slices", ms.coordinate_slices, {"skeleton": at["skeleton"]})
+    yield Call("mass_matrix", ms.mass_matrix, at)
+    yield Call("bias_forces", ms.bias_forces, {**at, "rates": [1.0], **gravity})
+    yield Call("forward_dynamics", ms.forward_dynamics, {**at, **forces, **gravity})
+    yield Call(
+        "inverse_dynamics", ms.inverse_dynamics, {**at, "rates": [1.0], "accelerations": [1.0], **gravity}
+    )
