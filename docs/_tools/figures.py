@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import re
 import subprocess
 import sys
@@ -142,11 +143,18 @@ def _at(results: Any, path: list[Any]) -> float:
 
 
 def run(command: str) -> Any:
-    """Run a command with --json, without showing its output, and return the results it writes."""
+    """Run a command with --json at the root of the checkout, without showing its output, and return the results it writes."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "results.json"
         words = [sys.executable, *command.split()[1:], "--json", str(path)]
-        subprocess.run(words, check=True, stdout=subprocess.DEVNULL, cwd=ROOT)
+        paths = [
+            str(ROOT),
+            *filter(None, [os.environ.get("PYTHONPATH")]),
+        ]  # for the benchmarks, which are not installed
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+        subprocess.run(
+            words, check=True, stdout=subprocess.DEVNULL, cwd=ROOT, env=environment
+        )
         content = json.loads(path.read_text())
         return content.get("results", content)
 
