@@ -52,6 +52,7 @@ compiled_for() {
     mkdir -p build
     if [ ! -f "$build/CMakeCache.txt" ]; then
         cmake -G Ninja -S . -B "$build" -DMAGSHELL_TESTING=ON -DMAGSHELL_NATIVE=OFF -DMAGSHELL_BASELINE="$1" -DPython_EXECUTABLE="$python" \
+            -DSKBUILD_PROJECT_VERSION="$(sed -n 's/^version = "\(.*\)"$/\1/p' pyproject.toml)" \
             -Dpybind11_DIR="$("$python" -m pybind11 --cmakedir)" ${CMAKE_ARGS:-} >"$build.log" ||
             { cat "$build.log"; rm -f "$build/CMakeCache.txt"; return 1; }
     fi

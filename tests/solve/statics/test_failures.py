@@ -146,7 +146,11 @@ def test_a_failure_beside_flat_faces_names_them():
     )
     assert mesh.quality.largest_angles[int(named[1])] > np.radians(179)
     assert "mend the mesh there first" in text and "smaller steps" not in text
-    assert "The energy still falls along a motion at vertices" in text
+    ends = (
+        "The energy still falls along a motion at vertices",
+        "2 relaxation steps",
+    )  # which one, round-off decides too
+    assert any(end in text for end in ends)
 
 
 def test_exception_of_a_field_reaches_the_caller():
