@@ -84,6 +84,7 @@ std::vector<ShellInput> sheets_of(const py::list& given) {
         sheet.growth = growth_of(each);
         sheet.directors = each["directors"].cast<bool>();
         sheet.magnetic = each["magnetic"].cast<bool>();
+        sheet.magnetization_law = magnetization_law_of(each);
         sheet.directed_edges = directed_edges(each["directed_edges"].cast<IndexArray>());
     }
     return sheets;
@@ -106,6 +107,7 @@ std::vector<SixNodeShellInput> six_node_sheets_of(const py::list& given) {
         sheet.directed_edges = directed_edges(each["directed_edges"].cast<IndexArray>());
         sheet.surface = surface_of(each);
         sheet.magnetic = each["magnetic"].cast<bool>();
+        sheet.magnetization_law = magnetization_law_of(each);
         sheet.surface_acts = each["surface_acts"].cast<bool>();
     }
     return sheets;

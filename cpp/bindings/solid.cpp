@@ -26,6 +26,11 @@ py::tuple point_states(const Model& model, Index solid, const VectorXd& q) {
 
 }  // namespace
 
+MagnetizationLaw magnetization_law_of(const py::handle& given) {
+    return given["magnetization_rotates"].cast<bool>() ? MagnetizationLaw::rotates
+                                                       : MagnetizationLaw::stretches;
+}
+
 SolidSurface surface_of(const py::handle& given) {
     return {given["surface"].cast<std::shared_ptr<TriangleMesh>>(),
             given["surface_vertices"].cast<std::vector<Index>>()};
@@ -43,6 +48,7 @@ std::vector<SolidInput> solids_of(const py::list& given) {
         solid.vertices = each["vertices"].cast<std::vector<Index>>();
         solid.surface = surface_of(each);
         solid.magnetic = each["magnetic"].cast<bool>();
+        solid.magnetization_law = magnetization_law_of(each);
         solid.surface_acts = each["surface_acts"].cast<bool>();
         solid.response = {each["material"].cast<std::string>(), each["mean_volume"].cast<bool>()};
     }
@@ -52,7 +58,7 @@ std::vector<SolidInput> solids_of(const py::list& given) {
 std::vector<SkinInput> skins_of(const py::list& given) {
     std::vector<SkinInput> skins;
     for (const py::handle each : given)
-        skins.push_back({each["owner"].cast<std::string>(), surface_of(each)});
+        skins.push_back({each["owner"].cast<std::string>(), surface_of(each), magnetization_law_of(each)});
     return skins;
 }
 

@@ -8,6 +8,8 @@ namespace magshell::bindings {
 
 /// Converts the keys "surface" and "surface_vertices" of a body.
 SolidSurface surface_of(const py::handle& given);
+/// Converts the key "magnetization_rotates" of a body.
+MagnetizationLaw magnetization_law_of(const py::handle& given);
 std::vector<SolidInput> solids_of(const py::list& given);
 std::vector<SkinInput> skins_of(const py::list& given);
 /// Convert the volumes of cavities and pneumatic cells, and tendons.

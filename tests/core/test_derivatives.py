@@ -75,10 +75,11 @@ def soft(mesh, **options):
     return ms.Shell(mesh, thickness=1e-2 * mesh.size, young_modulus=1e-9, **options)
 
 
-def magnetic(field, magnetization, controls):
+def magnetic(field, magnetization, controls, law="stretches"):
     def build(size):
         source = field(size)
-        scene = ms.Scene(soft(curved_mesh(size)), field=source, allow_rigid_motions=True)
+        sheet = soft(curved_mesh(size), magnetization_law=law)
+        scene = ms.Scene(sheet, field=source, allow_rigid_motions=True)
         return Problem(scene, controls, np.array(MAGNETIZATION[magnetization]))
 
     return build
@@ -201,6 +202,9 @@ TERMS = {
     "custom field": (magnetic(custom, "mixed", IN_SOURCES), "magnetic"),
     "custom field with gradient": (magnetic(custom_with_gradient, "tangential", IN_SOURCES), "magnetic"),
     "superposed fields": (magnetic(everything_magnetic, "mixed", IN_BOTH), "magnetic"),
+    "magnetic, rotating, tangential": (magnetic(uniform, "tangential", IN_FIELD, "rotates"), "magnetic"),
+    "magnetic, rotating, mixed": (magnetic(uniform, "mixed", IN_FIELD, "rotates"), "magnetic"),
+    "superposed fields, rotating": (magnetic(everything_magnetic, "mixed", IN_BOTH, "rotates"), "magnetic"),
     "gravity": (gravity, "gravity"),
     "loads": (loads, "loads"),
     "edge couple, midedge": (edge_moment("midedge"), "couple"),

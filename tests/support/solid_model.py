@@ -77,6 +77,7 @@ class SolidModel:
                     "material": material,
                     "mean_volume": mean,
                     "magnetic": False,
+                    "magnetization_rotates": False,
                     "surface_acts": False,
                 }
             ],

@@ -1,25 +1,25 @@
 // MagneticSix: the Zeeman energy of a magnetized quadratic triangle in an applied field, at its six interior
 // points.
 //
-//   E_p = - w_p/2 J~_p h (alpha a_1 + beta a_2 + gamma n) . B(x_p)                               [J]   energy/magnetic.h
+//   E_p = - w_p/2 J~_p h M . B(x_p)                               [J]   energy/magnetic_face.h
 //
-// a_1 and a_2 are the derivatives of the position from corner 0 towards the other two corners, n their unit
-// normal, and (alpha, beta, gamma) the coordinates of M~_r in this frame of the reference shape, which differ
-// from point to point on a curved face.
+// The law of M takes for a_1 and a_2 the derivatives of the position from corner 0 towards the other two corners. The coordinates
+// (alpha, beta, gamma) of M~_r in the frame of the reference shape differ from point to point on a curved face.
 #pragma once
 
-#include "magshell/energy/magnetic.h"
+#include "magshell/energy/magnetic_face.h"
 #include "magshell/strain/deformation.h"
 #include "magshell/strain/six_nodes.h"
 
 namespace magshell {
 
+template <class Law>
 class MagneticSix {
   public:
     static constexpr int points = 6;
-    using Element = Magnetic::Element;
+    using Element = typename Law::Element;
 
-    MagneticSix(const SimdVec3 x[6], int point) : point_(point), frame_(of(x, point)) {}
+    MagneticSix(const SimdVec3 x[6], int point, const Element& e) : point_(point), frame_(of(x, point, e)) {}
 
     static SimdVec3 position(const SimdVec3 x[6], int point) {
         SimdVec3 at = SimdDouble(shapes_[point][0]) * x[0];
@@ -27,14 +27,12 @@ class MagneticSix {
         return at;
     }
 
-    const Magnetic& frame() const { return frame_; }
-    /// Computes the rates of a_1, a_2 and n for given nodal velocities.
+    const Law& frame() const { return frame_; }
+    /// Computes the rates of the law's frame for given nodal velocities.
     void rates(const SimdVec3 along[6], SimdVec3 rate[3]) const {
         const SimdVec3 zero = {SimdDouble(0.0), SimdDouble(0.0), SimdDouble(0.0)};
         const SimdVec3 ends[3] = {zero, combination(first(), along), combination(second(), along)};
-        rate[0] = ends[1];
-        rate[1] = ends[2];
-        rate[2] = frame_.normal_rate(ends);
+        frame_.frame_rate(ends, rate);
     }
 
     void add_gradient(const Element& e, const SimdVec3& flux, SimdVec3 g[6]) const {
@@ -45,7 +43,7 @@ class MagneticSix {
     }
 
     /// Adds the part of the gradient that is due to the gradient of the field.
-    void add_gradient_by_position(const Element& e, const Magnetic::Field& field, SimdVec3 g[6]) const {
+    void add_gradient_by_position(const Element& e, const FieldAtPoint& field, SimdVec3 g[6]) const {
         const SimdVec3 pull = -e.volume * multiply(transpose(field.gradient), frame_.magnetization(e));
         for (int k = 0; k < 6; ++k) g[k] += SimdDouble(shapes_[point_][k]) * pull;
     }
@@ -67,7 +65,7 @@ class MagneticSix {
 
     /// Adds the part due to the variation of the field in space: d2(M . B(x_p)) with one or two derivatives by
     /// x_p.
-    void add_hessian_by_position(const Element& e, const Magnetic::Field& field, SimdMat3 h[21]) const {
+    void add_hessian_by_position(const Element& e, const FieldAtPoint& field, SimdMat3 h[21]) const {
         SimdMat3 by_first, by_second;  // d(M . dB/dx_j)/da, row = component of a, column = j
         for (int j = 0; j < 3; ++j) {
             SimdVec3 d1, d2;
@@ -96,11 +94,11 @@ class MagneticSix {
         for (int k = 1; k < 6; ++k) sum += SimdDouble(by_node[k]) * x[k];
         return sum;
     }
-    static Magnetic of(const SimdVec3 x[6], int point) {
+    static Law of(const SimdVec3 x[6], int point, const Element& e) {
         const SimdVec3 corners[3] = {{SimdDouble(0.0), SimdDouble(0.0), SimdDouble(0.0)},
                                      combination(firsts_[point], x),
                                      combination(seconds_[point], x)};
-        return Magnetic(corners);
+        return Law(corners, e);
     }
     static void set_column(SimdMat3& matrix, int j, const SimdVec3& column) {
         matrix.at[j] = column.x;
@@ -117,7 +115,7 @@ class MagneticSix {
     }();
 
     const int point_;
-    const Magnetic frame_;
+    const Law frame_;
 };
 
 }  // namespace magshell

@@ -15,7 +15,7 @@
 #include <array>
 
 #include "magshell/core/vector3.h"
-#include "magshell/energy/magnetic.h"
+#include "magshell/energy/magnetic_face.h"
 #include "magshell/strain/deformation.h"
 #include "magshell/strain/push_forward.h"
 
@@ -27,40 +27,64 @@ struct MagneticSolid : PushForward<N> {  // alpha_k [A/m2]
 
     SimdDouble volume;  // V_p [m3]
 
-    SimdVec3 magnetization(const SimdVec3 x[N]) const { return this->at(x); }
+    static constexpr bool is_linear = true;
 
-    static SimdVec3 position(const std::array<double, N>& shapes, const SimdVec3 x[N]) {
-        SimdVec3 at = SimdDouble(shapes[0]) * x[0];
-        for (int k = 1; k < N; ++k) at += SimdDouble(shapes[k]) * x[k];
-        return at;
+    void set(int lane, const Eigen::Matrix<double, N, 3>& g, const Vec3& m, double point_volume) {
+        const Eigen::Matrix<double, N, 1> coordinates = g * m;
+        volume.set(lane, point_volume);
+        for (int k = 0; k < N; ++k) alpha[k].set(lane, coordinates[k]);
     }
 
-    SimdDouble energy(const SimdVec3 x[N], const SimdVec3& flux) const {
-        return -volume * dot(magnetization(x), flux);
-    }
+    /// The magnetization of a point at the positions x of its nodes.
+    class Stretched {
+      public:
+        Stretched(const MagneticSolid& point, const SimdVec3 x[N]) : point_(point), x_(x) {}
 
-    /// Adds the nodal gradients of a field taken as uniform.
-    void add_gradient(const SimdVec3& flux, SimdVec3 g[N]) const {
-        for (int k = 0; k < N; ++k) g[k] += (-volume * alpha[k]) * flux;
-    }
+        SimdVec3 magnetization() const { return point_.PushForward<N>::at(x_); }
 
-    /// Adds the part of the gradient that is due to the gradient of the field.
-    void add_gradient_by_position(const std::array<double, N>& shapes, const SimdVec3 x[N],
-                                  const Magnetic::Field& field, SimdVec3 g[N]) const {
-        const SimdVec3 pull = -volume * multiply(transpose(field.gradient), magnetization(x));
-        for (int k = 0; k < N; ++k) g[k] += SimdDouble(shapes[k]) * pull;
-    }
+        SimdDouble energy(const SimdVec3& flux) const { return -point_.volume * dot(magnetization(), flux); }
 
-    /// Adds lower blocks at lower_index(k, l).
-    void add_hessian(const std::array<double, N>& shapes, const Magnetic::Field& field, SimdMat3 h[]) const {
-        const SimdMat3 along = -volume * field.gradient, across = transpose(along),
-                       twice = -volume * field.curvature;
-        for (int k = 0; k < N; ++k)
-            for (int l = 0; l <= k; ++l)
-                h[lower_index(k, l)] += (SimdDouble(shapes[l]) * alpha[k]) * along +
-                                        (SimdDouble(shapes[k]) * alpha[l]) * across +
-                                        SimdDouble(shapes[k] * shapes[l]) * twice;
-    }
+        /// Adds the nodal gradients of a field taken as uniform.
+        void add_gradient(const SimdVec3& flux, SimdVec3 g[N]) const {
+            for (int k = 0; k < N; ++k) g[k] += (-point_.volume * point_.alpha[k]) * flux;
+        }
+
+        /// Adds the part of the gradient that is due to the gradient of the field.
+        void add_gradient_by_position(const std::array<double, N>& shapes, const FieldAtPoint& field,
+                                      SimdVec3 g[N]) const {
+            const SimdVec3 pull = -point_.volume * multiply(transpose(field.gradient), magnetization());
+            for (int k = 0; k < N; ++k) g[k] += SimdDouble(shapes[k]) * pull;
+        }
+
+        /// Does nothing: in a field taken as uniform the Hessian is zero.
+        void add_hessian(const SimdVec3&, SimdMat3*) const {}
+
+        /// Adds lower blocks at lower_index(k, l).
+        void add_hessian_by_position(const std::array<double, N>& shapes, const FieldAtPoint& field,
+                                     SimdMat3 h[]) const {
+            const SimdMat3 along = -point_.volume * field.gradient, across = transpose(along),
+                           twice = -point_.volume * field.curvature;
+            for (int k = 0; k < N; ++k)
+                for (int l = 0; l <= k; ++l)
+                    h[lower_index(k, l)] += (SimdDouble(shapes[l]) * point_.alpha[k]) * along +
+                                            (SimdDouble(shapes[k]) * point_.alpha[l]) * across +
+                                            SimdDouble(shapes[k] * shapes[l]) * twice;
+        }
+
+      private:
+        const MagneticSolid& point_;
+        const SimdVec3* x_;
+    };
+
+    Stretched deformed(const SimdVec3 x[N]) const { return Stretched(*this, x); }
 };
+
+/// Returns the position of a point with given values of the shape functions.
+template <int N>
+SimdVec3 position_of(const std::array<double, N>& shapes, const SimdVec3 x[N]) {
+    SimdVec3 at = SimdDouble(shapes[0]) * x[0];
+    for (int k = 1; k < N; ++k) at += SimdDouble(shapes[k]) * x[k];
+    return at;
+}
 
 }  // namespace magshell

@@ -10,6 +10,7 @@
 #include "magshell/body/solid.h"
 #include "magshell/dofs/dof_map.h"
 #include "magshell/dofs/joint.h"
+#include "magshell/energy/magnetization_law.h"
 #include "magshell/field/applied_field.h"
 #include "magshell/force/drag.h"
 #include "magshell/terms/actuator/muscle_fibres.h"
@@ -38,6 +39,7 @@ struct ShellInput {
     GrowthForm growth;
     bool directors = true;  // true: midedge elements; false: hinge elements
     bool magnetic = false;
+    MagnetizationLaw magnetization_law = MagnetizationLaw::stretches;
     std::vector<DirectedEdge> directed_edges;  // directions are rows of SceneInput::directions
 };
 
@@ -50,6 +52,7 @@ struct SixNodeShellInput {
         directed_edges;    // of mesh.corners; directions are rows of SceneInput::directions
     SolidSurface surface;  // four flat triangles per face
     bool magnetic = false;
+    MagnetizationLaw magnetization_law = MagnetizationLaw::stretches;
     bool surface_acts = false;  // whether water or a face energy acts on its surface
 };
 
@@ -62,6 +65,7 @@ struct SolidInput {
     SolidSurface surface;
     SolidResponse response;
     bool magnetic = false;
+    MagnetizationLaw magnetization_law = MagnetizationLaw::stretches;
     bool surface_acts = false;  // whether water or a face energy acts on its surface
 };
 
@@ -69,6 +73,7 @@ struct SolidInput {
 struct SkinInput {
     std::string owner;  // name of the owner of its parameters
     SolidSurface surface;
+    MagnetizationLaw magnetization_law = MagnetizationLaw::stretches;
 };
 
 /// An energy of a body's faces in addition to its elastic and magnetic ones.

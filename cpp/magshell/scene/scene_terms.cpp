@@ -206,26 +206,29 @@ void Builder::add_six_node_shell(std::size_t number, const GrowthForm& growth) {
 
 void Builder::add_magnetic_terms(const SceneInput& input) {
     const std::size_t shells = input.shells.size(), solids = input.solids.size();
-    const auto add = [&](std::size_t k) {
+    const auto add = [&](std::size_t k, MagnetizationLaw law) {
         const auto& [surface, body] = bodies_.faces()[k];
         out_.energies.push_back(
-            std::make_unique<MagneticTerm>(*surface, body, *out_.loops[k], out_.field_sources, registry_));
+            make_magnetic_term(law, *surface, body, *out_.loops[k], out_.field_sources, registry_));
     };
     for (std::size_t k = 0; k < shells; ++k)
-        if (input.shells[k].magnetic) add(k);
-    for (std::size_t k = 0; k < input.skins.size(); ++k) add(shells + solids + k);
+        if (input.shells[k].magnetic) add(k, input.shells[k].magnetization_law);
+    for (std::size_t k = 0; k < input.skins.size(); ++k)
+        add(shells + solids + k, input.skins[k].magnetization_law);
     for (std::size_t k = 0; k < input.six_node_shells.size(); ++k) {
         const Index body = bodies_.six_node_bodies()[k];
-        if (input.six_node_shells[k].magnetic)
-            out_.energies.push_back(std::make_unique<MagneticSixTerm>(*bodies_.six_node_shells()[k], body,
-                                                                      out_.coloring.of(body), matrix_,
-                                                                      out_.field_sources, registry_));
+        const SixNodeShellInput& given = input.six_node_shells[k];
+        if (given.magnetic)
+            out_.energies.push_back(
+                make_magnetic_six_term(given.magnetization_law, *bodies_.six_node_shells()[k], body,
+                                       out_.coloring.of(body), matrix_, out_.field_sources, registry_));
     }
     for (std::size_t k = 0; k < solids; ++k) {
         const Index body = static_cast<Index>(shells + k);
         if (input.solids[k].magnetic)
-            out_.energies.push_back(make_magnetic_solid_term(
-                *bodies_.solids()[k], body, out_.coloring.of(body), matrix_, out_.field_sources, registry_));
+            out_.energies.push_back(
+                make_magnetic_solid_term(input.solids[k].magnetization_law, *bodies_.solids()[k], body,
+                                         out_.coloring.of(body), matrix_, out_.field_sources, registry_));
     }
 }
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "magshell/assembly/lanes.h"
-#include "magshell/energy/magnetic.h"
+#include "magshell/energy/magnetic_face.h"
 #include "magshell/field/applied_field.h"
 
 namespace magshell {
@@ -12,11 +12,11 @@ namespace magshell {
 /// The field at all integration points of a SIMD vector of elements.
 template <int points>
 struct PointFields {
-    Magnetic::Field at[points];
+    FieldAtPoint at[points];
 };
 
 /// Stores sample n plus a uniform flux density [T] in one lane. Order as in AppliedField::add_samples.
-inline void set_field(Magnetic::Field& field, int lane, const FieldSamples& samples, Index n, int order,
+inline void set_field(FieldAtPoint& field, int lane, const FieldSamples& samples, Index n, int order,
                       const Vec3& everywhere) {
     set_lane(field.flux, lane, Vec3(samples.flux[n] + everywhere));
     for (int r = 0; r < 3; ++r)

@@ -1,7 +1,9 @@
 #include "magshell/terms/magnetic/magnetic_solid_term.h"
 
 #include "magshell/assembly/element_loop.h"
+#include "magshell/energy/magnetic.h"
 #include "magshell/energy/magnetic_solid.h"
+#include "magshell/energy/magnetic_solid_rotating.h"
 #include "magshell/strain/tetrahedron.h"
 #include "magshell/terms/magnetic/field_groups.h"
 #include "magshell/terms/magnetic/total_applied_field.h"
@@ -9,11 +11,11 @@
 namespace magshell {
 namespace {
 
-template <class Element>
+template <class Element, template <int> class Law>
 class MagneticSolidTerm final : public Term {
     static constexpr int N = Element::nodes, points = Element::points;
     using Nodes = std::array<Index, N>;
-    using Point = MagneticSolid<N>;
+    using Point = Law<N>;
     struct Points {
         Point at[points];
     };
@@ -43,11 +45,8 @@ class MagneticSolidTerm final : public Term {
                 const Index t = loop_.element(group, lane);
                 const RestElement<Element> rest = rest_of(t);
                 const Vec3 m = values.vector(magnetization_, t);
-                for (int p = 0; p < points; ++p) {
-                    const Eigen::Matrix<double, N, 1> alpha = gradients(rest, p) * m;
-                    elements_[group].at[p].volume.set(lane, rest.volume[p]);
-                    for (int k = 0; k < N; ++k) elements_[group].at[p].alpha[k].set(lane, alpha[k]);
-                }
+                for (int p = 0; p < points; ++p)
+                    elements_[group].at[p].set(lane, gradients(rest, p), m, rest.volume[p]);
             }
         return true;
     }
@@ -60,8 +59,8 @@ class MagneticSolidTerm final : public Term {
             loop_.gather(group, q, x);
             SimdDouble total(0.0);
             for (int p = 0; p < points; ++p)
-                total +=
-                    elements_[group].at[p].energy(x, fields.empty() ? everywhere : fields[group].at[p].flux);
+                total += elements_[group].at[p].deformed(x).energy(fields.empty() ? everywhere
+                                                                                  : fields[group].at[p].flux);
             return total;
         });
     }
@@ -75,9 +74,9 @@ class MagneticSolidTerm final : public Term {
             loop_.gather(group, q, x);
             std::fill_n(g, N, none);
             for (int p = 0; p < points; ++p) {
-                const Point& point = elements_[group].at[p];
+                const auto point = elements_[group].at[p].deformed(x);
                 point.add_gradient(fields.empty() ? everywhere : fields[group].at[p].flux, g);
-                if (!fields.empty()) point.add_gradient_by_position(shapes_[p], x, fields[group].at[p], g);
+                if (!fields.empty()) point.add_gradient_by_position(shapes_[p], fields[group].at[p], g);
             }
             loop_.scatter(group, g, out);
         });
@@ -87,45 +86,59 @@ class MagneticSolidTerm final : public Term {
         fields_ = sample(q, load_parameters, 2);
     }
 
-    void assemble(const ElementBlock& element_block, const double*, const LoadParameters&, bool,
-                  SystemMatrix& out) const override {
-        if (fields_.empty()) return;
+    void assemble(const ElementBlock& element_block, const double* q, const LoadParameters& load_parameters,
+                  bool, SystemMatrix& out) const override {
+        const bool varies = !fields_.empty();
+        const Vec3 uniform = field_.uniform(load_parameters);
+        if (!varies && (Point::is_linear || uniform.isZero(0.0))) return;
+        const SimdVec3 everywhere = broadcast(uniform);
         ElementLoop<N>::over_groups(element_block, [&](Index group) {
+            SimdVec3 x[N];
             SimdMat3 h[N * (N + 1) / 2];
+            loop_.gather(group, q, x);
             for (SimdMat3& block : h) std::fill_n(block.at, 9, SimdDouble(0.0));
-            for (int p = 0; p < points; ++p)
-                elements_[group].at[p].add_hessian(shapes_[p], fields_[group].at[p], h);
+            for (int p = 0; p < points; ++p) {
+                const auto point = elements_[group].at[p].deformed(x);
+                point.add_hessian(varies ? fields_[group].at[p].flux : everywhere, h);
+                if (varies) point.add_hessian_by_position(shapes_[p], fields_[group].at[p], h);
+            }
             loop_.scatter(group, h, out);
         });
     }
 
-    // The rate of the energy along lambda, with F' and v the rates of F and of x_p,
+    // The rate of the energy along lambda, with M' and v the rates of M and of x_p and G = dB/dx,
     //
-    //   D = - V_p (F' M . B + F M . G v),
+    //   D = - V_p (M' . B + M . G v),   M' = F' M~ or omega x M,
     //
     // is linear in the magnetization and in the field.
     void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
              Gradient& out) override {
         const Vec3 everywhere = field_.uniform(load_parameters);
         const double factor = field_.factor(load_parameters);
-        std::vector<Vec3> places, magnetizations, rates, angle_branches;
+        std::vector<Vec3> places, magnetizations;
         at_points(q, places, magnetizations);
-        at_points(lambda, rates, angle_branches);
+        const Rates rates = rates_at_points(q, lambda);
         const FieldSamples samples = field_.at_factor_one(places, magnetizations);
-        FieldProbe probe;  // - V_p (F' M, F M, v)
-        probe.direction = rates;
+        FieldProbe probe;  // - V_p (M', M, v)
+        probe.direction = rates.velocities;
         for (Index t = 0; t < solid_.n_elements(); ++t) {
             const RestElement<Element> rest = rest_of(t);
             const Eigen::Matrix<double, 3, N> x = nodes_of(t, q), along = nodes_of(t, lambda);
             Vec3 by_magnetization = Vec3::Zero();
             for (int p = 0; p < points; ++p) {
                 const Index n = t * points + p;
-                const Eigen::Matrix<double, N, 3> g = gradients(rest, p);
                 const Vec3 flux = everywhere + factor * samples.flux[n],
-                           flux_rate = factor * (samples.gradient[n] * rates[n]);
-                by_magnetization -=
-                    rest.volume[p] * (g.transpose() * (along.transpose() * flux + x.transpose() * flux_rate));
-                probe.flux.push_back(-rest.volume[p] * angle_branches[n]);
+                           flux_rate = factor * (samples.gradient[n] * rates.velocities[n]);
+                if constexpr (Point::is_linear) {
+                    const Eigen::Matrix<double, N, 3> g = gradients(rest, p);
+                    by_magnetization -=
+                        rest.volume[p] *
+                        (g.transpose() * (along.transpose() * flux + x.transpose() * flux_rate));
+                } else {
+                    by_magnetization -= rest.volume[p] * (rates.rotations[n].transpose() *
+                                                          (flux.cross(rates.spins[n]) + flux_rate));
+                }
+                probe.flux.push_back(-rest.volume[p] * rates.magnetizations[n]);
                 probe.moment.push_back(-rest.volume[p] * magnetizations[n]);
             }
             out.values.segment<3>(magnetization_.at(t)) += by_magnetization;
@@ -154,7 +167,7 @@ class MagneticSolidTerm final : public Term {
         return at;
     }
 
-    // Computes x_p and F M at every point, element by element. Applied to rates it computes their rates.
+    // Computes x_p and M at every point, element by element.
     void at_points(const double* q, std::vector<Vec3>& places, std::vector<Vec3>& magnetizations) const {
         places.resize(static_cast<std::size_t>(solid_.n_elements()) * points);
         magnetizations.resize(places.size());
@@ -162,8 +175,8 @@ class MagneticSolidTerm final : public Term {
             SimdVec3 x[N];
             loop_.gather(group, q, x);
             for (int p = 0; p < points; ++p) {
-                const SimdVec3 place = Point::position(shapes_[p], x),
-                               m = elements_[group].at[p].magnetization(x);
+                const SimdVec3 place = position_of<N>(shapes_[p], x),
+                               m = elements_[group].at[p].deformed(x).magnetization();
                 for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
                     const Index n = loop_.element(group, lane) * points + p;
                     places[n] = lane_of(place, lane);
@@ -171,6 +184,43 @@ class MagneticSolidTerm final : public Term {
                 }
             }
         });
+    }
+
+    // Rates at all points, for given velocities of the nodes.
+    struct Rates {
+        std::vector<Vec3> velocities, magnetizations;
+        std::vector<Mat3> rotations;  // R and the spin omega, of a magnetization that turns
+        std::vector<Vec3> spins;
+    };
+
+    Rates rates_at_points(const double* q, const double* lambda) const {
+        Rates rates;
+        if constexpr (Point::is_linear) {
+            at_points(lambda, rates.velocities, rates.magnetizations);
+        } else {
+            const std::size_t count = static_cast<std::size_t>(solid_.n_elements()) * points;
+            rates.velocities.resize(count), rates.magnetizations.resize(count);
+            rates.rotations.resize(count), rates.spins.resize(count);
+            loop_.each_group([&](Index group) {
+                SimdVec3 x[N], along[N];
+                loop_.gather(group, q, x);
+                loop_.gather(group, lambda, along);
+                for (int p = 0; p < points; ++p) {
+                    const auto point = elements_[group].at[p].deformed(x);
+                    const SimdVec3 velocity = position_of<N>(shapes_[p], along), spin = point.spin(along),
+                                   rate = cross(spin, point.magnetization());
+                    for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+                        const Index n = loop_.element(group, lane) * points + p;
+                        rates.velocities[n] = lane_of(velocity, lane);
+                        rates.magnetizations[n] = lane_of(rate, lane);
+                        rates.spins[n] = lane_of(spin, lane);
+                        for (int k = 0; k < 9; ++k)
+                            rates.rotations[n](k / 3, k % 3) = point.rotation().at[k][lane];
+                    }
+                }
+            });
+        }
+        return rates;
     }
 
     // Returns the applied field at every point in SIMD vectors; empty in a uniform field. Order as in
@@ -193,16 +243,24 @@ class MagneticSolidTerm final : public Term {
     std::vector<Fields> fields_;  // sampled for the current assembly; empty in a uniform field
 };
 
+template <template <int> class Law>
+std::unique_ptr<Term> make_term(const Solid& solid, Index body, const ColoredLoop& element_blocks,
+                                const SystemMatrix& matrix, const FieldSources& sources, Registry& registry) {
+    if (solid.quadratic())
+        return std::make_unique<MagneticSolidTerm<QuadraticTetrahedron, Law>>(
+            solid, solid.quadratic_nodes, body, element_blocks, matrix, sources, registry);
+    return std::make_unique<MagneticSolidTerm<LinearTetrahedron, Law>>(
+        solid, solid.linear_nodes, body, element_blocks, matrix, sources, registry);
+}
+
 }  // namespace
 
-std::unique_ptr<Term> make_magnetic_solid_term(const Solid& solid, Index body,
+std::unique_ptr<Term> make_magnetic_solid_term(MagnetizationLaw law, const Solid& solid, Index body,
                                                const ColoredLoop& element_blocks, const SystemMatrix& matrix,
                                                const FieldSources& sources, Registry& registry) {
-    if (solid.quadratic())
-        return std::make_unique<MagneticSolidTerm<QuadraticTetrahedron>>(
-            solid, solid.quadratic_nodes, body, element_blocks, matrix, sources, registry);
-    return std::make_unique<MagneticSolidTerm<LinearTetrahedron>>(solid, solid.linear_nodes, body,
-                                                                  element_blocks, matrix, sources, registry);
+    if (law == MagnetizationLaw::rotates)
+        return make_term<RotatingMagneticSolid>(solid, body, element_blocks, matrix, sources, registry);
+    return make_term<MagneticSolid>(solid, body, element_blocks, matrix, sources, registry);
 }
 
 }  // namespace magshell

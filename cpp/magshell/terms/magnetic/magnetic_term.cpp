@@ -3,25 +3,66 @@
 #include <Eigen/LU>
 #include <limits>
 
+#include "magshell/energy/magnetic.h"
+#include "magshell/energy/magnetic_rotating.h"
 #include "magshell/mesh/half_edges.h"
 #include "magshell/terms/magnetic/field_groups.h"
+#include "magshell/terms/magnetic/total_applied_field.h"
 
 namespace magshell {
 namespace {
 
-// Returns the matrix (a~_1, a~_2, n~) of a face.
-Mat3 rest_frame(const Surface& surface, Index face) {
-    const std::array<Vec3, 3>& x = surface.rest_corners(face);
-    const Vec3 a1 = x[1] - x[0], a2 = x[2] - x[0];
-    Mat3 frame;
-    frame << a1, a2, a1.cross(a2).normalized();
-    return frame;
-}
+// In a uniform field nothing is sampled. If the magnetization is linear in the positions too, the force does not
+// depend on the deformation, and there is no Hessian to add.
+template <class Law>
+class MagneticTerm final : public Term {
+  public:
+    MagneticTerm(const Surface& surface, Index body, const FaceLoop& loop, const FieldSources& sources,
+                 Registry& registry);
 
-}  // namespace
+    std::string_view name() const override { return Magnetic::name; }
+    Index body() const override { return body_; }
+    bool set_values(const Values& values) override;
+    double energy(const double* q, const LoadParameters& load_parameters) const override;
+    void evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) override;
+    void prepare_assembly(const double* q, const LoadParameters& load_parameters) override;
+    void assemble(const ElementBlock& element_block, const double* q, const LoadParameters& load_parameters,
+                  bool, SystemMatrix& out) const override;
+    void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
+             Gradient& out) override;
+    double field_sampling_error(const double* q, const LoadParameters& load_parameters,
+                                double extent) override;
+    std::size_t bytes() const override;
 
-MagneticTerm::MagneticTerm(const Surface& surface, Index body, const FaceLoop& loop,
-                           const FieldSources& sources, Registry& registry)
+  private:
+    // Finds the face across each edge of every face, if it is not known yet.
+    void find_neighbours();
+    // Computes the barycenters [m] of all faces and the magnetizations [A/m] there.
+    void find_points(const double* q, std::vector<Vec3>& points, std::vector<Vec3>& magnetizations) const;
+    // Returns the applied field at every barycenter in SIMD vectors; empty in a uniform field. Order as in
+    // AppliedField::add_samples.
+    std::vector<FieldAtPoint> sample(const double* q, const LoadParameters& load_parameters, int order) const;
+    Mat3 rest_frame(Index face) const {
+        const std::array<Vec3, 3>& x = surface_.rest_corners(face);
+        return Law::rest_frame(x[1] - x[0], x[2] - x[0]);
+    }
+
+    const Surface& surface_;
+    const Index body_;
+    const FaceLoop& loop_;
+    const TotalAppliedField field_;
+    ParameterSlice magnetization_, thickness_;  // values
+    std::vector<double> thicknesses_;
+    LargeVector<typename Law::Element> elements_;
+    std::vector<FieldAtPoint> fields_;  // sampled for the current assembly; empty in a uniform field
+    std::vector<std::array<Index, 3>>
+        neighbours_;      // across the edge opposite each corner, -1 for none; see find_neighbours
+    bool linear_ = true;  // every magnetization is linear in the positions
+};
+
+template <class Law>
+MagneticTerm<Law>::MagneticTerm(const Surface& surface, Index body, const FaceLoop& loop,
+                                const FieldSources& sources, Registry& registry)
     : surface_(surface),
       body_(body),
       loop_(loop),
@@ -31,37 +72,42 @@ MagneticTerm::MagneticTerm(const Surface& surface, Index body, const FaceLoop& l
       thickness_(registry.values.add(surface.owner, "thickness", "m", surface.n_faces(), 1, &surface.faces)),
       elements_(loop.groups()) {}
 
-bool MagneticTerm::set_values(const Values& values) {
+template <class Law>
+bool MagneticTerm<Law>::set_values(const Values& values) {
     if (!values.changed(magnetization_, thickness_)) return false;
-    normal_magnetization_ = false;
+    linear_ = true;
     thicknesses_.assign(values[thickness_], values[thickness_] + thickness_.size());
     for (Index group = 0; group < loop_.groups(); ++group)
         for (int lane = 0; lane < SimdDouble::width; ++lane) {
             const Index f = loop_.face(group, lane);
-            const Mat3 frame = rest_frame(surface_, f);
-            const Vec3 across = frame.col(0).cross(frame.col(1)), m = values.vector(magnetization_, f);
+            const std::array<Vec3, 3>& x = surface_.rest_corners(f);
+            const Vec3 a1 = x[1] - x[0], a2 = x[2] - x[0];
+            const Mat3 frame = Law::rest_frame(a1, a2);
+            const Vec3 across = a1.cross(a2), m = values.vector(magnetization_, f);
             Vec3 coordinates = frame.inverse() * m;
             // A tangential magnetization keeps a normal coordinate of round-off size after the inverse: it is
             // set to zero.
             if (std::abs(coordinates[2]) <= 1e-14 * m.norm()) coordinates[2] = 0.0;
-            if (coordinates[2] != 0.0) normal_magnetization_ = true;
+            linear_ &= Law::is_linear(coordinates);
             elements_[group].volume.set(lane, 0.5 * across.norm() * thicknesses_[f]);
             elements_[group].alpha.set(lane, coordinates[0]);
             elements_[group].beta.set(lane, coordinates[1]);
             elements_[group].gamma.set(lane, coordinates[2]);
+            Law::set_rest(a1, a2, elements_[group], lane);
         }
     return true;
 }
 
-void MagneticTerm::find_points(const double* q, std::vector<Vec3>& points,
-                               std::vector<Vec3>& magnetizations) const {
+template <class Law>
+void MagneticTerm<Law>::find_points(const double* q, std::vector<Vec3>& points,
+                                    std::vector<Vec3>& magnetizations) const {
     points.resize(surface_.n_faces());
     magnetizations.resize(surface_.n_faces());
     loop_.each_group([&](Index group) {
         SimdVec3 x[3];
         loop_.gather(group, q, x);
         const SimdVec3 center = SimdDouble(1.0 / 3.0) * (x[0] + x[1] + x[2]);
-        const SimdVec3 m = Magnetic(x).magnetization(elements_[group]);
+        const SimdVec3 m = Law(x, elements_[group]).magnetization(elements_[group]);
         for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
             points[loop_.face(group, lane)] = lane_of(center, lane);
             magnetizations[loop_.face(group, lane)] = lane_of(m, lane);
@@ -69,38 +115,42 @@ void MagneticTerm::find_points(const double* q, std::vector<Vec3>& points,
     });
 }
 
-std::vector<Magnetic::Field> MagneticTerm::sample(const double* q, const LoadParameters& load_parameters,
-                                                  int order) const {
+template <class Law>
+std::vector<FieldAtPoint> MagneticTerm<Law>::sample(const double* q, const LoadParameters& load_parameters,
+                                                    int order) const {
     if (!field_.varies(load_parameters)) return {};
     std::vector<Vec3> points, moments;
     find_points(q, points, moments);
     const FieldSamples samples = field_.sample(points, moments, order, load_parameters);
     const Vec3 everywhere = field_.uniform(load_parameters);
-    std::vector<Magnetic::Field> groups(loop_.groups());
+    std::vector<FieldAtPoint> groups(loop_.groups());
     for (Index group = 0; group < loop_.groups(); ++group)
         for (int lane = 0; lane < SimdDouble::width; ++lane)
             set_field(groups[group], lane, samples, loop_.face(group, lane), order, everywhere);
     return groups;
 }
 
-double MagneticTerm::energy(const double* q, const LoadParameters& load_parameters) const {
-    const std::vector<Magnetic::Field> fields = sample(q, load_parameters, 0);
+template <class Law>
+double MagneticTerm<Law>::energy(const double* q, const LoadParameters& load_parameters) const {
+    const std::vector<FieldAtPoint> fields = sample(q, load_parameters, 0);
     const SimdVec3 everywhere = broadcast(field_.uniform(load_parameters));
     return loop_.sum([&](Index group) {
         SimdVec3 x[3];
         loop_.gather(group, q, x);
-        return Magnetic(x).energy(elements_[group], fields.empty() ? everywhere : fields[group].flux);
+        return Law(x, elements_[group])
+            .energy(elements_[group], fields.empty() ? everywhere : fields[group].flux);
     });
 }
 
-void MagneticTerm::evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) {
-    const std::vector<Magnetic::Field> fields = sample(q, load_parameters, 1);
+template <class Law>
+void MagneticTerm<Law>::evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) {
+    const std::vector<FieldAtPoint> fields = sample(q, load_parameters, 1);
     const bool varies = !fields.empty();
     const SimdVec3 everywhere = broadcast(field_.uniform(load_parameters));
     loop_.scatter_groups([&](Index group) {
         SimdVec3 x[3], g[3];
         loop_.gather(group, q, x);
-        const Magnetic face(x);
+        const Law face(x, elements_[group]);
         face.gradient(elements_[group], varies ? fields[group].flux : everywhere, g);
         if (varies) {
             const SimdVec3 pull = face.gradient_by_position(elements_[group], fields[group]);
@@ -110,34 +160,37 @@ void MagneticTerm::evaluate(const double* q, const LoadParameters& load_paramete
     });
 }
 
-void MagneticTerm::prepare_assembly(const double* q, const LoadParameters& load_parameters) {
+template <class Law>
+void MagneticTerm<Law>::prepare_assembly(const double* q, const LoadParameters& load_parameters) {
     fields_ = sample(q, load_parameters, 2);
 }
 
-void MagneticTerm::assemble(const ElementBlock& element_block, const double* q,
-                            const LoadParameters& load_parameters, bool, SystemMatrix& out) const {
+template <class Law>
+void MagneticTerm<Law>::assemble(const ElementBlock& element_block, const double* q,
+                                 const LoadParameters& load_parameters, bool, SystemMatrix& out) const {
     const bool varies = !fields_.empty();
     const Vec3 uniform = field_.uniform(load_parameters);
-    if (!varies && (!normal_magnetization_ || uniform.isZero(0.0))) return;
+    if (!varies && (linear_ || uniform.isZero(0.0))) return;
     const SimdVec3 everywhere = broadcast(uniform);
     FaceLoop::over_groups(element_block, [&](Index group) {
         SimdVec3 x[3];
         SimdMat3 h[6];
         loop_.gather(group, q, x);
-        const Magnetic face(x);
+        const Law face(x, elements_[group]);
         face.hessian(elements_[group], varies ? fields_[group].flux : everywhere, h);
         if (varies) face.add_hessian_by_position(elements_[group], fields_[group], h);
         loop_.scatter(group, h, out);
     });
 }
 
-// The rate of the energy along lambda, with M' and v the rates of F_0 M~_r and of x_b and G = dB/dx,
+// The rate of the energy along lambda, with M' and v the rates of M and of x_b and G = dB/dx,
 //
-//   D = - A~ h (M' . B + M . G v),   M' = alpha a_1' + beta a_2' + gamma n',
+//   D = - A~ h (M' . B + M . G v),   M' = alpha f_1' + beta f_2' + gamma n',
 //
 // is linear in (alpha, beta, gamma), in the thickness and in the field.
-void MagneticTerm::vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
-                       Gradient& out) {
+template <class Law>
+void MagneticTerm<Law>::vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
+                            Gradient& out) {
     const Index n = surface_.n_faces();
     const double factor = field_.factor(load_parameters);
     const Vec3 everywhere = field_.uniform(load_parameters);
@@ -151,16 +204,19 @@ void MagneticTerm::vjp(const double* q, const LoadParameters& load_parameters, c
         SimdVec3 x[3], rate[3];
         loop_.gather(group, q, x);
         loop_.gather(group, lambda, rate);
-        const Magnetic face(x);
-        const SimdVec3 turn = face.normal_rate(rate);
+        const Law face(x, elements_[group]);
+        SimdVec3 columns[3], column_rates[3];
+        face.frame(columns);
+        face.frame_rate(rate, column_rates);
         for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
             const Index f = loop_.face(group, lane);
-            const Magnetic::Element& e = elements_[group];
+            const typename Law::Element& e = elements_[group];
             const Vec3 coordinates(e.alpha[lane], e.beta[lane], e.gamma[lane]),
                 at[3] = {lane_of(rate[0], lane), lane_of(rate[1], lane), lane_of(rate[2], lane)};
             Mat3 frame, frame_rate;
-            frame << lane_of(face.a1, lane), lane_of(face.a2, lane), lane_of(face.normal, lane);
-            frame_rate << at[1] - at[0], at[2] - at[0], lane_of(turn, lane);
+            frame << lane_of(columns[0], lane), lane_of(columns[1], lane), lane_of(columns[2], lane);
+            frame_rate << lane_of(column_rates[0], lane), lane_of(column_rates[1], lane),
+                lane_of(column_rates[2], lane);
             const Vec3 v = (at[0] + at[1] + at[2]) / 3.0;
             const Vec3 flux = everywhere + factor * samples.flux[f];
             const Vec3 flux_rate = factor * (samples.gradient[f] * v);
@@ -168,7 +224,7 @@ void MagneticTerm::vjp(const double* q, const LoadParameters& load_parameters, c
             const Vec3 by_coordinates =
                 -volume * (frame_rate.transpose() * flux + frame.transpose() * flux_rate);
             out.values.segment<3>(magnetization_.at(f)) +=
-                rest_frame(surface_, f).transpose().inverse() * by_coordinates;
+                rest_frame(f).transpose().inverse() * by_coordinates;
             out.values[thickness_.at(f)] += by_coordinates.dot(coordinates) / thicknesses_[f];
             probe.flux[f] = -volume * (frame_rate * coordinates);
             probe.moment[f] = -volume * magnetizations[f];
@@ -178,7 +234,8 @@ void MagneticTerm::vjp(const double* q, const LoadParameters& load_parameters, c
     field_.add_vjp(points, probe, samples, load_parameters, out);
 }
 
-void MagneticTerm::find_neighbours() {
+template <class Law>
+void MagneticTerm<Law>::find_neighbours() {
     const Index n = surface_.n_faces();
     if (static_cast<Index>(neighbours_.size()) == n) return;
     Rows3i faces(n, 3);
@@ -203,8 +260,9 @@ void MagneticTerm::find_neighbours() {
 //   (|d_i| / |e_i|)^2 (G(x_b + e_i)^T m - F - F' e_i).
 //
 // Across an edge of the border it is taken as the mean of the others.
-double MagneticTerm::field_sampling_error(const double* q, const LoadParameters& load_parameters,
-                                          double extent) {
+template <class Law>
+double MagneticTerm<Law>::field_sampling_error(const double* q, const LoadParameters& load_parameters,
+                                               double extent) {
     constexpr double cancelling = 0.1;  // [-] of the sum of the forces, as in field_sampling.py
     constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
     if (!field_.varies(load_parameters)) return 0.0;
@@ -223,8 +281,8 @@ double MagneticTerm::field_sampling_error(const double* q, const LoadParameters&
         SimdVec3 x[3];
         loop_.gather(group, q, x);
         const SimdVec3 center = SimdDouble(1.0 / 3.0) * (x[0] + x[1] + x[2]);
-        const Magnetic::Element& e = elements_[group];
-        const SimdVec3 moment = e.volume * Magnetic(x).magnetization(e);
+        const typename Law::Element& e = elements_[group];
+        const SimdVec3 moment = e.volume * Law(x, e).magnetization(e);
         for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
             const Index f = loop_.face(group, lane);
             Sample& here = samples[f];
@@ -262,8 +320,19 @@ double MagneticTerm::field_sampling_error(const double* q, const LoadParameters&
     return error.norm() / total;
 }
 
-std::size_t MagneticTerm::bytes() const {
+template <class Law>
+std::size_t MagneticTerm<Law>::bytes() const {
     return bytes_of(elements_) + bytes_of(thicknesses_) + bytes_of(fields_) + bytes_of(neighbours_);
+}
+
+}  // namespace
+
+std::unique_ptr<Term> make_magnetic_term(MagnetizationLaw law, const Surface& surface, Index body,
+                                         const FaceLoop& loop, const FieldSources& sources,
+                                         Registry& registry) {
+    if (law == MagnetizationLaw::rotates)
+        return std::make_unique<MagneticTerm<RotatingMagnetic>>(surface, body, loop, sources, registry);
+    return std::make_unique<MagneticTerm<Magnetic>>(surface, body, loop, sources, registry);
 }
 
 }  // namespace magshell

@@ -22,6 +22,7 @@ import numpy as np
 from ... import _core
 from ..._runtime.warning_stacklevel import callers_level
 from ...errors import FieldSamplingWarning
+from ..shells.deformed_magnetization import deformed_magnetization
 from ..solids.solid import Solid
 from .magnetization import magnetized_bodies
 
@@ -143,15 +144,11 @@ def _magnetized_faces(values, positions) -> Iterator[tuple[Any, np.ndarray, np.n
         label = labels[id(magnetized)]
         magnetization = scene._value_layout.of(values.numbers, label, "remanent_magnetization")
         rest, corners = span.mesh.rest_positions[faces], positions[span.vertices][faces]
-        frame, volumes = _frames(rest)
-        turned, _ = _frames(corners)
-        own = np.linalg.solve(frame, np.broadcast_to(magnetization, (len(faces), 3))[..., None])
-        yield now, corners, (volumes * now.thickness)[:, None] * (turned @ own)[..., 0]
+        magnetization = np.broadcast_to(magnetization, (len(faces), 3))
+        turned = deformed_magnetization(rest, corners, magnetization, now.magnetization_law == "rotates")
+        yield now, corners, (_areas(rest) * now.thickness)[:, None] * turned
 
 
-def _frames(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the frames (a_1, a_2, n) of faces as columns, (n, 3, 3), and their areas (n,) m2 [Chen22] (20)."""
-    a1, a2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    across = np.cross(a1, a2)
-    area2 = np.linalg.norm(across, axis=1)
-    return np.stack([a1, a2, across / area2[:, None]], axis=2), 0.5 * area2
+def _areas(corners: np.ndarray) -> np.ndarray:
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return 0.5 * np.linalg.norm(across, axis=1)

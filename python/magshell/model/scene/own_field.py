@@ -87,6 +87,12 @@ def own_field_inputs(scene: Scene) -> dict[str, object]:
 
 def _require_flat_shell(number: int, body: Shell | Solid) -> None:
     if isinstance(body, Shell) and isinstance(body.mesh, TriangleMesh):
+        if body.magnetization_law != "stretches":
+            raise ValueError(
+                f'own_field does not support body {number}, whose magnetization_law is "{body.magnetization_law}": its '
+                'charges would change with the stretch. Take magnetization_law="stretches", or name the other shells in '
+                "ms.OwnField(bodies=...)"
+            )
         return
     kind = "a Solid" if isinstance(body, Solid) else "a Shell of six-node faces"
     raise ValueError(

@@ -125,6 +125,7 @@ def _sheets(scene, directed_edges: np.ndarray) -> list[dict[Any, Any]]:
             **_growth(shell),
             "directors": shell.bending == "midedge",
             "magnetic": bool(scene.fields),
+            "magnetization_rotates": shell.magnetization_law == "rotates",
             "directed_edges": directed[k],
         }
         for k, (shell, span) in enumerate(zip(scene.bodies, scene._bodies.spans, strict=True))
@@ -146,6 +147,7 @@ def _six_node_sheets(scene, directed_edges: np.ndarray) -> list[dict[Any, Any]]:
             "surface_acts": _surface_acts(scene, k),
             **_growth(shell),
             "magnetic": bool(scene.fields),
+            "magnetization_rotates": shell.magnetization_law == "rotates",
             "directed_edges": directed[k],
         }
         for k, (shell, span) in enumerate(zip(scene.bodies, scene._bodies.spans, strict=True))

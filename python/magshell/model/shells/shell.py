@@ -112,6 +112,7 @@ def _which(sizes: np.ndarray) -> str:
 
 
 BENDING = ("midedge", "midedge2", "hinge")
+MAGNETIZATION_LAWS = ("stretches", "rotates")
 # Fractions of an element's mass at its nodes, in proportion to the diagonal of the mass matrix of a flat element (Hinton,
 # Rock, Zienkiewicz 1976). All are positive, while the integrals of the shape functions are not.
 _LUMPED = {3: np.full(3, 1 / 3), 6: np.array([1 / 19] * 3 + [16 / 57] * 3)}
@@ -135,6 +136,10 @@ class Shell(Owner):
         membrane strains of Regge elements: Neunteufel and Schoeberl 2019, 2021); or "hinge" ([Chen22] (19): no rotations,
         cheaper, and off by several percent on irregular meshes).
     remanent_magnetization: (3,) or (n_f, 3) A/m, in a scene with a field, unless a solve gives another.
+    magnetization_law: "stretches", the default, F M of the papers: the magnetization of a face stretches with it; or
+        "rotates", R M of the polar decomposition F = R U: it turns with the face and keeps its magnitude, as experiments
+        with sheets that are stretched show (docs/theory.md). Both are the same where a sheet bends without stretching. An
+        OwnField needs "stretches".
     growth: the factor by which lengths in the faces have grown, so that they are free of stress: a positive number, or a
         symmetric tensor in world axes at rest, (3, 3) or one per face (n_f, 3, 3), of which the part in the face acts:
         np.eye(3) + 0.1 np.outer(d, d) grows by a tenth along d. A sheet that is stretched by s before it is fixed to others
@@ -146,7 +151,7 @@ class Shell(Owner):
     Growth changes the stress-free state that stretching and bending are measured from, and the area of the energy. A
     uniform growth keeps the angles of a curved rest shape, so that it scales the shape (in general its second fundamental
     form is multiplied by the root of det G). Everything else stays: thickness is that of the grown sheet; mass, weight,
-    magnetization and area loads are those of the mesh, and the magnetization stretches with the sheet, grown or not. Both
+    magnetization and area loads are those of the mesh, and the magnetization follows the sheet, grown or not. Both
     growth and rest_curvature may change along ms.follow_path and in ms.simulate. With "hinge" both faces of an edge share
     one angle, their mean, and free edges have none.
 
@@ -189,6 +194,7 @@ class Shell(Owner):
         curvature_scale: Numbers = 1.0,
         bending: str | None = None,
         remanent_magnetization: Numbers | None = None,
+        magnetization_law: str = "stretches",
         growth: Numbers | None = None,
         rest_curvature: Numbers | None = None,
     ):
@@ -228,6 +234,7 @@ class Shell(Owner):
             )
         )
 
+        self.magnetization_law: str = checked_magnetization_law(magnetization_law)
         self.growth, self.rest_curvature = (
             None if given is None else self._growth.checked(name, given)
             for name, given in (("growth", growth), ("rest_curvature", rest_curvature))
@@ -244,7 +251,8 @@ class Shell(Owner):
             for name in self._in_time
             if name in values
         }
-        return Shell(self.mesh, bending=self.bending, **{**properties, **values, **grown})
+        kept = {"bending": self.bending, "magnetization_law": self.magnetization_law}
+        return Shell(self.mesh, **kept, **{**properties, **values, **grown})
 
     def _add_numbers(self, label: str, values: Values, numbers: dict[Any, Any]) -> None:
         for name in self._stiffnesses:
@@ -420,6 +428,13 @@ def _checked_bending(bending, mesh) -> str:
             'take bending="midedge2", or mesh.first_order() without their middle nodes'
         )
     return bending
+
+
+def checked_magnetization_law(given: str) -> str:
+    """Return the given law of a magnetization. Raises ValueError if there is none of that name."""
+    if given not in MAGNETIZATION_LAWS:
+        raise ValueError(f"magnetization_law must be one of {MAGNETIZATION_LAWS}, got {given!r:.60}")
+    return given
 
 
 def magnetization_of(given: Numbers, count: int, rows: str = "(n_f, 3)") -> np.ndarray:

@@ -12,7 +12,7 @@ from ..._input.selections import indices, selection
 from ..._runtime.frozen import variant
 from ...mesh.tetrahedra.tet_mesh import TetMesh
 from ...mesh.triangles.triangle_mesh import TriangleMesh
-from ..shells.shell import magnetization_of
+from ..shells.shell import checked_magnetization_law, magnetization_of
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
@@ -33,6 +33,7 @@ class Skin(Owner):
         which needs a density too. By default the layer has no mass.
     remanent_magnetization: (3,) or (k, 3) A/m, at rest, in world axes; if it is None, a solve gives it:
         `values={solid.skin: {"remanent_magnetization": ...}}`.
+    magnetization_law: "stretches" with the faces, the default, or "rotates" with them only, as for a Shell.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.box((0.1, 0.02, 0.02), cells=(10, 2, 2))
@@ -57,7 +58,9 @@ class Skin(Owner):
         mass_density: Numbers | None = None,
         faces: Numbers | None = None,
         remanent_magnetization: Numbers | None = None,
+        magnetization_law: str = "stretches",
     ):
+        self.magnetization_law: str = checked_magnetization_law(magnetization_law)
         self.faces: np.ndarray | None = None if faces is None else selection("Skin faces", faces)
         self.thickness: np.ndarray = _positive("thickness", "m", thickness)
         self.mass_density: np.ndarray | None = (
@@ -117,7 +120,8 @@ class Skin(Owner):
     def replaced(self, **values: Any) -> Skin:
         """Return the same skin with other values."""
         now = {name: getattr(self, name) for name in self._replaceable}
-        return variant(Skin(faces=self.faces, **(now | values)), _corners=self._corners, _areas=self._areas)
+        made = Skin(faces=self.faces, magnetization_law=self.magnetization_law, **(now | values))
+        return variant(made, _corners=self._corners, _areas=self._areas)
 
     def _gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
         """Return the gradients by its values, including those through the vertex masses."""
@@ -173,7 +177,12 @@ class Skin(Owner):
         faces = mesh.faces[self.faces]
         used = np.unique(faces)
         surface = TriangleMesh(mesh.rest_positions[used], np.searchsorted(used, faces))
-        return {"owner": owner, "surface": surface._core, "surface_vertices": vertices[used]}
+        return {
+            "owner": owner,
+            "surface": surface._core,
+            "surface_vertices": vertices[used],
+            "magnetization_rotates": self.magnetization_law == "rotates",
+        }
 
     def __repr__(self) -> str:
         where = "all faces" if self.faces is None else f"{len(self.faces)} faces"

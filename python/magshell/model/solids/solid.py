@@ -12,7 +12,7 @@ from ..._runtime.frozen import variant
 from ..._runtime.solver_entry_point import grouped
 from ...mesh.tetrahedra.jacobian import shape_integrals, shape_products
 from ...mesh.tetrahedra.tet_mesh import TetMesh
-from ..shells.shell import magnetization_of
+from ..shells.shell import checked_magnetization_law, magnetization_of
 from .materials import ProjectiveMaterial, SolidMaterial
 from .mean_volume import warn_of_free_modes
 from .skin import Skin
@@ -44,6 +44,9 @@ class Solid(Owner):
     skin: Skin, a thin magnetized layer on its surface; as `solid.skin` it has values of its own.
     remanent_magnetization: (3,) or (n_t, 3) A/m, at rest, in world axes, of a solid that is magnetized throughout; zero
         if a solve is to give it.
+    magnetization_law: "stretches", the default, F M of the papers: the magnetization stretches with the body; or "rotates",
+        R M of the polar decomposition F = R U: it turns with the body and keeps its magnitude, as experiments with bodies
+        that are stretched show (docs/theory.md).
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.box((0.1, 0.02, 0.02), cells=(10, 2, 2))
@@ -67,6 +70,7 @@ class Solid(Owner):
         mean_volume: bool | None = None,
         skin: Skin | None = None,
         remanent_magnetization: Numbers | None = None,
+        magnetization_law: str = "stretches",
     ):
         if not isinstance(mesh, TetMesh):
             raise ValueError(f"mesh must be a TetMesh, got {type(mesh).__name__}")
@@ -95,6 +99,7 @@ class Solid(Owner):
             raise ValueError(f"skin must be a Skin, got {skin!r:.60}")
         self.skin: Skin | None = None if skin is None else skin._on(mesh, self.mesh)
         self.remanent_magnetization: np.ndarray | None = self._magnetization(remanent_magnetization)
+        self.magnetization_law: str = checked_magnetization_law(magnetization_law)
         if self.mean_volume:
             warn_of_free_modes(self.mesh, material.isochoric)
 
@@ -163,6 +168,7 @@ class Solid(Owner):
             "material": self.material._core_name,
             "mean_volume": self.mean_volume,
             "magnetic": self.remanent_magnetization is not None,
+            "magnetization_rotates": self.magnetization_law == "rotates",
         }
 
     def _add_numbers(self, label: str, values: Values, numbers: dict[Any, Any]) -> None:

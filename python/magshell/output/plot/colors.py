@@ -163,7 +163,7 @@ def _displacement(states: list[State], unit: LengthUnit) -> Scalar:
 
 
 def _magnetic_energy(states: list[State], _: LengthUnit) -> Scalar:
-    """Compute the magnetic energy per reference volume, - (F_0 M_r) . B at the barycenters, [Chen22] (24)."""
+    """Compute the magnetic energy per reference volume, - M . B at the barycenters, [Chen22] (24)."""
     densities = []
     for state in states:
         if not state.is_magnetized or (state.flux_density is None and not state.has_sources):

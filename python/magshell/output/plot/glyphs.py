@@ -52,7 +52,7 @@ def sample_faces(mesh: TriangleMesh, spacing: float) -> np.ndarray:
 
 
 def magnetization_glyphs(state: State, count: int, unit_vector: float) -> Glyphs:
-    """Return about `count` arrows of the magnetization F_0 M_r.
+    """Return about `count` arrows of the magnetization F_0 M_r or R M_r.
 
     A vector of length `unit_vector` [A/m] is drawn LENGTH spacings long. A tangential arrow is centered on its face, a
     normal one starts there.

@@ -21,7 +21,7 @@ from .limits import arrow_count
 class Style:
     """The things that are drawn in addition to the bodies, and the backend: `style` of ms.plot, ms.animate, ms.write_page.
 
-    arrows: arrows of the magnetization F_0 M_r: True for about 60 on a body, False for none, or their approximate number.
+    arrows: arrows of the current magnetization: True for about 60 on a body, False for none, or their approximate number.
     show_field: show a uniform field as one arrow next to the bodies, and a field that varies in space as arrows around them.
     rest: show the rest shape as a faint outline. mesh_lines: show the edges of the mesh.
     contacts: show the forces of all contacts, friction included, as arrows at the vertices, in front of everything else.

@@ -130,7 +130,7 @@ def write_series(
 
     Fields on points are `displacement` [m], `velocity` [m/s], in a field `flux_density` [T], and for scenes with contacts
     `contact_pressure` [Pa], the normal forces on both sides of a shell over a third of the adjacent faces' area. The
-    magnetization F_0 M_r in the deformed configuration is a field on faces, `magnetization` [A/m].
+    magnetization F_0 M_r or R M_r in the deformed configuration is a field on faces, `magnetization` [A/m].
 
     Returns the path of the PVD file. An earlier series of the same name is replaced. The PVD file is complete at the end;
     after an error, a full disk or Ctrl-C it lists the states that were written in full.

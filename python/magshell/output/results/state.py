@@ -20,6 +20,7 @@ from ...model.contact.obstacles import Obstacle
 from ...model.fields.field import AppliedField, UniformField
 from ...model.results.result_lookup import result_of
 from ...model.scene.scene import Scene
+from ...model.shells.deformed_magnetization import deformed_magnetization
 from ...model.shells.shell import Shell
 from ...model.shells.shell_stresses import ShellStresses
 from ...model.solids.solid import Solid
@@ -57,6 +58,7 @@ class State:
     links, tendons, shapes: surfaces of links, of tendons and of free rigid bodies, (vertices (n, 3) m, faces (m, 3)) each.
     elements: () -> [(first face, mesh, SolidStates or ShellStresses)] of the bodies of a result, or None.
     loads: () -> ContactLoads of a result of a scene with contacts, or None.
+    rotates: whether the magnetization of each face only rotates with it, (n_f,), or of all faces.
     """
 
     mesh: TriangleMesh | QuadraticTriangleMesh | TetMesh | JoinedMesh
@@ -75,6 +77,7 @@ class State:
     tendons: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
     loads: Callable[[], ContactLoads] | None = None
     shapes: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+    rotates: np.ndarray | bool = False
 
     @property
     def contact_pressures(self) -> np.ndarray | None:
@@ -83,13 +86,13 @@ class State:
 
     @property
     def magnetization(self) -> np.ndarray:
-        """The magnetization in the deformed configuration, F_0 M_r, (n_f, 3) A/m, [Chen22] (20)."""
+        """The magnetization in the deformed configuration, F_0 M_r [Chen22] (20) or R M_r, (n_f, 3) A/m."""
+        faces = self.mesh.faces
         if self.remanent_magnetization is None:
             return np.zeros((self.mesh.n_faces, 3))
-        coordinates = np.linalg.solve(
-            _frames(self.mesh.rest_positions, self.mesh.faces), self.remanent_magnetization[:, :, None]
+        return deformed_magnetization(
+            self.mesh.rest_positions[faces], self.positions[faces], self.remanent_magnetization, self.rotates
         )
-        return (_frames(self.positions, self.mesh.faces) @ coordinates)[:, :, 0]
 
     @property
     def is_magnetized(self) -> bool:
@@ -322,6 +325,7 @@ def _states(
             strength,
             title,
             obstacles=obstacles,
+            rotates=given.get("rotates", False),
         )
         for frame, flux, sources, strength, title in zip(
             frames, flux_densities, fields, strengths, titles, strict=True
@@ -371,7 +375,8 @@ def _with_own(given: dict[str, Any], scene: Scene, obstacles=None) -> dict[str, 
 
 
 def _magnetized(given: dict[str, Any], bodies) -> dict[str, Any]:
-    """Add the magnetization of the bodies, unless another is given."""
+    """Add the magnetization of the bodies, unless another is given, and on which faces it only rotates."""
+    given = {**given, "rotates": _rotating_faces(bodies)}
     own = [body._face_magnetization for body in bodies]
     if given["remanent_magnetization"] is not None or all(each is None for each in own):
         return given
@@ -380,6 +385,13 @@ def _magnetized(given: dict[str, Any], bodies) -> dict[str, Any]:
         np.broadcast_to(np.zeros(3) if each is None else each, (body.mesh.n_faces, 3)) for each, body in pairs
     ]
     return {**given, "remanent_magnetization": np.concatenate(rows)}
+
+
+def _rotating_faces(bodies) -> np.ndarray | bool:
+    """Return for each face of the bodies whether its magnetization only rotates with it, (n_f,); False if none does."""
+    laws = [body if isinstance(body, Shell) else body.skin for body in bodies]
+    rotates = [law is not None and law.magnetization_law == "rotates" for law in laws]
+    return any(rotates) and np.repeat(rotates, [body.mesh.n_faces for body in bodies])
 
 
 def _obstacles(values) -> tuple[Obstacle, ...]:
@@ -394,12 +406,3 @@ def _listed(value) -> tuple[Any, ...]:
     if value is None:
         return ()
     return tuple(value) if isinstance(value, list | tuple) else (value,)
-
-
-def _frames(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Return the matrices of each face with the columns a_1, a_2 (edges) and unit normal, (n_f, 3, 3)."""
-    x0, x1, x2 = np.moveaxis(positions[faces], 1, 0)
-    normal = np.cross(x1 - x0, x2 - x0)
-    length = np.linalg.norm(normal, axis=1, keepdims=True)
-    normal = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
-    return np.stack([x1 - x0, x2 - x0, normal], axis=2)

@@ -1,0 +1,103 @@
+// MagneticFace: the Zeeman energy of a uniformly magnetized triangle in an applied field, for any law of its magnetization.
+//
+//   E_f = - A~ h M . B(x_b)                                                         [J]   [Chen22] (24)
+//
+// A law (magnetic.h, magnetic_rotating.h) derives from MagneticFace<Law> and provides
+//
+//   struct Element                        A~ h, the coordinates (alpha, beta, gamma) of M~_r, and what else it needs of the rest shape
+//   Law(x, element)                       at corners x
+//   frame(columns)                        f_1, f_2, n with M = alpha f_1 + beta f_2 + gamma n
+//   frame_rate(rate, columns)             their rates for given rates of the corners
+//   by_edges(element, b, d1, d2)          d(M . b)/da_1 and d(M . b)/da_2 for a fixed b
+//   edge_hessian(element, b, h11, h12, h22)  the second derivatives of - A~ h M . b by a_1 and a_2
+//   rest_frame(a1, a2), set_rest(a1, a2, element, lane), is_linear(coordinates)
+//
+// One face per SIMD lane.
+#pragma once
+
+#include "magshell/energy/face_frame.h"
+#include "magshell/energy/symmetric3.h"
+
+namespace magshell {
+
+/// The applied field at a point. Gradient and curvature are set only if the field varies in space.
+struct FieldAtPoint {
+    SimdVec3 flux;       // B                      [T]
+    SimdMat3 gradient;   // dB_i/dx_j              [T/m]
+    SimdMat3 curvature;  // d2(M . B)/dx_j dx_k    [A/m T/m2]
+};
+
+template <class Law>
+struct MagneticFace : FaceFrame {
+    using FaceFrame::FaceFrame;
+
+    template <class Element>
+    SimdDouble energy(const Element& e, const SimdVec3& flux) const {
+        return -e.volume * dot(law().magnetization(e), flux);
+    }
+
+    template <class Element>
+    void gradient(const Element& e, const SimdVec3& flux, SimdVec3 g[3]) const {
+        SimdVec3 d1, d2;
+        law().by_edges(e, flux, d1, d2);
+        g[1] = -(e.volume * d1);
+        g[2] = -(e.volume * d2);
+        g[0] = -(g[1] + g[2]);
+    }
+
+    /// Returns the part of each node's gradient that is due to the gradient of the field: - A~ h (dB/dx)^T M / 3.
+    template <class Element>
+    SimdVec3 gradient_by_position(const Element& e, const FieldAtPoint& field) const {
+        const SimdVec3 m = law().magnetization(e);
+        const SimdDouble* g = field.gradient.at;
+        const SimdVec3 pull = {g[0] * m.x + g[3] * m.y + g[6] * m.z, g[1] * m.x + g[4] * m.y + g[7] * m.z,
+                               g[2] * m.x + g[5] * m.y + g[8] * m.z};
+        return (e.volume * SimdDouble(-1.0 / 3.0)) * pull;
+    }
+
+    /// Computes the lower blocks at lower_index(k, l) in a field taken as uniform.
+    template <class Element>
+    void hessian(const Element& e, const SimdVec3& flux, SimdMat3 h[6]) const {
+        SimdMat3 h11, h12, h22;
+        law().edge_hessian(e, flux, h11, h12, h22);
+        for (int row = 0; row < 3; ++row)
+            for (int column = 0; column < 3; ++column) {
+                const int k = 3 * row + column, transposed = 3 * column + row;
+                const SimdDouble b11 = h11.at[k], b12 = h12.at[k], b21 = h12.at[transposed], b22 = h22.at[k];
+                h[lower_index(1, 1)].at[k] = b11;
+                h[lower_index(2, 1)].at[k] = b21;
+                h[lower_index(2, 2)].at[k] = b22;
+                h[lower_index(1, 0)].at[k] = -(b11 + b12);
+                h[lower_index(2, 0)].at[k] = -(b21 + b22);
+                h[lower_index(0, 0)].at[k] = b11 + b12 + b21 + b22;
+            }
+    }
+
+    /// Adds the part due to the variation of the field in space: d2(M . B(x_b)) with one or two derivatives by x_b.
+    template <class Element>
+    void add_hessian_by_position(const Element& e, const FieldAtPoint& field, SimdMat3 h[6]) const {
+        SimdMat3 by_node[3];  // d(M . dB/dx_j)/dx_node, row = component of the node, column = j
+        for (int j = 0; j < 3; ++j) {
+            SimdVec3 d1, d2;
+            law().by_edges(e, {field.gradient.at[j], field.gradient.at[3 + j], field.gradient.at[6 + j]}, d1,
+                           d2);
+            const SimdVec3 d0 = -(d1 + d2);
+            const SimdVec3* of_node[3] = {&d0, &d1, &d2};
+            for (int k = 0; k < 3; ++k) {
+                by_node[k].at[j] = of_node[k]->x;
+                by_node[k].at[3 + j] = of_node[k]->y;
+                by_node[k].at[6 + j] = of_node[k]->z;
+            }
+        }
+        const SimdMat3 both = (e.volume * SimdDouble(-1.0 / 9.0)) * field.curvature;
+        const SimdDouble third = e.volume * SimdDouble(-1.0 / 3.0);
+        for (int k = 0; k < 3; ++k)
+            for (int l = 0; l <= k; ++l)
+                h[lower_index(k, l)] += both + third * (by_node[k] + transpose(by_node[l]));
+    }
+
+  private:
+    const Law& law() const { return static_cast<const Law&>(*this); }
+};
+
+}  // namespace magshell
