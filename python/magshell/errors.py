@@ -43,6 +43,13 @@ class MeshQualityWarning(UserWarning):
     """
 
 
+class MeshGroupWarning(UserWarning):
+    """A warning about content of a mesh file that is not read, or about named groups that a mesh does not keep.
+
+    It lists everything of one file at once.
+    """
+
+
 class UnitWarning(UserWarning):
     """A warning about a value whose unit is probably wrong, such as mm, kPa or mT given for m, Pa or T.
 

@@ -96,6 +96,14 @@ def _meshes(s: Sample) -> Iterator[Call]:
     yield Call("TriangleMesh.faces_where", mesh.faces_where, left)
     yield Call("TriangleMesh.nearest_vertex", mesh.nearest_vertex, {"point": (0, 0, 0)})
     yield Call("TriangleMesh.edges_between", mesh.edges_between, {"vertex_indices": np.arange(5)})
+    yield Call(
+        "TriangleMesh.faces_between", mesh.faces_between, {"vertex_indices": np.arange(mesh.n_vertices)}
+    )
+    groups = {"A": mesh.edges_where(lambda p: p[:, 0] > -np.inf), "B": {"faces": np.arange(3)}}
+    yield Call("TriangleMesh.with_groups", mesh.with_groups, {"groups": groups})
+    named = mesh.with_groups(groups)
+    for select in (named.vertices_in, named.edges_in, named.faces_in):
+        yield Call(f"TriangleMesh.{select.__name__}", select, {"group": "B"})
 
 
 def _scenes(s: Sample) -> Iterator[Call]:

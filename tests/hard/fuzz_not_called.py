@@ -38,6 +38,7 @@ NOT_CALLED = {
     "LargeStrainWarning": "a warning",
     "StepErrorWarning": "a warning",
     "FieldSamplingWarning": "a warning",
+    "MeshGroupWarning": "a warning",
     "MeshQualityWarning": "a warning",
     "UnitWarning": "a warning",
     "VibrationModes": "a result",

@@ -7,10 +7,10 @@ from functools import cached_property
 import numpy as np
 
 from .._runtime.mixins import PlotMixin
-from .selection import MeshSelection
+from .group_selection import GroupSelection
 
 
-class MeshBase(PlotMixin, MeshSelection):
+class MeshBase(PlotMixin, GroupSelection):
     """Base class of meshes: counts and lengths that follow from rest_positions, edges, faces and components."""
 
     @property

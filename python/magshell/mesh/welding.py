@@ -11,6 +11,7 @@ import scipy
 
 from .._input.quantity import quantity
 from .._runtime.frozen import immutable
+from .groups import Members, merged, renumbered
 from .selection import RELATIVE_TOLERANCE
 from .tetrahedra.tet_mesh import TetMesh
 from .topology import groups
@@ -88,6 +89,7 @@ def weld_solids(meshes: tuple[TetMesh, ...], tolerance: float | None) -> TetWeld
     maps = tuple(np.split(number, offsets[1:-1]))
     _check_solids_connected(meshes, joined, maps, tolerance)
     ends = np.cumsum([0, *(mesh.n_tetrahedra for mesh in meshes)])
+    joined = joined._with_members(_merged_groups(meshes, maps, ends))
     return TetWeld(joined, maps, tuple(np.arange(a, b) for a, b in pairwise(ends)))
 
 
@@ -211,7 +213,7 @@ def weld(*meshes: TriangleMesh | TetMesh, tolerance: float | None = None) -> Wel
     stay open; if both sides of a slit would be welded to one vertex, ValueError is raised.
 
     Tetrahedral meshes are welded along faces of their surfaces, in the same way. The tetrahedra keep the numbers and names
-    of their `parts`.
+    of their `parts`. Named groups are kept; those of one name in several meshes become one.
 
     Args:
         meshes: two or more, all triangle meshes or all tetrahedral meshes of one order. Normals of triangle meshes must
@@ -252,7 +254,16 @@ def weld(*meshes: TriangleMesh | TetMesh, tolerance: float | None = None) -> Wel
 
     ends = np.cumsum([mesh.n_faces for mesh in meshes])
     face_maps = tuple(np.arange(end - mesh.n_faces, end) for mesh, end in zip(meshes, ends, strict=True))
-    return Weld(TriangleMesh(positions, faces), tuple(maps), face_maps)
+    joined = TriangleMesh(positions, faces)._with_members(_merged_groups(meshes, maps, [0] * len(meshes)))
+    return Weld(joined, tuple(maps), face_maps)
+
+
+def _merged_groups(meshes, maps, first_tetrahedra) -> dict[str, Members]:
+    """Return the groups of the welded mesh; groups of one name in several meshes become one."""
+    return merged(
+        renumbered(mesh._groups, mapped, int(first))
+        for mesh, mapped, first in zip(meshes, maps, first_tetrahedra, strict=False)
+    )
 
 
 def _vertex_maps(meshes, tolerance: float) -> list[np.ndarray]:

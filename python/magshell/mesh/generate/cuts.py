@@ -9,6 +9,7 @@ import scipy
 
 from ..._input.arrays import index_array
 from ..._runtime.solver_entry_point import grouped
+from ..groups import Members, members, row_numbers
 from ..triangles.triangle_mesh import TriangleMesh, checked_mesh
 
 if TYPE_CHECKING:
@@ -56,7 +57,21 @@ def cut(mesh: TriangleMesh, edges: Numbers) -> TriangleMesh:
         )
     origin = np.empty(corner_vertex.max() + 1, dtype=np.int64)
     origin[corner_vertex] = mesh.faces.ravel()
-    return TriangleMesh(mesh.rest_positions[origin], corner_vertex.reshape(-1, 3))
+    opened = TriangleMesh(mesh.rest_positions[origin], corner_vertex.reshape(-1, 3))
+    return opened._with_members(_groups(mesh, opened, origin))
+
+
+def _groups(mesh: TriangleMesh, opened: TriangleMesh, origin: np.ndarray) -> dict[str, Members]:
+    """Return the groups of the cut mesh: both sides of a cut belong to the groups of its edges and vertices."""
+    groups = {}
+    for name, group in mesh._groups.items():
+        edges = np.isin(mesh.face_edges, row_numbers(mesh.edges, group.edges))
+        groups[name] = members(
+            np.flatnonzero(np.isin(origin, group.vertices)),
+            opened.edges[np.unique(opened.face_edges[edges])],
+            opened.faces[row_numbers(mesh.faces, group.faces)],
+        )
+    return groups
 
 
 def _corners_at(mesh: TriangleMesh, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""Checks of the counts in STL and MSH files against the file's size, before memory is allocated for them."""
+"""Checks of the counts in STL, MSH and VTK files against the file's size, before memory is allocated for them."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ _ELEMENT_NODES = {
 
 
 def check_counts(path: Path) -> None:
-    """Raise ValueError if an STL or MSH file claims more data than its size allows, or for STL less."""
-    check = {".stl": _check_stl, ".msh": _check_msh}.get(path.suffix.lower())
+    """Raise ValueError if an STL, MSH or VTK file claims more data than its size allows, or for STL less."""
+    check = {".stl": _check_stl, ".msh": _check_msh, ".vtk": _check_vtk}.get(path.suffix.lower())
     if check:
         check(path.read_bytes())
 
@@ -37,6 +37,30 @@ def _check_stl(data: bytes) -> None:
         raise ValueError(
             f"its header says {count:,} triangles, which take {84 + 50 * count:,} bytes, but the file has {len(data):,}"
         )
+
+
+_VTK_COUNTS = re.compile(
+    rb"^[ \t]*(POINTS|CELLS|CELL_TYPES|POINT_DATA|CELL_DATA|LOOKUP_TABLE|COLOR_SCALARS|FIELD)[ \t]+([^\r\n]*)",
+    re.IGNORECASE | re.MULTILINE,
+)
+_VTK_ARRAY = re.compile(rb"^[ \t]*\S+[ \t]+(\d+)[ \t]+(\d+)[ \t]+(?:\w+)[ \t]*\r?$", re.MULTILINE)
+
+
+def _check_vtk(data: bytes) -> None:
+    """Check a legacy VTK file: every number that follows takes a byte at least, in text two."""
+    if b"UNSTRUCTURED_GRID" not in data[:4096].upper():
+        raise ValueError("of the legacy VTK files only those of an UNSTRUCTURED_GRID are read")
+    for found in _VTK_COUNTS.finditer(data):
+        for word in found[2].split():
+            if word.isdigit() and int(word) > len(data):
+                raise ValueError(
+                    f"its {found[1].decode()} says {int(word):,}, but the file has {len(data):,} bytes in all"
+                )
+    for found in _VTK_ARRAY.finditer(data):
+        if int(found[1]) * int(found[2]) > len(data):
+            raise ValueError(
+                f"{found[0].decode('latin-1').strip()!r:.80} says more numbers than the file has bytes, {len(data):,}"
+            )
 
 
 def _check_msh(data: bytes) -> None:

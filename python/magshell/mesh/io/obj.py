@@ -1,20 +1,26 @@
-"""OBJ files: vertices and triangles; colours, normals, textures, groups and materials are ignored."""
+"""OBJ files: vertices, triangles and groups; colours, normals, textures and materials are ignored."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 
+from ..groups import members
+from .named_groups import Named
+from .triangles import TriangleContent
 
-def read_obj(path: Path) -> tuple[np.ndarray, np.ndarray, dict[Any, Any], dict[Any, Any]]:
-    """Read an OBJ file as (points, faces, vertex fields, face fields); the fields are empty.
+
+def read_obj(path: Path) -> TriangleContent:
+    """Read an OBJ file; the names of its groups (`g`) and objects (`o`) become groups of faces.
 
     Raises ValueError, which names the line, for an invalid vertex and for a face that is not a triangle.
     """
     points: list[list[float]] = []
     faces: list[list[int]] = []
+    names: dict[str, list[str]] = {"g": [], "o": []}
+    of_names: dict[str, list[int]] = {}
     for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), start=1):
         words = line.split()
         try:
@@ -23,13 +29,19 @@ def read_obj(path: Path) -> tuple[np.ndarray, np.ndarray, dict[Any, Any], dict[A
                 points.append([float(x), float(y), float(z)])
             elif words[:1] == ["f"]:
                 faces.append([_vertex(word, len(points)) for word in words[1:]])
+                for name in {*names["g"], *names["o"]}:
+                    of_names.setdefault(name, []).append(len(faces) - 1)
+            elif words[:1] in (["g"], ["o"]):
+                names[words[0]] = words[1:]
         except ValueError as error:
             raise ValueError(f"line {number}, {line!r}: {error}") from error
         if faces and len(faces[-1]) != 3:
             raise ValueError(
                 f"line {number}, {line!r}: a face of {len(words) - 1} vertices; only triangles are supported"
             )
-    return np.array(points).reshape(-1, 3), np.array(faces, dtype=np.int64).reshape(-1, 3), {}, {}
+    triangles = np.array(faces, dtype=np.int64).reshape(-1, 3)
+    named = Named({name: members(faces=triangles[rows]) for name, rows in of_names.items()})
+    return TriangleContent(np.array(points).reshape(-1, 3), triangles, {}, {}, named)
 
 
 def _vertex(word: str, n_points: int) -> int:

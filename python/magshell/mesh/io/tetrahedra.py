@@ -1,7 +1,8 @@
-"""Conversion between tetrahedral meshes and meshio's meshes, for MSH and VTU files."""
+"""Conversion between tetrahedral meshes and the contents of files that meshio or `read_inp` reads."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from ..._input.arrays import integer_array
 from ..tetrahedra.tet_mesh import TetMesh
+from .named_groups import Named, drop_group_fields, groups_of_vertex_fields, merged_names
 
 # gmsh writes them in addition to the solid
 LOWER_CELLS = ("vertex", "line", "line3", "triangle", "triangle6")
@@ -33,6 +35,7 @@ class TetContent:
     vertex_fields: dict[str, np.ndarray]
     tetrahedron_fields: dict[str, np.ndarray]
     part_names: dict[str, int]
+    named: Named
 
     def build(self) -> tuple[TetMesh, TetFields]:
         """Build the mesh and its fields; its parts come from the field `part` or gmsh's physical groups of volumes."""
@@ -40,11 +43,13 @@ class TetContent:
         chosen = next((name for name in _PART_FIELDS if name in fields), None)
         parts = None if chosen is None else integer_array(f"the cell field {chosen!r}", fields.pop(chosen))
         mesh = TetMesh(self.points, self.tetrahedra, parts, self.part_names)
-        return mesh, TetFields(self.vertex_fields, fields)
+        return mesh, TetFields(self.vertex_fields, drop_group_fields(fields))
 
 
-def tetrahedra_of(content: Any) -> TetContent | None:
+def tetrahedra_of(content: Any, named: Callable[[str], Named]) -> TetContent | None:
     """Extract the tetrahedra from meshio's mesh; None if it has none.
+
+    named: returns the named groups if tetrahedra of the given kind are read.
 
     Raises ValueError if it has other volume cells, or tetrahedra of both 4 and 10 points.
     """
@@ -65,12 +70,16 @@ def tetrahedra_of(content: Any) -> TetContent | None:
     names = {
         name: int(data[0]) for name, data in content.field_data.items() if len(data) == 2 and data[1] == 3
     }
+    vertex_fields = dict(content.point_data)
+    groups = named(there[0])
+    groups.groups = merged_names(groups.groups, groups_of_vertex_fields(vertex_fields))
     return TetContent(
         np.asarray(content.points, dtype=np.float64),
         np.concatenate([content.cells[k].data for k in blocks]),
-        dict(content.point_data),
+        vertex_fields,
         fields,
         names,
+        groups,
     )
 
 

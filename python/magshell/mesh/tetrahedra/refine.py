@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..groups import renumbered
 from ..off_surface import warn_of_nodes_off
 from ..signed_distance import Distance, middles_on_surface
 from ..topology import EDGES, MIRRORED, edge_table
@@ -24,15 +25,16 @@ _LEAST_JACOBIAN = 0.1  # [-] smallest Jacobian determinant, relative to that of 
 def quadratic(mesh: TetMesh, surface: Projection | None) -> TetMesh:
     """Return the mesh with ten nodes, with the midside nodes on the boundary moved onto a surface if one is given."""
     nodes = ten_nodes(mesh)
+    mesh._warn_of_new_vertices()
     positions = np.concatenate([mesh.rest_positions, mesh.edge_midpoints])
     if surface is None:
-        return type(mesh)(positions, nodes, mesh.parts, mesh.part_names)
+        return type(mesh)(positions, nodes, mesh.parts, mesh.part_names)._with_members(mesh._groups)
     edges, middles = middles_on_surface(mesh, mesh.boundary_edges, surface)
     target = positions.copy()
     target[mesh.n_vertices + edges] = middles
     positions = limit_displacements(positions, target, nodes)
     warn_of_nodes_off(mesh, edges, positions[mesh.n_vertices + edges], surface)
-    return type(mesh)(positions, nodes, mesh.parts, mesh.part_names)
+    return type(mesh)(positions, nodes, mesh.parts, mesh.part_names)._with_members(mesh._groups)
 
 
 def curved(mesh: TetMesh, project: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> TetMesh:
@@ -43,7 +45,8 @@ def curved(mesh: TetMesh, project: Callable[[np.ndarray, np.ndarray], np.ndarray
     nodes = ten_nodes(mesh)
     straight = np.concatenate([mesh.rest_positions, mesh.edge_midpoints])
     target = np.concatenate([mesh.rest_positions, project(mesh.edge_midpoints, mesh.edges)])
-    return type(mesh)(limit_displacements(straight, target, nodes), nodes, mesh.parts, mesh.part_names)
+    curved_mesh = type(mesh)(limit_displacements(straight, target, nodes), nodes, mesh.parts, mesh.part_names)
+    return curved_mesh._with_members(mesh._groups)
 
 
 def ten_nodes(mesh: TetMesh) -> np.ndarray:
@@ -71,9 +74,10 @@ def limit_displacements(straight: np.ndarray, target: np.ndarray, nodes: np.ndar
 def linear(mesh: TetMesh) -> TetMesh:
     """Return the mesh of the corners only, with four-node tetrahedra."""
     used = np.unique(mesh.corners)
-    return type(mesh)(
-        mesh.rest_positions[used], np.searchsorted(used, mesh.corners), mesh.parts, mesh.part_names
-    )
+    numbers = np.full(mesh.n_vertices, -1)
+    numbers[used] = np.arange(len(used))
+    straight = type(mesh)(mesh.rest_positions[used], numbers[mesh.corners], mesh.parts, mesh.part_names)
+    return straight._with_members(renumbered(mesh._groups, numbers))
 
 
 # nodes of a tetrahedron: 0 to 3 are its corners, 4 to 9 the midpoints of the edges 01 12 20 03 13 23
@@ -109,8 +113,9 @@ def refined(mesh: TetMesh, surface: Projection | None = None) -> TetMesh:
         nodes = ten_nodes(mesh)
         positions = np.concatenate([mesh.rest_positions, mesh.edge_midpoints])
         if surface is not None:
-            positions = quadratic(mesh, surface).rest_positions
-        return type(mesh)(positions, nodes[:, CHILDREN].reshape(-1, 4), parts, mesh.part_names)
+            positions = quadratic(mesh._with_members({}), surface).rest_positions
+        fine = type(mesh)(positions, nodes[:, CHILDREN].reshape(-1, 4), parts, mesh.part_names)
+        return fine._with_members(mesh._refined_groups())
 
     corners = mesh.tetrahedra[:, CHILDREN].reshape(-1, 4)
     table = edge_table(corners)
@@ -121,5 +126,5 @@ def refined(mesh: TetMesh, surface: Projection | None = None) -> TetMesh:
     first = np.unique(table.tetrahedron_edges.ravel(), return_index=True)[1]
     positions = np.concatenate([mesh.rest_positions, on_edges[first]])
     nodes = np.concatenate([corners, mesh.n_vertices + table.tetrahedron_edges], axis=1)
-    fine = type(mesh)(positions, nodes, parts, mesh.part_names)
+    fine = type(mesh)(positions, nodes, parts, mesh.part_names)._with_members(mesh._refined_groups())
     return fine if surface is None else quadratic(fine.first_order(), surface)

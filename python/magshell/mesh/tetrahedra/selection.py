@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..._input.arrays import count, index_array
 from ..._input.selections import Indices
+from ..groups import Members, counts, description, joined, members, unknown
 from ..mesh_base import MeshBase
 from ..selection import _where
+from ..topology import FACES
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
@@ -42,7 +44,9 @@ class TetSelection(MeshBase):
         return _where("tetrahedron", predicate, self.tetrahedron_barycenters, np.arange(self.n_tetrahedra))
 
     def tetrahedra_in(self, part: int | str | Sequence[int | str]) -> np.ndarray:
-        """Select the tetrahedra of a part, given by its number or name, or of several parts.
+        """Select the tetrahedra of a part, given by its number or name, of a named group of tetrahedra, or of several.
+
+        Raises ValueError, with the nearest names, if there is none, or if the group has no tetrahedra.
 
         >>> import magshell as ms
         >>> block = ms.meshes.box((2.0, 1.0, 1.0), cells=(2, 1, 1))
@@ -50,40 +54,79 @@ class TetSelection(MeshBase):
         >>> len(halves.tetrahedra_in("right"))
         6
         """
-        return Indices(np.flatnonzero(self._in_parts(part)), "tetrahedra")
+        found = self._in(part)
+        if len(found.tetrahedra) == 0:
+            have = ", ".join(f"{n} {kind}" for kind, n in counts(found).items()) or "no members"
+            raise ValueError(f"{part!r:.60} has no tetrahedra: it has {have}")
+        return Indices(found.tetrahedra, "tetrahedra")
 
-    def vertices_in(self, part: int | str | Sequence[int | str]) -> np.ndarray:
-        """Select the vertices of the tetrahedra of a part, or of several; a vertex between two parts belongs to both."""
-        return Indices(np.unique(self.tetrahedra[self._in_parts(part)]).astype(np.int64), "vertices")
+    def vertices_in(self, group: int | str | Sequence[int | str]) -> np.ndarray:
+        """Select the vertices of a named group or a part, or of several: its own, and all nodes of its members.
 
-    def faces_in(self, part: int | str | Sequence[int | str]) -> np.ndarray:
-        """Select the faces of the surface whose tetrahedron belongs to a part, or to one of several.
+        A vertex between two parts belongs to both.
+        """
+        return super().vertices_in(group)
+
+    def edges_in(self, group: int | str | Sequence[int | str]) -> np.ndarray:
+        """Select the edges of a named group or a part, or of several: its own, and those of its faces and tetrahedra."""
+        return super().edges_in(group)
+
+    def faces_in(self, group: int | str | Sequence[int | str]) -> np.ndarray:
+        """Select the faces of a named group, and those on the surface whose tetrahedron belongs to a part, or to several.
 
         Raises ValueError if there are none.
         """
-        found = np.flatnonzero(self._in_parts(part)[self.face_tetrahedra])
-        if len(found) == 0:
-            raise ValueError(f"part {part!r} has no faces: none of its tetrahedra is on the surface")
-        return Indices(found, "faces")
+        return super().faces_in(group)
 
-    def _in_parts(self, part) -> np.ndarray:
-        """Return whether each tetrahedron belongs to the part, or to one of several, (n_t,) bool."""
-        wanted = [part] if isinstance(part, str) or not isinstance(part, Iterable) else list(part)
-        numbers = [self._part_number(each) for each in wanted]
-        return np.isin(self.parts, numbers)
+    @property
+    def groups(self) -> dict[str, dict[str, int]]:
+        """The named groups, and the parts with a name, {name: {kind of members: number}}, as a copy."""
+        named = {name: counts(self._named(name)) for name in self.part_names if self._has_part(name)}
+        return {**super().groups, **named}
 
-    def _part_number(self, part) -> int:
+    def _groups_text(self) -> str:
+        return description(self.groups)
+
+    def _named(self, name: Any) -> Members:
+        """Return the members of a group, of a part, or of both if they have the same name."""
+        if isinstance(name, str) and name in self._groups and not self._has_part(name):
+            return self._groups[name]
+        part = members(tetrahedra=np.flatnonzero(self.parts == self._part_number(name)))
+        return joined([part, self._groups[name]]) if name in self._groups else part
+
+    def _has_part(self, name: str) -> bool:
+        """Return whether a tetrahedron belongs to the part of this name."""
+        return name in self.part_names and bool((self.parts == self.part_names[name]).any())
+
+    def _part_number(self, part: Any) -> int:
         """Return the number of a part given by its number or name. Raises ValueError if no tetrahedron belongs to it."""
         there = np.unique(self.parts).tolist()
         names = ", ".join(f"{name!r} ({number})" for name, number in self.part_names.items())
         what = f"its parts are {', '.join(map(str, there[:20]))}" + (f", named {names}" if names else "")
         if isinstance(part, str):
             if part not in self.part_names:
-                raise ValueError(f"the mesh has no part {part!r}: {what}")
+                raise ValueError(f"{unknown(part, [*self._groups, *self.part_names])}; {what}")
             part = self.part_names[part]
         if isinstance(part, bool) or not isinstance(part, int | np.integer) or part not in there:
             raise ValueError(f"the mesh has no part {part!r:.60}: {what}")
         return int(part)
+
+    @property
+    def _corners_of_sides(self) -> np.ndarray:
+        return self.faces_of_corners
+
+    @property
+    def _middle_nodes(self) -> np.ndarray | None:
+        return self.edge_nodes if self.order == 2 else None
+
+    def _sides_of_tetrahedra(self, tetrahedra: np.ndarray) -> np.ndarray:
+        return np.flatnonzero(np.isin(self._outer // 4, tetrahedra))
+
+    def _corners_of_tetrahedra(self, tetrahedra: np.ndarray) -> np.ndarray:
+        return self.corners[tetrahedra].astype(np.int64)
+
+    def _all_sides(self) -> np.ndarray:
+        return self.corners[:, FACES].reshape(-1, 3)
 
 
 def checked_parts(parts: Numbers, n_tetrahedra: int) -> np.ndarray:

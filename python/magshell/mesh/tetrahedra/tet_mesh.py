@@ -97,7 +97,8 @@ class TetMesh(TetSelection):
 
     # Copies and worker processes compute the connectivity again, which is cheap.
     def __reduce__(self) -> tuple[Any, ...]:
-        return TetMesh, (self.rest_positions, self.tetrahedra, self.parts, self.part_names)
+        made_from = (self.rest_positions, self.tetrahedra, self.parts, self.part_names)
+        return TetMesh, made_from, self._groups_state()
 
     def __repr__(self) -> str:
         extent = " x ".join(f"{length:.4g}" for length in np.ptp(self.rest_positions, axis=0))
@@ -112,7 +113,7 @@ class TetMesh(TetSelection):
             f"  size: {extent} m, volume {self.volume:.4g} m3, surface {self.face_areas.sum():.4g} m2\n"
             f"  shape: {pieces}, {parts}\n"
             f"  tetrahedra: edges {self.edge_lengths.min():.3g} to {self.edge_lengths.max():.3g} m, dihedral angles "
-            f"{angles[0]:.1f} to {angles[1]:.1f} deg, aspect at most {self.quality.aspects.max():.3g}"
+            f"{angles[0]:.1f} to {angles[1]:.1f} deg, aspect at most {self.quality.aspects.max():.3g}{self._groups_text()}"
         )
 
     @classmethod
@@ -236,9 +237,14 @@ class TetMesh(TetSelection):
     @cached_property
     def surface(self) -> TriangleMesh:
         """The surface as a TriangleMesh: its faces are `faces`, its vertices `surface_vertices`."""
-        return TriangleMesh(
+        surface = TriangleMesh(
             self.rest_positions[self.surface_vertices], np.searchsorted(self.surface_vertices, self.faces)
         )
+        if not self._groups:
+            return surface
+        numbers = np.full(self.n_vertices, -1)
+        numbers[self.surface_vertices] = np.arange(len(self.surface_vertices))
+        return surface._with_members(surface._existing(self._surface_groups(numbers)))
 
     @cached_property
     def surface_vertices(self) -> np.ndarray:
@@ -315,7 +321,7 @@ class TetMesh(TetSelection):
 
     def with_parts(self, parts: Numbers, names: dict[str, int] | None = None) -> TetMesh:
         """Return the same mesh with other parts (n_t,), integers or booleans, and names {name: number} for them."""
-        return TetMesh(self.rest_positions, self.tetrahedra, parts, names)
+        return TetMesh(self.rest_positions, self.tetrahedra, parts, names)._with_members(self._groups)
 
     def second_order(self, surface: Projection | None = None) -> TetMesh:
         """Return the mesh with ten nodes: corners keep their numbers, edge k gets node n_v + k (see `edge_nodes`).
@@ -350,9 +356,9 @@ class TetMesh(TetSelection):
         tetrahedra = self.tetrahedra
         if straight_volumes(positions[tetrahedra[:1, :4]])[0] < 0:
             tetrahedra = tetrahedra[:, MIRRORED[: tetrahedra.shape[1]]]
-        return TetMesh(positions, tetrahedra, self.parts, self.part_names)
+        return TetMesh(positions, tetrahedra, self.parts, self.part_names)._with_members(self._groups)
 
     def scaled(self, factor: float) -> TetMesh:
         """Return the mesh with all coordinates multiplied by a positive factor."""
         positions = self.rest_positions * positive("factor", "", factor)
-        return TetMesh(positions, self.tetrahedra, self.parts, self.part_names)
+        return TetMesh(positions, self.tetrahedra, self.parts, self.part_names)._with_members(self._groups)

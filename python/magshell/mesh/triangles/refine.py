@@ -27,4 +27,5 @@ def refined(mesh: TriangleMesh, surface: Distance | None) -> TriangleMesh:
         middles = middles.copy()
         middles[edges] = on_it
     nodes = np.concatenate([mesh.faces, mesh.n_vertices + mesh.face_edges], axis=1)
-    return type(mesh)(np.concatenate([mesh.rest_positions, middles]), nodes[:, _CHILDREN].reshape(-1, 3))
+    fine = type(mesh)(np.concatenate([mesh.rest_positions, middles]), nodes[:, _CHILDREN].reshape(-1, 3))
+    return fine._with_members(mesh._refined_groups())

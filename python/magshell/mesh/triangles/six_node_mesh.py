@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +11,8 @@ import numpy as np
 from ..._input.arrays import index_array
 from ..._input.quantity import quantity
 from ..._input.scalars import positive
+from ..._input.selections import Indices
+from ..groups import renumbered
 from ..mesh_base import MeshBase, frozen
 from ..off_surface import warn_of_straight_edges
 from ..selection import _where
@@ -101,9 +103,9 @@ class QuadraticTriangleMesh(MeshBase):
         if project is not None:
             middles = _projected("project(midpoints)", "n_e", project, middles)
         nodes = mesh.n_vertices + mesh.face_edges[:, [2, 0, 1]]  # edge i is opposite corner i
-        return cls(
-            np.concatenate([mesh.rest_positions, middles]), np.concatenate([mesh.faces, nodes], axis=1)
-        )
+        mesh._warn_of_new_vertices()
+        positions = np.concatenate([mesh.rest_positions, middles])
+        return cls(positions, np.concatenate([mesh.faces, nodes], axis=1))._with_members(mesh._groups)
 
     @classmethod
     def fitted(cls, mesh: TriangleMesh, to: TriangleMesh | None = None) -> QuadraticTriangleMesh:
@@ -135,7 +137,8 @@ class QuadraticTriangleMesh(MeshBase):
 
     # A copy or a pickle stores positions and elements only; the connectivity is computed again, which is cheap.
     def __reduce__(self) -> tuple[Any, ...]:
-        return QuadraticTriangleMesh._without_warning, (self.rest_positions, self.elements)
+        made_from = (self.rest_positions, self.elements)
+        return QuadraticTriangleMesh._without_warning, made_from, self._groups_state()
 
     def __repr__(self) -> str:
         extent = " x ".join(f"{length:.4g}" for length in np.ptp(self.rest_positions, axis=0))
@@ -145,7 +148,7 @@ class QuadraticTriangleMesh(MeshBase):
             f"{self.n_edges} edges\n"
             f"  size: {extent} m, area {self.element_areas.sum():.4g} m2\n"
             f"  shape: {parts}, {len(self.boundary_edges)} edges on the boundary\n"
-            f"  elements: edges {self.edge_lengths.min():.3g} to {self.edge_lengths.max():.3g} m"
+            f"  elements: edges {self.edge_lengths.min():.3g} to {self.edge_lengths.max():.3g} m{self._groups_text()}"
         )
 
     # Nodes and elements
@@ -236,7 +239,7 @@ class QuadraticTriangleMesh(MeshBase):
     @cached_property
     def surface(self) -> TriangleMesh:
         """The flat triangles `faces` as a TriangleMesh, with the same vertex numbers."""
-        return TriangleMesh(self.rest_positions, self.faces)
+        return TriangleMesh(self.rest_positions, self.faces)._with_members(self._surface_groups())
 
     @property
     def surface_vertices(self) -> np.ndarray:
@@ -306,6 +309,18 @@ class QuadraticTriangleMesh(MeshBase):
         """Select the edges with both ends and the midside node at the given coordinates [m]; see `vertices_at`."""
         return self._at("edge", self.nodes_of_edges, x, y, z, tolerance)
 
+    def elements_in(self, group: str | Sequence[str]) -> np.ndarray:
+        """Select the elements of a named group of faces, or of several. Raises ValueError if there are none."""
+        return Indices(self._sides_in(group), "elements of six nodes")
+
+    @property
+    def _corners_of_sides(self) -> np.ndarray:
+        return self.elements[:, :3]
+
+    @property
+    def _middle_nodes(self) -> np.ndarray | None:
+        return self.edge_nodes
+
     def elements_where(self, predicate: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
         """Select the elements for which `predicate` is True; it maps centers (n, 3) [m] to booleans (n,)."""
         return _where("element", predicate, self.element_centers, np.arange(self.n_elements))
@@ -313,8 +328,12 @@ class QuadraticTriangleMesh(MeshBase):
     # Modified meshes
 
     def first_order(self) -> TriangleMesh:
-        """Return the flat mesh of the corners, the same as `corners`."""
-        return self._corners
+        """Return the flat mesh of the corners, `corners` with the groups of this mesh."""
+        numbers = np.full(self.n_vertices, -1)
+        numbers[self._corner_vertices] = np.arange(len(self._corner_vertices))
+        return (
+            self._corners._with_members(renumbered(self._groups, numbers)) if self._groups else self._corners
+        )
 
     def refined(self, project: Callable[[np.ndarray], np.ndarray] | None = None) -> QuadraticTriangleMesh:
         """Return the mesh with each element divided into four: element k into 4 k to 4 k + 3, in the order of `faces`.
@@ -325,21 +344,25 @@ class QuadraticTriangleMesh(MeshBase):
         new, elements = divided(self)
         if project is not None:
             new = _projected("project(nodes)", "m", project, new)
-        return self._without_warning(np.concatenate([self.rest_positions, new]), elements)
+        fine = self._without_warning(np.concatenate([self.rest_positions, new]), elements)
+        return fine._with_members(self._refined_groups())
 
     def flipped(self) -> QuadraticTriangleMesh:
         """Return the same surface with reversed normals; elements and vertices keep their numbers."""
-        return self._without_warning(self.rest_positions, self.elements[:, _REVERSED])
+        reverse = self._without_warning(self.rest_positions, self.elements[:, _REVERSED])
+        return reverse._with_members(self._groups)
 
     def transformed(
         self, rotation: Rotates | None = None, translation: Numbers | None = None
     ) -> QuadraticTriangleMesh:
         """Return the mesh transformed by x -> rotation x + translation; see `TriangleMesh.transformed`."""
-        return self._without_warning(moved(self.rest_positions, rotation, translation), self.elements)
+        positions = moved(self.rest_positions, rotation, translation)
+        return self._without_warning(positions, self.elements)._with_members(self._groups)
 
     def scaled(self, factor: float) -> QuadraticTriangleMesh:
         """Return the mesh with all coordinates multiplied by a positive factor."""
-        return self._without_warning(self.rest_positions * positive("factor", "", factor), self.elements)
+        positions = self.rest_positions * positive("factor", "", factor)
+        return self._without_warning(positions, self.elements)._with_members(self._groups)
 
 
 def _checked_attributes(rest_positions: Numbers, elements: Numbers) -> dict[str, Any]:

@@ -29,6 +29,7 @@ def summary(mesh: TriangleMesh) -> str:
         f"  faces: edges {mesh.edge_lengths.min():.3g} to {mesh.edge_lengths.max():.3g} m, "
         f"angles {np.degrees(quality.smallest_angles.min()):.1f} to "
         f"{np.degrees(quality.largest_angles.max()):.1f} deg, aspect at most {quality.aspects.max():.3g}"
+        f"{mesh._groups_text()}"
     )
 
 

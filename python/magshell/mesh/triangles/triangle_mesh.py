@@ -47,7 +47,7 @@ class TriangleMesh(MeshBase):
 
     # Copies and worker processes compute the connectivity again, which is cheap.
     def __reduce__(self) -> tuple[Any, ...]:
-        return TriangleMesh, (self.rest_positions, self.faces)
+        return TriangleMesh, (self.rest_positions, self.faces), self._groups_state()
 
     def __repr__(self) -> str:
         return summary(self)
@@ -200,7 +200,7 @@ class TriangleMesh(MeshBase):
 
     def flipped(self) -> TriangleMesh:
         """Return the same surface with reversed normals; faces and vertices keep their numbers."""
-        return TriangleMesh(self.rest_positions, self.faces[:, [0, 2, 1]])
+        return TriangleMesh(self.rest_positions, self.faces[:, [0, 2, 1]])._with_members(self._groups)
 
     def refined(self, surface: Distance | None = None) -> TriangleMesh:
         """Return the mesh with each face divided into four, 4 f to 4 f + 3, at the midpoints of its edges.
@@ -221,12 +221,13 @@ class TriangleMesh(MeshBase):
                 order, so under a matrix that mirrors, the normals end up on the other side of the mirrored surface.
             translation: (3,), m.
         """
-        return TriangleMesh(moved(self.rest_positions, rotation, translation), self.faces)
+        positions = moved(self.rest_positions, rotation, translation)
+        return TriangleMesh(positions, self.faces)._with_members(self._groups)
 
     def scaled(self, factor: float) -> TriangleMesh:
         """Return the mesh with all coordinates multiplied by a positive factor."""
         positions = self.rest_positions * positive("factor", "", factor)
-        return TriangleMesh(positions, self.faces)
+        return TriangleMesh(positions, self.faces)._with_members(self._groups)
 
 
 def checked_mesh(value: Any, name: str = "mesh") -> TriangleMesh:
