@@ -143,7 +143,7 @@ def _at(results: Any, path: list[Any]) -> float:
 
 
 def run(command: str) -> Any:
-    """Run a command with --json at the root of the checkout, without showing its output, and return the results it writes."""
+    """Run a command with --json, at the root and without showing its output, and return the results it writes."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "results.json"
         words = [sys.executable, *command.split()[1:], "--json", str(path)]

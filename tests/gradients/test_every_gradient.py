@@ -92,8 +92,12 @@ def unit(vector):
 
 @cache
 def rounding(name) -> float:
-    """Return the error of differences due to round-off: equilibria are found to a relative 1e-13."""
-    return 1e-12 * max(abs(loss(name, {})), 1.0) / kind(name).step
+    """Return the error of differences due to round-off: equilibria are found to a relative 1e-13.
+
+    Implicit contact multiplies contact and friction by up to 3.4, and their round-off: 2.2e-5 for 1.9e-5 on x86-64-v2.
+    """
+    accuracy = 3.4e-12 if "contact implicit" in name else 1e-12
+    return accuracy * max(abs(loss(name, {})), 1.0) / kind(name).step
 
 
 ROWS = [

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -154,8 +156,5 @@ def test_accelerations_are_those_of_pinocchio(angles, mass_matrix, rates, torque
         np.testing.assert_allclose(end[:, 0], rates, rtol=1e-12)
         found.append((end[:, 1] - end[:, 0]) / time_step)
     for order in (1, 2, 3):  # Richardson
-        found = [
-            (2**order * fine - rough) / (2**order - 1)
-            for rough, fine in zip(found[:-1], found[1:], strict=True)
-        ]
+        found = [(2**order * fine - rough) / (2**order - 1) for rough, fine in itertools.pairwise(found)]
     np.testing.assert_allclose(found[0], accelerations, atol=1e-6 * np.abs(accelerations).max())
