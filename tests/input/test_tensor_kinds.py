@@ -134,6 +134,15 @@ def test_batches_of_designs_are_refused_by_name(scene, solve):
         torch.vmap(lambda magnetization: solve(scene, magnetization))(STRENGTH.repeat(2, 1))
 
 
+@pytest.mark.parametrize("name", ["thickness", "young_modulus"])
+def test_batches_of_values_are_refused_by_name(scene, name):
+    (sheet,) = scene.bodies
+    given = torch.full((2,), float(np.mean(getattr(sheet, name))))
+    field = {"remanent_magnetization": (1e4, 0, 0), "applied_flux_density": (0, 0, 1e-3)}
+    with pytest.raises(ValueError, match=rf"{name} of Shell.* is inside torch\.vmap.*loop"):
+        torch.vmap(lambda value: ms.equilibrium(scene, values={sheet: {name: value}}, **field))(given)
+
+
 @pytest.mark.parametrize("name", FORWARD)
 def test_motions_have_no_tangents(scene, name):
     with pytest.raises(ms.NoGradient, match="no tangents of a motion"):

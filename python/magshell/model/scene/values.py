@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._input.quantity import quantity
+from ..._input.tensor_kinds import why_not
 from ..._runtime.frozen import remember, variant
 from ..bodies.bodies import CombinedSheets, joined
 from ..shells.shell import Shell
@@ -46,6 +47,8 @@ class Values:
         magnetization: np.ndarray | None = None,
     ):
         self.scene = scene
+        for item, values in (replaced or {}).items():
+            _check_readable(item, values)
         self.replaced: dict[object, dict[Any, Any]] = {
             item: deepcopy(values) for item, values in (replaced or {}).items()
         }
@@ -316,3 +319,10 @@ class Gradient:
             return gradient_by_all(self._scene, self)
         by_control = self.control("scene", name)
         return by_control[..., 0, :] if name == "applied_flux_density" else by_control[..., 0]
+
+
+def _check_readable(item: object, values: dict[Any, Any]) -> None:
+    """Raise ValueError if the numbers of a value cannot be read, such as those of a tensor inside torch.vmap."""
+    for name, value in values.items():
+        if reason := why_not(value):
+            raise ValueError(f"{name} of {item!r} {reason}")
