@@ -93,7 +93,8 @@ from .model.solids.materials import (
 from .model.solids.skin import Skin
 from .model.solids.solid import Solid
 from .model.supports.supports import Clamp, Pin, SymmetryPlane
-from .output.plot import Color, Picture, Style, View, animate, plot, write_page
+from .output.plot import Color, Picture, Style, View, animate, plot, plot_history, write_page
+from .output.results.probes import Probe
 from .output.results.saved import load, save
 from .output.results.series import write_series
 from .output.results.surface_files import write_surface
@@ -202,6 +203,7 @@ __all__ = [
     "PrintableSet",
     "PrintableStage",
     "Prismatic",
+    "Probe",
     "ProjectiveDynamics",
     "ProjectiveMaterial",
     "QuadraticTriangleMesh",
@@ -273,6 +275,7 @@ __all__ = [
     "optim",
     "parametrize",
     "plot",
+    "plot_history",
     "random_starts",
     "read_fields",
     "read_mesh",

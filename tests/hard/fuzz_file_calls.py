@@ -19,6 +19,10 @@ def file_calls(s: Sample) -> Iterator[Call]:
     yield Call("load", ms.load, {"path": s.folder / "rest.npz", "scene": s.rest.scene})
     yield Call("to_pandas", ms.to_pandas, {"result": s.rest, "per": "state"})
     yield Call("to_xarray", ms.to_xarray, {"result": s.rest})
+    yield Call("Probe", ms.Probe, {"name": "tip", "of": np.array([0, 1]), "what": "distance", "body": None})
+    twice = ms.EquilibriumSet([s.rest, s.rest])
+    curve = {"result": twice, "columns": ["tip.z"], "against": None, "probes": [ms.Probe("tip", [0])]}
+    yield Call("plot_history", ms.plot_history, curve, cost=30)
     table = s.folder / "field.txt"
     table.write_text("\n".join(f"{x} {y} {z} 0 0 {x}" for x in range(3) for y in range(3) for z in range(2)))
     units = {"length_unit": "mm", "flux_density_unit": "mT", "columns": (0, 1, 2, 3, 4, 5)}

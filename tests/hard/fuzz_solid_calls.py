@@ -59,7 +59,7 @@ def solid_calls(s: Sample) -> Iterator[Call]:
     yield Call("TetMesh.tetrahedra_where", block.tetrahedra_where, left)
     named = block.with_parts(parts, names={"odd": 1})
     for select in (named.tetrahedra_in, named.vertices_in, named.faces_in):
-        yield Call(f"TetMesh.{select.__name__}", select, {"part": "odd"})
+        yield Call(f"TetMesh.{select.__name__}", select, {"group": "odd"})
     yield Call("TetQuality.worst", block.quality.worst, {"count": 2})
     apart = block.transformed(translation=(1.0, 0, 0))
     yield Call(

@@ -229,6 +229,7 @@ def _options(given: Arrays) -> dict[str, object]:
         ),
         "view": ms.View(30, -60, frame=given([[0.0, 0, 0], [0.1, 0.02, 0.01]])),
         "style": ms.Style(),
+        "probe": ms.Probe("tip", given.numbers(0, 1, 2)),
         "color": ms.Color(given([0.0, 1.0, 2.0])),
         "primitive": ball,
         "moved": ball.translated(given([0.1, 0, 0])),

@@ -99,7 +99,12 @@ def _episode(make: Callable[..., Any], policy, seed: int) -> Episode:
     """Run one episode in this process."""
     if make not in _made:
         _made.clear()
-        _made[make] = make()
+        environment = make()
+        if not (hasattr(environment, "reset") and hasattr(environment, "step")):
+            raise ValueError(
+                f"make must return an environment, with reset and step; it returned {environment!r:.60}"
+            )
+        _made[make] = environment
     environment = _made[make]
     observation, _ = environment.reset(seed=seed)
     seen, actions, rewards, failure = [observation], [], [], None

@@ -6,7 +6,6 @@ welding, although these give edges and faces other numbers. Faces inside a solid
 
 from __future__ import annotations
 
-import difflib
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
@@ -14,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .._input.nearest_names import nearest_names
 from .._runtime.warning_stacklevel import callers_level
 from ..errors import MeshGroupWarning
 from .topology import EDGES, FLAT
@@ -78,11 +78,7 @@ def description(groups: Mapping[str, Mapping[str, int]]) -> str:
 
 def unknown(name: str, names: Iterable[str]) -> str:
     """Return the beginning of an error message for a name that no group has, with the nearest names."""
-    lowered: dict[str, str] = {each.lower(): each for each in names}
-    near = [lowered[each] for each in difflib.get_close_matches(name.lower(), lowered, n=3, cutoff=0.5)]
-    nearest = f"; the nearest names are {', '.join(map(repr, near))}" if near else ""
-    listed = ", ".join(map(repr, list(lowered.values())[:20])) or "none"
-    return f"the mesh has no group or part {name!r:.60}{nearest}. Its names are {listed}"
+    return f"the mesh has no group or part {name!r:.60}{nearest_names(name, names)}"
 
 
 def edges_of_faces(faces: np.ndarray) -> np.ndarray:

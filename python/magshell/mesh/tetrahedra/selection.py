@@ -43,7 +43,7 @@ class TetSelection(MeshBase):
         """Select the tetrahedra for which `predicate` is True; it maps barycenters (n_t, 3) [m] to booleans (n_t,)."""
         return _where("tetrahedron", predicate, self.tetrahedron_barycenters, np.arange(self.n_tetrahedra))
 
-    def tetrahedra_in(self, part: int | str | Sequence[int | str]) -> np.ndarray:
+    def tetrahedra_in(self, group: int | str | Sequence[int | str]) -> np.ndarray:
         """Select the tetrahedra of a part, given by its number or name, of a named group of tetrahedra, or of several.
 
         Raises ValueError, with the nearest names, if there is none, or if the group has no tetrahedra.
@@ -54,10 +54,10 @@ class TetSelection(MeshBase):
         >>> len(halves.tetrahedra_in("right"))
         6
         """
-        found = self._in(part)
+        found = self._in(group)
         if len(found.tetrahedra) == 0:
             have = ", ".join(f"{n} {kind}" for kind, n in counts(found).items()) or "no members"
-            raise ValueError(f"{part!r:.60} has no tetrahedra: it has {have}")
+            raise ValueError(f"{group!r:.60} has no tetrahedra: it has {have}")
         return Indices(found.tetrahedra, "tetrahedra")
 
     def vertices_in(self, group: int | str | Sequence[int | str]) -> np.ndarray:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from ..._input.quantity import quantity
 from ..._input.tensors import requires_gradient
@@ -286,7 +286,9 @@ def _velocity_product(link: _PosedLink, before: np.ndarray, own: np.ndarray) -> 
 
 
 def _rotation(vector: np.ndarray) -> np.ndarray:
-    return Rotation.from_rotvec(np.array(vector)).as_matrix()  # a copy, as scipy takes no read-only arrays
+    return scipy.spatial.transform.Rotation.from_rotvec(
+        np.array(vector)
+    ).as_matrix()  # a copy, as scipy takes no read-only arrays
 
 
 def _rotations_about(axes: np.ndarray, origin: np.ndarray) -> np.ndarray:

@@ -3,9 +3,10 @@
 from .animation import animate
 from .drawing import plot
 from .fits import plot_fit as _  # noqa: F401 - registers FitResult.plot
+from .histories import plot_history
 from .page import write_page
 from .picture import Picture
 from .style import Color, Style
 from .view import View
 
-__all__ = ["Color", "Picture", "Style", "View", "animate", "plot", "write_page"]
+__all__ = ["Color", "Picture", "Style", "View", "animate", "plot", "plot_history", "write_page"]

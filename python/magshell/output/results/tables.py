@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,7 @@ from ...solve.dynamics.trajectory import Trajectory
 from ...solve.statics.equilibria import EquilibriumSet
 from ...solve.statics.equilibrium import Equilibrium
 from ...solve.statics.path import EquilibriumPath
+from .probes import Probe, checked_probes
 
 if TYPE_CHECKING:
     import pandas
@@ -21,13 +23,16 @@ _RESULTS = Equilibrium | EquilibriumSet | EquilibriumPath | Trajectory
 _PER = ("state", "vertex")
 
 
-def to_xarray(result: Equilibrium | EquilibriumSet | EquilibriumPath | Trajectory) -> xarray.Dataset:
+def to_xarray(
+    result: Equilibrium | EquilibriumSet | EquilibriumPath | Trajectory, probes: Probe | Sequence[Probe] = ()
+) -> xarray.Dataset:
     """Convert a result to an xarray.Dataset (needs the package xarray).
 
     The states lie along the coordinate `time` [s] of a Trajectory, `parameter` of an EquilibriumPath or `case` of an
     EquilibriumSet. The variables are `positions`, `displacements` and, of a motion, `velocities`, (..., vertex, axis); the
     energies, one variable per term, and `kinetic_energy`; the largest strains; `applied_flux_density` (..., axis);
-    `rest_positions` (vertex, axis) and `faces` (face, corner). Units are in `attrs["units"]`. Tensors become arrays.
+    `rest_positions` (vertex, axis) and `faces` (face, corner). Each ms.Probe in `probes` adds its columns. Units are in
+    `attrs["units"]`. Tensors become arrays.
 
     Raises ValueError if `result` is not a result, ImportError without xarray.
 
@@ -43,7 +48,7 @@ def to_xarray(result: Equilibrium | EquilibriumSet | EquilibriumPath | Trajector
     coordinate, numbers = _states(result)
     along = () if coordinate is None else (coordinate,)
     variables = {}
-    for name, (unit, values) in _columns(result).items():
+    for name, (unit, values) in _columns(result, checked_probes(probes)).items():
         variables[name] = (along, values, {"units": unit})
     for name, (unit, values) in _rows(result).items():
         variables[name] = ((*along, "vertex", "axis"), values, {"units": unit})
@@ -59,13 +64,17 @@ def to_xarray(result: Equilibrium | EquilibriumSet | EquilibriumPath | Trajector
 
 
 def to_pandas(
-    result: Equilibrium | EquilibriumSet | EquilibriumPath | Trajectory, per: str = "state"
+    result: Equilibrium | EquilibriumSet | EquilibriumPath | Trajectory,
+    per: str = "state",
+    probes: Probe | Sequence[Probe] = (),
 ) -> pandas.DataFrame:
     """Convert a result to a pandas.DataFrame (needs the package pandas), with units in the names of its columns.
 
     per: "state" gives one row per state, with energies, strains and the uniform field. "vertex" gives one row per vertex and
         state, with its position and, for a motion, its velocity. The index is `time [s]` of a Trajectory, `parameter` of an
         EquilibriumPath or `case` of an EquilibriumSet, and `vertex`.
+    probes: each ms.Probe adds its columns to those of the states; a reaction or contact force on a path solves its points
+        again.
 
     Raises ValueError on bad input, ImportError without pandas.
 
@@ -79,13 +88,17 @@ def to_pandas(
     """
     if per not in _PER:
         raise ValueError(f'per must be "state" or "vertex", got {per!r}')
+    chosen = checked_probes(probes)
+    if chosen and per == "vertex":
+        raise ValueError('probes are columns of states: they need per="state"')
     pandas = _imported("pandas")
     coordinate, numbers = _states(result)
     name = "time [s]" if coordinate == "time" else coordinate
     states = pandas.Index([0] if coordinate is None else numbers, name=name or "case")
     if per == "state":
         columns = {
-            f"{what} [{unit}]": np.atleast_1d(values) for what, (unit, values) in _columns(result).items()
+            f"{what} [{unit}]": np.atleast_1d(values)
+            for what, (unit, values) in _columns(result, chosen).items()
         }
         if (flux := getattr(result, "applied_flux_density", None)) is not None:
             for axis, values in zip("xyz", np.atleast_2d(np.asarray(detached(flux))).T, strict=True):
@@ -125,10 +138,21 @@ def _states(result) -> tuple[str | None, np.ndarray | None]:
     )
 
 
-def _columns(result) -> dict[str, tuple[str, np.ndarray]]:
-    """Return the scalars of each state, {name: (unit, (n,) or ())}."""
+def _columns(result, probes: tuple[Probe, ...]) -> dict[str, tuple[str, np.ndarray]]:
+    """Return the scalars of each state, {name: (unit, (n,) or ())}, and those of probes. Raises ValueError if a probe has
+    the name of another column."""
+    found = _own_columns(result)
+    for probe in probes:
+        added = probe.columns(result)
+        if twice := added.keys() & found.keys():
+            raise ValueError(f"probe {probe.name!r} has the name of another column: {min(twice)!r}")
+        found |= added
+    return found
+
+
+def _own_columns(result) -> dict[str, tuple[str, np.ndarray]]:
     if isinstance(result, EquilibriumSet):
-        cases = [_columns(case) for case in result]
+        cases = [_own_columns(case) for case in result]
         return {
             name: (unit, np.array([case[name][1] for case in cases]))
             for name, (unit, _) in (cases[0] if cases else {}).items()

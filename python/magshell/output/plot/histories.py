@@ -1,0 +1,77 @@
+"""Curves of the columns of a result's table, such as a displacement against a field or over time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from ..._input.nearest_names import nearest_names
+from ..results.probes import Probe
+from ..results.tables import to_pandas
+from .picture import Picture
+
+if TYPE_CHECKING:
+    import pandas
+
+    from ...solve.dynamics.trajectory import Trajectory
+    from ...solve.statics.equilibria import EquilibriumSet
+    from ...solve.statics.path import EquilibriumPath
+
+
+def plot_history(
+    result: EquilibriumSet | EquilibriumPath | Trajectory,
+    columns: str | Sequence[str],
+    *,
+    against: str | None = None,
+    probes: Probe | Sequence[Probe] = (),
+) -> Picture:
+    """Draw columns of a result's table as curves over its states (needs the packages pandas and matplotlib).
+
+    columns: names of columns of ms.to_pandas(result, probes=probes), with or without their units: "tip.z". Those of
+        different units get axes below each other.
+    against: the column along the horizontal axis; by default the time, the path's parameter or the number of the case.
+
+    Raises ValueError if there is no such column, or if the result has one state only.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.05, 0.01, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    >>> fall = ms.simulate(scene, steps=5, time_step=2e-3)
+    >>> ms.plot_history(fall, "tip.z", probes=ms.Probe("tip", mesh.vertices_at(x=0.05)))
+    Picture(640 x 320 pixels, painted by matplotlib)
+    """
+    from matplotlib.figure import Figure
+
+    table = to_pandas(result, probes=probes)
+    if len(table) < 2:
+        raise ValueError("result must have several states: a motion, a path or load cases")
+    wanted = [columns] if isinstance(columns, str) else columns
+    if not isinstance(wanted, list | tuple) or not wanted:
+        raise ValueError(f"columns must be the name of a column or a list of names, got {columns!r:.60}")
+    names = [_column(table, each) for each in wanted]
+    along = table.index.name if against is None else _column(table, against)
+    x = table.index.to_numpy() if against is None else table[along].to_numpy()
+    by_unit: dict[str, list[str]] = {}
+    for name in names:
+        by_unit.setdefault(name.rpartition(" [")[2].rstrip("]"), []).append(name)
+    figure = Figure(figsize=(6.4, 0.4 + 2.8 * len(by_unit)), layout="constrained")
+    rows = figure.subplots(len(by_unit), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, (unit, group) in zip(rows, by_unit.items(), strict=True):
+        for name in group:
+            axes.plot(x, table[name], marker="." if len(x) < 50 else "", label=name.rpartition(" [")[0])
+        axes.set_ylabel(f"{group[0]}" if len(group) == 1 else f"[{unit}]")
+        if len(group) > 1:
+            axes.legend(frameon=False)
+        axes.spines[["top", "right"]].set_visible(False)
+    rows[-1].set_xlabel(along)
+    return Picture(figure)
+
+
+def _column(table: pandas.DataFrame, name: Any) -> str:
+    """Return the column of this name, with or without its unit. Raises ValueError with the nearest names."""
+    for column in table.columns:
+        if name in (column, column.rpartition(" [")[0]):
+            return column
+    names = [column.rpartition(" [")[0] for column in table.columns]
+    raise ValueError(f"the table has no column {name!r:.60}{nearest_names(name, names)}")
