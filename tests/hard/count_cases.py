@@ -52,7 +52,7 @@ COSTLY = {
     "hard saddles/flat strip between clamps, 0.001",
     "hard saddles/flat strip between clamps, 0.0001",
     "hard saddles/strip magnetized against the field, 40",
-    "hard slivers/far bent strip with a tiny face, 1e-05",
+    "hard slivers/far bent strip with a tinier face",
     "hard slivers/far bent strip with a face of nanometres",
     "hard solids/comes back, random, Corotated",
     "hard solids/crumples",

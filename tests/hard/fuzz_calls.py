@@ -97,7 +97,7 @@ def _meshes(s: Sample) -> Iterator[Call]:
     yield Call("TriangleMesh.nearest_vertex", mesh.nearest_vertex, {"point": (0, 0, 0)})
     yield Call("TriangleMesh.edges_between", mesh.edges_between, {"vertex_indices": np.arange(5)})
     yield Call(
-        "TriangleMesh.faces_between", mesh.faces_between, {"vertex_indices": np.arange(mesh.n_vertices)}
+        "TriangleMesh.faces_between", mesh.faces_between, {"vertex_indices": np.arange(1, mesh.n_vertices)}
     )
     groups = {"A": mesh.edges_where(lambda p: p[:, 0] > -np.inf), "B": {"faces": np.arange(3)}}
     yield Call("TriangleMesh.with_groups", mesh.with_groups, {"groups": groups})
