@@ -24,7 +24,7 @@ from .groups import (
     unknown,
     warn_of_vertex_groups,
 )
-from .selection import MeshSelection
+from .selection import MeshSelection, rows_among
 
 if TYPE_CHECKING:
     from .._input.kinds import Numbers
@@ -121,9 +121,7 @@ class GroupSelection(MeshSelection):
         given = indices(
             "vertex_indices", selection("vertex_indices", vertex_indices, "vertices"), self.n_vertices
         )
-        chosen = np.zeros(self.n_vertices, dtype=bool)
-        chosen[given] = True
-        found = np.flatnonzero(chosen[self.faces].all(axis=1))
+        found = rows_among(self.faces, given, self.n_vertices)
         if len(found) == 0:
             raise ValueError(f"no face has all its vertices among the {len(given)} given")
         return Indices(found, "faces")

@@ -117,9 +117,7 @@ class MeshSelection:
             raise ValueError(
                 f"vertex_indices names vertex {outside[0]}, but they are numbered 0 to {self.n_vertices - 1}"
             )
-        chosen = np.zeros(self.n_vertices, dtype=bool)
-        chosen[indices] = True
-        found = np.flatnonzero(chosen[self.edges].all(axis=1))
+        found = rows_among(self.edges, indices, self.n_vertices)
         if len(found) == 0:
             raise ValueError(f"no edge joins two of the {len(indices)} vertices given")
         return Indices(found, "edges")
@@ -180,3 +178,10 @@ def _where(kind: str, predicate: Callable[..., Any], points: np.ndarray, indices
         spans = ", ".join(f"{name} {low[i]:.6g} to {high[i]:.6g}" for i, name in enumerate("xyz"))
         raise ValueError(f"the predicate holds for no {kind}; they span {spans} m")
     return Indices(indices[mask], _PLURAL[kind.split()[-1]])
+
+
+def rows_among(rows: np.ndarray, vertices: np.ndarray, n_vertices: int) -> np.ndarray:
+    """Return the numbers of the rows (n, k) of vertices that are all among the given ones."""
+    chosen = np.zeros(n_vertices, dtype=bool)
+    chosen[vertices] = True
+    return np.flatnonzero(chosen[rows].all(axis=1))
