@@ -40,6 +40,17 @@ def pytest_report_header() -> str | None:
     return None
 
 
+@pytest.fixture(autouse=True)
+def _ctrl_c_stays_an_exception() -> Iterator[None]:
+    """Fail a test after which Ctrl-C would end the process, as a plain `gmsh.initialize()` leaves it, and put that right."""
+    before = signal.getsignal(signal.SIGINT)
+    yield
+    after = signal.getsignal(signal.SIGINT)
+    if after != before:
+        signal.signal(signal.SIGINT, before)
+        pytest.fail(f"the test changed what Ctrl-C does, from {before} to {after}")
+
+
 @pytest.fixture
 def rng() -> np.random.Generator:
     """Return a generator with a fixed seed, new for each test, so that no test depends on another's draws."""
