@@ -31,6 +31,7 @@ def env_calls(s: Sample) -> Iterator[Call]:
         ms.envs.ParametricAction,
         {"owner": s.clamp, "name": "displacement", "numbers": 3, "value": lambda share, time, before: before},
     )
+    yield Call("envs.VectorEnv", ms.envs.VectorEnv, {"environment": pendulum, "num_envs": 2, "threads": 1})
     yield Call(
         "envs.episodes",
         ms.envs.episodes,

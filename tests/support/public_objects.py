@@ -19,6 +19,7 @@ STATEFUL = {
         ("optim.MMA", "optim.GCMMA", "optim.LBFGS", "optim.GaussNewton"), "optimizers of torch, with a state"
     ),
     "envs.Environment": "an environment of gymnasium, with an episode under way",
+    "envs.VectorEnv": "an environment of gymnasium, with episodes under way",
 }
 
 

@@ -15,10 +15,10 @@ Where an action is not the value itself but sets it through a function (the spee
 `ParametricAction` takes that function.
 
 Robots that come along are registered once their module is loaded, which gymnasium does for names before a colon:
-`gymnasium.make("magshell.envs.robots:magshell/MagneticStrip-v0")`, and `gymnasium.make_vec` for many in processes; whole
-episodes run in the processes of any executor by `episodes`.
+`gymnasium.make("magshell.envs.robots:magshell/MagneticStrip-v0")`. `VectorEnv` steps many of them at once over threads,
+`gymnasium.make_vec` in processes; whole episodes run in the processes of any executor by `episodes`.
 
-gymnasium (the extra `gym`) is imported when `Environment` or `robots` is first asked for.
+gymnasium (the extra `gym`) is imported when `Environment`, `VectorEnv` or `robots` is first asked for.
 """
 
 from __future__ import annotations
@@ -31,12 +31,23 @@ from .parametric_action import ParametricAction
 from .rollouts import Episode, episodes
 from .snapshot import Snapshot
 
-__all__ = ["Action", "Environment", "Episode", "ParametricAction", "Snapshot", "episodes", "robots"]
+__all__ = [
+    "Action",
+    "Environment",
+    "Episode",
+    "ParametricAction",
+    "Snapshot",
+    "VectorEnv",
+    "episodes",
+    "robots",
+]
 
 
 def __getattr__(name: str) -> Any:
     if name == "Environment":
         return import_module(".environment", __name__).Environment
+    if name == "VectorEnv":
+        return import_module(".vector", __name__).VectorEnv
     if name == "robots":
         return import_module(".robots", __name__)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import inspect
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
@@ -108,6 +109,7 @@ class Environment(gymnasium.Env):
         if not isinstance(scene, Scene):
             raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
         self.scene, self.actuators = scene, checked_list("actuators", actuators, (Action,))
+        self._scene_of_actuators = scene
         if not self.actuators:
             raise ValueError("actuators must hold at least one ms.envs.Action")
         for k, each in enumerate(self.actuators):
@@ -214,6 +216,13 @@ class Environment(gymnasium.Env):
             self._camera.close()
             self._camera = None
 
+    def _copied(self) -> Environment:
+        """Return an environment of its own core model, which shares meshes, objects and functions with this one."""
+        other = copy.copy(self)
+        other.scene = copy.copy(self.scene)
+        other._now = other._camera = other._np_random = None
+        return other
+
     def _begin(self, where: dict[Any, Any]) -> None:
         """Compute the state that an episode begins in: the first state of a motion of one step, whose end is not
         used."""
@@ -231,7 +240,8 @@ class Environment(gymnasium.Env):
         for actuator, old, new in zip(self.actuators, before, now, strict=True):
             each_owners = actuator._all_time_series(old, new, steps)
             for owner, series in zip(actuator.owners, each_owners, strict=True):
-                values.setdefault(owner, {})[actuator.name] = series
+                owner_here = self.scene if owner is self._scene_of_actuators else owner
+                values.setdefault(owner_here, {})[actuator.name] = series
         if self.scene.has_uniform_field and FLUX_DENSITY not in self._options:
             values.setdefault(self.scene, {}).setdefault(FLUX_DENSITY, np.zeros(3))
         return simulate_motion(

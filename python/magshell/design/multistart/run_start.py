@@ -17,7 +17,7 @@ from typing import Any
 from ..._input.quantity import real_numbers
 from ..._input.tensors import detached
 from ..._runtime.progress import no_bars
-from .single_thread import one_thread
+from ..._runtime.single_thread import one_thread
 
 
 @dataclass

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
-from .single_thread import one_thread_in_children
+from ..._runtime.single_thread import one_thread_in_children
 
 if TYPE_CHECKING:
     from types import TracebackType

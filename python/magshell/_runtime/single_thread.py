@@ -1,4 +1,4 @@
-"""Restricts each start to one thread: starts run in parallel instead, and sums keep their order and so their bits."""
+"""Restricts solves to one thread each where several run in parallel: they keep the order of their sums, and their bits."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from ... import _core
+from .. import _core
 
 # Environment variables that libraries read once, when a new process loads them.
 _VARIABLES = (
