@@ -28,6 +28,7 @@ NOT_CALLED = {
     "NotConverged": "an error",
     "ObjectiveFailed": "an error",
     "EquilibriumPath": "a result",
+    "envs.EnvState": "a result",
     "Picture": "a result",
     "ContactState": "a result",
     "Reaction": "a result",

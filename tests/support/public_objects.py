@@ -355,6 +355,7 @@ def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
         found |= {"fit": fit, "prediction": prediction, "residual tests": fit.tests}
         found["uncertainty of a fit"] = fit.uncertainty
     rare = (
+        ms.envs.EnvState,
         ms.Buckling,
         ms.CriticalPoint,
         ms.Extrapolation,

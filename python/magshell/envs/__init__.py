@@ -27,12 +27,14 @@ from importlib import import_module
 from typing import Any
 
 from .action import Action
+from .differentiable import EnvState
 from .parametric_action import ParametricAction
 from .rollouts import Episode, episodes
 from .snapshot import Snapshot
 
 __all__ = [
     "Action",
+    "EnvState",
     "Environment",
     "Episode",
     "ParametricAction",

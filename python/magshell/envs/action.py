@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._input.quantity import quantity
+from .._input.tensors import is_tensor
 from .._runtime.frozen import Frozen
 from .._runtime.keywords import CONTROLS, FLUX_DENSITY, controls_of, nearest_first
 from ..model.scene.time_varying import may_jump, names_in_time, row_in_time
@@ -100,24 +101,31 @@ class Action(Frozen):
         if self._of_scene and self.name not in controls_of(self.owner, scene):
             raise ValueError(f"the scene has no {self.name}")
 
-    def value(self, action: np.ndarray, time: float, before: np.ndarray) -> np.ndarray:
+    def value(self, action: Any, time: float, before: Any) -> Any:
         """Return the value for its entries of an action, (size,) in -1 to 1, which begins at a time [s] with the
-        value `before`."""
+        value `before`. A tensor gives a tensor."""
         fraction = 0.5 * (action.reshape(self.shape) + 1.0)
-        return self.lower + fraction * (self.upper - self.lower)
+        lower, reach = self.lower, self.upper - self.lower
+        if is_tensor(action):
+            lower, reach = fraction.new_tensor(lower), fraction.new_tensor(reach)
+        return lower + fraction * reach
 
-    def _all_time_series(self, before: np.ndarray, now: np.ndarray, steps: int) -> list[np.ndarray]:
+    def _all_time_series(self, before: Any, now: Any, steps: int) -> list[Any]:
         """Return the values of each owner during an action, as ms.simulate takes them.
 
         A value that may jump is constant, (steps, ...); another one is linear in time, (steps + 1, ...).
         """
         return [self._time_series(before, now, steps)]
 
-    def _time_series(self, before: np.ndarray, now: np.ndarray, steps: int) -> np.ndarray:
+    def _time_series(self, before: Any, now: Any, steps: int) -> Any:
         """Return the values of one owner during an action, constant or linear in time."""
         if self._of_scene or may_jump(self.owner):
-            return np.broadcast_to(now, (steps, *self.shape))
-        fractions = np.linspace(0.0, 1.0, steps + 1).reshape(-1, *(1 for _ in self.shape))
+            shape = (steps, *self.shape)
+            return now.expand(shape) if is_tensor(now) else np.broadcast_to(now, shape)
+        fractions: Any = np.linspace(0.0, 1.0, steps + 1).reshape(-1, *(1 for _ in self.shape))
+        if is_tensor(now):
+            fractions = now.new_tensor(fractions)
+            before = before if is_tensor(before) else now.new_tensor(before)
         return (1.0 - fractions) * before + fractions * now
 
     def __repr__(self) -> str:

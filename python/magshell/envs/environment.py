@@ -12,7 +12,8 @@ import numpy as np
 from .._input.arrays import count, named_values
 from .._input.checked_list import checked_list
 from .._input.quantity import quantity, real_numbers
-from .._input.scalars import positive
+from .._input.scalars import flag, positive
+from .._input.tensors import require_torch, requires_gradient
 from .._runtime.keywords import FLUX_DENSITY, nearest_first
 from .._runtime.solver_entry_point import grouped
 from ..errors import NotConverged
@@ -20,9 +21,12 @@ from ..model.scene.scene import Scene
 from ..output.plot.limits import checked_width
 from ..output.plot.style import Style, style_of
 from ..output.plot.view import View, view_of
+from ..output.plot.window import FrameWindow
 from ..output.results.state import states_of
 from ..solve.dynamics.simulate import simulate as simulate_motion
 from .action import Action
+from .bounds import Bounds
+from .differentiable import EnvState, as_result, first_state, next_state
 from .frames import Camera
 from .library import require_gymnasium
 from .snapshot import Snapshot
@@ -35,9 +39,9 @@ if TYPE_CHECKING:
 if not TYPE_CHECKING:
     gymnasium = require_gymnasium("envs.Environment")
 
+_RENDER_MODES = ["rgb_array", "human"]
 # Arguments of ms.simulate that the environment sets itself.
 _OWN = ("steps", "time_step", "start", "velocities", "values", "record_every", "progress")
-_ROUNDING = 1e-6  # [-] allowed excess of an action beyond its bounds, which single precision may cause
 
 
 class Environment(gymnasium.Env):
@@ -56,12 +60,18 @@ class Environment(gymnasium.Env):
     failure_reward: if a step of the motion fails, the episode ends with this reward, at the last good state, and
         info["failure"] says why. None: ms.NotConverged is raised.
     simulate: {name: value}, further arguments of ms.simulate: integrator, damping, solver, ...
-    render_mode: "rgb_array" or None; render_width: pixels; view, style: as in ms.plot, but without
-        contacts.
+    observation_bounds: (lower, upper) of the observation space, numbers or arrays of the observation's shape; by default
+        infinite.
+    clip: replace numbers of actions beyond -1 and 1, and of observations beyond their bounds, by the bounds; info says how
+        many, as "clipped_actions" and "clipped_observations". By default they raise ValueError.
+    dtype: "float64" or "float32", of observations and of the spaces; the scene computes in float64.
+    render_mode: None; "rgb_array", with which `render` returns a frame; or "human", which shows every state in a window of
+        matplotlib. render_width: pixels; view, style: as in ms.plot, but without contacts.
 
     The scene is built once; each action continues the motion from its last state, with the same bits as one long motion.
-    The same seed and actions give the same bits. To run many environments in processes, pass functions that make them to
-    gymnasium.vector.AsyncVectorEnv; scenes can be pickled.
+    The same seed and actions give the same bits. VectorEnv steps many environments over threads. To run them in processes,
+    pass functions that make them to gymnasium.vector.AsyncVectorEnv; scenes can be pickled.
+    `differentiable_step` is a step in torch with gradients.
 
     Raises ValueError on bad input: an observation that is not finite or changes its shape, an action of another shape.
 
@@ -101,6 +111,9 @@ class Environment(gymnasium.Env):
         finished: Callable[[Snapshot], bool] | None = None,
         failure_reward: float | None = None,
         simulate: dict[Any, Any] | None = None,
+        observation_bounds: Sequence[Any] | None = None,
+        clip: bool = False,
+        dtype: str = "float64",
         render_mode: str | None = None,
         render_width: int = 480,
         view: View | Sequence[float] | str | None = None,
@@ -121,8 +134,8 @@ class Environment(gymnasium.Env):
         for name, function in functions.items():
             if not callable(function) and (function is not None or name in ("observation", "reward")):
                 raise ValueError(f"{name} must be a function, got {function!r:.60}")
-        if render_mode not in (None, "rgb_array"):
-            raise ValueError(f'render_mode must be None or "rgb_array", got {render_mode!r}')
+        if render_mode not in (None, *_RENDER_MODES):
+            raise ValueError(f"render_mode must be None or one of {_RENDER_MODES}, got {render_mode!r}")
         self._observe, self._reward, self._start, self._finished = observation, reward, start, finished
         self._failure_reward = (
             None if failure_reward is None else float(quantity("failure_reward", "", failure_reward, ()))
@@ -142,6 +155,7 @@ class Environment(gymnasium.Env):
                     else f"but {nearest_first(name, known)}"
                 )
                 raise ValueError(f"simulate must not hold {name!r}, {why}")
+        self._bounds = Bounds(observation_bounds, clip, dtype)
         self.render_mode, self._width, self._view = render_mode, checked_width(render_width), view
         view_of(states_of(scene), view)  # raises, before there is anything to see
         self._style = style_of(style)
@@ -151,17 +165,23 @@ class Environment(gymnasium.Env):
                 "its style; ms.plot and ms.animate show those of a motion"
             )
         self.metadata: dict[str, list[str] | int] = {
-            "render_modes": ["rgb_array"],
+            "render_modes": _RENDER_MODES,
             "render_fps": max(1, round(min(1e9, 1.0 / (self.time_step * self.steps_per_action)))),
         }
         size = sum(each.size for each in self.actuators)
-        self.action_space: Any = gymnasium.spaces.Box(-1.0, 1.0, (size,), np.float64)
+        number = self._bounds.dtype.type
+        self.action_space: Any = gymnasium.spaces.Box(-1.0, 1.0, (size,), number)
         self._shape: tuple[int, ...] | None = None
         self._camera: Camera | None = None
+        self._window: FrameWindow | None = None
         self._now: Snapshot | None = None
         self._begin({})
-        self._shape = self._observed(self._now).shape
-        self.observation_space: Any = gymnasium.spaces.Box(-np.inf, np.inf, self._shape, np.float64)
+        self._shape = np.shape(real_numbers("observation", self._observe(self._now)))
+        self._bounds.fit(self._shape)
+        self._observed(self._now, {})
+        self.observation_space: Any = gymnasium.spaces.Box(
+            self._bounds.lower, self._bounds.upper, self._shape, number
+        )
         self._now = None
 
     def reset(
@@ -171,21 +191,25 @@ class Environment(gymnasium.Env):
         super().reset(seed=seed)
         begun = {} if self._start is None else self._start(self.np_random)
         self._begin({**named_values("what `start` returns", begun), **named_values("options", options)})
-        return self._observed(self._now), {"time": 0.0}
+        info: dict[Any, Any] = {"time": 0.0}
+        observation = self._observed(self._now, info)
+        self._show()
+        return observation, info
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[Any, Any]]:
         """Take one action: returns (observation, reward, terminated, truncated, info)."""
         if self._now is None:
             raise RuntimeError("reset must be called before the first step of an episode")
-        values = self._values(action)
+        within, clipped = self._bounds.action(action, self.action_space.shape)
+        values = self._values(within, self._now.time, self._setting)
         before = Snapshot(self._now.motion, self._now.index, self._now.action)
         try:
             motion = self._moved(self._from, self.steps_per_action, self._setting, values)
         except NotConverged as error:
             if self._failure_reward is None:
                 raise
-            self._now, observation = None, self._observed(before)
-            info = {"time": before.time, "failure": str(error)}
+            info: dict[Any, Any] = {"time": before.time, "failure": str(error)}
+            self._now, observation = None, self._observed(before, info)
             return observation, self._failure_reward, True, False, info
         self._from, self._setting = {"start": motion.end}, values
         self._now = now = Snapshot(
@@ -195,7 +219,49 @@ class Environment(gymnasium.Env):
         reward = self._rewarded(now)
         terminated = bool(self._finished(now)) if self._finished is not None else False
         info = {"time": now.time, "iterations": motion.iterations}
-        return self._observed(now), reward, terminated, self._taken >= self.actions_per_episode, info
+        if self._bounds.clip:
+            info["clipped_actions"] = clipped
+        observation = self._observed(now, info)
+        self._show()
+        return observation, reward, terminated, self._taken >= self.actions_per_episode, info
+
+    def differentiable_state(self, requires_grad: bool = False) -> EnvState:
+        """Return the state of the episode as tensors, from which `differentiable_step` goes on.
+
+        requires_grad: whether gradients are computed for positions, velocities and edge rotations of this state.
+        Raises ValueError for scenes with rigid parts and motions with a Maxwell branch, whose states hold more.
+        """
+        if self._now is None:
+            raise RuntimeError("reset must be called before there is a state")
+        return first_state(self._now, self._setting, flag("requires_grad", requires_grad))
+
+    def differentiable_step(self, state: EnvState, action: Any) -> tuple[EnvState, Any, Any]:
+        """Take one action in torch: returns (next state, observation, reward) with gradients by the state and the action.
+
+        state: of `differentiable_state` or of the step before; state.detach() ends gradients there. action: tensor of
+        shape (k,), each number from -1 to 1; where it is clipped its gradient is zero. The observation is a tensor of the
+        shape of the observation space, the reward one of shape (); both in float64, and the observation is not clipped. The
+        functions of the environment compute them from tensors: they must use torch, or operations that tensors and arrays
+        share, such as `now.positions[tip, 2].mean()` and lists of such numbers.
+
+        The episode of the environment itself is not changed, no episode ends here, and `finished` is not asked. By
+        ImplicitEuler() a step has the bits of `step`. Raises NotConverged if a step of the motion fails, NoGradient if
+        the functions leave torch.
+        """
+        if not isinstance(state, EnvState):
+            raise ValueError(f"state must be a state of differentiable_state, got {type(state).__name__}")
+        if state._motion._numbers.state.shape != (self.scene._model.size,):
+            raise ValueError("state is of another scene")
+        torch = require_torch("Environment.differentiable_step")
+        within, _ = self._bounds.action(torch.as_tensor(action), self.action_space.shape)
+        values = self._values(within, state.time, state._setting)
+        motion = self._moved({"start": state._motion}, self.steps_per_action, state._setting, values)
+        chosen = torch.cat([each.reshape(-1) for each in values])
+        now = Snapshot(motion, len(motion) - 1, chosen, state._snapshot)
+        connected = any(map(requires_gradient, (motion.positions, within)))
+        observation = as_result("observation", self._observe, now, self._shape, connected)
+        reward = as_result("reward", self._reward, now, (), connected)
+        return next_state(now, values), observation, reward
 
     def render(self) -> np.ndarray | None:
         """Draw the current state: returns (height, width, 3) uint8, or None without a render_mode."""
@@ -203,6 +269,21 @@ class Environment(gymnasium.Env):
             return None
         if self._now is None:
             raise RuntimeError("reset must be called before there is anything to render")
+        frame = self._frame()
+        if self.render_mode != "human":
+            return frame
+        if self._window is None:
+            self._window = FrameWindow("magshell")
+        self._window.show(frame)
+        return None
+
+    def _show(self) -> None:
+        """Show the current state, if the render_mode is "human"."""
+        if self.render_mode == "human":
+            self.render()
+
+    def _frame(self) -> np.ndarray:
+        """Draw the current state: returns (height, width, 3) uint8."""
         if self._camera is None:
             fields = [each.upper for each in self.actuators if each.name == FLUX_DENSITY]
             self._camera = Camera(
@@ -211,16 +292,19 @@ class Environment(gymnasium.Env):
         return self._camera.frame(self._now)
 
     def close(self) -> None:
-        """Close the window that frames are drawn in."""
+        """Close the windows that frames are drawn and shown in."""
         if self._camera is not None:
             self._camera.close()
             self._camera = None
+        if self._window is not None:
+            self._window.close()
+            self._window = None
 
     def _copied(self) -> Environment:
         """Return an environment of its own core model, which shares meshes, objects and functions with this one."""
         other = copy.copy(self)
         other.scene = copy.copy(self.scene)
-        other._now = other._camera = other._np_random = None
+        other._now = other._camera = other._window = other._np_random = None
         return other
 
     def _begin(self, where: dict[Any, Any]) -> None:
@@ -255,33 +339,21 @@ class Environment(gymnasium.Env):
             **self._options,
         )
 
-    def _values(self, action) -> list[np.ndarray]:
-        """Return the values that an action sets, one for each actuator. Raises ValueError on another shape or beyond
-        the bounds."""
-        array = real_numbers("action", action).astype(np.float64)
-        if array.shape != self.action_space.shape:
-            raise ValueError(f"action must have shape {self.action_space.shape}, got {array.shape}")
-        if not (np.abs(array) <= 1.0 + _ROUNDING).all():
-            worst = array[np.argmax(~(np.abs(array) <= 1.0 + _ROUNDING))]
-            raise ValueError(f"action must lie between -1 and 1, got {worst:g}")
-        ends = np.cumsum([each.size for each in self.actuators])[:-1]
-        parts = np.split(np.clip(array, -1.0, 1.0), ends)
-        time = self._now.time
+    def _values(self, action: Any, time: float, setting: Sequence[Any]) -> list[Any]:
+        """Return the values that an action sets, one for each actuator, after those of `setting`."""
+        ends = np.cumsum([each.size for each in self.actuators])
+        parts = [action[end - each.size : end] for each, end in zip(self.actuators, ends, strict=True)]
         return [
             each.value(part, time, before)
-            for each, part, before in zip(self.actuators, parts, self._setting, strict=True)
+            for each, part, before in zip(self.actuators, parts, setting, strict=True)
         ]
 
-    def _observed(self, now: Snapshot) -> np.ndarray:
-        """Return the observation as an array. Raises ValueError if it is not finite or its shape changes."""
-        array = np.array(real_numbers("observation", self._observe(now)), dtype=np.float64)
-        if not np.isfinite(array).all():
-            raise ValueError(
-                f"observation must be finite, but {np.count_nonzero(~np.isfinite(array))} of {array.size} numbers are not, "
-                f"at {now.time:.6g} s"
-            )
-        if self._shape is not None and array.shape != self._shape:
-            raise ValueError(f"observation must have shape {self._shape} in every state, got {array.shape}")
+    def _observed(self, now: Snapshot, info: dict[Any, Any]) -> np.ndarray:
+        """Return the observation as an array, and record in `info` how much of it was clipped. Raises ValueError if it
+        is not finite, changes its shape, or leaves its bounds."""
+        array, clipped = self._bounds.observation(self._observe(now), self._shape, now.time)
+        if self._bounds.clip:
+            info["clipped_observations"] = clipped
         return array
 
     def _rewarded(self, now: Snapshot) -> float:

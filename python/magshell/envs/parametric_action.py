@@ -9,6 +9,7 @@ import numpy as np
 
 from .._input.arrays import count
 from .._input.quantity import quantity
+from .._input.tensors import is_tensor, real_tensor
 from .action import Action
 
 if TYPE_CHECKING:
@@ -73,11 +74,14 @@ class ParametricAction(Action):
         for each in self._further:
             each._check_in(scene)
 
-    def value(self, action: np.ndarray, time: float, before: np.ndarray) -> np.ndarray:
+    def value(self, action: Any, time: float, before: Any) -> Any:
         shape = (len(self.owners), *self.shape) if self._several else self.shape
+        if is_tensor(action):
+            before = before if is_tensor(before) else action.new_tensor(before)
+            return real_tensor(f"what steers {self.name}", self._function(action, time, before), shape)
         return quantity(f"what steers {self.name}", "", self._function(action, time, before), shape)
 
-    def _all_time_series(self, before: np.ndarray, now: np.ndarray, steps: int) -> list[np.ndarray]:
+    def _all_time_series(self, before: Any, now: Any, steps: int) -> list[Any]:
         if not self._several:
             return super()._all_time_series(before, now, steps)
         return [self._time_series(old, new, steps) for old, new in zip(before, now, strict=True)]

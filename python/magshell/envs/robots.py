@@ -50,7 +50,7 @@ def magnetic_strip(
     def seen(now):
         heights = (now.positions[tip, 2].mean(), now.positions[middle, 2].mean())
         speeds = (now.velocities[tip, 2].mean(), now.velocities[middle, 2].mean())
-        return np.array([*heights, *speeds]) / STRIP_LENGTH
+        return [each / STRIP_LENGTH for each in (*heights, *speeds)]
 
     return Environment(
         scene,

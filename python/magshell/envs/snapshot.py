@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from .._input.tensors import is_tensor
 from .._runtime.frozen import immutable
 from ..model.results.result_lookup import result_of
 from ..model.scene.scene import Scene
@@ -23,16 +24,18 @@ class Snapshot:
         snapshot that is itself the `before` of another.
 
     `snapshot[item]` is the result of one body, link or joint in this state, such as `snapshot[hinge].angle` (without full
-    turns, in -pi to pi). With several bodies, rows are those of one after another.
+    turns, in -pi to pi). With several bodies, rows are those of one after another. Positions, velocities, displacements,
+    edge rotations and the action are tensors in Environment.differentiable_step.
     """
 
     motion: Trajectory = field(repr=False)
     index: int
-    action: np.ndarray
+    action: Any
     before: Snapshot | None = field(repr=False, default=None)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "action", np.array(self.action))
+        if not is_tensor(self.action):
+            object.__setattr__(self, "action", np.array(self.action))
 
     @property
     def scene(self) -> Scene:
@@ -45,22 +48,22 @@ class Snapshot:
         return float(self.motion.times[self.index])
 
     @property
-    def positions(self) -> np.ndarray:
+    def positions(self) -> Any:
         """The positions of the vertices, (n_v, 3) m."""
         return self.motion.positions[self.index]
 
     @property
-    def velocities(self) -> np.ndarray:
+    def velocities(self) -> Any:
         """The velocities of the vertices, (n_v, 3) m/s."""
         return self.motion.velocities[self.index]
 
     @property
-    def displacements(self) -> np.ndarray:
+    def displacements(self) -> Any:
         """The displacements of the vertices from the rest shape, (n_v, 3) m."""
         return self.motion.displacements[self.index]
 
     @property
-    def edge_rotations(self) -> np.ndarray:
+    def edge_rotations(self) -> Any:
         """The rotations of the edges, (n_e,) rad."""
         return self.motion.edge_rotations[self.index]
 

@@ -21,6 +21,7 @@ from ...model.scene.solve_inputs import Inputs
 from ..options import Adaptive, Clock, Integrator, Newton, clock_of
 from ..statics.equilibrium import Equilibrium
 from ..statics.start import check_faces
+from .differentiable_state import DifferentiableState
 from .schedule import Schedule
 from .scheduled_values import ScheduledValues
 from .step_errors import tolerance_of
@@ -248,7 +249,7 @@ class MotionInputs:
         origin = self._origin(start)
         if inputs.scene.joints:
             check_joints(inputs, model.points(origin.state))
-        goes_on = isinstance(start, Trajectory | MotionState)
+        goes_on = isinstance(start, Trajectory | MotionState | DifferentiableState)
         own = own_velocities(inputs, start, goes_on)
         if (
             goes_on and inputs.scene.rigid_parts
@@ -256,6 +257,8 @@ class MotionInputs:
             own = model.points(origin.velocity)[inputs.scene.mesh.n_vertices :]
         if velocities is None and (goes_on or not own.any()):
             return origin
+        if isinstance(start, DifferentiableState):
+            raise ValueError("velocities are those of the DifferentiableState that the motion starts from")
         n_v = inputs.scene.mesh.n_vertices
         given = np.zeros((n_v, 3)) if velocities is None else velocities
         rows = np.broadcast_to(inputs.keyword("velocities", given), (n_v, 3))
@@ -293,8 +296,9 @@ class MotionInputs:
                 inputs.take("positions", start.positions)
                 inputs.take("edge_rotations", start.edge_rotations)
             return MotionState(0.0, start._state, still, start._angle_branches)
-        if isinstance(start, MotionState):
-            return _checked_state(start, model.size, model.n_strains)
+        if isinstance(start, MotionState | DifferentiableState):
+            state = start if isinstance(start, MotionState) else start._taken_by(inputs)
+            return _checked_state(state, model.size, model.n_strains)
         given = inputs.take("positions", start)
         positions = quantity("start", "m", given, (mesh.n_vertices, 3))
         inputs.scene._bodies.check_welded("start", "m", positions)
