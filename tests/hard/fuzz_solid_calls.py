@@ -36,7 +36,11 @@ def solid_calls(s: Sample) -> Iterator[Call]:
         ms.QuadraticTriangleMesh.from_triangles,
         {"mesh": flat, "project": lambda points: points},
     )
-    yield Call("QuadraticTriangleMesh.fitted", ms.QuadraticTriangleMesh.fitted, {"mesh": flat, "to": flat})
+    yield Call(
+        "QuadraticTriangleMesh.from_triangles with a finer mesh",
+        ms.QuadraticTriangleMesh.from_triangles,
+        {"mesh": flat, "surface": flat},
+    )
     yield Call("QuadraticTriangleMesh.refined", six.refined, {"project": lambda points: points})
     yield Call(
         "QuadraticTriangleMesh.transformed",

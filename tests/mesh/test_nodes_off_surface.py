@@ -100,7 +100,7 @@ def test_six_node_triangles_on_the_surface_get_no_warning(make, area):
         curved = make(16, order=2)
         curved.refined().flipped().scaled(2.0)
         ms.QuadraticTriangleMesh(curved.rest_positions, curved.elements)
-        ms.QuadraticTriangleMesh.fitted(make(16), to=make(32))
+        ms.QuadraticTriangleMesh.from_triangles(make(16), surface=make(32))
         ms.QuadraticTriangleMesh.from_triangles(make(128))  # short enough
     assert curved.element_areas.sum() == pytest.approx(area, rel=1e-3)
 

@@ -66,8 +66,8 @@ def warn_of_straight_edges(mesh: TriangleMesh, middles: np.ndarray) -> None:
     warnings.warn(
         f"{off.sum()} of {mesh.n_edges} nodes between corners lie on straight edges of a mesh that is curved as a smooth "
         f"surface is: they stay off it by up to about {bulges[worst]:.3g} m, {relative[worst]:.2g} of an edge, and six-node "
-        "elements are no better than flat ones there. Give project= of QuadraticTriangleMesh.from_triangles the surface, "
-        "fit the nodes to a finer mesh (QuadraticTriangleMesh.fitted), or make the mesh by ms.meshes with order=2",
+        "elements are no better than flat ones there. Give QuadraticTriangleMesh.from_triangles the surface, by "
+        "project= as a function or by surface= as a finer mesh, or make the mesh by ms.meshes with order=2",
         MeshQualityWarning,
         stacklevel=callers_level(),
     )

@@ -80,15 +80,29 @@ class QuadraticTriangleMesh(MeshBase):
 
     @classmethod
     def from_triangles(
-        cls, mesh: TriangleMesh, project: Callable[[np.ndarray], np.ndarray] | None = None
+        cls,
+        mesh: TriangleMesh,
+        project: Callable[[np.ndarray], np.ndarray] | None = None,
+        *,
+        surface: TriangleMesh | None = None,
     ) -> QuadraticTriangleMesh:
         """Build a six-node mesh from a three-node one.
 
-        Vertices keep their numbers. The midside node of edge k of `mesh` gets the number n_v + k.
+        Vertices keep their positions and numbers. The midside node of edge k of `mesh` gets the number n_v + k. Without
+        `project` and `surface` the edges stay straight. On a curved surface most of the accuracy of six nodes is then lost;
+        a MeshQualityWarning says so if the angles between faces are those of a smooth surface.
 
         project: a function that maps the midpoints of all edges, (n_e, 3) m, to points on the curved surface, the midside
-            nodes. Without it the edges stay straight. On a curved surface most of the accuracy of six nodes is then lost; a
-            MeshQualityWarning says so if the angles between faces are those of a smooth surface.
+            nodes.
+        surface: a mesh of the same surface, a few times as fine, with normals on the same side; the boundary vertices of
+            `mesh` must be boundary vertices of it. `mesh` itself where there is no finer one. Use it for a surface that is
+            known only as a mesh, from a scan or another program. Around the midpoint of each inner edge a polynomial of
+            fourth degree is fitted to about thirty connected vertices of `surface`; the midpoint moves along the normal onto
+            the fit. For a boundary edge a curve of fourth degree is fitted to the boundary vertices nearby, but not beyond
+            corners of the boundary; the midpoint moves perpendicular to the edge onto this curve.
+
+        Raises ValueError if both are given, if `project` does not return one finite point an edge, or if `surface` has
+        creases of more than 40 degrees or nothing near an edge of `mesh`.
 
         >>> import magshell as ms
         >>> coarse = ms.meshes.cylinder(1.0, 1.0, angle=1.0, cells=(4, 4))
@@ -97,43 +111,26 @@ class QuadraticTriangleMesh(MeshBase):
         >>> curved = ms.QuadraticTriangleMesh.from_triangles(coarse, project=outwards)
         >>> bool(abs(curved.element_areas.sum() - 1.0) < 1e-4)
         True
-        """
-        mesh = checked_mesh(mesh)
-        middles = mesh.edge_midpoints
-        if project is not None:
-            middles = _projected("project(midpoints)", "n_e", project, middles)
-        nodes = mesh.n_vertices + mesh.face_edges[:, [2, 0, 1]]  # edge i is opposite corner i
-        mesh._warn_of_new_vertices()
-        positions = np.concatenate([mesh.rest_positions, middles])
-        return cls(positions, np.concatenate([mesh.faces, nodes], axis=1))._with_members(mesh._groups)
-
-    @classmethod
-    def fitted(cls, mesh: TriangleMesh, to: TriangleMesh | None = None) -> QuadraticTriangleMesh:
-        """Build a six-node mesh whose midside nodes lie on a smooth surface through the vertices of a finer mesh.
-
-        Use it for a surface that is known only as a mesh, from a scan or another program. Around the midpoint of each inner
-        edge a polynomial of fourth degree is fitted to about thirty connected vertices of `to`; the midpoint moves along the
-        normal onto the fit. For a boundary edge a curve of fourth degree is fitted to the boundary vertices of `to` nearby,
-        but not beyond corners of the boundary; the midpoint moves perpendicular to the edge onto this curve. Vertices keep
-        their positions and numbers. The midside node of edge k of `mesh` gets the number n_v + k.
-
-        to: a mesh of the same surface, a few times as fine, with normals on the same side. The boundary vertices of `mesh`
-            must be boundary vertices of it. By default `mesh` itself.
-
-        Raises ValueError if `to` has creases of more than 40 degrees or no surface near an edge of `mesh`, and for the same
-        reasons as `from_triangles`.
-
-        >>> import magshell as ms
         >>> fine = ms.meshes.cylinder(1.0, 1.0, angle=1.0, cells=(16, 16))
-        >>> coarse = ms.meshes.cylinder(1.0, 1.0, angle=1.0, cells=(4, 4))
-        >>> radii = np.linalg.norm(ms.QuadraticTriangleMesh.fitted(coarse, to=fine).rest_positions[:, [0, 2]], axis=1)
+        >>> fitted = ms.QuadraticTriangleMesh.from_triangles(coarse, surface=fine)
+        >>> radii = np.linalg.norm(fitted.rest_positions[:, [0, 2]], axis=1)
         >>> bool(abs(radii - 1.0).max() < 1e-6)
         True
         """
         mesh = checked_mesh(mesh)
-        name = "mesh" if to is None else "to"
-        middles = middles_on_fit(mesh, mesh if to is None else checked_mesh(to, "to"), name)
-        return cls.from_triangles(mesh, project=lambda _: middles)
+        if project is not None and surface is not None:
+            raise ValueError("give project= or surface=, not both: each says where the midside nodes lie")
+        middles = mesh.edge_midpoints
+        if project is not None:
+            middles = _projected("project(midpoints)", "n_e", project, middles)
+        elif surface is not None:
+            middles = middles_on_fit(
+                mesh, checked_mesh(surface, "surface"), "mesh" if surface is mesh else "surface"
+            )
+        nodes = mesh.n_vertices + mesh.face_edges[:, [2, 0, 1]]  # edge i is opposite corner i
+        mesh._warn_of_new_vertices()
+        positions = np.concatenate([mesh.rest_positions, middles])
+        return cls(positions, np.concatenate([mesh.faces, nodes], axis=1))._with_members(mesh._groups)
 
     # A copy or a pickle stores positions and elements only; the connectivity is computed again, which is cheap.
     def __reduce__(self) -> tuple[Any, ...]:
