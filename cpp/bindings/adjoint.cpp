@@ -20,6 +20,38 @@ py::tuple pull_back_to_inputs(Model& model, const StaticsResult& equilibrium, co
     return py::make_tuple(values_to_user(model, gradient.values), gradient.load_parameters);
 }
 
+py::tuple by_parameters(const Model& model, const Gradient& gradient) {
+    return py::make_tuple(values_to_user(model, gradient.values), gradient.load_parameters);
+}
+
+// Returns lambda . dg/dk at a state, in equilibrium or not, for all parameters and load parameters k.
+py::tuple residual_vjp(Model& model, const VectorXd& q, const LoadParameters& load_parameters,
+                       const VectorXd& lambda) {
+    Gradient gradient(model.parameters().registry());
+    {
+        const py::gil_scoped_release unlocked;
+        const std::lock_guard lock(model.in_use());
+        model.evaluate(q, load_parameters);
+        model.parameters().vjp(q, load_parameters, lambda, gradient);
+    }
+    return by_parameters(model, gradient);
+}
+
+// Returns dF/dq_h . dq_h/dk for all parameters and load parameters k, with the prescribed dofs q_h.
+py::tuple prescribed_vjp(Model& model, const VectorXd& q, const LoadParameters& load_parameters,
+                         const VectorXd& by_state) {
+    Gradient gradient(model.parameters().registry());
+    {
+        const py::gil_scoped_release unlocked;
+        const std::lock_guard lock(model.in_use());
+        model.evaluate(q, load_parameters);
+        const VectorXd none = VectorXd::Zero(q.size());
+        if (model.dof_map().has_values())
+            model.dof_map().vjp(by_state, none, none, load_parameters, gradient, {});
+    }
+    return by_parameters(model, gradient);
+}
+
 }  // namespace
 
 void register_adjoint(py::module_& module) {
@@ -28,6 +60,14 @@ void register_adjoint(py::module_& module) {
         py::arg("by_edge_rotations"), py::arg("by_driving") = VectorXd(),
         "The gradients by everything a solve takes, of a function of positions (n_v, 3), edge rotations "
         "(n_e,) and what motors do (m,) with these gradients. The model must hold the values of that solve.");
+    module.def("vjp", &residual_vjp, py::arg("model"), py::arg("q"), py::arg("controls"), py::arg("adjoint"),
+               "adjoint . dg/dk at a state q, g the gradient of the energy: (n,) by every value and (m,) by the "
+               "controls. What supports prescribe stays.");
+    module.def(
+        "prescribed_vjp", &prescribed_vjp, py::arg("model"), py::arg("q"), py::arg("controls"),
+        py::arg("by_state"),
+        "by_state (size,) . dq_h/dk, with q_h what supports prescribe at a state q: (n,) by every value and "
+        "(m,) by the controls. For scenes without rigid parts.");
 }
 
 }  // namespace magshell::bindings

@@ -69,6 +69,7 @@ __all__: list[str] = [
     "pair_frictions",
     "pair_proximities",
     "pair_sums",
+    "prescribed_vjp",
     "pull_back",
     "pull_back_motion",
     "push_forward",
@@ -1237,6 +1238,16 @@ def pair_sums(
     Sums over pairs of their gradients (4, 3) and of the lower blocks of their Hessians (10, 3, 3).
     """
 
+def prescribed_vjp(
+    model: Model,
+    q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    by_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+) -> tuple[typing.Any, ...]:
+    """
+    by_state (size,) . dq_h/dk, with q_h what supports prescribe at a state q: (n,) by every value and (m,) by the controls. For scenes without rigid parts.
+    """
+
 def pull_back(
     model: Model,
     equilibrium: StaticsResult,
@@ -1328,9 +1339,9 @@ def vjp(
     q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     adjoint: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+) -> tuple[typing.Any, ...]:
     """
-    adjoint . dg/dk at a state q, g the gradient of the energy and k every value, (n,).
+    adjoint . dg/dk at a state q, g the gradient of the energy: (n,) by every value and (m,) by the controls. What supports prescribe stays.
     """
 
 __version__: str = "0.1.0"

@@ -145,7 +145,7 @@ class SolidModel:
         return {key: self.layout.of(found, *key) for key in self.others}
 
     def _vjp(self, x, adjoint) -> np.ndarray:
-        return np.asarray(_core.vjp(self.core, self.state(x), self.controls, self.state(adjoint)))
+        return np.asarray(_core.vjp(self.core, self.state(x), self.controls, self.state(adjoint))[0])
 
 
 def shape_gradients(nodes, tetrahedra):

@@ -1,11 +1,9 @@
-// Binds single functions of the core: logarithms in SIMD lanes, the loaded part of a matrix, derivatives by values.
+// Binds single functions of the core: logarithms in SIMD lanes, the loaded part of a matrix.
 #include <memory>
-#include <mutex>
 #include <string>
 
 #include "bindings/arrays.h"
 #include "bindings/given_away.h"
-#include "bindings/gradients.h"
 #include "bindings/testing/testing.h"
 #include "magshell/core/errors.h"
 #include "magshell/core/simd_functions.h"
@@ -29,17 +27,6 @@ py::array_t<double> lane_logarithms(const Array& numbers) {
         for (int lane = 0; lane < lanes; ++lane) to[first + lane] = group[lane];
     }
     return out;
-}
-
-// Returns lambda . dg/dk at a state for all parameters, in the caller's order.
-VectorXd by_values(Model& model, const VectorXd& q, const LoadParameters& load_parameters,
-                   const VectorXd& lambda) {
-    const py::gil_scoped_release unlocked;
-    const std::lock_guard lock(model.in_use());
-    Gradient gradient(model.parameters().registry());
-    model.evaluate(q, load_parameters);
-    model.parameters().vjp(q, load_parameters, lambda, gradient);
-    return model.parameters().registry().values.to_user(gradient.values);
 }
 
 py::tuple loaded(Index size, const IndexArray& column_starts, const IndexArray& rows, const Array& values,
@@ -82,8 +69,6 @@ void register_kernels(py::module_& module) {
                "ln of an array's numbers as the element kernels take it, to be tested.");
     module.def("solve_with_operator", &solve_with_operator, py::arg("size"), py::arg("column_starts"),
                py::arg("rows"), py::arg("values"), py::arg("added"), py::arg("rhs"));
-    module.def("vjp", &by_values, py::arg("model"), py::arg("q"), py::arg("controls"), py::arg("adjoint"),
-               "adjoint . dg/dk at a state q, g the gradient of the energy and k every value, (n,).");
     module.def("loaded_part", &loaded, py::arg("size"), py::arg("column_starts"), py::arg("rows"),
                py::arg("values"), py::arg("forces"),
                "Of a symmetric matrix, given as to analyze(), the part that forces (n,) act on: its "

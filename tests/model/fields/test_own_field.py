@@ -134,7 +134,7 @@ def test_derivatives_by_the_magnetization_of_every_face_agree_with_differences(m
 
     inputs = Inputs(scene, base, None)
     with inputs.in_core():
-        found = _core.vjp(scene._model, state, inputs.controls, adjoint)
+        found = _core.vjp(scene._model, state, inputs.controls, adjoint)[0]
     by_body = [scene._value_layout.of(found, f"body {k}", "remanent_magnetization") for k in range(2)]
     step = 1e-3
     differences = (along(base + step * change) - along(base - step * change)) / (2 * step)

@@ -190,7 +190,7 @@ class EnergyAdjoint:
         inputs, state = self.inputs, self.state(self.inputs.controls)
         with inputs.in_core():
             self._model.term_energies(state, [], inputs.controls)
-            by_values = _core.vjp(self._model, state, inputs.controls, motion)
+            by_values = _core.vjp(self._model, state, inputs.controls, motion)[0]
         return Gradient(inputs.scene, by_values, np.zeros_like(inputs.controls))
 
     def _moved_by(self, leaf: Leaf, of_values: bool) -> list[tuple[str, str]]:
