@@ -115,13 +115,14 @@ from .solve.options import (
     Newton,
     ProjectiveDynamics,
 )
+from .solve.statics.critical_point import CriticalPoint
 from .solve.statics.energies_at import energies, energy, forces, free_motions, hessian
 from .solve.statics.equilibria import EquilibriumSet
 from .solve.statics.equilibrium import Equilibrium
 from .solve.statics.extrapolation import Extrapolation, richardson_extrapolation
 from .solve.statics.magnetic_state import MagneticState, field_of
 from .solve.statics.multistable import find_equilibria
-from .solve.statics.path import CriticalPoint, EquilibriumPath, follow_path
+from .solve.statics.path import EquilibriumPath, follow_path
 from .solve.statics.path_events import PathEvent
 from .solve.statics.solve import equilibrium
 from .solve.statics.solve_log import SolveLog, SolveStep

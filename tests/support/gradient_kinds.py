@@ -21,6 +21,7 @@ from gradient_kinds_bodies import (
 from gradient_kinds_contact import CONTACT_MAKERS, sheets_rubbing
 from gradient_kinds_custom import custom_energies_at_rest, custom_energies_in_motion
 from gradient_kinds_growth import GROWTH_MAKERS
+from gradient_kinds_linear import LINEAR_MAKERS
 from gradient_kinds_magnetization import rotating_magnetization
 from gradient_kinds_muscles import muscles_at_rest, muscles_in_motion
 from gradient_kinds_own_field import own_field
@@ -367,6 +368,7 @@ MAKERS = {
     "custom energies in motion": custom_energies_in_motion,
     "bodies whose magnetization rotates at rest": lambda: rotating_magnetization(False),
     "bodies whose magnetization rotates in motion": lambda: rotating_magnetization(True),
+    **LINEAR_MAKERS,
 }
 
 

@@ -28,9 +28,9 @@ def is_followed(tensor) -> bool:
 
 def numbers_of(tensor) -> np.ndarray:
     """Return the numbers of a readable tensor, without its graph. bfloat16, which numpy lacks, becomes float32."""
-    from ..solve.adjoint.autograd import is_transformed, outside_transforms
+    from ..solve.adjoint.autograd import is_transformed, outside_transforms, within_transform
 
-    if is_transformed(tensor):
+    if is_transformed(tensor) or within_transform():  # which wraps what it detaches
         return outside_transforms(tensor, numbers_of)
     plain = tensor.detach().cpu().resolve_conj().resolve_neg()
     return (plain.float() if plain.dtype == sys.modules["torch"].bfloat16 else plain).numpy()

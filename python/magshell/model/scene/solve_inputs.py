@@ -164,6 +164,13 @@ class Inputs:
         there.values = values
         return there
 
+    def without_tensors(self) -> Inputs:
+        """Return a copy of these inputs with numbers in place of tensors."""
+        there = copy.copy(self)
+        there.leaves, there.given, there.given_flux_density = [], [], None
+        there.given_magnetization = detached(self.given_magnetization)
+        return there
+
     @contextmanager
     def in_core(self) -> Iterator[None]:
         """Hold the scene's core with the values of this solve, as a context manager; solves of other threads wait
@@ -174,8 +181,20 @@ class Inputs:
 
 
 def plain_inputs(
-    scene: Scene, remanent_magnetization: Numbers, applied_flux_density: Numbers, values: Any, **factors: Any
+    scene: Scene,
+    remanent_magnetization: Numbers,
+    applied_flux_density: Numbers,
+    values: Any,
+    differentiable: bool = False,
+    **factors: Any,
 ) -> Inputs:
-    """Return the inputs of a solve without gradients, in which values of the scene may be replaced."""
+    """Return the inputs of a solve in which values of the scene may be replaced."""
     replaced = requested(scene, None, values) if isinstance(scene, Scene) else None
-    return Inputs(scene, remanent_magnetization, applied_flux_density, replaced=replaced, **factors)
+    return Inputs(
+        scene,
+        remanent_magnetization,
+        applied_flux_density,
+        replaced=replaced,
+        differentiable=differentiable,
+        **factors,
+    )

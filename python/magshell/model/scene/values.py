@@ -307,6 +307,11 @@ class Gradient:
         """Return the gradient by a load parameter; of a motion (time points, rows, width)."""
         return self._scene._control_layout.of(self._controls, owner, name)
 
+    @property
+    def of_values(self) -> np.ndarray:
+        """The gradient by all values, (n,)."""
+        return self._values
+
     def of_controls(self, part: slice) -> np.ndarray:
         """Return the gradient by a slice of the vector of load parameters."""
         return self._controls[..., part]

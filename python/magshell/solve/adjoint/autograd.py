@@ -337,6 +337,14 @@ def is_transformed(tensor: torch.Tensor) -> bool:
     return _is_wrapped(tensor) or _has_tangent(tensor)
 
 
+def within_transform() -> bool:
+    """Return whether a transform of torch.func is at work."""
+    try:
+        return torch._C._functorch.peek_interpreter_stack() is not None
+    except AttributeError:  # a torch without this function
+        return False
+
+
 def is_batched(tensor: torch.Tensor) -> bool:
     """Return whether a tensor stands for several, one for each member of a batch of torch.vmap."""
     while _is_wrapped(tensor):

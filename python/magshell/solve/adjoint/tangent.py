@@ -72,7 +72,7 @@ def motor_tangent(
                     model.set_values(numbers)
                     return model.driving(state, controls, turns)[None]
 
-                total += _required(directional_derivative(at, _steps(inputs, leaf, each)))[0]
+                total += _required(directional_derivative(at, steps_along(inputs, leaf, each)))[0]
         finally:
             model.set_values(inputs.values.numbers)
     return total
@@ -120,7 +120,7 @@ def _rates(inputs: Inputs, found: _core.StaticsResult, leaf: Leaf, change: np.nd
         model.set_values(numbers)
         return np.stack([model.gradient(state, controls), model.driven_increment(state, controls)])
 
-    rates = directional_derivative(at, _steps(inputs, leaf, change))
+    rates = directional_derivative(at, steps_along(inputs, leaf, change))
     if rates is None:
         raise NoGradient(
             f"no tangent by {leaf.name}: the forces are not smooth in it, or it is at the end of its range; {advice}"
@@ -128,7 +128,7 @@ def _rates(inputs: Inputs, found: _core.StaticsResult, leaf: Leaf, change: np.nd
     return rates
 
 
-def _steps(inputs: Inputs, leaf: Leaf, change: np.ndarray) -> list[float]:
+def steps_along(inputs: Inputs, leaf: Leaf, change: np.ndarray) -> list[float]:
     """Return the steps along a change that are tried one after another."""
     if leaf.owner is not None:
         value = inputs.values.replaced[leaf.owner][leaf.name]

@@ -13,7 +13,13 @@ from ..statics.equilibrium import Equilibrium
 from .stiffness import Stiffness
 
 
-def idle_inputs(scene: Scene, replaced: dict[Any, Any], flux_density: Any = None, **factors: Any) -> Inputs:
+def idle_inputs(
+    scene: Scene,
+    replaced: dict[Any, Any],
+    flux_density: Any = None,
+    differentiable: bool = False,
+    **factors: Any,
+) -> Inputs:
     """Return inputs without loads and field unless they are given; shells and skins without magnetization get zero."""
     _refuse_own_field(scene)
     if scene.fields:
@@ -22,7 +28,7 @@ def idle_inputs(scene: Scene, replaced: dict[Any, Any], flux_density: Any = None
         replaced = {**replaced, **{each: {**nothing, **replaced.get(each, {})} for each in magnetic}}
     if flux_density is None and scene.has_uniform_field and not factors:
         flux_density = np.zeros(3)
-    return Inputs(scene, None, flux_density, replaced=replaced, **factors)
+    return Inputs(scene, None, flux_density, replaced=replaced, differentiable=differentiable, **factors)
 
 
 def _refuse_own_field(scene: Scene) -> None:

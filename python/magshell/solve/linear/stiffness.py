@@ -8,13 +8,13 @@ import numpy as np
 import scipy
 
 from ... import _core
+from ..adjoint.factorized import Factorized, analyzed, times_low_rank
 
-_SMALL = 20000  # degrees of freedom, up to which trying two orderings costs more than the better one saves
 
+class _Factorized(Factorized):
+    """A factorized positive definite matrix. Raises ValueError if it is not positive definite.
 
-class _Factorized:
-    """A factorized positive definite matrix, given as to _core.analyze, plus a low-rank part. Raises ValueError if it is not
-    positive definite.
+    where: the state in words, for that error.
     """
 
     def __init__(
@@ -27,20 +27,8 @@ class _Factorized:
         where: str,
         low_rank: tuple[np.ndarray, ...] = (),
     ):
-        self._values, self._low_rank = values, low_rank
-        self._factor = _analysed(size, starts, rows, points)
-        refuse_indefinite(self._factor.factorize(values, *low_rank), size, where)
-
-    def solve(self, forces: np.ndarray) -> np.ndarray:
-        """Solve, with one refinement by a residual of more digits.
-
-        Without it, where stiffnesses differ by 1e6, the digits of the soft ones would depend on the order of elimination.
-        """
-        solution = self._factor.solve(forces)
-        left = self._factor.residual(self._values, solution, forces)
-        if self._low_rank:
-            left = left - _times(self._low_rank, solution)
-        return solution + self._factor.solve(left)
+        super().__init__(size, starts, rows, values, points, low_rank)
+        refuse_indefinite(self.report, size, where)
 
 
 def refuse_indefinite(report: _core.FactorReport, size: int, where: str) -> None:
@@ -50,16 +38,6 @@ def refuse_indefinite(report: _core.FactorReport, size: int, where: str) -> None
             f"the stiffness {where} is not positive definite ({report.negative_pivots} negative and "
             f"{report.perturbed_pivots} zero pivots of {size}), and linear theory needs that: add supports"
         )
-
-
-def _analysed(size: int, starts: np.ndarray, rows: np.ndarray, points: np.ndarray) -> _core.Factor:
-    return _core.analyze(size, starts, rows, points=points, ordering="amd" if size <= _SMALL else "best")
-
-
-def _times(low_rank: tuple[np.ndarray, ...], vector: np.ndarray) -> np.ndarray:
-    """Return the product of the sum of s u u^T with a vector, for columns u (n, k) and stiffnesses s (k,)."""
-    columns, stiffnesses = low_rank
-    return columns @ (stiffnesses * (columns.T @ vector))
 
 
 class Stiffness:
@@ -106,7 +84,7 @@ class Stiffness:
     def negative_directions(self, change: np.ndarray) -> int:
         """Count the negative eigenvalues of K plus a change of its nonzeros, by another factorization."""
         *pattern, values = self._triangle
-        return _analysed(*pattern, self._model.free_points).factorize(values + change).negative_pivots
+        return analyzed(*pattern, self._model.free_points).factorize(values + change).negative_pivots
 
     @property
     def factorized(self) -> bool:
@@ -134,7 +112,7 @@ class Stiffness:
     def _pull(self, moved: np.ndarray) -> np.ndarray:
         """Return K times a motion of all degrees of freedom."""
         pattern = self._model.hessian(self.state, self.controls, reduced=False)
-        return symmetric(*pattern) @ moved + _times(self._model.low_rank(reduced=False), moved)
+        return symmetric(*pattern) @ moved + times_low_rank(self._model.low_rank(reduced=False), moved)
 
 
 def symmetric(size: int, starts: np.ndarray, rows: np.ndarray, values: np.ndarray) -> scipy.sparse.csc_array:

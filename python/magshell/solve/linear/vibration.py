@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
 
 from ... import _core
+from ..._input.tensors import detached, dtype_like, is_tensor, like
 from ..._runtime.frozen import immutable
 from ..._runtime.solver_entry_point import solve_entry
 from ...errors import NotConverged
@@ -19,11 +20,16 @@ from ...model.scene.solve_inputs import Inputs
 from ...model.scene.values import Values
 from ...model.shells.shell import Shell
 from ...model.solids.solid import Solid
+from ..adjoint.eigenvalue import FrequencyAdjoint
+from ..adjoint.residual import Residual
 from ..statics.equilibrium import Equilibrium
 from .base_state import idle_inputs, inputs_about, set_state
 from .mode_shapes import mode_shapes
 from .rest import refuse_what_acts
 from .stiffness import symmetric
+
+if TYPE_CHECKING:
+    from ..._input.kinds import Computed
 
 
 def consistent_masses(values: Values) -> scipy.sparse.csc_array:
@@ -101,14 +107,14 @@ class VibrationModes:
     """The slowest small vibrations of a scene about an equilibrium, with their frequencies and shapes.
 
     squares: (k,) 1/s2, ascending: of the angular frequencies. Zero for a motion that nothing resists, negative for one
-        that grows: the equilibrium is not stable.
+        that grows: the equilibrium is not stable. A tensor if the equilibrium or a value has tensors.
     modes: (k, n_v, 3), displacements of the vertices, the largest component 1.
     edge_rotations: (k, n_e), rad, that go with them.
     unstable: how many modes grow, also where k is less.
     """
 
     scene: Scene
-    squares: np.ndarray
+    squares: Any
     modes: np.ndarray = field(repr=False)
     edge_rotations: np.ndarray = field(repr=False)
     unstable: int
@@ -116,18 +122,21 @@ class VibrationModes:
     wall_time: float
 
     @property
-    def frequencies(self) -> np.ndarray:
+    def frequencies(self) -> Computed:
         """The frequencies, (k,) Hz; NaN for a mode that grows instead of vibrating."""
+        if is_tensor(self.squares):
+            nothing = self.squares.new_full((), np.nan)
+            return self.squares.where(self.squares >= 0.0, nothing).sqrt() / (2.0 * np.pi)
         vibrating = np.where(self.squares < 0.0, np.nan, self.squares)
         return np.sqrt(vibrating) / (2.0 * np.pi)
 
     @property
     def growth_rates(self) -> np.ndarray:
         """The rates r of the modes that grow as exp(r t), (k,) 1/s; zero for those that vibrate."""
-        return np.sqrt(np.maximum(-self.squares, 0.0))
+        return np.sqrt(np.maximum(-detached(self.squares), 0.0))
 
     def __repr__(self) -> str:
-        frequencies = ", ".join(f"{each:.5g}" for each in self.frequencies[self.unstable :])
+        frequencies = ", ".join(f"{each:.5g}" for each in detached(self.frequencies)[self.unstable :])
         text = f"VibrationModes: {frequencies} Hz; {self.wall_time:.3g} s"
         if self.unstable:
             rates = ", ".join(f"{each:.4g}" for each in self.growth_rates[: self.unstable])
@@ -157,6 +166,12 @@ def vibration_modes(
     count: how many modes.
     mass: "lumped" to the vertices, as motions have it: frequencies are off by the square of the size of the elements, 3 %
         for a cube of 6 quadratic cells a side; or "consistent" with the elements' shapes: 1 % of it with 4, and from above.
+
+    Squares and frequencies are differentiable, by perturbation of first order: by `values` that are tensors, and by the
+    inputs of an equilibrium that was found with tensors, with the change of the equilibrium itself. A gradient costs one
+    factorization and some thirty evaluations of the stiffness for each frequency asked for. Frequencies that equal the next
+    one to 1e-6 have none, as their modes mix; nor those of consistent masses, of rigid bodies, and under pressures without
+    potential: NoGradient says so. Modes are arrays.
 
     Raises ValueError on bad input, NotConverged where the search for the modes does not come to its end, Interrupted.
 
@@ -197,17 +212,54 @@ def vibration_modes(
     if consistent is not None:
         inertia = nonzeros_in_pattern(consistent, *stiffness[1:3])
     pencil = _Pencil(stiffness, low_rank, model.free_points, masses, slow, inertia, consistent)
-    squares, vectors = pencil.lowest(int(count))
-    modes, edge_rotations = mode_shapes(model, vectors)
+    next_too = bool(inputs.leaves) and count + 1 < np.count_nonzero(masses)  # whether the last one is simple
+    squares, vectors = pencil.lowest(int(count) + next_too)
+    modes, edge_rotations = mode_shapes(model, vectors[:, : int(count)])
     return VibrationModes(
         scene=scene,
-        squares=squares,
+        squares=_differentiable(
+            inputs, equilibrium, squares, vectors, masses, next_too, consistent is not None
+        ),
         modes=modes,
         edge_rotations=edge_rotations,
         unstable=pencil.growing(),
         factorizations=pencil.factorizations,
         wall_time=time.perf_counter() - began,
     )
+
+
+def _differentiable(
+    inputs: Inputs,
+    equilibrium: Equilibrium | None,
+    squares: np.ndarray,
+    vectors: np.ndarray,
+    masses: np.ndarray,
+    next_too: bool,
+    consistent: bool,
+) -> Any:
+    """Return the squares as a tensor that is connected to the inputs, if some of these require a gradient.
+
+    next_too: the last square only tells whether the one before is simple, and is left out.
+    """
+    kept = squares[: len(squares) - next_too]
+    if not inputs.leaves:
+        return like(kept, *inputs.given)
+    from ..adjoint.autograd import solved
+
+    model, layout = inputs.scene._model, inputs.scene._control_layout
+    normed = vectors / np.sqrt((masses[:, None] * vectors**2).sum(axis=0))
+    at = (model.rest_state(), [], layout.zeros())
+    if equilibrium is not None:
+        at = (equilibrium._state, equilibrium._angle_branches, equilibrium._controls)
+    adjoint = FrequencyAdjoint(
+        Residual(inputs, *at),
+        squares,
+        np.stack([model.expand(each) for each in normed.T], axis=1),
+        complete=not next_too,
+        at_rest=equilibrium is None,
+        consistent=consistent,
+    )
+    return solved(adjoint, (kept.copy(),), dtype_like(*inputs.given), inputs.tensors)[0]
 
 
 class _Pencil:
@@ -357,10 +409,11 @@ def _coupled_root(inertia, masses: np.ndarray) -> tuple[Any, ...]:
 def _inputs(scene: Scene, equilibrium: Equilibrium | None, values: dict[Any, Any] | None) -> Inputs:
     """Return the inputs of the equilibrium; without one, the scene's own values without a field."""
     if equilibrium is not None:
-        return inputs_about(scene, equilibrium, values=values)
+        inputs = inputs_about(scene, equilibrium, values=values)
+        return inputs if equilibrium._inputs is None else equilibrium._inputs
     if not isinstance(scene, Scene):
         raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
-    return idle_inputs(scene, requested(scene, None, values, moving=True))
+    return idle_inputs(scene, requested(scene, None, values, moving=True), differentiable=True)
 
 
 def _slow_square(body: Shell | Solid) -> float:

@@ -81,13 +81,14 @@ class Equilibrium(SaveMixin, OfOneBody):
     _own_points: Any = field(repr=False, default=None)  # (10 a rigid part, 3)
     _driving: Any = field(repr=False, default=None)  # (m,) N m or N, of motors in joints, in the core's order
     _steps: tuple[tuple[Any, ...], ...] = field(repr=False, default=())  # as in SolveStep
+    _inputs: Any = field(repr=False, default=None)  # the Inputs, if tensors are among them
 
     def __copy__(self) -> Equilibrium:
         return self  # immutable
 
     def __getstate__(self) -> dict[Any, Any]:
         """Return the data of a copy, another process or a file: tensors as arrays, without their gradients."""
-        return {**plain_arrays(vars(self)), "_values": self._values.to_state()}
+        return {**plain_arrays(vars(self)), "_values": self._values.to_state(), "_inputs": None}
 
     def __setstate__(self, state: dict[Any, Any]) -> None:
         values = Values.from_state(state["scene"], state["_values"])

@@ -13,6 +13,7 @@ import numpy as np
 from ... import _core
 from ..._input.arrays import count, number
 from ..._input.scalars import positive
+from ..._input.tensors import detached
 from ..._runtime.frozen import immutable
 from ..._runtime.log import log
 from ..._runtime.mixins import AnimateMixin
@@ -32,6 +33,7 @@ from ...model.shells.obtuse_faces import warn_of_obtuse_faces
 from ...model.shells.strains import StrainHistory, strains_of, warn_if_large
 from ..options import MixedNewton, Newton
 from .along_path import AlongPath, moving_obstacles
+from .critical_point import CriticalPoint, critical_point
 from .equilibrium import Equilibrium
 from .path_events import PathEvent, events_along
 from .single_solve import solve
@@ -39,25 +41,6 @@ from .start import starting_point
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
-
-
-@immutable
-@dataclass(frozen=True)
-class CriticalPoint:
-    """A point of a path where it gains or loses an unstable direction.
-
-    parameter: on the path. kind: "limit" (the path turns round here), "bifurcation" (another branch crosses, which
-    path.switch_branch follows) or, under forces without potential, "flutter" (oscillations begin to grow). positions:
-    (n_v, 3) m. mode: (n_v, 3), the displacement that costs nothing here, largest component 1. after_point: index of the
-    last point of the path before it.
-    """
-
-    parameter: float
-    kind: str
-    positions: np.ndarray = field(repr=False)
-    mode: np.ndarray = field(repr=False)
-    after_point: int
-    _found: Any = field(repr=False)
 
 
 @immutable
@@ -91,6 +74,7 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
     _from: Any = field(repr=False)
     _to: Any = field(repr=False)
     _options: Any = field(repr=False)
+    _start: Any = field(repr=False)
 
     def switch_branch(
         self,
@@ -144,7 +128,7 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
         return _follow(
             self._inputs,
             self._moving,
-            (found.state, found.turns, self._from),
+            (found.state, found.turns, self._from, self._start),
             options,
             _checked_until(until),
             progress,
@@ -166,7 +150,7 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
         options = MixedNewton()._options()
         options.require_stable = False
         point = self._points[index]
-        inputs = self._inputs.with_values(self._moving.values(self.parameters[index]))
+        inputs = self._inputs.with_values(self._moving.values(self.parameters[index])).without_tensors()
         return solve(inputs, point.state, point.turns, controls, controls, options).equilibrium
 
     def strains(self, index: int = -1) -> Any:
@@ -327,7 +311,7 @@ def follow_path(
     until = _checked_until(until)
     if start is not None and not isinstance(start, Equilibrium):
         raise ValueError(f"start must be an Equilibrium of this scene, got {type(start).__name__}")
-    inputs = plain_inputs(scene, **arguments)
+    inputs = plain_inputs(scene, differentiable=True, **arguments)
     state, angle_branches, from_, _ = starting_point(scene, start, inputs)
     moving = AlongPath(inputs, start)
     options = _core.PathOptions()
@@ -337,7 +321,7 @@ def follow_path(
     options.locate_critical = locate_critical
     options.watched = watched_obstacles(scene, moving_obstacles(scene, moving, from_, inputs.controls))
 
-    return _follow(inputs, moving, (state, angle_branches, from_), options, until, progress)
+    return _follow(inputs, moving, (state, angle_branches, from_, start), options, until, progress)
 
 
 def _checked_until(until: Any) -> Any:
@@ -348,11 +332,14 @@ def _checked_until(until: Any) -> Any:
 
 
 def _follow(
-    inputs: Inputs, moving: AlongPath, start: tuple[Any, Any, Any], options: Any, until: Any, progress: bool
+    inputs: Inputs, moving: AlongPath, start: tuple[Any, ...], options: Any, until: Any, progress: bool
 ) -> EquilibriumPath:
-    """Follow a path in the core. start: its state, the branches of its angles and the load parameters at parameter 0."""
+    """Follow a path in the core.
+
+    start: its state, the branches of its angles and the load parameters at parameter 0, and the Equilibrium there, or None.
+    """
     scene = inputs.scene
-    state, angle_branches, from_ = start
+    state, angle_branches, from_, first = start
     began = time.perf_counter()
     with inputs.in_core(), SolveBar("path", progress) as bar:
         found = _core.follow_path(
@@ -367,7 +354,7 @@ def _follow(
             _advance(bar),
         )
         bending = _bending_energies(scene, found, inputs.controls)
-    path = _path(inputs, moving, found, from_, options, time.perf_counter() - began)
+    path = _path(inputs, moving, found, (from_, first), options, time.perf_counter() - began)
     log.debug("path: %s, %d points, %.3g s", found.outcome.name, len(path), path.wall_time)
     if found.outcome == _core.Outcome.interrupted:
         raise Interrupted(f"interrupted after {len(path)} points of the path", path)
@@ -422,8 +409,8 @@ def _advance(bar):
     return advance
 
 
-def _path(inputs: Inputs, moving: AlongPath, found, from_, options, wall_time: float) -> EquilibriumPath:
-    scene = inputs.scene
+def _path(inputs: Inputs, moving: AlongPath, found, begin, options, wall_time: float) -> EquilibriumPath:
+    scene, (from_, start) = inputs.scene, begin
     model = scene._model
     points = found.points
     strain = StrainHistory.of([_largest(model, moving.values(point.parameter), point) for point in points])
@@ -434,8 +421,8 @@ def _path(inputs: Inputs, moving: AlongPath, found, from_, options, wall_time: f
             len(points), scene.mesh.n_vertices, 3
         ),
         n_negative_eigenvalues=np.array([point.n_negative_eigenvalues for point in points], dtype=int),
-        critical=tuple(_critical(model, point) for point in found.critical),
-        remanent_magnetization=inputs.given_magnetization,
+        critical=tuple(critical_point(inputs, moving, start, from_, point) for point in found.critical),
+        remanent_magnetization=detached(inputs.given_magnetization),
         largest_membrane_strain=strain.membrane,
         largest_bending_strain=strain.bending,
         iterations=found.iterations,
@@ -449,20 +436,10 @@ def _path(inputs: Inputs, moving: AlongPath, found, from_, options, wall_time: f
         _from=from_,
         _to=inputs.controls,
         _options=options,
+        _start=start,
     )
 
 
 def _largest(model, values: Values, point) -> tuple[Any, ...]:
     with values.growth_in_core():
         return model.largest_strains(point.state, values.all_sheets.thickness)
-
-
-def _critical(model, found) -> CriticalPoint:
-    return CriticalPoint(
-        parameter=found.point.parameter,
-        kind=found.kind.name,
-        positions=model.positions(found.point.state),
-        mode=model.positions(found.mode),
-        after_point=found.after_point,
-        _found=found,
-    )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..._input.tensors import detached
 from ..._runtime.frozen import immutable
 from ...model.scene.contact_state import compute_contact_state
 
@@ -42,7 +43,9 @@ class PathEvent:
 
 def events_along(path: EquilibriumPath) -> tuple[PathEvent, ...]:
     """Return the critical points of a path and the changes of its contacts, in their order along it."""
-    events = [PathEvent(point.kind, point.parameter, point.after_point) for point in path.critical]
+    events = [
+        PathEvent(point.kind, float(detached(point.parameter)), point.after_point) for point in path.critical
+    ]
     for contact in path.scene.contacts:
         in_contact = [_is_in_contact(path, contact, k) for k in range(len(path))]
         events += [

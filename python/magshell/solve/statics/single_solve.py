@@ -240,6 +240,7 @@ def _result(
         _own_points=points[n_v:] if scene.rigid_parts else None,
         _driving=driving,
         _steps=steps_of(found),
+        _inputs=inputs if inputs.given else None,
     )
 
 

@@ -1,0 +1,154 @@
+"""Derivatives of products of the gradient of the energy with motions, at one state. Works on arrays.
+
+    w . g(q, k)                 derivatives by q: H w,  by values and load parameters k: w . dg/dk
+    v . H(q, k) w               the same, differentiated along v by differences of high order
+
+The second one contracts the third derivatives of the energy twice. It is what an eigenvalue of the stiffness changes by.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ... import _core
+from ...errors import NoGradient
+from ...model.scene.values import Gradient
+from .differences import directional_derivative
+
+if TYPE_CHECKING:
+    from ...model.scene.solve_inputs import Inputs
+
+# The first step along a motion: the fraction (1) of the shortest edge by which a vertex moves, and the angle in rad by which
+# an edge angle_branches; and the fractions (1) of it that are tried until differences of sixth and eighth order agree. Tested by
+# test_frequencies_have_the_gradients_of_differences.
+_STEP, _SHORTER = 1 / 64, (1.0, 0.25, 0.1, 1e-2, 1e-3, 1e-4)
+
+
+class Slopes(NamedTuple):
+    """The derivatives of a number by all unknowns of the core, by all values and by all load parameters."""
+
+    by_state: np.ndarray
+    by_values: np.ndarray
+    by_controls: np.ndarray
+
+    def plus(self, factor: float, other: Slopes) -> Slopes:
+        """Return the derivatives of the sum of this number and a multiple of another."""
+        return Slopes(*(mine + factor * theirs for mine, theirs in zip(self, other, strict=True)))
+
+
+class Residual:
+    """The gradient g of the energy at a state with load parameters, and derivatives of its products with motions.
+
+    angle_branches: the full turns of angles there, as Equilibrium has them. The core must hold the values of the inputs while the
+    methods run. These raise NoGradient in scenes of which the state is more than positions and edge rotations.
+    """
+
+    def __init__(self, inputs: Inputs, state: np.ndarray, angle_branches: list[list[float]], controls: np.ndarray):
+        self.inputs, self.state, self.controls = inputs, state, controls
+        self._model, self._angle_branches = inputs.scene._model, angle_branches
+
+    def at(self, state: np.ndarray, controls: np.ndarray) -> Residual:
+        """Return the same at another state and other load parameters."""
+        return Residual(self.inputs, state, self._angle_branches, controls)
+
+    def gradient(self) -> np.ndarray:
+        """Return g of all unknowns."""
+        self._prepare()
+        return self._model.gradient(self.state, self.controls)
+
+    def hessian(self) -> tuple[tuple[int, np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, ...]]:
+        """Return the lower triangle of H for the free unknowns, and its low-rank part, () if there is none.
+
+        Raises NoGradient if H is not symmetric.
+        """
+        self._prepare()
+        try:
+            triangle = self._model.hessian(self.state, self.controls)
+        except ValueError as error:
+            raise NoGradient(f"no gradient here: {error}") from error
+        columns, stiffnesses = self._model.low_rank()
+        return triangle, ((columns, stiffnesses) if np.any(stiffnesses) else ())
+
+    def slopes(self, motion: np.ndarray) -> Slopes:
+        """Return the derivatives of motion . g at a fixed motion of all unknowns."""
+        self._prepare()
+        return self._slopes(self.state, motion)
+
+    def bent(self, motion: np.ndarray, along: np.ndarray) -> Slopes:
+        """Return the derivatives of along . H motion at fixed motions of all unknowns.
+
+        Raises NoGradient where the forces are not smooth.
+        """
+        parts, size = self._parts, np.concatenate(self._slopes(self.state, motion)).size
+
+        def rows(step: float) -> np.ndarray:
+            self._prepare()
+            flat = np.concatenate(self._slopes(self.state + step * along, motion))
+            found = np.zeros((len(parts), max(part.stop - part.start for part in parts)))
+            for row, part in zip(found, parts, strict=True):
+                row[: part.stop - part.start] = flat[part]
+            return found
+
+        length = self._relative_size(along)
+        if length == 0.0:
+            rates = rows(0.0) * 0.0
+        else:
+            rates = directional_derivative(rows, [_STEP * shorter / length for shorter in _SHORTER])
+        if rates is None:
+            raise NoGradient(
+                "no gradient here: the stiffness is not smooth at this state; contacts may open or close there"
+            )
+        flat = np.zeros(size)
+        for row, part in zip(rates, parts, strict=True):
+            flat[part] = row[: part.stop - part.start]
+        n, m = len(self.state), self.inputs.scene._value_layout.size
+        return Slopes(flat[:n], flat[n : n + m], flat[n + m :])
+
+    def prescribed(self, by_state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return derivatives by values and load parameters through what supports prescribe, from those by unknowns."""
+        return _core.prescribed_vjp(self._model, self.state, self.controls, by_state)
+
+    def by_inputs(self, slopes: Slopes, masses: np.ndarray | None = None) -> Gradient:
+        """Return the gradient by values and load parameters, also through what supports prescribe.
+
+        masses: the derivatives by the masses of vertices.
+        """
+        through = self.prescribed(slopes.by_state)
+        others = {} if masses is None else {"mass": masses}
+        return Gradient(
+            self.inputs.scene, slopes.by_values + through[0], slopes.by_controls + through[1], others
+        )
+
+    def _slopes(self, state: np.ndarray, motion: np.ndarray) -> Slopes:
+        product = self._model.hessian_product(state, self.controls, motion)
+        return Slopes(product, *_core.vjp(self._model, state, self.controls, motion))
+
+    def _prepare(self) -> None:
+        if self.inputs.scene.rigid_parts:
+            raise NoGradient("no gradient here: the scene has rigid bodies or skeletons")
+        self._model.term_energies(self.state, self._angle_branches, self.controls)
+
+    @property
+    def _parts(self) -> list[slice]:
+        """The entries of flat Slopes of one unit each: unknowns of vertices and others, each value, each load parameter."""
+        scene, n = self.inputs.scene, len(self.state)
+        vertices = 3 * scene._bodies.n_points
+        directions = vertices + 3 * len(scene._constraints.directions)
+        parts, first = [slice(0, vertices), slice(vertices, directions), slice(directions, n)], n
+        for layout in (scene._value_layout, scene._control_layout):
+            entries = np.arange(first, first + layout.size)
+            for key in layout:
+                of_key = layout.of(entries, *key).ravel()
+                parts.append(slice(of_key.min(initial=first), of_key.max(initial=first - 1) + 1))
+            first += layout.size
+        return [part for part in parts if part.stop > part.start]
+
+    def _relative_size(self, motion: np.ndarray) -> float:
+        """Return the largest motion of a vertex over the shortest edge, or the largest rotation in rad, if that is more."""
+        scene = self.inputs.scene
+        vertices = 3 * scene._bodies.n_points
+        edges = scene.mesh.edge_lengths
+        moved = np.abs(motion[:vertices]).max(initial=0.0) / edges.min(initial=np.inf)
+        return float(max(moved, np.abs(motion[vertices:]).max(initial=0.0)))

@@ -1,0 +1,131 @@
+"""Kinds of scene with numbers of their stiffness, for gradient_kinds.py: frequencies, and critical points of paths."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from adjoint_scenes import DEFAULTS, MESH, everything
+from gradient_scenes import Kind
+from gradient_world import EXACT, FACTORS, REACH
+
+import magshell as ms
+
+torch = pytest.importorskip("torch")
+
+
+def frequencies(scene, values, start=None, **given):
+    """Return the logarithms of the three lowest squares of frequencies about an equilibrium."""
+    rest = ms.equilibrium(scene, values=values, start=start, **given)
+    return numbers(ms.vibration_modes(scene, rest, count=3).squares)
+
+
+def frequencies_at_rest(scene, values, **of_body):
+    body = scene.bodies[0]
+    values = {**values, body: {**values.get(body, {}), **of_body}}
+    return numbers(ms.vibration_modes(scene, values=values, count=3).squares)
+
+
+def numbers(positive) -> SimpleNamespace:
+    """Return positive numbers as results, by their logarithms."""
+    return SimpleNamespace(numbers=as_tensor(positive).log().reshape(-1))
+
+
+def as_tensor(values):
+    return values if torch.is_tensor(values) else torch.tensor(np.array(values, dtype=np.float64))
+
+
+def vibrating_sheet() -> Kind:
+    """Build the sheet on which everything acts, vibrating about its equilibrium."""
+    return Kind(everything(), {**DEFAULTS, **FACTORS}, solve=frequencies, fixed=EXACT, reach=REACH)
+
+
+def vibrating_solid() -> Kind:
+    """Build a magnetized solid with a skin, vibrating about its equilibrium in a field."""
+    block = ms.Solid(
+        ms.meshes.box((0.1, 0.03, 0.02), cells=(4, 2, 1)),
+        material=ms.NeoHookean(young_modulus=1e6, poisson_ratio=0.4),
+        mass_density=1e3,
+        remanent_magnetization=(3e4, 1e3, 2e4),
+        skin=ms.Skin(remanent_magnetization=(4e4, 0.0, 1e4), thickness=1e-3, mass_density=2e3),
+    )
+    pin = ms.Pin(block.mesh.vertices_at(x=0.0))
+    scene = ms.Scene(block, supports=[pin], field=ms.UniformField(), gravity=(0.2, 0.1, -9.81))
+    controls = {"applied_flux_density": (2e-3, 1e-3, 2e-2), "gravity_factor": 0.9}
+    return Kind(scene, controls, solve=frequencies, fixed=EXACT, reach=REACH)
+
+
+def vibrating_at_rest() -> Kind:
+    """Build a sheet that vibrates about its rest shape, without loads."""
+    sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
+    scene = ms.Scene(sheet, supports=[ms.Clamp(MESH.edges_at(x=0.0))])
+    return Kind(scene, {}, solve=frequencies_at_rest, reach=REACH)
+
+
+def numbers_of(given):
+    """Return tensors without their graphs, and anything else as it is."""
+    return {name: value.detach() if torch.is_tensor(value) else value for name, value in given.items()}
+
+
+def snap(scene, values, start=None, **given):
+    """Return the first limit point of the path on which a field pushes a buckled beam through, as the field grows."""
+    sheet = scene.bodies[0]
+    of_sheet = {name: given.pop(name) for name in OF_SHEET if name in given}
+    values = {**values, sheet: {**values.get(sheet, {}), **of_sheet}}
+    if "vertex_loads" in given:
+        values[scene] = {**values.get(scene, {}), "vertex_loads": given.pop("vertex_loads")}
+    field = as_tensor(given.pop("applied_flux_density"))  # a tensor: the point is located by Newton's method
+    pushed = ms.equilibrium(
+        scene,
+        values={owner: numbers_of(named) for owner, named in values.items()},
+        applied_flux_density=(0, 0, -5e-3),
+        **numbers_of(given),
+    )
+    rest = ms.equilibrium(scene, values=values, applied_flux_density=(1e-4, 0, 0), start=pushed, **given)
+    middle = scene.mesh.nearest_vertex((0.06, 0.01, 0.0))
+    path = ms.follow_path(
+        scene,
+        values=values,
+        applied_flux_density=field,
+        start=rest,
+        max_step=0.02,
+        progress=False,
+        until=lambda _, positions: positions[middle, 2] < 0.0,
+        **given,
+    )
+    point = next(each for each in path.critical if each.kind == "limit")
+    positions = as_tensor(point.positions) - torch.tensor(np.array(scene.mesh.rest_positions))
+    found = numbers(point.parameter)
+    found.displacements = positions
+    return found
+
+
+OF_SHEET = ("thickness", "young_modulus", "poisson_ratio", "mass_density", "curvature_scale")
+
+
+def snapping_beam() -> Kind:
+    """Build a beam, buckled by its clamps, with halves magnetized against each other, in its weight and slightly pushed."""
+    mesh = ms.meshes.rectangle(0.12, 0.02, cells=(12, 2))
+    sheet = ms.Shell(mesh, thickness=2.5e-3, young_modulus=4.2e6, poisson_ratio=0.45, mass_density=1e3)
+    left = ms.Clamp(mesh.edges_at(x=0.0), displacement=(4e-4, 0, 0), rotation=(0.0, 2e-3, 0.0))
+    right = ms.Clamp(mesh.edges_at(x=0.12), displacement=(-3e-4, 0, 0), rotation=(0.0, 1e-3, 0.0))
+    end = ms.PointLoad(mesh.nearest_vertex((0.03, 0.01, 0.0)), (0, 0, -2e-4))
+    scene = ms.Scene(
+        sheet, supports=[left, right], loads=[end], gravity=(0.3, 0, -0.1), field=ms.UniformField()
+    )
+    magnetization = np.zeros((mesh.n_faces, 3))
+    magnetization[:, 0] = 5.4e4 * np.sign(mesh.face_barycenters[:, 0] - 0.06)
+    controls = {
+        "remanent_magnetization": magnetization,
+        "applied_flux_density": (1e-3, 2e-4, 2e-2),
+        **FACTORS,
+    }
+    reach = {**REACH, "displacement": 3e-4, "rotation": 0.01, "center": 1e-3}
+    return Kind(scene, controls, solve=snap, fixed=EXACT, reach=reach)
+
+
+LINEAR_MAKERS = {
+    "a sheet that vibrates about an equilibrium": vibrating_sheet,
+    "a solid that vibrates about an equilibrium": vibrating_solid,
+    "a sheet that vibrates about its rest shape": vibrating_at_rest,
+    "a beam that snaps at a limit point": snapping_beam,
+}
