@@ -60,9 +60,10 @@ void register_adjoint(py::module_& module) {
         py::arg("by_edge_rotations"), py::arg("by_driving") = VectorXd(),
         "The gradients by everything a solve takes, of a function of positions (n_v, 3), edge rotations "
         "(n_e,) and what motors do (m,) with these gradients. The model must hold the values of that solve.");
-    module.def("vjp", &residual_vjp, py::arg("model"), py::arg("q"), py::arg("controls"), py::arg("adjoint"),
-               "adjoint . dg/dk at a state q, g the gradient of the energy: (n,) by every value and (m,) by the "
-               "controls. What supports prescribe stays.");
+    module.def(
+        "vjp", &residual_vjp, py::arg("model"), py::arg("q"), py::arg("controls"), py::arg("adjoint"),
+        "adjoint . dg/dk at a state q, g the gradient of the energy: (n,) by every value and (m,) by the "
+        "controls. What supports prescribe stays.");
     module.def(
         "prescribed_vjp", &prescribed_vjp, py::arg("model"), py::arg("q"), py::arg("controls"),
         py::arg("by_state"),

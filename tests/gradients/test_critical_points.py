@@ -94,14 +94,14 @@ def test_critical_fields_have_the_gradients_of_differences_of_whole_paths():
 
 
 def test_positions_at_limit_points_have_the_gradients_of_differences():
-    def place(x):
+    def weighted_positions(x):
         return weighted(point_of(snap(x), "limit").positions)
 
     x = ZERO.clone().requires_grad_()
-    (by,) = torch.autograd.grad(place(x), x)
+    (by,) = torch.autograd.grad(weighted_positions(x), x)
     thicker = torch.eye(3, dtype=torch.float64)[0]
-    assert float(by @ thicker) == pytest.approx(slope(place, ZERO, thicker), rel=1e-6)
-    torch.testing.assert_close(torch.func.jacfwd(place)(ZERO)[0], by[0], rtol=1e-7, atol=0.0)
+    assert float(by @ thicker) == pytest.approx(slope(weighted_positions, ZERO, thicker), rel=1e-6)
+    torch.testing.assert_close(torch.func.jacfwd(weighted_positions)(ZERO)[0], by[0], rtol=1e-7, atol=0.0)
     assert by[1:].abs().max() < 1e-8 * by[0].abs()  # E and M scale the field alone
 
 
@@ -198,7 +198,7 @@ def test_load_parameters_of_the_start_and_of_the_end_have_gradients():
     assert by_end.item() == pytest.approx(-s / 7.5, rel=1e-7)
 
 
-def test_other_results_of_a_path_stay_numbers():
+def test_points_of_a_path_between_critical_ones_stay_arrays():
     x = ZERO.clone().requires_grad_()
     path = snap(x)
     assert torch.is_tensor(path.critical[0].parameter) and path.critical[0].parameter.requires_grad

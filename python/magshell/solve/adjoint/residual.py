@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ...model.scene.solve_inputs import Inputs
 
 # The first step along a motion: the fraction (1) of the shortest edge by which a vertex moves, and the angle in rad by which
-# an edge angle_branches; and the fractions (1) of it that are tried until differences of sixth and eighth order agree. Tested by
+# an edge turns; and the fractions (1) of it that are tried until differences of sixth and eighth order agree. Tested by
 # test_frequencies_have_the_gradients_of_differences.
 _STEP, _SHORTER = 1 / 64, (1.0, 0.25, 0.1, 1e-2, 1e-3, 1e-4)
 
@@ -41,11 +41,13 @@ class Slopes(NamedTuple):
 class Residual:
     """The gradient g of the energy at a state with load parameters, and derivatives of its products with motions.
 
-    angle_branches: the full turns of angles there, as Equilibrium has them. The core must hold the values of the inputs while the
-    methods run. These raise NoGradient in scenes of which the state is more than positions and edge rotations.
+    angle_branches: the full turns of angles there, as Equilibrium has them. The core must hold the values of the inputs
+    while the methods run. These raise NoGradient in scenes of which the state is more than positions and edge rotations.
     """
 
-    def __init__(self, inputs: Inputs, state: np.ndarray, angle_branches: list[list[float]], controls: np.ndarray):
+    def __init__(
+        self, inputs: Inputs, state: np.ndarray, angle_branches: list[list[float]], controls: np.ndarray
+    ):
         self.inputs, self.state, self.controls = inputs, state, controls
         self._model, self._angle_branches = inputs.scene._model, angle_branches
 
