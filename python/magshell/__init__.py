@@ -119,6 +119,7 @@ from .solve.statics.critical_point import CriticalPoint
 from .solve.statics.energies_at import energies, energy, forces, free_motions, hessian
 from .solve.statics.equilibria import EquilibriumSet
 from .solve.statics.equilibrium import Equilibrium
+from .solve.statics.equilibrium_batch import EquilibriumBatch
 from .solve.statics.extrapolation import Extrapolation, richardson_extrapolation
 from .solve.statics.magnetic_state import MagneticState, field_of
 from .solve.statics.multistable import find_equilibria
@@ -156,6 +157,7 @@ __all__ = [
     "EdgeCouple",
     "EdgeLoad",
     "Equilibrium",
+    "EquilibriumBatch",
     "EquilibriumJumped",
     "EquilibriumPath",
     "EquilibriumSet",

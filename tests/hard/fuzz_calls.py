@@ -233,6 +233,9 @@ def _solves(s: Sample) -> Iterator[Call]:
         ms.equilibrium,
         {**magnetic, "applied_flux_density": [s.field, -s.field], "solver": quick},
     )
+    fields = [s.field, -s.field]
+    several = {**magnetic, "applied_flux_density": fields, "batch": 2, "threads": 1, "solver": quick}
+    yield Call("equilibrium of a batch", ms.equilibrium, several)
     hunt = dict(
         start=s.positions,
         include_unstable=True,

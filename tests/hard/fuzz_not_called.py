@@ -27,6 +27,7 @@ NOT_CALLED = {
     "NoGradient": "an error",
     "NotConverged": "an error",
     "ObjectiveFailed": "an error",
+    "EquilibriumBatch": "a result",
     "EquilibriumPath": "a result",
     "envs.EnvState": "a result",
     "Picture": "a result",

@@ -128,7 +128,7 @@ REVERSE = {
 FORWARD = {"jvp": lambda f, t: torch.func.jvp(f, (t,), (t,)), "dual numbers": dual}
 
 
-@SOLVES
+@pytest.mark.parametrize("solve", [motion, linear])
 def test_batches_of_designs_are_refused_by_name(scene, solve):
     with pytest.raises(ValueError, match=r"remanent_magnetization \[A/m\] is inside torch\.vmap.*loop"):
         torch.vmap(lambda magnetization: solve(scene, magnetization))(STRENGTH.repeat(2, 1))
@@ -139,8 +139,9 @@ def test_batches_of_values_are_refused_by_name(scene, name):
     (sheet,) = scene.bodies
     given = torch.full((2,), float(np.mean(getattr(sheet, name))))
     field = {"remanent_magnetization": (1e4, 0, 0), "applied_flux_density": (0, 0, 1e-3)}
+    steps = {"steps": 1, "time_step": 1e-3}
     with pytest.raises(ValueError, match=rf"{name} of Shell.* is inside torch\.vmap.*loop"):
-        torch.vmap(lambda value: ms.equilibrium(scene, values={sheet: {name: value}}, **field))(given)
+        torch.vmap(lambda value: ms.simulate(scene, values={sheet: {name: value}}, **field, **steps))(given)
 
 
 @pytest.mark.parametrize("name", FORWARD)

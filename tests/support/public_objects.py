@@ -317,6 +317,7 @@ def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
         "equilibrium": rest,
         "magnetic state": ms.field_of(rest),
         "equilibria": ms.EquilibriumSet([rest, rest]),
+        "batch": ms.equilibrium(scene, **asked, batch=2),
         "log of a solve": rest.log,
         "step of a solve": rest.log[0],
         "trajectory": move,

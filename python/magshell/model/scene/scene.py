@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterable
-from contextlib import contextmanager
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +11,6 @@ import numpy as np
 from ... import _core
 from ..._input.checked_list import checked_list
 from ..._input.quantity import quantity
-from ..._runtime.frozen import remember
 from ..._runtime.mixins import PlotMixin
 from ..._runtime.solver_entry_point import grouped
 from ...mesh.triangles.triangle_mesh import TriangleMesh
@@ -46,6 +43,7 @@ from ..shells.shell import Shell
 from ..solids.solid import Solid
 from ..supports.constraints import free_rigid_motions, gather
 from ..supports.supports import Clamp, Pin, SymmetryPlane
+from .core_models import CoreModels
 from .new_scene_checks import check_new_scene
 from .own_field import OwnField, own_field_inputs
 from .parameter_layout import Layout
@@ -180,7 +178,7 @@ class Scene(PlotMixin):
         self.__init__(**arguments)
 
     def _build(self, allow_rigid_motions: bool) -> None:
-        bodies, mesh = self._bodies, self.mesh
+        bodies = self._bodies
         edges = moment_edges(bodies, self.loads)
         self._moment_directions = moment_directions(bodies, edges)
         constraints = gather(bodies, self.supports, self._moment_directions)
@@ -210,17 +208,27 @@ class Scene(PlotMixin):
                 f"the supports leave {called(bodies.listed)} free: {'; '.join(free)}. Hold {it}, or say "
                 "allow_rigid_motions=True if a field or gravity does"
             )
-        n_directions, n_moments = len(constraints.directions), len(edges)
-        surfaces, body_contacts = body_contact_inputs(self._body_contacts, bodies)
         self._constraints, self._moment_edges = constraints, edges
-        self._turn, self._solving = threading.RLock(), False
         self._warned_of_obtuse_faces = False
         self._warned_of_strain = 0.0
         self._warned_of_steps = 0.0
         self._warned_of_jumps = False
         self._warned_of_units: set[str] = set()
-        self._model = _core.Model(
-            n_vertices=mesh.n_vertices,
+        self._cores = CoreModels(self._new_model(), self._new_model)
+        self._value_layout = Layout(self._model.parameters)
+        self._control_layout = Layout(self._model.controls)
+        self._values = Values(self)
+        with self._values.in_core():
+            pass
+        check_new_scene(self)
+
+    def _new_model(self) -> _core.Model:
+        """Return a new model of the core."""
+        bodies, constraints, edges = self._bodies, self._constraints, self._moment_edges
+        n_directions, n_moments = len(constraints.directions), len(edges)
+        surfaces, body_contacts = body_contact_inputs(self._body_contacts, bodies)
+        return _core.Model(
+            n_vertices=self.mesh.n_vertices,
             original=bodies.original if bodies.ties else [],
             **body_inputs(self, constraints.directed_edges),
             **skeleton_inputs(bodies, self._labels),
@@ -244,12 +252,6 @@ class Scene(PlotMixin):
             water=None if self.water is None else self.water._core,
             **own_field_inputs(self),
         )
-        self._value_layout = Layout(self._model.parameters)
-        self._control_layout = Layout(self._model.controls)
-        # The values that the core has at the moment; a solve with other values sets its own.
-        self._values = self._in_core = Values(self)
-        self._model.set_values(self._values.numbers)
-        check_new_scene(self)
 
     def _grounded_vertices(self) -> np.ndarray:
         """Return the vertices of links that joints hold to the world."""
@@ -283,17 +285,19 @@ class Scene(PlotMixin):
         labels = [(each, f"{kind} {k}") for kind, objects in kinds for k, each in enumerate(objects)]
         return labels if self.water is None else [*labels, (self.water, "water")]
 
-    @contextmanager
-    def _exclusive(self):
-        """Allow one solve at a time: the core stores the magnetization and the last evaluated state."""
-        with self._turn:
-            if self._solving:
-                raise RuntimeError("the scene is being solved: what a solve calls cannot solve it again")
-            remember(self, _solving=True)
-            try:
-                yield
-            finally:
-                remember(self, _solving=False)
+    @property
+    def _model(self) -> _core.Model:
+        """The model of the core that this thread uses."""
+        return self._cores.current.model
+
+    @property
+    def _in_core(self) -> Values | None:
+        """The values that the core of this thread has at the moment."""
+        return self._cores.current.values
+
+    @property
+    def _solving(self) -> bool:
+        return self._cores.current.solving
 
     @cached_property
     def _obtuse_faces(self) -> ObtuseFaces:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..._input.quantity import quantity
 from ..._input.tensor_kinds import why_not
-from ..._runtime.frozen import remember, variant
+from ..._runtime.frozen import variant
 from ..bodies.bodies import CombinedSheets, joined
 from ..shells.shell import Shell
 from ..supports.constraints import Constraints, gather
@@ -86,11 +86,11 @@ class Values:
     @contextmanager
     def in_core(self) -> Iterator[None]:
         """Hold the scene's core with these values set, as a context manager; solves of other threads wait meanwhile."""
-        scene = self.scene
-        with scene._exclusive():
-            if scene._in_core is not self:
-                scene._model.set_values(self.numbers)
-                remember(scene, _in_core=self)
+        core = self.scene._cores.current
+        with core.held():
+            if core.values is not self:
+                core.model.set_values(self.numbers)
+                core.values = self
             yield
 
     @contextmanager

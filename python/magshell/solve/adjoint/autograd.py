@@ -297,6 +297,85 @@ def slopes_of(
     return _Slopes.apply(adjoint, dtype, torch.ones((), dtype=torch.float64), *leaves)
 
 
+class _Mapped(torch.autograd.Function):
+    """Results of a solve inside torch.func.vmap: the members of the map become one batch of solves.
+
+    solves: has `solve(tensors) -> results`, of tensors with a leading axis, and afterwards `gradients(by_results)`.
+    """
+
+    @staticmethod
+    def forward(solves: Any, *tensors: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        raise NoGradient("no batch of solves here: none of the values is inside torch.func.vmap")
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: tuple[torch.Tensor, ...]) -> None:
+        ctx.solves, *ctx.tensors = inputs
+
+    @staticmethod
+    def backward(ctx: Any, *by_results: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
+        return None, *_MappedTransposed.apply(ctx.solves, len(by_results), *by_results, *ctx.tensors)
+
+    @staticmethod
+    def jvp(ctx: Any, *tangents: torch.Tensor | None) -> tuple[torch.Tensor, ...]:
+        raise NoGradient(
+            "no tangents inside torch.func.vmap: ms.equilibrium(..., batch=k) has them, by torch.func.jvp around it"
+        )
+
+    @staticmethod
+    def vmap(info: Any, in_dims: tuple[Any, ...], solves: Any, *tensors: torch.Tensor) -> tuple[Any, Any]:
+        found = solves.solve(_in_front(info.batch_size, in_dims[1:], tensors))
+        return found, (0,) * len(found)
+
+
+class _MappedTransposed(torch.autograd.Function):
+    """Gradients by the values of solves inside torch.func.vmap. The tensors say which map it is."""
+
+    @staticmethod
+    def forward(solves: Any, count: int, *given: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        raise NoGradient("no gradient here: none of the values is inside torch.func.vmap")
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: tuple[torch.Tensor, ...]) -> None:
+        pass
+
+    @staticmethod
+    def backward(ctx: Any, *_: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
+        raise NoGradient(_SECOND)
+
+    @staticmethod
+    def vmap(
+        info: Any, in_dims: tuple[Any, ...], solves: Any, count: int, *given: torch.Tensor
+    ) -> tuple[Any, Any]:
+        given = _in_front(info.batch_size, in_dims[2:], given)
+        found = solves.gradients([_numbers(each) for each in given[:count]])
+        parts = zip(found, given[count:], strict=True)
+        by_tensors = tuple(torch.from_numpy(np.array(each)).to(like) for each, like in parts)
+        return by_tensors, (0,) * len(by_tensors)
+
+
+def _in_front(count: int, in_dims: tuple[Any, ...], tensors: Sequence[torch.Tensor]) -> list[torch.Tensor]:
+    """Return tensors with the axis of a map in front; one that has none is repeated."""
+    return [
+        each.expand(count, *each.shape) if dim is None else each.movedim(dim, 0)
+        for each, dim in zip(tensors, in_dims, strict=True)
+    ]
+
+
+def mapped(solves: Any, tensors: Sequence[torch.Tensor]) -> tuple[torch.Tensor, ...]:
+    """Return the results of solves whose values, or some of them, are inside torch.func.vmap."""
+    return _Mapped.apply(solves, *tensors)
+
+
+def is_followed_in_map(tensor: torch.Tensor) -> bool:
+    """Return whether a transform inside of torch.func.vmap, such as torch.func.grad, follows a tensor."""
+    functorch = torch._C._functorch
+    while _is_wrapped(tensor) and not functorch.is_batchedtensor(tensor):
+        if functorch.is_gradtrackingtensor(tensor):
+            return True
+        tensor = functorch.get_unwrapped(tensor)
+    return False
+
+
 def depends_on(tensor: torch.Tensor, other: torch.Tensor) -> bool:
     """Return whether torch can differentiate one tensor by another."""
     if not tensor.requires_grad:

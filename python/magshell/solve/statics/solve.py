@@ -12,9 +12,11 @@ from ..._runtime.solve_keywords import given_to
 from ..._runtime.solver_entry_point import grouped, solve_entry
 from ...model.scene.scene import Scene
 from ..options import MixedNewton, Newton
+from .batch import find_batch
 from .cases import find_all, split, starts_of
 from .equilibria import EquilibriumSet
 from .equilibrium import Equilibrium
+from .mapped import find_mapped, is_mapped
 from .single_solve import Search, find
 
 if TYPE_CHECKING:
@@ -44,8 +46,10 @@ def equilibrium(
     ignore_velocity_forces: bool = False,
     solver: Newton | None = None,
     progress: bool | Callable[[float, float], None] = True,
-) -> Equilibrium | Any:  # Equilibria where there are load cases
-    """Find a stable equilibrium of a scene, or one for each of several load cases.
+    batch: int | None = None,
+    threads: int | None = None,
+) -> Equilibrium | Any:  # EquilibriumSet of load cases, EquilibriumBatch of a batch
+    """Find a stable equilibrium of a scene, one for each of several load cases, or one for each member of a batch.
 
     {keywords}
     values: {object of the scene: {name: value}}, stand in for what the objects were made with: the values of loads, the
@@ -65,6 +69,12 @@ def equilibrium(
     solver: MixedNewton() by default.
     progress: show a bar once it has taken two seconds; or a function, called now and then with how far the controls have
         come (0 to 1, of all load cases) and the residual.
+    batch: number of members k. Any value or load parameter may then have a leading axis of length k; others are the same for
+        all members. The members are solved at once over threads, each with the bits of a single call, and the result is an
+        EquilibriumBatch: a member that fails loses no other. Gradients are computed over threads too. `start` may have
+        the axis as well.
+    threads: number of threads of a batch, at most the processors that this process may use; by default all of them. Each
+        has a core model of its own.
 
     Raises NotConverged and Interrupted (on Ctrl-C), both with the last converged state as `last_good`, which on Ctrl-C may
     be as rough as its residual says; ValueError on bad input. With torch tensors among the inputs, positions and edge
@@ -75,7 +85,7 @@ def equilibrium(
 
     Tangents (forward mode) along a change of the inputs cost one back-substitution too, and four or eight evaluations of
     forces: by torch.autograd.forward_ad, torch.func.jvp and jacfwd. torch.func.grad, vjp, jacrev and functional_call work as
-    well; torch.vmap over designs does not. By the origins, axes and pitches of joints there are gradients, but no tangents.
+    well; torch.func.vmap solves a batch. By the origins, axes and pitches of joints there are gradients, but no tangents.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -90,6 +100,16 @@ def equilibrium(
         search = Search(
             MixedNewton() if solver is None else solver, require_stable, advance, ignore_velocity_forces, note
         )
+        if is_mapped(arguments):
+            if batch is not None:
+                raise ValueError("batch and torch.func.vmap are both axes of members: take one of them")
+            return find_mapped(scene, arguments, start, search)
+        if batch is not None:
+            return find_batch(scene, arguments, batch, threads, start, search)
+        if threads is not None:
+            raise ValueError(
+                "threads is the number of threads of a batch: give batch=k, or ms.set_num_threads"
+            )
         cases = split(arguments)
         if cases is None:
             return find(scene, arguments, start, search).equilibrium
