@@ -29,6 +29,7 @@ SMALL = {
     "bistable_beam": "cells=(24, 4), meshes=((12, 2), (24, 4), (48, 8))",
     "bending_twisting": "cells=(16, 2), bending_time=10.0, turning_time=5.0, undamped_time=0.3",
     "pneumatic_finger": "",
+    "snap_design": "cells=(24, 4)",
     "shell_against_volume": "cells=(32, 4), layers=(2, 6), angles=(1.0, 3.14159)",
 }
 _SCRIPT = """

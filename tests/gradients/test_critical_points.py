@@ -202,6 +202,7 @@ def test_points_of_a_path_between_critical_ones_stay_arrays():
     x = ZERO.clone().requires_grad_()
     path = snap(x)
     assert torch.is_tensor(path.critical[0].parameter) and path.critical[0].parameter.requires_grad
+    assert path.critical[0].parameter.shape == snap(ZERO).critical[0].parameter.shape == ()
     assert isinstance(path.events[0].parameter, float)
     assert isinstance(path.parameters, np.ndarray) and isinstance(path.remanent_magnetization, np.ndarray)
     there = path.equilibrium(3)

@@ -97,7 +97,7 @@ def _connected(
     arrays = np.array(parameter), np.ascontiguousarray(inputs.scene._model.positions(state))
     given = [*inputs.given, *(leaf.tensor for leaf in of_start)]
     if not (inputs.leaves or of_start):
-        return tuple(like(each, *given) for each in arrays)
+        return tuple(like(each, *given).reshape(each.shape) for each in arrays)
     from ..adjoint.autograd import solved
 
     adjoint = CriticalAdjoint(inputs, point, of_start, refusal)
