@@ -153,10 +153,6 @@ class Statics {
             VectorXd trial = result_.state;
             NewtonReport report =
                 solve_load_step(trial, load_parameters, target - result_.progress, target < 1.0);
-            if (report.converged && jumped_branch(report, step)) {
-                report.converged = false;
-                report.reason = "a load step converged to another branch, which is unstable";
-            }
             const std::string through =
                 report.converged ? sides_.crossed(trial, load_parameters) : std::string();
             if (!through.empty()) {
@@ -166,7 +162,6 @@ class Statics {
             record("load step", target, trial, report);
             if (report.converged) {
                 halvings = 0;
-                was_stable_ = report.factor.negative_pivots == 0;
                 predictor_.record(result_.state, report.tangent, target - result_.progress);
                 accept(trial, load_parameters, target, report.residual);
                 inexact_ = report.inexact;
@@ -268,15 +263,6 @@ class Statics {
         if (!report.converged) return false;
         accept(trial, to_, 1.0, report.residual);
         return check_stability();
-    }
-
-    // Returns true if a long step from a stable state converged to an unstable branch, which a shorter step may avoid.
-    bool jumped_branch(const NewtonReport& report, double step) const {
-        // [-] Load step above which a shorter one is tried, of the load path; see test_a_semi_cylinder_pulled_and_pushed.
-        constexpr double long_step = 0.125;
-        constexpr int quick_iterations = 8;  // see test_a_semi_cylinder_pulled_and_pushed
-        return options_.start_at_rest && options_.require_stable && was_stable_ && step > long_step &&
-               report.iterations > quick_iterations && report.factor.negative_pivots > 0;
     }
 
     // Tries standard Newton steps, which may converge for a strongly bent shell if mixed ones do not.
@@ -395,7 +381,6 @@ class Statics {
     StaticsResult& result_;
     SolveLog log_;
     const bool stop_on_instability_;  // load steps end at once when they leave the stable states
-    bool was_stable_ = true;          // at the end of the last load step
     bool inexact_ = false;            // whether the last load step ended before full convergence
     StressPredictor last_;            // of the last load step, if it was inexact
     ObstacleSides sides_;             // of the contact points in the state of the result

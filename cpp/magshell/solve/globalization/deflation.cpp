@@ -11,14 +11,10 @@ namespace {
 // [-] Rms distance from a known equilibrium, over the extent, below which a solution is taken for the same one; see
 // test_both_wells_of_a_bistable_beam.
 constexpr double same_distance = 1e-5;
-// [-] Largest displacement in one step, and in the last step before a search counts as converged, both over the extent; see
-// test_saddles_are_found_with_include_unstable.
-constexpr double longest_step = 0.25, last_step_tolerance = 1e-3;
+// [-] Largest displacement in one step, over the extent; see test_saddles_are_found_with_include_unstable.
+constexpr double longest_step = 0.25;
 // [-] Largest size of the factor between the deflated and the original Newton step; see test_both_wells_of_a_bistable_beam.
 constexpr double max_step_factor = 10.0;
-// [-] The search ends if less than this fraction of a deflated step leads to a state that has an energy; see
-// test_far_beyond_its_first_instability_a_sheet_has_many.
-constexpr double min_deflated_step = 1e-4;
 
 // The deflation operator M(q) of the header, with |.| the root mean square over the area of the bodies.
 class Deflation {
@@ -63,8 +59,7 @@ class DeflatedSteps final : public NewtonIteration {
 
   private:
     bool is_done() override {
-        if (report_.residual > newton_.options().tolerance ||
-            last_step_ > last_step_tolerance * model_.extent())
+        if (report_.residual > newton_.options().tolerance || last_step_ > settled_step * model_.extent())
             return false;
         report_.converged = !deflation_.is_known(q_, same_distance * model_.extent());
         if (!report_.converged) fail("the search converged to an equilibrium that is known");
@@ -81,7 +76,7 @@ class DeflatedSteps final : public NewtonIteration {
         step *= deflation_.factor(q_, step);
         const double length = step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
         if (length > longest_step * model_.extent()) step *= longest_step * model_.extent() / length;
-        if (newton_.apply_increment(q_, step, min_deflated_step, report_) < 0.0) return false;
+        if (newton_.apply_increment(q_, step, min_step_length, report_) < 0.0) return false;
         if (mixed) model_.extrapolate(step);
         last_step_ = step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
         evaluate();

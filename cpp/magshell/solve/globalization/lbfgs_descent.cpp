@@ -15,16 +15,12 @@ namespace {
 constexpr std::size_t descent_history = 12;
 // [-] Longest step, over the extent, and largest multiple of an L-BFGS step; see test_a_semi_cylinder_pulled_and_pushed.
 constexpr double max_step_extent = 0.1, max_step_factor_lbfgs = 4.0;
-// [-] Constants of the Armijo and of the curvature condition (N&W 3.1); see test_a_semi_cylinder_pulled_and_pushed.
-constexpr double armijo_c1 = 1e-4, wolfe_c2 = 0.5;
+// [-] Constant of the curvature condition (N&W 3.1); see test_a_semi_cylinder_pulled_and_pushed.
+constexpr double wolfe_c2 = 0.5;
 // Evaluations of the energy in one line search, at most; see test_a_semi_cylinder_pulled_and_pushed.
 constexpr int max_search_trials = 8;
-// [-] Round-off of an energy, over its size; see test_small_load_on_a_shallow_roof.
-constexpr double energy_round_off = 1e-13;
 // [-] Predicted decrease that ends the descent, over that of the first step; see test_a_flat_strip_far_beyond_where_it_buckles.
 constexpr double min_relative_decrease = 1e-6;
-// [-] Smallest cosine between a stored step and its change of the gradient; see test_a_semi_cylinder_pulled_and_pushed.
-constexpr double min_curvature_cosine = 1e-10;
 // [-] Smallest fraction of a rejected step that is tried next; see test_a_semi_cylinder_pulled_and_pushed.
 constexpr double min_backtrack = 0.05;
 
@@ -41,7 +37,7 @@ class Descent {
         : newton_(newton),
           model_(newton.model()),
           load_parameters_(load_parameters),
-          history_(descent_history, min_curvature_cosine) {
+          history_(descent_history) {
         model_.evaluate(q, load_parameters_);
         here_ = at(q, energy);
     }
@@ -50,24 +46,12 @@ class Descent {
         double first = 0.0;  // twice the decrease of the energy that the first step predicts
         for (int k = 0; k < most_steps; ++k, newton_.count_iteration()) {
             newton_.watch(newton_.relative_residual(here_.q, {}));
-            VectorXd d = direction();
-            double slope = here_.gradient.dot(d);
-            if (!(slope < 0.0) && !history_.empty()) {
-                history_.clear();
-                d = direction();
-                slope = here_.gradient.dot(d);
-            }
+            const VectorXd d = direction();
+            const double slope = here_.gradient.dot(d), before = here_.energy;
             if (k == 0) first = -slope;
             if (!(slope < 0.0) || -slope < min_relative_decrease * first) break;
-            const double before = here_.energy;
-            if (!line_search_along(d, slope)) {
-                model_.set_angle_branches(here_.angle_branches);
-                model_.evaluate(here_.q, load_parameters_);
-                if (history_.empty()) break;
-                history_.clear();
-            } else if (before - here_.energy <= energy_round_off * std::abs(before)) {
-                break;
-            }
+            if (!line_search_along(d, slope)) break;
+            if (before - here_.energy <= energy_tolerance * std::abs(before)) break;
         }
         model_.set_angle_branches(here_.angle_branches);
         return here_;
@@ -99,7 +83,7 @@ class Descent {
             max_alpha = std::min(max_alpha,
                                  asked * model_.capabilities().admissible_step_length(here_.q, asked * step));
         }
-        const double allowed = energy_round_off * std::abs(here_.energy);
+        const double allowed = energy_tolerance * std::abs(here_.energy);
         double alpha = std::min(1.0, max_alpha), last = 0.0, last_slope = slope, accepted_alpha = 0.0;
         bool too_far = false;
         DescentState end;
@@ -111,7 +95,7 @@ class Descent {
                 model_.capabilities().crossing_reason(here_.q, load_parameters_, there, load_parameters_);
             const bool crosses = !crossing.empty();
             if (crosses) crossing_reason_ = std::move(crossing);
-            if (crosses || !(change <= armijo_c1 * alpha * slope + allowed)) {
+            if (crosses || !(change <= allowed)) {
                 if (accepted_alpha > 0.0) break;
                 too_far = true;
                 const double bottom =

@@ -11,6 +11,9 @@
 
 namespace magshell {
 
+// [-] Increase of the energy that counts as none, over its size; see test_small_load_on_a_shallow_roof.
+constexpr double energy_tolerance = 1e-12;
+
 struct LbfgsRound {
     double displacement = 0.0;    // [m] the largest, or 0 if no step lowers the energy
     std::string crossing_reason;  // why an obstacle refused a trial, in words; empty if none did

@@ -12,18 +12,16 @@ namespace magshell {
 
 class LbfgsHistory {
   public:
-    // [-] Smallest cosine between a step and its change of the gradient; see test_rounds_as_they_are_lead_there_too.
-    static constexpr double usual_cosine = 1e-12;
-
-    /// max_pairs: largest number of stored steps; 0: nothing is stored. min_cosine: smallest cosine between a step and its change.
-    explicit LbfgsHistory(std::size_t max_pairs, double min_cosine = usual_cosine)
-        : most_(max_pairs), min_cosine_(min_cosine) {}
+    /// max_pairs: largest number of stored steps; 0: nothing is stored.
+    explicit LbfgsHistory(std::size_t max_pairs) : most_(max_pairs) {}
 
     /// Stores a step and the change of the gradient along it, unless the change shows no positive curvature.
     void add(VectorXd step, VectorXd change) {
+        // [-] Smallest cosine between a step and its change of the gradient; see test_rounds_as_they_are_lead_there_too.
+        constexpr double min_cosine = 1e-12;
         if (most_ == 0) return;
         const double curvature = step.dot(change);
-        if (!(curvature > min_cosine_ * step.norm() * change.norm())) return;
+        if (!(curvature > min_cosine * step.norm() * change.norm())) return;
         if (pairs_.size() == most_) pairs_.pop_front();
         pairs_.push_back({std::move(step), std::move(change), 1.0 / curvature});
     }
@@ -49,7 +47,6 @@ class LbfgsHistory {
         double inverse;  // of the product of both
     };
     std::size_t most_;
-    double min_cosine_;
     std::deque<Pair> pairs_;
 };
 

@@ -20,27 +20,20 @@ double LoadStepController::propose(double left) {
 }
 
 void LoadStepController::accept(double step, const NewtonReport& report) {
-    // Newton iterations up to which a step counts as easy and the next one grows; see test_a_thin_strip_rolled_up.
-    constexpr int quick_iterations = 8;
     // [-] Growth of the failed step with every success, so that it is forgotten; see test_a_field_from_behind.
     constexpr double failed_step_growth = 1.2;
     // [-] Largest step, over the one that failed; see test_a_field_from_behind.
     constexpr double below_failed_step = 0.75;
-    // [-] Growth of the step after an easy one, at most and as a rule; see test_a_thin_strip_rolled_up.
+    // [-] Growth of the step, at most and as a rule; see test_a_thin_strip_rolled_up.
     constexpr double max_growth = 4.0, usual_growth = 2.0;
     const double length = length_of(report);
-    if (report.iterations <= quick_iterations) {
-        const double times =
-            stop_on_instability_
-                ? std::clamp(good_length / std::max(length, negligible_length), usual_growth, max_growth)
-                : usual_growth;
-        // The step that failed bounds the next one, or if the scene now moves less per unit of load, the length that failed.
-        const double failed = length > negligible_length
-                                  ? std::max(failed_step_, failed_length_ / length * step)
-                                  : failed_step_;
-        step_ = std::min(times * step, below_failed_step * failed);
-    }
-    failures_ = 0;
+    // The step that failed bounds the next one, or if the scene now moves less per unit of load, the length that failed.
+    const double failed =
+        length > negligible_length ? std::max(failed_step_, failed_length_ / length * step) : failed_step_;
+    const double times = stop_on_instability_ ? std::clamp(good_length / std::max(length, negligible_length),
+                                                           usual_growth, max_growth)
+                                              : usual_growth;
+    step_ = std::min(times * step, below_failed_step * failed);
     failed_step_ *= failed_step_growth;
     failed_length_ *= failed_step_growth;
 }
@@ -54,18 +47,12 @@ bool LoadStepController::is_short(const NewtonReport& report) const {
 bool LoadStepController::reject(double step, const NewtonReport& report) {
     // [-] Shortening after a diverged iteration, after another failure, and at most; see test_a_flat_strip_far_beyond_where_it_buckles.
     constexpr double diverged_factor = 0.25, usual_factor = 0.5, least_factor = 0.125;
-    // [-] Ratio of first lengths above which a shorter step has not moved less; see test_a_strip_buckles_to_the_side_that_its_load_pushes.
-    constexpr double not_shorter = 0.9;
     // [-] Smallest step in any case, of the load path; see test_a_thin_strip_rolled_up.
     constexpr double shortest_step = 1e-6;
-    constexpr int enough = 2;  // failures in a row; see test_a_semi_cylinder_pulled_and_pushed
     failed_step_ = step;
     step_ = (report.diverged ? diverged_factor : usual_factor) * step;
-    ++failures_;
     if (stop_on_instability_) {
-        const double before = failed_length_, length = failed_length_ = length_of(report);
-        // A shorter step that moves as far is not driven by the load: the branch has ended.
-        if (failures_ >= enough && length > not_shorter * before) return false;
+        const double length = failed_length_ = length_of(report);
         const double good_step = good_length / std::max(length, negligible_length) * step;
         // On a load path that moves the scene by many extents, even a small fraction may be a long step.
         if (!fixed_) smallest_ = std::max(std::min(smallest_, least_factor * good_step), shortest_step);

@@ -25,7 +25,7 @@ class LoadStepController {
     /// Returns the size of the next step, given the part of the path that is left.
     double propose(double left);
 
-    /// Reports that a step succeeded: an easy one is followed by a longer one.
+    /// Reports that a step succeeded: a longer one follows.
     void accept(double step, const NewtonReport& report);
     /// Shortens the step after a failure. Returns false if shorter steps are not worth trying.
     bool reject(double step, const NewtonReport& report);
@@ -42,7 +42,6 @@ class LoadStepController {
     const double longest_, extent_;
     const bool stop_on_instability_;
     const bool fixed_;  // the smallest step was given by the caller
-    int failures_ = 0;  // since the last success
     double failed_step_ = 2.0,
            failed_length_ = 0.0;  // the shortest step that failed, and the length of its first iteration
 };

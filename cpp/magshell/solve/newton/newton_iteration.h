@@ -7,6 +7,12 @@
 
 namespace magshell {
 
+// [-] Last step of a converged iteration, over the extent; see test_fine_roof_takes_small_steps.
+constexpr double settled_step = 1e-3;
+// [-] Shortest part of a step that is taken where the whole one leads to states without an energy; see
+// test_landing_solid_is_not_inverted.
+constexpr double min_step_length = 1e-4;
+
 class NewtonIteration {
   public:
     virtual ~NewtonIteration() = default;
