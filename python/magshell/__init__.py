@@ -21,6 +21,9 @@ from .design.multistart.starts import MultistartResult
 from .design.printable_minimum import PrintableMinimum, PrintableStage
 from .design.printable_set import PrintableSet
 from .design.printing import minimize_printable
+from .design.study.points import latin_hypercube
+from .design.study.study import study
+from .design.study.table import Study, StudyRow
 from .errors import (
     DesignRejected,
     EquilibriumJumped,
@@ -93,7 +96,7 @@ from .model.solids.materials import (
 from .model.solids.skin import Skin
 from .model.solids.solid import Solid
 from .model.supports.supports import Clamp, Pin, SymmetryPlane
-from .output.plot import Color, Picture, Style, View, animate, plot, plot_history, write_page
+from .output.plot import Color, Picture, Style, View, animate, plot, plot_history, plot_study, write_page
 from .output.results.probes import Probe
 from .output.results.saved import load, save
 from .output.results.series import write_series
@@ -229,6 +232,8 @@ __all__ = [
     "StableNeoHookean",
     "StepErrorWarning",
     "Strains",
+    "Study",
+    "StudyRow",
     "Style",
     "SurfaceTension",
     "SymmetryPlane",
@@ -264,6 +269,7 @@ __all__ = [
     "free_motions",
     "hessian",
     "inverse_dynamics",
+    "latin_hypercube",
     "linear_buckling",
     "linear_response",
     "load",
@@ -279,6 +285,7 @@ __all__ = [
     "parametrize",
     "plot",
     "plot_history",
+    "plot_study",
     "random_starts",
     "read_fields",
     "read_mesh",
@@ -289,6 +296,7 @@ __all__ = [
     "shapes",
     "show_config",
     "simulate",
+    "study",
     "to_pandas",
     "to_xarray",
     "vibration_modes",

@@ -83,9 +83,9 @@ class ObjectiveFailed(RuntimeError):
 
 
 class MultistartFailed(RuntimeError):
-    """An error for a multistart whose executor broke, or of which no start finished.
+    """An error for a multistart or a study whose executor broke, or for a multistart of which no start finished.
 
-    `last_good` holds a MultistartResult of the starts that finished.
+    `last_good` holds a MultistartResult of the starts that finished, or the Study of the rows so far.
     """
 
     def __init__(self, message: str, last_good: Any = None):

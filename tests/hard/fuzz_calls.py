@@ -346,6 +346,28 @@ def _solves(s: Sample) -> Iterator[Call]:
             "progress": False,
         },
     )
+    yield Call(
+        "study",
+        ms.study,
+        {
+            "function": _root,
+            "parameters": {"x": [1.0, 4.0]},
+            "executor": _here(),
+            "workers": None,
+            "attempts": 1,
+            "checkpoint": None,
+            "resume": False,
+            "progress": False,
+        },
+    )
+    bounds = {"x": (1.0, 2.0), "y": (0.1, 10.0)}
+    yield Call(
+        "latin_hypercube", ms.latin_hypercube, {"count": 3, "bounds": bounds, "logarithmic": "y", "seed": 0}
+    )
+
+
+def _root(x: float) -> float:
+    return math.sqrt(x)
 
 
 def _here():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from fuzz_calls import Call, Sample
@@ -23,6 +24,8 @@ def file_calls(s: Sample) -> Iterator[Call]:
     twice = ms.EquilibriumSet([s.rest, s.rest])
     curve = {"result": twice, "columns": ["tip.z"], "against": None, "probes": [ms.Probe("tip", [0])]}
     yield Call("plot_history", ms.plot_history, curve, cost=30)
+    points = ms.study(lambda a: a, {"a": [1.0, 2.0]}, ThreadPoolExecutor(1), progress=False)
+    yield Call("plot_study", ms.plot_study, {"study": points, "outputs": "output", "against": ["a"]}, cost=30)
     table = s.folder / "field.txt"
     table.write_text("\n".join(f"{x} {y} {z} 0 0 {x}" for x in range(3) for y in range(3) for z in range(2)))
     units = {"length_unit": "mm", "flux_density_unit": "mT", "columns": (0, 1, 2, 3, 4, 5)}

@@ -364,6 +364,8 @@ def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
         ms.PathEvent,
         ms.PrintableMinimum,
         ms.PrintableStage,
+        ms.Study,
+        ms.StudyRow,
     )
     return found | {
         cls.__name__: _from_fields(cls) for cls in (*rare, ms.control.RecedingHorizonResult, ms.envs.Episode)

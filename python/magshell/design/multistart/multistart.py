@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import numbers
-import os
-import pickle
-import queue
 import time
 from collections.abc import Callable, Iterable
-from concurrent import futures
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +14,11 @@ from ..._runtime.log import log
 from ..._runtime.progress import progress_bar
 from ...errors import Interrupted, MultistartFailed
 from ..minimum import MinimizeResult, effort
-from .run_start import CallOff, Outcome, attempt_packed, attempt_sent, failure, this_process
-from .serialization import packed, refuse_while_importing
+from .execution import check_executor, drive, in_words, tasks
+from .run_start import Outcome
+from .serialization import refuse_while_importing
 from .start_files import StartFiles
 from .starts import FailedStart, FinishedStart, MultistartResult
-from .worker_processes import WorkerDied, WorkerProcesses
 
 
 def multistart(
@@ -75,7 +70,7 @@ def multistart(
     refuse_while_importing("ms.multistart")
     starts = _listed(starts)
     _check(run, executor, workers, attempts, feasibility, checkpoint, resume)
-    task = _tasks(run, starts, executor)
+    task = tasks(run, starts, executor)
     files = None if checkpoint is None else StartFiles(checkpoint, run, starts, resume)
     state = _State(starts, feasibility, files)
     bar = progress_bar("multistart", len(starts), shown=progress, initial=len(state.outcomes))
@@ -83,63 +78,16 @@ def multistart(
         with bar:
             if state.resumed:
                 bar.set_postfix_str(state.summary())
-            if executor is not None:
-                _drive(state, executor, task, bar)
-            elif state.unfinished:
-                count = min(workers or _processors(), len(state.unfinished))
-                with WorkerProcesses(count, attempts) as own:
-                    _drive(state, own, task, bar)
+            drive(state, executor, task, bar, workers, attempts)
     except KeyboardInterrupt as error:
         raise Interrupted(f"interrupted after {state.progress()}", state.result()) from error
     except Exception as error:
         raise MultistartFailed(
-            f"stopped after {state.progress()}: {_in_words(error)}\nWhat has finished is in `error.last_good`; with a "
+            f"stopped after {state.progress()}: {in_words(error)}\nWhat has finished is in `error.last_good`; with a "
             "checkpoint, a call with resume=True does only the rest.",
             state.result(),
         ) from error
     return _unless_all_failed(state.result())
-
-
-def _drive(state: _State, executor: Executor, task: Callable[..., Any], bar) -> None:
-    """Run every unfinished start, and store the outcomes as they come.
-
-    Ctrl-C may come at any moment, also between the end of a start and the storing of its outcome: finished starts
-    are not lost.
-    """
-    done: queue.SimpleQueue[tuple[int, Future]] = queue.SimpleQueue()
-    running: dict[int, Future] = {}
-    call_off = CallOff()
-    try:
-        for number in state.unfinished:
-            running[number] = executor.submit(*task(number, call_off))
-            running[number].add_done_callback(lambda future, number=number: done.put((number, future)))
-        for _ in running:
-            number, future = _next(done)
-            state.take(number, _outcome(future))
-            bar.update()
-            bar.set_postfix_str(state.summary())
-    finally:
-        call_off.done = True
-        for future in running.values():
-            future.cancel()
-        for number, future in running.items():
-            if (
-                number not in state.outcomes
-                and future.done()
-                and not future.cancelled()
-                and not future.exception()
-            ):
-                state.take(number, _outcome(future))
-
-
-def _next(done: queue.SimpleQueue[tuple[int, Future]]) -> tuple[int, Future]:
-    """Return the next future that ends. The waits are short, because Ctrl-C at the beginning of a wait is noticed
-    only at its end."""
-    while True:
-        try:
-            return done.get(timeout=0.2)
-        except queue.Empty:
-            continue
 
 
 class _State:
@@ -197,38 +145,6 @@ class _State:
         return ", ".join(filter(None, (best, done, failed, resumed)))
 
 
-def _tasks(run, starts: list[Any], executor) -> Callable[[int, CallOff], tuple[Any, ...]]:
-    """Return a function that gives what to submit for each start.
-
-    Raises ValueError, before any work, if the run or a start cannot be sent to another process.
-    """
-    if executor is not None and not isinstance(executor, futures.ProcessPoolExecutor):
-        return lambda number, call_off: (attempt_sent, run, starts[number], this_process(), call_off)
-    run = packed("run", run)
-    for number, start in enumerate(starts):
-        packed(f"start {number}", start)
-    return lambda number, _: (attempt_packed, run, packed(f"start {number}", starts[number]))
-
-
-def _outcome(future: Future) -> Outcome:
-    """Return the outcome of a start. Raises the error if the executor caused it, and not the start."""
-    try:
-        outcome = future.result()
-        return pickle.loads(outcome) if isinstance(outcome, bytes) else outcome
-    except (BrokenExecutor, CancelledError):
-        raise
-    except WorkerDied as error:
-        return Outcome(error=str(error))
-    except Exception as error:
-        return failure(error)
-
-
-def _in_words(error: Exception) -> str:
-    if isinstance(error, CancelledError):
-        return "the executor cancelled its work, as one that is closed does"
-    return f"{type(error).__name__}: {error}"
-
-
 def _unless_all_failed(found: MultistartResult) -> MultistartResult:
     if found.finished:
         return found
@@ -258,24 +174,8 @@ def _listed(starts) -> list[Any]:
 def _check(run, executor, workers, attempts, feasibility, checkpoint, resume) -> None:
     if not callable(run):
         raise ValueError(f"run must be a function of a start, got {run!r:.60}")
-    if hasattr(executor, "get_executor"):
-        raise ValueError("executor must be a concurrent.futures.Executor: pass client.get_executor()")
-    if isinstance(executor, type) or not (executor is None or callable(getattr(executor, "submit", None))):
-        what = (
-            f"the class {executor.__name__}: call it" if isinstance(executor, type) else f"{executor!r:.60}"
-        )
-        raise ValueError(f"executor must be a concurrent.futures.Executor, got {what}")
-    if workers is not None and executor is not None:
-        raise ValueError("workers is for processes made here: an executor has its own")
-    for name, value in (("workers", 1 if workers is None else workers), ("attempts", attempts)):
-        if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < 1:
-            raise ValueError(f"{name} must be an integer of at least 1, got {value!r}")
+    check_executor(executor, workers, attempts)
     if not checked_number("feasibility", feasibility) >= 0:
         raise ValueError(f"feasibility must not be negative, got {feasibility}")
     if resume and checkpoint is None:
         raise ValueError("resume needs the checkpoint to continue from")
-
-
-def _processors() -> int:
-    """Return the number of processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

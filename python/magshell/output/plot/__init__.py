@@ -6,7 +6,8 @@ from .fits import plot_fit as _  # noqa: F401 - registers FitResult.plot
 from .histories import plot_history
 from .page import write_page
 from .picture import Picture
+from .studies import plot_study
 from .style import Color, Style
 from .view import View
 
-__all__ = ["Color", "Picture", "Style", "View", "animate", "plot", "plot_history", "write_page"]
+__all__ = ["Color", "Picture", "Style", "View", "animate", "plot", "plot_history", "plot_study", "write_page"]
