@@ -157,3 +157,27 @@ def test_bad_places_are_refused(move, tmp_path) -> None:
         ms.write_series(tmp_path / "none" / "a.pvd", move)
     with pytest.raises(ValueError, match="the list is empty"):
         ms.write_series(tmp_path / "a.pvd", [])
+
+
+def test_reactions_balance_loads_and_weight(tmp_path) -> None:
+    sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    ends = [ms.Clamp(MESH.edges_at(x=0.0)), ms.Pin(MESH.vertices_at(x=0.05))]
+    load = ms.AreaLoad((0.0, 0.0, -3.0))
+    scene = ms.Scene(sheet, supports=ends, loads=[load], gravity=(0, 0, -9.81))
+    rest = ms.equilibrium(scene, load_factor=0.5)
+    pvd = ms.write_series(tmp_path / "held.pvd", ms.EquilibriumSet([rest, rest]))
+    for file in listed(pvd).values():
+        on_vertices, _ = ms.read_fields(tmp_path / file)
+        area, weight = 0.05 * 0.01, 1e3 * 1e-3 * 0.05 * 0.01 * 9.81
+        assert on_vertices["load"].sum(axis=0) == pytest.approx([0, 0, -1.5 * area], abs=1e-12)
+        assert on_vertices["reaction"][:, 2].sum() == pytest.approx(1.5 * area + weight, rel=1e-6)
+        held = np.flatnonzero(np.abs(on_vertices["reaction"]).max(axis=1) > 0)
+        assert set(held) == {*MESH.vertices_at(x=0.0), *MESH.vertices_at(x=0.05)}
+
+
+def test_reactions_of_a_motion_are_those_of_its_result(move, tmp_path) -> None:
+    file = list(listed(ms.write_series(tmp_path / "strip.pvd", move)).values())[3]
+    on_vertices, _ = ms.read_fields(tmp_path / file)
+    total = sum(move.reaction(support, 3).force for support in move.scene.supports)
+    assert on_vertices["reaction"].sum(axis=0) == pytest.approx(total, rel=1e-12)
+    assert "load" not in on_vertices

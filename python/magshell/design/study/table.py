@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._input.nearest_names import nearest_names
-from ..._runtime.frozen import FixedDict, immutable
+from ..._runtime.frozen import immutable
 
 if TYPE_CHECKING:
     import pandas
@@ -34,8 +34,8 @@ class StudyRow:
     """
 
     number: int
-    parameters: FixedDict
-    outputs: FixedDict
+    parameters: dict[str, Any]
+    outputs: dict[str, Any]
     error: str
     traceback: str
     seconds: float

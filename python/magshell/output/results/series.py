@@ -129,8 +129,10 @@ def write_series(
     NaN.
 
     Fields on points are `displacement` [m], `velocity` [m/s], in a field `flux_density` [T], and for scenes with contacts
-    `contact_pressure` [Pa], the normal forces on both sides of a shell over a third of the adjacent faces' area. The
-    magnetization F_0 M_r or R M_r in the deformed configuration is a field on faces, `magnetization` [A/m].
+    `contact_pressure` [Pa], the normal forces on both sides of a shell over a third of the adjacent faces' area, and
+    `contact_force` [N], with friction. The forces of the supports of an equilibrium or a motion are `reaction` [N], with
+    inertia and damping, NaN where a motion starts; point, edge and area loads are `load` [N]. The magnetization F_0 M_r or
+    R M_r in the deformed configuration is a field on faces, `magnetization` [A/m].
 
     Returns the path of the PVD file. An earlier series of the same name is replaced. The PVD file is complete at the end;
     after an error, a full disk or Ctrl-C it lists the states that were written in full.
@@ -178,7 +180,10 @@ def write_series(
             on_vertices = {"displacement": state.displacements}
             on_vertices |= {name: values[k] for name, values in more["vertex"].items()}
             if (pressures := state.contact_pressures) is not None:
-                on_vertices = {"contact_pressure": pressures, **on_vertices}
+                forces = {"contact_pressure": pressures, "contact_force": state.loads().forces}
+                on_vertices = {**forces, **on_vertices}
+            if state.forces is not None:
+                on_vertices = {**state.forces(), **on_vertices}
             if in_field:
                 on_vertices["flux_density"] = state.flux_density_at(state.positions)
             on_faces, on_tetrahedra = (

@@ -40,6 +40,7 @@ from .link_surfaces import (
     tendons_of,
 )
 from .magnets import surfaces_of
+from .nodal_forces import nodal_forces
 from .surroundings import surroundings_of
 from .units import clock
 
@@ -58,6 +59,7 @@ class State:
     links, tendons, shapes: surfaces of links, of tendons and of free rigid bodies, (vertices (n, 3) m, faces (m, 3)) each.
     elements: () -> [(first face, mesh, SolidStates or ShellStresses)] of the bodies of a result, or None.
     loads: () -> ContactLoads of a result of a scene with contacts, or None.
+    forces: () -> {name: (n_v, 3) N} of a result, the forces of its supports and loads on the vertices, or None.
     rotates: whether the magnetization of each face only rotates with it, (n_f,), or of all faces.
     """
 
@@ -76,6 +78,7 @@ class State:
     links: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
     tendons: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
     loads: Callable[[], ContactLoads] | None = None
+    forces: Callable[[], dict[str, np.ndarray]] | None = None
     shapes: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
     rotates: np.ndarray | bool = False
 
@@ -225,7 +228,7 @@ def _skeletons_alone(result) -> tuple[TriangleMesh, np.ndarray]:
 
 
 def _with_elements(result, states: list[State], positions) -> list[State]:
-    """Add the stresses of elements and the contact forces to the states of a result, unless other positions were given."""
+    """Add the stresses of elements and the forces on vertices to states, unless other positions were given."""
     if positions is not None or not hasattr(result, "_values_at"):
         return states
     bodies = result.scene._bodies
@@ -239,7 +242,13 @@ def _with_elements(result, states: list[State], positions) -> list[State]:
     def loads_of(k: int):
         return (lambda: contact_loads(result, k)) if result.scene.contacts else None
 
-    return [replace(state, elements=elements_of(k), loads=loads_of(k)) for k, state in enumerate(states)]
+    def forces_of(k: int):
+        return (lambda: nodal_forces(result, k)) if result.scene.bodies else None
+
+    return [
+        replace(state, elements=elements_of(k), loads=loads_of(k), forces=forces_of(k))
+        for k, state in enumerate(states)
+    ]
 
 
 def timed(states: list[State], times: Numbers) -> list[State]:

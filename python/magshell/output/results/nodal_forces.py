@@ -1,0 +1,37 @@
+"""The forces of supports and loads on the vertices of a result, for files."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...model.loads.loads import DeadLoad
+from ...solve.dynamics.trajectory import Trajectory
+from ...solve.statics.equilibrium import Equilibrium
+
+
+def nodal_forces(result: Any, index: int) -> dict[str, np.ndarray]:
+    """Return the `reaction` of all supports and the dead `load` on the vertices in state `index`, (n_v, 3) N each.
+
+    Only those are there that the scene has. Paths store no reactions: their points would have to be solved again.
+    """
+    scene, found = result.scene, {}
+    if scene.supports and isinstance(result, Equilibrium | Trajectory):
+        forces = np.zeros((scene.mesh.n_vertices, 3))
+        for support in scene.supports:
+            held = (
+                result.reaction(support, index)
+                if isinstance(result, Trajectory)
+                else result.reaction(support)
+            )
+            np.add.at(forces, held.vertices, held.forces)
+        found["reaction"] = forces
+    loads = [load for load in scene.loads if isinstance(load, DeadLoad)]
+    if loads:
+        values, forces = result._values_at(index), np.zeros((scene.mesh.n_vertices, 3))
+        for load in loads:
+            part = scene._bodies.of(load)
+            forces[part.vertices] += values.current(load).vertex_forces(part.mesh)
+        found["load"] = np.ravel(result._load_factors)[index] * forces
+    return found
