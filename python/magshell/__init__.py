@@ -104,6 +104,7 @@ from .output.results.surface_files import write_surface
 from .output.results.tables import to_pandas, to_xarray
 from .solve.dynamics.simulate import simulate
 from .solve.dynamics.trajectory import MotionState, Trajectory
+from .solve.dynamics.trajectory_batch import TrajectoryBatch
 from .solve.linear.buckling import Buckling, linear_buckling
 from .solve.linear.response import LinearResponse, linear_response
 from .solve.linear.vibration import VibrationModes, vibration_modes
@@ -241,6 +242,7 @@ __all__ = [
     "TetMesh",
     "Tie",
     "Trajectory",
+    "TrajectoryBatch",
     "TriangleMesh",
     "UniformField",
     "UnitWarning",

@@ -34,6 +34,7 @@ NOT_CALLED = {
     "ContactState": "a result",
     "Reaction": "a result",
     "Trajectory": "a result",
+    "TrajectoryBatch": "a result",
     "SolveLog": "a result",
     "SolveStep": "a result",
     "Strains": "a result",

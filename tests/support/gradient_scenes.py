@@ -17,7 +17,7 @@ from magshell.model.solids.materials import SolidMaterial
 
 IN_TIME = ", in time"
 # Keywords of a solve that are no numbers to differentiate by.
-SETTINGS = {"scene", "values", "solver", "progress"}
+SETTINGS = {"batch", "threads", "scene", "values", "solver", "progress"}
 SETTINGS_OF = {
     ms.equilibrium: SETTINGS
     | {"require_stable", "ignore_velocity_forces", "start"},  # wherever the search began: a tensor is refused

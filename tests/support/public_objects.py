@@ -298,6 +298,7 @@ def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
     move = ms.simulate(
         scene, steps=2, time_step=1e-3, velocities=given(np.zeros((6, 3))), values=values, **asked
     )
+    moves = ms.simulate(scene, steps=2, time_step=1e-3, batch=2, **asked)
     path = ms.follow_path(scene, **asked)
     solid, muscle = made["solid"], made["muscle"]
     actuated = ms.Scene(
@@ -317,6 +318,7 @@ def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
         "equilibrium": rest,
         "magnetic state": ms.field_of(rest),
         "equilibria": ms.EquilibriumSet([rest, rest]),
+        "batch of motions": moves,
         "batch": ms.equilibrium(scene, **asked, batch=2),
         "log of a solve": rest.log,
         "step of a solve": rest.log[0],

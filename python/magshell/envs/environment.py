@@ -41,7 +41,9 @@ if not TYPE_CHECKING:
 
 _RENDER_MODES = ["rgb_array", "human"]
 # Arguments of ms.simulate that the environment sets itself.
-_OWN = ("steps", "time_step", "start", "velocities", "values", "record_every", "progress")
+_OWN = (
+    *("steps", "time_step", "start", "velocities", "values", "record_every", "progress", "batch", "threads"),
+)
 
 
 class Environment(gymnasium.Env):

@@ -277,7 +277,7 @@ def test_an_interrupted_motion_leaves_nothing_behind(monkeypatch, call):
             raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr("magshell.solve.dynamics.simulate._advance", lambda bar: interrupt)
+        patched.setattr("magshell.solve.dynamics.simulate.SolveBar.to", interrupt)
         with pytest.raises(ms.Interrupted) as caught:
             simulate_sliding(scene, solver=ms.Newton(max_iterations=1))
     assert caught.value.last_good.steps_done > 0 or call < 40  # not in the first step alone

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -66,10 +67,13 @@ class BatchAxis:
         arguments: dict[str, Any],
         members: int,
         known: dict[tuple[Any, str], bool] | None = None,
+        refusal_in_time: Callable[[Any, str, np.ndarray], ValueError | str | None] = lambda *_: "",
     ):
         """Split the arguments. known: values (owner, name) that have the axis for certain, and whether gradients are
-        computed for them."""
+        computed for them. refusal_in_time: for a value that may vary in time, the error of its numbers or None; "" for
+        another value."""
         self._scene, self.members, self._known = scene, members, known or {}
+        self._refusal_in_time = refusal_in_time
         self._owners = arguments.get("values") or {}
         if not isinstance(self._owners, dict):
             raise ValueError(
@@ -157,6 +161,8 @@ class BatchAxis:
         thorough: check its shape against the whole scene, not only its numbers against its object.
         """
         scene = self._scene
+        if (refusal := self._refusal_in_time(owner, name, numbers)) != "":
+            return refusal
         if owner is None and name in names_of("shell") and len(scene.bodies) == 1:
             owner = scene.bodies[0]
         try:

@@ -398,6 +398,21 @@ def products(
     )
 
 
+def chained(
+    leaves: Sequence[torch.Tensor], tensors: Sequence[torch.Tensor], by_leaves: Sequence[np.ndarray | None]
+) -> list[np.ndarray | None]:
+    """Return gradients by tensors from those by leaves that were computed from them; None where there is no connection."""
+    given = [
+        (leaf, torch.from_numpy(np.array(each)).to(leaf))
+        for leaf, each in zip(leaves, by_leaves, strict=True)
+        if each is not None
+    ]
+    if not given:
+        return [None for _ in tensors]
+    found = products([leaf for leaf, _ in given], tensors, [each for _, each in given])
+    return [None if each is None else _numbers(each) for each in found]
+
+
 def _numbers(by_output) -> np.ndarray:
     if why := why_not(by_output):
         raise NoGradient(f"no gradient here: the one by a result {why}")

@@ -1,45 +1,16 @@
-"""Motions of a scene: ms.simulate."""
+"""Motions of a scene in time: ms.simulate."""
 
 from __future__ import annotations
 
-import time
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from ... import _core
-from ..._input.tensors import detached, dtype_like, like
-from ..._runtime.log import log
 from ..._runtime.progress import SolveBar
-from ..._runtime.solve_keywords import given_to, names_of
+from ..._runtime.solve_keywords import given_to
 from ..._runtime.solver_entry_point import grouped, solve_entry
-from ...errors import Interrupted, NotConverged
-from ...model.contact.contacts_to_core import check_apart
-from ...model.fields.magnet_overlap import describe_magnet_overlap
-from ...model.scene.field_sampling import warn_of_sampling
-from ...model.scene.replacements import requested
 from ...model.scene.scene import Scene
-from ...model.scene.solve_inputs import Inputs
-from ...model.shells.obtuse_faces import warn_of_obtuse_faces
-from ...model.shells.shell import Shell
-from ...model.shells.strains import StrainHistory, warn_if_large
-from ..adjoint.dynamic import MotionAdjoint
-from ..options import (
-    SDIRK2,
-    SDIRK3,
-    TRBDF2,
-    Adaptive,
-    AdjointStorage,
-    ImplicitEuler,
-    Integrator,
-    MixedNewton,
-    Newton,
-    as_adjoint_storage,
-)
-from .motion_inputs import MotionInputs
-from .schedule import split_schedules
-from .step_errors import warn_of_steps
+from ..options import Adaptive, AdjointStorage, Integrator, MixedNewton, Newton
+from .batch import simulate_batch
+from .single_motion import MotionOptions, run
 from .trajectory import MotionState, Trajectory
 
 if TYPE_CHECKING:
@@ -78,8 +49,10 @@ def simulate(
     adjoint_storage: str | AdjointStorage | None = None,
     solver: Newton | None = None,
     progress: bool = True,
-) -> Trajectory:
-    """Simulate the motion of a scene in time.
+    batch: int | None = None,
+    threads: int | None = None,
+) -> Trajectory | Any:  # TrajectoryBatch of a batch
+    """Simulate the motion of a scene in time, or one for each member of a batch.
 
     steps: how many; with ms.Adaptive, or more lengths than that, the number of intervals of the time grid: states are
         recorded at its times, and arrays in time are given at them.
@@ -103,6 +76,8 @@ def simulate(
         take. By default all states if they fit into 2 GB, else checkpoints.
     solver: of a step; MixedNewton() by default, of which the load steps are not used. ProjectiveDynamics needs none.
     progress: show a bar once the motion has taken two seconds.
+    batch, threads: as in ms.equilibrium. The result is a TrajectoryBatch. In a value that varies in time the axis of the
+        members comes first, (k, steps, ...). The members share the bytes of `adjoint_storage`.
 
     A step that does not converge is taken in halves, down to 1/64 of it; with ms.Adaptive it is made shorter, as is one
     whose error is too large. ms.StepErrorWarning warns of steps that are too long. Raises NotConverged and Interrupted
@@ -128,241 +103,11 @@ def simulate(
     ((21, 33, 3), True)
     """
     arguments = given_to("simulate", locals())
-    solver = MixedNewton() if solver is None else solver
-    if integrator is not None and not isinstance(integrator, Integrator):
-        what = (
-            f"the class {integrator.__name__}: call it" if isinstance(integrator, type) else repr(integrator)
-        )
-        raise ValueError(
-            "integrator must be ms.TRBDF2(), ImplicitEuler(), SDIRK2(), SDIRK3() or ProjectiveDynamics(), "
-            f"got {what}"
-        )
-    if not isinstance(solver, Newton):
-        raise ValueError(f"solver must be a MixedNewton or a Newton, got {type(solver).__name__}")
-    if not isinstance(scene, Scene):
-        raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
-    replaced = requested(
-        scene,
-        arguments.pop("vertex_loads"),
-        arguments.pop("values"),
-        moving=True,
-        in_time=True,
-        **{name: arguments.pop(name) for name in names_of("shell")},
-    )
-    replaced, schedules = split_schedules(scene, replaced)
-    uniform = np.zeros(3) if scene.has_uniform_field else None
-    if integrator is None:
-        integrator = ImplicitEuler() if scene.contacts else TRBDF2()
-    held = [
-        part for part in scene.rigid_parts if part.vertices is not None or scene._bodies.skeleton_of(part)
-    ]
-    if held and isinstance(integrator, SDIRK2 | SDIRK3):
-        raise ValueError(
-            f"{type(integrator).__name__} falls to first order where rigid parts with joints or vertices turn, as its first "
-            "stage is of first order only: take TRBDF2(), which keeps the second, or ImplicitEuler()"
-        )
-    magnetization = arguments.pop("remanent_magnetization")
-
-    def prepared(chosen: list[float] | None = None) -> MotionInputs:
-        inputs = Inputs(scene, magnetization, uniform, replaced=replaced, differentiable=True, moving=True)
-        return MotionInputs(
-            inputs,
-            arguments,
-            steps=steps,
-            record_every=record_every,
-            adjoint_storage=as_adjoint_storage(adjoint_storage),
-            start=start,
-            integrator=integrator,
-            solver=solver,
-            schedules=schedules,
-            chosen=chosen,
-        )
-
-    asked = prepared()
-    began = time.perf_counter()
-    with asked.inputs.in_core(), SolveBar("simulate", progress) as bar:
-        check_apart(scene, asked.start.state)
-        found = _core.simulate(
-            scene._model,
-            asked.core,
-            bool(asked.inputs.leaves),
-            asked.memory_budget,
-            asked.keep,
-            _advance(bar),
-        )
-    if isinstance(time_step, Adaptive):
-        asked = prepared(found.time_steps)
-    result = _with_strains(_trajectory(asked, found, time.perf_counter() - began))
-    log.debug(
-        "simulate: %s, %d of %d steps, %d in parts, %d iterations, %d factorizations, %.3g s",
-        found.outcome.name,
-        result.steps_done,
-        asked.steps,
-        len(result.substeps),
-        found.iterations,
-        found.factorizations,
-        result.wall_time,
-    )
-    if found.outcome == _core.Outcome.interrupted:
-        raise Interrupted(f"interrupted after {result.steps_done} of {steps} steps", result)
-    if found.outcome == _core.Outcome.failed:
-        where = f"{found.steps_done} of {len(asked.time_steps)}, at {result.end.time:.6g} s, failed even in parts of 1/64"
-        if isinstance(time_step, Adaptive):
-            shortest = asked.time_steps.clock.time_step / 2**time_step._deepest
-            where = f"{found.steps_done}, at {result.end.time:.6g} s, failed even with a length of {shortest:.3g} s"
-        advice = _advice(result, isinstance(time_step, Adaptive))
-        raise NotConverged(
-            f"step {where}: {found.reason}. {advice} The motion until there is in `error.last_good`.", result
-        )
-    bending = result.energies.get("bending", np.zeros(len(result)))
-    most = int(np.argmax(bending))
-    positions = np.asarray(detached(result.positions[most]), dtype=np.float64)
-    where = f"the motion, at {result.times[most]:.4g} s,"
-    warn_of_obtuse_faces(scene, positions, asked.inputs.values.all_sheets, bending[most], where)
-    _warn(result)
-    warn_of_steps(result)
-    try:  # a field may be a function of the caller's, in which Ctrl-C can come
-        _warn_of_fields(result)
-    except KeyboardInterrupt as stopped:
-        raise Interrupted("interrupted while the sampling of the field was checked", result) from stopped
-    return result
-
-
-def _advice(result: Trajectory, chosen: bool) -> str:
-    """Return the advice for an error message about a step that failed. chosen: by ms.Adaptive."""
-    fields = map(result._values_at(len(result) - 1).current, result.scene.fields)
-    positions = np.asarray(detached(result.positions[-1]), dtype=np.float64)
-    overlap = describe_magnet_overlap(fields, positions, result.scene.mesh.edge_lengths)
-    if overlap or not chosen:
-        return overlap or "Take shorter steps."
-    return (
-        "Take a larger tolerance, or more halvings; errors that do not fall with the step come from motors that jump, from "
-        "contacts that open and close in every step, or from round-off."
-    )
-
-
-def _with_strains(result: Trajectory) -> Trajectory:
-    """Return the motion with its largest strains computed again, state by state, if sheets grew during it."""
-    if not any(isinstance(owner, Shell) for owner, _ in result._varied):
-        return result
-    strain = StrainHistory.of_each(result.strains(k) for k in range(len(result)))
-    return replace(result, largest_membrane_strain=strain.membrane, largest_bending_strain=strain.bending)
-
-
-def _warn(result: Trajectory) -> None:
-    strain = StrainHistory(result.largest_membrane_strain, result.largest_bending_strain)
-    k = strain.worst
-    warn_if_large(
-        result, strain.at(k), f"the motion, in recorded state {k}, at {result.times[k]:.6g} s", (k,)
-    )
-
-
-def _warn_of_fields(result: Trajectory) -> None:
-    """Warn of coarsely sampled fields in the state of largest magnetic energy, where magnets are nearest."""
-    if not result.scene.fields:
-        return
-    k = int(np.argmax(np.abs(result.energies.get("magnetic", np.zeros(len(result))))))
-    flux_density = result.applied_flux_density
-    warn_of_sampling(
-        result._values_at(k),
-        np.asarray(detached(result.positions[k]), dtype=np.float64),
-        float(result._field_factors[k]),
-        None if flux_density is None else np.reshape(detached(flux_density), (-1, 3))[k],
-        f"the motion, in recorded state {k}, at {result.times[k]:.6g} s",
-    )
-
-
-def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
-    scene, model, values = asked.inputs.scene, asked.inputs.scene._model, asked.inputs.values
-    points, edge_rotations, velocities, driving = _outputs(asked, found)
-    rigid, n_v = bool(scene.rigid_parts), scene.mesh.n_vertices
-    recorded = len(found.kinetic_energy)
-    grid, after = asked.time_steps, np.array(found.steps_recorded, dtype=np.int64)
-    ended = grid.clock_after(found.steps_done)
-    thickness = values.all_sheets.thickness
-    with values.growth_in_core():
-        strain = StrainHistory.of(found.largest_strains(model, thickness))
-    by_term = np.array(found.energies).reshape(recorded, -1)
-    return Trajectory(
-        scene=scene,
-        integrator=asked.integrator,
-        times=grid.grid_times[asked.record_every * np.arange(recorded)],
-        positions=points[:, :n_v] if rigid else points,
-        velocities=velocities[:, :n_v] if rigid else velocities,
-        edge_rotations=edge_rotations,
-        remanent_magnetization=asked.inputs.given_magnetization,
-        applied_flux_density=asked.recorded("applied_flux_density", after),
-        kinetic_energy=np.array(found.kinetic_energy),
-        energies=_by_name(model.term_names, by_term),
-        largest_membrane_strain=strain.membrane,
-        largest_bending_strain=strain.bending,
-        steps=asked.steps,
-        steps_done=int(np.searchsorted(grid.grid_ends, found.steps_done, side="right")) - 1,
-        substeps={step: len(parts) for step, parts in found.substeps.items() if len(parts) > 1},
-        fallback_steps=tuple(
-            step for step, parts in found.substeps.items() if any(calm for _, _, calm in parts)
-        ),
-        time_steps=np.array(found.time_steps),
-        step_errors=np.array(found.step_errors),
-        end=MotionState(
-            ended.time,
-            found.last_state,
-            found.last_velocity,
-            found.last_turns,
-            found.last_acceleration,
-            found.last_strain_rates(model),
-            found.last_maxwell_strains(model),
-            found.last_maxwell_strain_rates(model),
-            ended,
-            found.begun or asked.start.rotations_known,
-            found.last_contact_acceleration,
-        ),
-        iterations=found.iterations,
-        factorizations=found.factorizations,
-        adjoint_storage=found.keep.name,
-        bytes=found.bytes,
-        wall_time=wall_time,
-        linear_time=found.linear_time,
-        _field_factors=asked.recorded("field_factor", after),
-        _load_factors=asked.recorded("load_factor", after),
-        _varied=asked.varied(after),
-        _step_factorizations=np.array(found.step_factorizations, dtype=np.int64),
-        _thickness=thickness,
-        _values=values,
-        _directions=found.directions(model),
-        _held_forces=found.held_forces(model),
-        _own_points=points[:, n_v:] if rigid else None,
-        _own_velocities=velocities[:, n_v:] if rigid else None,
-        _driving=driving,
-    )
-
-
-def _by_name(names: list[str], by_term: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the energies by name, {name: (n,)}, from those of all terms (n, terms); terms of one name are summed."""
-    sums: dict[str, np.ndarray] = {}
-    for name, each in zip(names, by_term.T, strict=True):
-        sums[name] = sums[name] + each if name in sums else each
-    return sums
-
-
-def _outputs(asked: MotionInputs, found):
-    """Return positions, edge rotations and velocities, with the points of rigid bodies, and the forces of motors."""
-    inputs, model = asked.inputs, asked.inputs.scene._model
-    arrays = (
-        found.positions(model),
-        found.edge_rotations(model),
-        found.velocities(model),
-        found.driving(),
-    )
-    if not inputs.leaves:
-        return tuple(like(array, *inputs.given) for array in arrays)
-    from ..adjoint.autograd import solved
-
-    return solved(MotionAdjoint(asked, found), arrays, dtype_like(*inputs.given), inputs.tensors)
-
-
-def _advance(bar):
-    def advance(fraction: float, residual: float) -> None:
-        bar.to(fraction)
-
-    return advance
+    options = MotionOptions(steps, start, integrator, record_every, adjoint_storage, solver)
+    if batch is not None:
+        with SolveBar("simulate", progress) as bar:
+            return simulate_batch(scene, arguments, options, batch, threads, bar.to)
+    if threads is not None:
+        raise ValueError("threads is the number of threads of a batch: give batch=k, or ms.set_num_threads")
+    with SolveBar("simulate", progress) as bar:
+        return run(scene, arguments, options, bar.to).result

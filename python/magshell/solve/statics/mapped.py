@@ -12,7 +12,8 @@ from ..._runtime.frozen import immutable
 from ...errors import NoGradient
 from ...model.results.result_lookup import displacements_of
 from ...model.scene.batch_axis import BatchAxis
-from .batch import BatchAdjoint, find_along
+from ..adjoint.batch import BatchAdjoint
+from .batch import find_along
 from .single_solve import Search
 
 if TYPE_CHECKING:
@@ -74,6 +75,7 @@ class _Solves:
         self._start, self._search = start, search
         self._adjoint: BatchAdjoint | None = None
         self._shapes: list[tuple[int, ...]] = []
+        self._n_driving = 0
 
     def solve(self, tensors: list[Any]) -> tuple[Any, ...]:
         """Return positions and edge rotations of all members, of tensors with their axis in front."""
@@ -83,6 +85,7 @@ class _Solves:
         batch, self._adjoint = find_along(axis, self._scene, None, self._start, self._search)
         for error in batch.failed.values():
             raise error
+        self._n_driving = len(batch[0]._driving)
         self._shapes = [tuple(each.shape) for each in tensors]
         return batch.positions, batch.edge_rotations
 
@@ -94,7 +97,7 @@ class _Solves:
         n_points = self._scene._model.points(self._scene._model.rest_state()).shape[0]
         by_points = np.zeros((len(by_positions), n_points, 3))
         by_points[:, : by_positions.shape[1]] = by_positions
-        driving = np.zeros((len(by_positions), self._adjoint.n_driving))
+        driving = np.zeros((len(by_positions), self._n_driving))
         values = [(each.owner, each.name) for each in self._adjoint.values]
         found = self._adjoint.gradients([by_points, by_edge_rotations, driving], [True] * len(values))
         by_value = dict(zip(values, found, strict=True))

@@ -154,7 +154,7 @@ def solve(
         if moving is not None and found.load_fraction < 1.0:
             inputs = inputs.with_values(moving.values(found.load_fraction))
     with inputs.in_core():
-        energies, arrays = _energies(scene, found), _arrays(scene, found)
+        energies, arrays = _energies(scene, found), arrays_of(scene, found)
         strain = largest_of(scene, found.state, inputs.values.all_sheets.thickness)
     result = _result(inputs, found, energies, arrays, strain, time.perf_counter() - began)
     log.debug(
@@ -244,7 +244,7 @@ def _result(
     )
 
 
-def _arrays(scene: Scene, found: _core.StaticsResult) -> tuple[np.ndarray, ...]:
+def arrays_of(scene: Scene, found: _core.StaticsResult) -> tuple[np.ndarray, ...]:
     """Return the positions with the points of rigid bodies, the edge rotations and the forces of motors."""
     model, driven = scene._model, any(joint._driven for joint in scene.joints)
     return (

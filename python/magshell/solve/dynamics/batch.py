@@ -1,0 +1,169 @@
+"""Motions of many designs or controls of one scene at once, over threads: ms.simulate(..., batch=k)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..._input.arrays import count
+from ..._input.tensors import is_tensor
+from ..._runtime.solve_keywords import SOLVE_KEYWORDS
+from ..._runtime.worker_threads import checked_threads
+from ...errors import Interrupted
+from ...model.scene.batch_axis import BatchAxis
+from ...model.scene.time_varying import may_jump, row_in_time
+from ..adjoint.batch import Member, OnThreads, solve_members
+from ..adjoint.dynamic import MotionAdjoint
+from ..options import as_adjoint_storage
+from ..statics.equilibria import EquilibriumSet
+from ..statics.equilibrium import Equilibrium
+from ..statics.equilibrium_batch import EquilibriumBatch
+from .single_motion import MotionOptions, arrays_of, preparation, run
+from .trajectory import MotionState, Trajectory
+from .trajectory_batch import TrajectoryBatch
+
+if TYPE_CHECKING:
+    from ...model.scene.scene import Scene
+
+
+def simulate_batch(
+    scene: Scene,
+    arguments: dict[str, Any],
+    options: MotionOptions,
+    members: int,
+    threads: int | None,
+    progress: Callable[[float], None],
+) -> TrajectoryBatch:
+    """Simulate the motions of all members, with the arguments of ms.simulate. Raises ValueError on bad input before any
+    motion, Interrupted with those that were found; errors of single motions are in the result."""
+    members = count("batch", members)
+    on = OnThreads(scene, checked_threads(threads, members))
+    steps = count("steps", options.steps)
+    arguments = dict(arguments)
+    time_step = arguments.pop("time_step")  # of all members
+    axis = BatchAxis(scene, arguments, members, refusal_in_time=_InTime(scene, steps))
+    storage = as_adjoint_storage(options.adjoint_storage)
+    storage = replace(storage, memory_budget=storage.memory_budget / members)
+    each = [
+        replace(options, start=start, adjoint_storage=storage) for start in _starts(options.start, members)
+    ]
+    every = dict.fromkeys(arguments)
+
+    def given(member: int) -> tuple[dict[str, Any], list[Any]]:
+        keywords, leaves = axis.arguments(member)
+        return {**every, **keywords, "time_step": time_step}, leaves
+
+    if is_tensor(time_step) and time_step.requires_grad:
+        raise ValueError("time_step of a batch must be a number: gradients by it need single motions")
+    first = preparation(scene, given(0)[0], each[0])(None)  # raises what every member would
+
+    def solve(member: int, check: Callable[[], None]) -> Member:
+        keywords, leaves = given(member)
+        one = run(scene, keywords, each[member], lambda fraction: check())
+        arrays, adjoint = arrays_of(one.asked, one.found), MotionAdjoint(one.asked, one.found)
+        return Member(one.result, arrays, adjoint, one.asked.inputs.tensors, leaves)
+
+    def missing() -> tuple[np.ndarray, ...]:
+        model, recorded = scene._model, 1 + steps // first.record_every
+        rest = model.rest_state()
+        points = np.zeros((recorded, *model.points(rest).shape))
+        return (
+            points,
+            np.zeros((recorded, *model.edge_rotations(rest).shape)),
+            points,
+            np.zeros((recorded, 0)),
+        )
+
+    solved = solve_members(on, axis, solve, lambda fraction, residual: progress(fraction), missing)
+    points, edge_rotations, velocities, driving = solved.arrays
+    n_v, rigid = scene.mesh.n_vertices, bool(scene.rigid_parts)
+    found = [
+        None
+        if one is None
+        else _member(axis, k, one.result, n_v, (points[k], edge_rotations[k], velocities[k], driving[k]))
+        for k, one in enumerate(solved.members)
+    ]
+    times = first.time_steps.grid_times[first.record_every * np.arange(points.shape[1])]
+    batch = TrajectoryBatch(
+        scene,
+        times,
+        points[:, :, :n_v] if rigid else points,
+        velocities[:, :, :n_v] if rigid else velocities,
+        edge_rotations,
+        solved.failed,
+        tuple(found),
+    )
+    if solved.interrupt is not None:
+        done = int(batch.converged.sum())
+        told = f"interrupted: {done} of {members} members of the batch came to their end"
+        raise Interrupted(told, batch) from solved.interrupt
+    return batch
+
+
+class _InTime:
+    """Says of a value that may vary in time whether its numbers are those of one motion."""
+
+    def __init__(self, scene: Scene, steps: int):
+        self._scene, self._steps = scene, steps
+
+    def __call__(self, owner: Any, name: str, numbers: np.ndarray) -> ValueError | str | None:
+        """Return the error of the numbers, None if they are those of a motion, "" if they cannot vary in time."""
+        keyword = SOLVE_KEYWORDS.get(name) if owner is None or owner is self._scene else None
+        row = keyword.shapes[0] if keyword is not None and keyword.varies else None
+        if row is None and owner is not None:
+            row = row_in_time(owner, name)
+        if row is None:
+            return ""
+        ends = (self._steps + 1, *row)
+        shapes = [row, ends]
+        if keyword is not None or may_jump(owner):
+            shapes.append((self._steps, *row))
+        if numbers.shape not in shapes:
+            return ValueError(f"{name} must have shape {' or '.join(map(str, shapes))}, got {numbers.shape}")
+        if not np.isfinite(numbers).all():
+            return ValueError(
+                f"{name} must be finite, but {np.count_nonzero(~np.isfinite(numbers))} numbers are not"
+            )
+        return None
+
+
+def _member(
+    axis: BatchAxis, member: int, found: Trajectory, n_vertices: int, arrays: Sequence[Any]
+) -> Trajectory:
+    """Return the motion of one member with its part of the results, connected to the values of the batch."""
+    points, edge_rotations, velocities, driving = arrays
+    rigid = bool(found.scene.rigid_parts)
+    magnetization = {
+        each.name: each.given_to(member)
+        for each in axis.values
+        if each.owner is None and each.name == "remanent_magnetization" and is_tensor(each.value)
+    }
+    return replace(
+        found,
+        positions=points[:, :n_vertices],
+        edge_rotations=edge_rotations,
+        velocities=velocities[:, :n_vertices],
+        _own_points=points[:, n_vertices:] if rigid else None,
+        _own_velocities=velocities[:, n_vertices:] if rigid else None,
+        _driving=driving,
+        **magnetization,
+    )
+
+
+def _starts(start: Any, members: int) -> list[Any]:
+    """Return the start of each member. Raises ValueError if there is another number of them, or if a tensor would lose its
+    gradient."""
+    if is_tensor(start) and start.requires_grad:
+        raise ValueError("start of a batch has no gradient: detach it, or simulate the members one by one")
+    several = isinstance(start, EquilibriumSet | EquilibriumBatch | TrajectoryBatch)
+    if isinstance(start, np.ndarray | list) or is_tensor(start):
+        states = isinstance(start, list) and isinstance(start[0], Equilibrium | Trajectory | MotionState)
+        several = states or np.ndim(start) == 3
+    if not several:
+        return [start] * members
+    if len(start) != members:
+        raise ValueError(f"start has {len(start)} members, but batch={members}")
+    return [start[k] for k in range(members)]
