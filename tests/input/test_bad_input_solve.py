@@ -131,7 +131,7 @@ GRADIENTS = {
     "thickness": lambda t: shell(thickness=t((N_F,))),
     "young_modulus": lambda t: shell(young_modulus=t(())),
     "curvature_scale": lambda t: shell(curvature_scale=t((N_E,))),
-    "load_factor": lambda t: ms.linear_buckling(scene(), load_factor=t(())),
+    "load_factor": lambda t: ms.linear_response(scene(), load_factor=t(())),
     "applied_flux_density": lambda t: ms.linear_response(
         scene(field=ms.UniformField()), remanent_magnetization=(1, 0, 0), applied_flux_density=t((3,))
     ),

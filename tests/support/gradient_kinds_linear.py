@@ -1,4 +1,4 @@
-"""Kinds of scene with numbers of their stiffness, for gradient_kinds.py: frequencies, and critical points of paths."""
+"""Kinds of scene with numbers of their stiffness, for gradient_kinds.py: frequencies, buckling factors, critical points."""
 
 from types import SimpleNamespace
 
@@ -66,13 +66,72 @@ def numbers_of(given):
     return {name: value.detach() if torch.is_tensor(value) else value for name, value in given.items()}
 
 
-def snap(scene, values, start=None, **given):
-    """Return the first limit point of the path on which a field pushes a buckled beam through, as the field grows."""
+def as_values(scene, values, given):
+    """Return values with the keywords of ms.equilibrium that other solves take as values, and the other keywords."""
     sheet = scene.bodies[0]
-    of_sheet = {name: given.pop(name) for name in OF_SHEET if name in given}
+    of_sheet = {name: given[name] for name in OF_SHEET if name in given}
+    of_scene = {name: given[name] for name in ("vertex_loads",) if name in given}
     values = {**values, sheet: {**values.get(sheet, {}), **of_sheet}}
-    if "vertex_loads" in given:
-        values[scene] = {**values.get(scene, {}), "vertex_loads": given.pop("vertex_loads")}
+    if of_scene:
+        values[scene] = {**values.get(scene, {}), **of_scene}
+    return values, {
+        name: value for name, value in given.items() if name not in (*OF_SHEET, "vertex_loads", "solver")
+    }
+
+
+def buckling(scene, values, **given):
+    """Return the lowest buckling factor of the loads."""
+    values, given = as_values(scene, values, given)
+    return numbers(ms.linear_buckling(scene, values=values, **given).factors)
+
+
+def buckling_about(scene, values, start=None, **given):
+    """Return the lowest buckling factor of the way from half of the loads, by which the sheet is bent, to these."""
+    factor, field = (as_tensor(given[name]) for name in ("load_factor", "applied_flux_density"))
+    half = {"load_factor": 0.5 * factor, "applied_flux_density": 0.5 * field}
+    rest = ms.equilibrium(scene, values=values, start=start, **{**given, **half})
+    towards = {name: given[name] for name in ("load_factor", "gravity_factor", "applied_flux_density")}
+    return numbers(ms.linear_buckling(scene, rest, **towards).factors)
+
+
+def column() -> ms.Scene:
+    """Build a clamped strip that is pressed along its length, in its weight and a field."""
+    sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
+    press = ms.EdgeLoad(MESH.edges_at(x=0.1), (-0.1, 0.02, 0))
+    return ms.Scene(
+        sheet,
+        supports=[ms.Clamp(MESH.edges_at(x=0.0))],
+        loads=[press],
+        gravity=(-9.81, 1.0, 0),
+        field=ms.UniformField(),
+    )
+
+
+def buckling_column() -> Kind:
+    controls = {
+        "load_factor": 0.9,
+        "gravity_factor": 0.8,
+        "remanent_magnetization": (3e3, 1e3, 0),
+        "applied_flux_density": (-1e-3, 3e-4, 0),
+    }
+    return Kind(column(), controls, solve=buckling, reach=REACH)
+
+
+def buckling_bent_column() -> Kind:
+    controls = {
+        "load_factor": 0.9,
+        "gravity_factor": 0.3,
+        "remanent_magnetization": (3e3, 1e3, 2e2),
+        "applied_flux_density": (-1e-3, 3e-4, 0),
+    }
+    # Long steps: the change of the stiffness along the way is a difference, with round-off of its own.
+    return Kind(column(), controls, solve=buckling_about, fixed=EXACT, step=2e-3, reach=REACH)
+
+
+def snap(scene, values, start=None, solver=None, **given):
+    """Return the first limit point of the path on which a field pushes a buckled beam through, as the field grows."""
+    values, given = as_values(scene, values, given)
+    given["solver"] = solver
     field = as_tensor(given.pop("applied_flux_density"))  # a tensor: the point is located by Newton's method
     pushed = ms.equilibrium(
         scene,
@@ -128,4 +187,6 @@ LINEAR_MAKERS = {
     "a solid that vibrates about an equilibrium": vibrating_solid,
     "a sheet that vibrates about its rest shape": vibrating_at_rest,
     "a beam that snaps at a limit point": snapping_beam,
+    "a column that buckles by linear theory": buckling_column,
+    "a bent column that buckles by linear theory": buckling_bent_column,
 }

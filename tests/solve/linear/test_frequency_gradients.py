@@ -102,10 +102,12 @@ def test_double_frequencies_have_no_gradient():
     assert squares[1] == pytest.approx(squares[2], rel=1e-9)
     (by,) = torch.autograd.grad(modes.squares[0], modulus, retain_graph=True)
     assert by.item() == pytest.approx(squares[0] / 1e6, rel=1e-8)
-    with pytest.raises(ms.NoGradient, match=r"square of frequency 1: it equals that of frequency 2.*mix"):
+    with pytest.raises(
+        ms.NoGradient, match=r"square of frequency 1: it equals the square of frequency 2.*mix"
+    ):
         torch.autograd.grad(modes.squares[1], modulus, retain_graph=True)
     two = ms.vibration_modes(scene, values={sheet: {"young_modulus": modulus}}, count=2)
-    with pytest.raises(ms.NoGradient, match="frequency 1: it equals that of frequency 2"):
+    with pytest.raises(ms.NoGradient, match="frequency 1: it equals the square of frequency 2"):
         torch.autograd.grad(two.squares[1], modulus)
 
 

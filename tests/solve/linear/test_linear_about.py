@@ -134,9 +134,8 @@ def test_tensors_in_tensors_out_and_no_gradient() -> None:
     assert isinstance(found.displacements, torch.Tensor)
     np.testing.assert_array_equal(found.positions, about.positions + found.displacements)
     wanted = ms.equilibrium(scene, load_factor=factor.requires_grad_())
-    for function in (ms.linear_response, ms.linear_buckling):
-        with pytest.raises(ValueError, match=rf"requires a gradient, and ms.{function.__name__} passes none"):
-            function(scene, wanted)
+    with pytest.raises(ValueError, match=r"requires a gradient, and ms.linear_response passes none"):
+        ms.linear_response(scene, wanted)
     with pytest.raises(ValueError, match="load_factor requires a gradient"):
         ms.linear_response(scene, about, load_factor=factor)
 

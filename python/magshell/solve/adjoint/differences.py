@@ -13,18 +13,25 @@ SIXTH = np.array([3 / 4, -3 / 20, 1 / 60, 0.0])
 # Two estimates of a derivative agree if they differ by the first fraction (1) of its largest entry; of those that differ by
 # more, the best is taken, up to the second fraction. Tested by test_tangents_agree_with_gradients_in_every_kind.
 # Round-off of the function is this fraction (1) of its largest value. Tested by the same.
-_ROUNDING = 64 * np.finfo(float).eps
+ROUNDING = 64 * np.finfo(float).eps
 _AGREE, _LARGEST_DIFFERENCE = 1e-11, 1e-7
 
 
-def directional_derivative(function: Callable[[float], np.ndarray], steps: list[float]) -> np.ndarray | None:
+def directional_derivative(
+    function: Callable[[float], np.ndarray],
+    steps: list[float],
+    rounding: float = ROUNDING,
+    sizes: np.ndarray | None = None,
+) -> np.ndarray | None:
     """Return the derivative of a function of one number at zero, by the first of these steps that suffices; or None.
 
-    Rows of the function's values (k, n) have units of their own.
+    Rows of the function's values (k, n) have units of their own. rounding: the error of its values (1), over the largest one
+    of the row. sizes: (k,), by which rows become comparable; then round-off of the largest row counts in all of them, except
+    where the size is zero.
     """
     best, smallest, before = None, _LARGEST_DIFFERENCE, np.inf
     for step in steps:
-        stencil = _Stencil(function, step)
+        stencil = _Stencil(function, step, rounding, sizes)
         try:
             linear = stencil.slope(4)
             if stencil.difference(linear, stencil.slope(1)) <= _AGREE:
@@ -46,8 +53,14 @@ def directional_derivative(function: Callable[[float], np.ndarray], steps: list[
 class _Stencil:
     """Central differences of a function at multiples of a step."""
 
-    def __init__(self, function: Callable[[float], np.ndarray], step: float):
-        self._function, self._step = function, step
+    def __init__(
+        self,
+        function: Callable[[float], np.ndarray],
+        step: float,
+        rounding: float,
+        sizes: np.ndarray | None,
+    ):
+        self._function, self._step, self._rounding, self._sizes = function, step, rounding, sizes
         self._slopes: dict[int, np.ndarray] = {}
         self._largest: np.ndarray | float = 0.0  # value of the function, for each row
 
@@ -71,5 +84,13 @@ class _Stencil:
         if not (np.isfinite(one).all() and np.isfinite(other).all()):
             return np.inf
         size, apart = (np.abs(each).max(axis=-1, initial=0.0) for each in (one, one - other))
-        apart = apart - _ROUNDING * self._largest / self._step
+        apart = apart - self._rounding * self._largest_of_all() / self._step
         return float(np.max(apart / np.where(size > 0.0, size, 1.0), where=apart > 0.0, initial=0.0))
+
+    def _largest_of_all(self) -> np.ndarray | float:
+        """Return the largest values of all rows, in the unit of each row; those of the row itself if no other counts."""
+        if self._sizes is None:
+            return self._largest
+        largest = float((self._largest * self._sizes).max(initial=0.0))
+        sizes = np.where(self._sizes > 0.0, self._sizes, np.inf)
+        return np.maximum(self._largest, largest / sizes)

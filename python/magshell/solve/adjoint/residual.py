@@ -8,6 +8,7 @@ The second one contracts the third derivatives of the energy twice. It is what a
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ import numpy as np
 from ... import _core
 from ...errors import NoGradient
 from ...model.scene.values import Gradient
-from .differences import directional_derivative
+from .differences import ROUNDING, directional_derivative
 
 if TYPE_CHECKING:
     from ...model.scene.solve_inputs import Inputs
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
 # an edge turns; and the fractions (1) of it that are tried until differences of sixth and eighth order agree. Tested by
 # test_frequencies_have_the_gradients_of_differences.
 _STEP, _SHORTER = 1 / 64, (1.0, 0.25, 0.1, 1e-2, 1e-3, 1e-4)
+# The error (1) of `bent`, a derivative by differences itself, over its largest entry of one kind. Tested by
+# test_factors_have_the_gradients_of_differences.
+_OF_DIFFERENCES = 1e-11
 
 
 class Slopes(NamedTuple):
@@ -36,6 +40,10 @@ class Slopes(NamedTuple):
     def plus(self, factor: float, other: Slopes) -> Slopes:
         """Return the derivatives of the sum of this number and a multiple of another."""
         return Slopes(*(mine + factor * theirs for mine, theirs in zip(self, other, strict=True)))
+
+    def at_fixed_state(self) -> Slopes:
+        """Return the same without the derivatives by unknowns."""
+        return self._replace(by_state=np.zeros_like(self.by_state))
 
 
 class Residual:
@@ -83,30 +91,51 @@ class Residual:
 
         Raises NoGradient where the forces are not smooth.
         """
-        parts, size = self._parts, np.concatenate(self._slopes(self.state, motion)).size
+
+        def at(step: float) -> Slopes:
+            self._prepare()
+            return self._slopes(self.state + step * along, motion)
+
+        return self._rates(at, self._relative_size(along))
+
+    def bent_rates(self, motion: np.ndarray, along: np.ndarray, rate: np.ndarray) -> Slopes:
+        """Return the rates of `bent(motion, motion)` as the state moves along a motion and load parameters at a rate.
+
+        Raises NoGradient where the forces are not smooth.
+        """
+
+        def at(step: float) -> Slopes:
+            there = self.at(self.state + step * along, self.controls + step * rate)
+            return there.bent(motion, motion)
+
+        self._prepare()
+        return self._rates(at, self._relative_size(along) or 1.0, _OF_DIFFERENCES)
+
+    def _rates(
+        self, function: Callable[[float], Slopes], length: float, rounding: float = ROUNDING
+    ) -> Slopes:
+        """Return the derivative of a function of one number at 0, in steps of a fraction over this length."""
+        parts, zero = self._parts, function(0.0)
+        if length == 0.0:
+            return Slopes(*(np.zeros_like(each) for each in zero))
 
         def rows(step: float) -> np.ndarray:
-            self._prepare()
-            flat = np.concatenate(self._slopes(self.state + step * along, motion))
+            flat = np.concatenate(function(step))
             found = np.zeros((len(parts), max(part.stop - part.start for part in parts)))
             for row, part in zip(found, parts, strict=True):
                 row[: part.stop - part.start] = flat[part]
             return found
 
-        length = self._relative_size(along)
-        if length == 0.0:
-            rates = rows(0.0) * 0.0
-        else:
-            rates = directional_derivative(rows, [_STEP * shorter / length for shorter in _SHORTER])
+        steps = [_STEP * shorter / length for shorter in _SHORTER]
+        rates = directional_derivative(rows, steps, rounding, self._sizes(parts))
         if rates is None:
             raise NoGradient(
                 "no gradient here: the stiffness is not smooth at this state; contacts may open or close there"
             )
-        flat = np.zeros(size)
+        flat = np.concatenate([np.zeros_like(each) for each in zero])
         for row, part in zip(rates, parts, strict=True):
             flat[part] = row[: part.stop - part.start]
-        n, m = len(self.state), self.inputs.scene._value_layout.size
-        return Slopes(flat[:n], flat[n : n + m], flat[n + m :])
+        return Slopes(*np.split(flat, np.cumsum([each.size for each in zero])[:-1]))
 
     def prescribed(self, by_state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return derivatives by values and load parameters through what supports prescribe, from those by unknowns."""
@@ -146,6 +175,15 @@ class Residual:
                 parts.append(slice(of_key.min(initial=first), of_key.max(initial=first - 1) + 1))
             first += layout.size
         return [part for part in parts if part.stop > part.start]
+
+    def _sizes(self, parts: list[slice]) -> np.ndarray:
+        """Return the sizes of the entries of all parts: the shortest edge, 1 rad, the largest number of a value."""
+        scene, values = self.inputs.scene, self.inputs.values
+        state = np.ones(len(self.state))
+        state[: 3 * scene._bodies.n_points] = scene.mesh.edge_lengths.min(initial=np.inf)
+        flat = np.abs(np.concatenate([state, values.numbers, self.controls]))
+        sizes = np.array([flat[part].max() for part in parts])
+        return np.where(np.isfinite(sizes), sizes, 0.0)
 
     def _relative_size(self, motion: np.ndarray) -> float:
         """Return the largest motion of a vertex over the shortest edge, or the largest rotation in rad, if that is more."""

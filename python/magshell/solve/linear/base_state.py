@@ -47,6 +47,7 @@ def inputs_about(
     remanent_magnetization: Any = None,
     applied_flux_density: Any = None,
     values: dict[Any, Any] | None = None,
+    differentiable: bool = False,
     **factors: Any,
 ) -> Inputs:
     """Return inputs with the magnetization and the values of an equilibrium, and with the load parameters given here.
@@ -68,23 +69,29 @@ def inputs_about(
             raise ValueError(
                 f"{what} of the equilibrium: give {it} to ms.equilibrium, or give no equilibrium"
             )
-    inputs = idle_inputs(scene, {}, applied_flux_density, **factors)
+    inputs = idle_inputs(scene, {}, applied_flux_density, differentiable, **factors)
     return inputs.with_values(equilibrium._values)
 
 
 def asked_inputs(
-    function: str, scene: Scene, equilibrium: Equilibrium | None, arguments: dict[str, Any]
+    function: str,
+    scene: Scene,
+    equilibrium: Equilibrium | None,
+    arguments: dict[str, Any],
+    differentiable: bool = False,
 ) -> Inputs:
     """Return the inputs of a linear solve, at rest or about an equilibrium, from its keywords in the table.
 
-    Raises ValueError for what does not fit.
+    Raises ValueError for what does not fit; unless `differentiable` is true, also for tensors that require a gradient.
     """
     if equilibrium is None:
-        inputs = plain_inputs(scene, **arguments)
+        inputs = plain_inputs(scene, differentiable=differentiable, **arguments)
         _refuse_own_field(scene)
         return inputs
-    inputs = inputs_about(scene, equilibrium, **arguments)
-    refuse_what_cannot_be(function, equilibrium, inputs)
+    inputs = inputs_about(scene, equilibrium, differentiable=differentiable, **arguments)
+    if not differentiable:
+        _refuse_gradient(function, equilibrium)
+    refuse_what_cannot_be(equilibrium, inputs)
     return inputs
 
 
@@ -117,14 +124,18 @@ class StiffnessAbout(Stiffness):
         return self.answer(forces, moved)
 
 
-def refuse_what_cannot_be(function: str, equilibrium: Equilibrium, inputs: Inputs) -> None:
-    """Raise ValueError if no load parameter changes, or if the equilibrium is not stable or requires a gradient."""
+def _refuse_gradient(function: str, equilibrium: Equilibrium) -> None:
+    """Raise ValueError if the equilibrium requires a gradient."""
     for name in ("positions", "edge_rotations"):
         if requires_gradient(getattr(equilibrium, name)):
             raise ValueError(
                 f"the equilibrium requires a gradient, and ms.{function} passes none back: find it under "
                 "torch.no_grad(), or of detached tensors"
             )
+
+
+def refuse_what_cannot_be(equilibrium: Equilibrium, inputs: Inputs) -> None:
+    """Raise ValueError if no load parameter changes, or if the equilibrium is not stable."""
     if not equilibrium.stable:
         raise ValueError(
             "the equilibrium is not stable, so that nothing stays near it: linear theory needs one that is"

@@ -10,12 +10,15 @@ import numpy as np
 import scipy
 
 from ..._input.arrays import count
+from ..._input.tensors import detached, dtype_like, like
 from ..._runtime.frozen import immutable
 from ..._runtime.solve_keywords import given_to
 from ..._runtime.solver_entry_point import solve_entry
 from ...errors import NotConverged
 from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs
+from ..adjoint.buckling import AFTER, BEFORE, BucklingAdjoint
+from ..adjoint.residual import Residual
 from ..statics.equilibrium import Equilibrium
 from .base_state import StiffnessAbout, asked_inputs
 from .mode_shapes import mode_shapes
@@ -38,13 +41,13 @@ class Buckling:
     """The lowest buckling modes of a scene.
 
     factors: (k,), ascending: by which the load parameters are multiplied where the scene buckles in mode k; about an
-        equilibrium, the fraction of the way from its load parameters to those given.
+        equilibrium, the fraction of the way from its load parameters to those given. A tensor if inputs are tensors.
     modes: (k, n_v, 3), displacements of the vertices, the largest component 1.
     edge_rotations: (k, n_e), rad, that go with them. equilibrium: that one, or None.
     """
 
     scene: Scene
-    factors: np.ndarray
+    factors: Any
     modes: np.ndarray = field(repr=False)
     edge_rotations: np.ndarray = field(repr=False)
     factorizations: int
@@ -52,7 +55,7 @@ class Buckling:
     equilibrium: Equilibrium | None = field(repr=False, default=None)
 
     def __repr__(self) -> str:
-        factors = ", ".join(f"{factor:.6g}" for factor in self.factors)
+        factors = ", ".join(f"{factor:.6g}" for factor in detached(self.factors))
         of = "times the controls" if self.equilibrium is None else "of the way to the new controls"
         return f"Buckling: at {factors} {of}; {self.wall_time:.3g} s"
 
@@ -96,10 +99,14 @@ def linear_buckling(
     a contact bears in one direction only, so that a mode and its opposite have different factors, and none of them is
     linear; ms.follow_path passes where contacts open and close. Actuators that are springs of their own are refused too.
 
-    Raises ValueError on bad input, about an equilibrium that is not stable, with its own load parameters, or one that
-    requires a gradient, as there is none here; in a scene with contact of bodies, where the supports leave the sheet a
-    motion without stiffness, where the load parameters do nothing, and where the sheet does not buckle under them (a column
-    that is pulled); Interrupted.
+    Factors are differentiable, by perturbation of first order: by values and load parameters that are tensors, and by the
+    inputs of an equilibrium that was found with tensors, with the change of the equilibrium. A gradient costs two
+    factorizations and some hundreds of evaluations of the stiffness for each factor asked for. Factors that equal the next
+    one to 1e-6 have none, nor those of loads with which supports move: NoGradient says so. Modes are arrays.
+
+    Raises ValueError on bad input, about an equilibrium that is not stable or with its own load parameters; in a scene with
+    contact of bodies, where the supports leave the sheet a motion without stiffness, where the load parameters do nothing,
+    and where the sheet does not buckle under them (a column that is pulled); Interrupted.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.01, cells=(20, 2))
@@ -111,7 +118,7 @@ def linear_buckling(
     """
     arguments = given_to("linear_buckling", locals())
     modes = count("modes", modes)
-    inputs = asked_inputs("linear_buckling", scene, equilibrium, arguments)
+    inputs = asked_inputs("linear_buckling", scene, equilibrium, arguments, differentiable=True)
     refuse_springs(inputs)
     if scene._body_contacts:
         raise ValueError(
@@ -136,17 +143,63 @@ def linear_buckling(
         response = stiffness.response(inputs)
         displacement = float(np.abs(model.points(response)).max())
         change = _stiffness_change(scene, stiffness, response, displacement, inputs)
-    factors, vectors = _lowest(stiffness, change, modes, _LARGEST_DISPLACEMENT * _size(scene), displacement)
-    shapes, edge_rotations = mode_shapes(model, vectors)
+    leaves = _leaves(inputs, equilibrium)
+    asked = modes + bool(leaves and modes + 1 < model.free_size)  # whether the last one is simple
+    factors, vectors = _lowest(stiffness, change, asked, _LARGEST_DISPLACEMENT * _size(scene), displacement)
+    shapes, edge_rotations = mode_shapes(model, vectors[:, :modes])
     return Buckling(
         scene=scene,
-        factors=factors,
+        factors=_differentiable(inputs, equilibrium, response, factors, vectors, modes),
         modes=shapes,
         edge_rotations=edge_rotations,
         factorizations=2,
         wall_time=time.perf_counter() - began,
         equilibrium=equilibrium,
     )
+
+
+def _leaves(inputs: Inputs, equilibrium: Equilibrium | None) -> list[tuple[Any, int]]:
+    """Return the tensors that gradients are asked by, each with the load parameters that it may be one of."""
+    own = [] if equilibrium is None or equilibrium._inputs is None else equilibrium._inputs.leaves
+    return [*((leaf, BEFORE) for leaf in own), *((leaf, AFTER) for leaf in inputs.leaves)]
+
+
+def _differentiable(
+    inputs: Inputs,
+    equilibrium: Equilibrium | None,
+    response: np.ndarray,
+    factors: np.ndarray,
+    vectors: np.ndarray,
+    modes: int,
+) -> Any:
+    """Return the factors as a tensor that is connected to the inputs, if some of these require a gradient."""
+    leaves, kept, model = _leaves(inputs, equilibrium), factors[:modes], inputs.scene._model
+    about = None if equilibrium is None else equilibrium._inputs
+    given = [*inputs.given, *(() if about is None else about.given)]
+    if not leaves:
+        return like(kept, *given)
+    from ..adjoint.autograd import solved
+
+    layout = inputs.scene._control_layout
+    at = (model.rest_state(), [], layout.zeros())
+    if equilibrium is not None:
+        at = (equilibrium._state, equilibrium._angle_branches, equilibrium._controls)
+    with inputs.in_core():
+        rate = model.prescribed_rate(at[2])
+    further = layout.of(inputs.controls - at[2], "scene", "support_factor")
+    moves = rate.any() and (further.any() or any(leaf.name == "support_factor" for leaf, _ in leaves))
+    adjoint = BucklingAdjoint(
+        Residual(inputs if about is None else about, *at),
+        inputs.controls,
+        response,
+        factors,
+        np.stack([model.expand(each) for each in vectors.T], axis=1),
+        leaves,
+        complete=len(factors) == modes,
+        at_rest=equilibrium is None,
+        refusal="no gradient of buckling factors: supports move with the loads" if moves else "",
+    )
+    return solved(adjoint, (kept.copy(),), dtype_like(*given), adjoint.tensors)[0]
 
 
 def _size(scene: Scene) -> float:

@@ -1,0 +1,80 @@
+"""Gradients of buckling factors of linear theory. Works on arrays; autograd.py has the tensors.
+
+    (K + f J) v = 0,   v . J v = -1:      df = v . (dK + f dJ) v
+    J = d/dt K(q + t u, c + t (c1 - c)),   K u = g(q, c) - g(q, c1)
+
+with the state q and the load parameters c of K, and the load parameters c1 towards which these go. u depends on the inputs,
+and about an equilibrium q does. Each costs one solve with K for all inputs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...errors import NoGradient
+from .eigenvalue import EigenvalueAdjoint, multiplier_of
+from .residual import Residual, Slopes
+
+if TYPE_CHECKING:
+    from ...model.scene.solve_inputs import Leaf
+    from ...model.scene.values import Gradient
+
+BEFORE, AFTER = 0, 1  # the load parameters c and c1, of which a leaf may be
+
+
+class BucklingAdjoint(EigenvalueAdjoint):
+    """The gradients of buckling factors by the inputs of the state whose stiffness K is, and by further load parameters.
+
+    residual: there. after: c1. response: u of all unknowns. vectors: (size, m), modes v of all unknowns. complete: as in
+        EigenvalueAdjoint. leaves: each with BEFORE or AFTER. at_rest: the state does not depend on the inputs.
+    refusal: why there is no gradient, or "".
+    """
+
+    _name = "factor"
+
+    def __init__(
+        self,
+        residual: Residual,
+        after: np.ndarray,
+        response: np.ndarray,
+        factors: np.ndarray,
+        vectors: np.ndarray,
+        leaves: Sequence[tuple[Leaf, int]],
+        *,
+        complete: bool,
+        at_rest: bool,
+        refusal: str = "",
+    ):
+        super().__init__(residual.inputs, factors, leaves, complete)
+        self._residual, self._after, self._response = residual, after, response
+        self._vectors, self._at_rest, self._refusal = vectors, at_rest, refusal
+
+    def _refuse(self, k: int) -> None:
+        if self._refusal:
+            raise NoGradient(self._refusal)
+        super()._refuse(k)
+
+    def _gradient(self, k: int) -> tuple[Gradient, ...]:
+        here, factor, response = self._residual, self._eigenvalues[k], self._response
+        vector = self._vectors[:, k]
+        vector = vector * np.sqrt(factor / (vector @ here.slopes(vector).by_state))
+        bent = here.bent(vector, vector)
+        rates = here.bent_rates(vector, response, self._after - here.controls)
+        # d/dt [(1 - t) K_c] for the load parameters before, d/dt [t K_c] for those after.
+        by_after = factor * bent.by_controls
+        total = bent.plus(factor, rates)
+        total = total._replace(by_controls=total.by_controls - by_after)
+        multiplier = multiplier_of(here, factor * bent.by_state)
+        there = here.at(here.state, self._after).slopes(multiplier)
+        total = total.plus(1.0, here.bent(multiplier, response)).plus(-1.0, here.slopes(multiplier))
+        total = Slopes(total.by_state + there.by_state, total.by_values + there.by_values, total.by_controls)
+        by_after = by_after + there.by_controls
+        if self._at_rest:
+            total = total.at_fixed_state()
+        else:
+            total = total.plus(1.0, here.slopes(multiplier_of(here, total.by_state)))
+        after = Slopes(np.zeros_like(total.by_state), total.by_values, by_after)
+        return here.by_inputs(total), here.by_inputs(after)
