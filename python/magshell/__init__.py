@@ -5,7 +5,7 @@ from ._runtime import instructions as _  # noqa: F401 - first: it says whether t
 # isort: split
 import sys
 
-from . import envs
+from . import envs, jax
 from ._core import __version__
 from ._runtime.threads import num_threads, set_num_threads, show_config
 from .design import control, objectives, optim, parametrize
@@ -271,6 +271,7 @@ __all__ = [
     "free_motions",
     "hessian",
     "inverse_dynamics",
+    "jax",
     "latin_hypercube",
     "linear_buckling",
     "linear_response",

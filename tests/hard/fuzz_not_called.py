@@ -34,6 +34,8 @@ NOT_CALLED = {
     "ContactState": "a result",
     "Reaction": "a result",
     "Trajectory": "a result",
+    "jax.JaxEquilibrium": "a result",
+    "jax.equilibrium": "needs JAX, an extra; tests/jax refuses bad input",
     "TrajectoryBatch": "a result",
     "SolveLog": "a result",
     "SolveStep": "a result",

@@ -80,10 +80,11 @@ ROOMS = [
     "output.results",
     "output.plot",
     "envs",
+    "jax",
     "__init__",
     "__main__",
 ]
-OFFERED_ROOMS = {"envs"}  # as ms.envs
+OFFERED_ROOMS = {"envs", "jax"}  # as ms.envs, ms.jax
 # Imports of a higher room, each with its reason.
 UPWARD_IMPORTS = {
     # Only autograd.py may see torch.autograd, which says what transforms a tensor is in. Asked for once torch is loaded.
@@ -106,9 +107,11 @@ HIDDEN_MODULES = {
     "matplotlib": ("output/plot/",),
     "pyvista": ("output/plot/",),
     "gymnasium": ("envs/",),
+    "jax": ("jax/",),
 }
 OPTIONAL_MODULES = (
-    "torch matplotlib pyvista PIL imageio_ffmpeg meshio gmsh magpylib ipctk distributed cloudpickle gymnasium pandas xarray"
+    "torch matplotlib pyvista PIL imageio_ffmpeg meshio gmsh magpylib ipctk distributed cloudpickle gymnasium pandas xarray "
+    "jax"
 ).split()
 LONGEST_FILE = 600
 SPELLINGS = {"cent" + "re": "center"}  # in two halves, as this file is read as well
