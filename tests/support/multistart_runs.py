@@ -97,3 +97,40 @@ def slow_bend(folder, start):
     (Path(folder) / f"{os.getpid()}-{time.monotonic_ns()}").touch()
     time.sleep(0.3)
     return bend(start)
+
+
+def bend_batch(designs):
+    """Compute the equilibria of a strip at several designs of three numbers, in one batch; (k, n_v, 3) m."""
+    mesh = ms.meshes.rectangle(0.1, 0.02, cells=(8, 2))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
+    given = {"remanent_magnetization": np.asarray(designs) * 1e4, "applied_flux_density": (0, 0, 2e-3)}
+    return ms.equilibrium(scene, batch=len(designs), threads=1, progress=False, **given).positions
+
+
+def slow_batch(folder, designs):
+    """Run `bend_batch` slowly enough to be interrupted, and write a file that names the process."""
+    (Path(folder) / f"{os.getpid()}-{time.monotonic_ns()}").touch()
+    time.sleep(0.5)
+    return bend_batch(designs)
+
+
+def strip():
+    """Make the environment of a strip."""
+    from magshell.envs import robots
+
+    return robots.magnetic_strip()
+
+
+def slow_strip(folder):
+    """Make the environment of a strip whose episodes take long enough to be interrupted, and name the process in files."""
+    made = strip()
+    reset = made.reset
+
+    def slow_reset(**given):
+        (Path(folder) / f"{os.getpid()}-{time.monotonic_ns()}").touch()
+        time.sleep(0.5)
+        return reset(**given)
+
+    made.reset = slow_reset
+    return made
