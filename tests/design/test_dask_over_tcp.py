@@ -51,7 +51,7 @@ def cluster(tmp_path):
 
 
 def kill_a_worker_that_began(folder, began):
-    """Send SIGKILL to the process that began last, once so many pieces of work have begun; each wrote a file with its name."""
+    """Send SIGKILL to the process that began last, once so many pieces of work have begun; each wrote a file."""
     until = time.monotonic() + PATIENCE
     while len(found := list(folder.iterdir())) < began:
         if time.monotonic() > until:
