@@ -16,7 +16,7 @@ pythons := $(wildcard python benchmarks tests examples docs scripts)
 cpps = $(shell find cpp -name '*.h' -o -name '*.cpp')
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick seconds docs wheel sanitize processors lint format stubs clean
+.PHONY: help demo test quick seconds docs gallery wheel sanitize processors lint format stubs clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -39,6 +39,9 @@ seconds: $(VENV)/.with-test  ## measure again which tests take long, for `make q
 docs: $(VENV)/.with-docs  ## the manual, in docs/_build/html; warnings are errors
 	$(VENV)/bin/python -m sphinx -W --keep-going -q -j auto -b html docs docs/_build/html
 	@echo "The manual is $(CURDIR)/docs/_build/html/index.html"
+
+gallery: $(VENV)/.with-docs  ## the pictures of the README and the examples, in docs/pictures, computed anew
+	$(VENV)/bin/python docs/_tools/front_page.py
 
 wheel: $(VENV)/.created  ## a wheel for other machines and the sdist, in dist/, tried in a bare environment
 	PYTHON=$(CURDIR)/$(VENV)/bin/python scripts/wheel.sh

@@ -17,6 +17,7 @@ version = release = magshell.__version__
 
 extensions = ["myst_parser", "sphinx.ext.autodoc"]
 myst_heading_anchors = 3
+myst_enable_extensions = ["html_image"]
 exclude_patterns = ["_build", "_tools", "ruff.toml", "_gallery/*.txt"]
 suppress_warnings = ["myst.header"]
 

@@ -16,9 +16,10 @@ HERE = Path(__file__).resolve().parents[1]
 ROOT = HERE.parent
 EXAMPLES = ROOT / "examples"
 MADE = HERE / "_gallery"
+PICTURES = HERE / "pictures"  # of every example, made by front_page.py
 
 # Arguments of `main` with which an example takes seconds, the longest ones first. Other examples take minutes and have no
-# picture.
+# figure here.
 SMALL = {
     "gripper": "iterations=4, steps=60",
     "hexagram": "edges_per_side=6, n_vertices=280, iterations=25",
@@ -53,7 +54,7 @@ def make(app) -> None:
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             list(pool.map(lambda name: _draw(name, MADE / f"{name}.png"), old))
     for name in names:
-        _write(MADE / f"{name}.md", _page(name, MADE / f"{name}.png"))
+        _write(MADE / f"{name}.md", _page(name))
     _write(MADE / "index.md", _index(names))
 
 
@@ -122,23 +123,29 @@ def _words(name: str) -> list[str]:
     return [" ".join(first.split()), rest]
 
 
-def _image(name: str, picture: Path) -> str:
-    return (
-        f"```{{image}} {name}.png\n:alt: {_title(name)}\n:width: 100%\n```\n\n"
-        if picture.exists()
-        else ""
-    )
+def _image(path: str, name: str, width: str) -> str:
+    return f"```{{image}} {path}\n:alt: {_title(name)}\n:width: {width}\n```\n\n"
 
 
-def _page(name: str, picture: Path) -> str:
+def _picture(name: str) -> str:
+    """Return the small picture of an example, which moves."""
+    there = (PICTURES / f"{name}.webp").exists()
+    return _image(f"../pictures/{name}.webp", name, "320px") if there else ""
+
+
+def _figure(name: str) -> str:
+    """Return the figure that an example draws, if it is fast enough for this manual."""
+    if not (MADE / f"{name}.png").exists():
+        return ""
+    small = f"The figure is of `main({SMALL[name]})`, smaller than what the script computes.\n\n"
+    return _image(f"{name}.png", name, "100%") + small
+
+
+def _page(name: str) -> str:
     first, rest = _words(name)
-    small = (
-        f"The picture is of `main({SMALL[name]})`, smaller than what the script computes.\n\n"
-        if name in SMALL
-        else ""
-    )
     code = f"## The code\n\n```{{literalinclude}} ../../examples/{name}.py\n:language: python\n```\n"
-    return f"# {_title(name)}\n\n{_image(name, picture)}{small}{_markdown(first)}\n\n{_markdown(rest)}\n\n{code}"
+    shown = f"{_picture(name)}{_markdown(first)}\n\n{_figure(name)}"
+    return f"# {_title(name)}\n\n{shown}{_markdown(rest)}\n\n{code}"
 
 
 def _markdown(text: str) -> str:
@@ -151,23 +158,14 @@ def _markdown(text: str) -> str:
 
 
 def _index(names: list[str]) -> str:
-    drawn = [name for name in names if (MADE / f"{name}.png").exists()]
     parts = [
-        f"### [{_title(name)}]({name}.md)\n\n{_image(name, MADE / f'{name}.png')}{_markdown(_words(name)[0])}\n"
-        for name in drawn
-    ]
-    others = [
-        f"- [{_title(name)}]({name}.md): {_markdown(_words(name)[0])}"
+        f"### [{_title(name)}]({name}.md)\n\n{_picture(name)}{_markdown(_words(name)[0])}\n"
         for name in names
-        if name not in drawn
     ]
     listed = "\n".join(names)
     return (
-        "# Gallery\n\nEvery picture is made by an example's own `plot()` while this manual is built; its title leads to the "
-        "code. "
+        "# Gallery\n\nEvery picture is computed by its example, some at a smaller size; the title leads to the code. "
         "`python examples/NAME.py` computes the full version, and writes its pictures and movies to `out/`.\n\n"
         + "\n".join(parts)
-        + "\n## Longer ones, without a picture here\n\n"
-        + "\n".join(others)
         + f"\n\n```{{toctree}}\n:hidden:\n\n{listed}\n```\n"
     )
