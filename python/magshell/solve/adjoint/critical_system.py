@@ -34,7 +34,8 @@ class Line:
     """The load parameters along a path, (1 - s) before + s after."""
 
     def __init__(self, before: np.ndarray, after: np.ndarray):
-        self.before, self.after = before, after
+        self.before: np.ndarray = before
+        self.after: np.ndarray = after
 
     def at(self, parameter: float) -> np.ndarray:
         return (1.0 - parameter) * self.before + parameter * self.after
@@ -47,21 +48,25 @@ class CriticalSystem:
     """
 
     def __init__(self, residual: Residual, line: Line, parameter: float, mode: np.ndarray):
-        self.residual, self.line, self.parameter = residual, line, parameter
+        self.residual: Residual = residual
+        self.line: Line = line
+        self.parameter: float = parameter
         self._model = residual.inputs.scene._model
         (size, starts, rows, numbers), low_rank = residual.hessian()
         diagonal = starts[:-1]
         guess, numbers = self._model.reduce(mode), numbers.copy()
-        self.pinned = int(np.argmax(guess**2 * np.abs(numbers[diagonal])))
+        self.pinned: int = int(np.argmax(guess**2 * np.abs(numbers[diagonal])))
         added = np.abs(numbers[diagonal][self.pinned])
         numbers[diagonal[self.pinned]] += added
         self._factor = Factorized(size, starts, rows, numbers, self._model.free_points, low_rank)
         unit = np.zeros(size)
         unit[self.pinned] = 1.0
-        self.response = self._factor.solve(unit)
-        self.null = self.response / self.response[self.pinned]
-        self.excess = (1.0 - added * self.response[self.pinned]) / self.response[self.pinned]  # v . K v
-        self.vector = self._model.expand(self.null)
+        self.response: np.ndarray = self._factor.solve(unit)
+        self.null: np.ndarray = self.response / self.response[self.pinned]
+        self.excess: float = (1.0 - added * self.response[self.pinned]) / self.response[
+            self.pinned
+        ]  # v . K v
+        self.vector: np.ndarray = self._model.expand(self.null)
 
     def solve(self, forces: np.ndarray) -> np.ndarray:
         """Solve K w = forces of the free unknowns, with the pinned entry of w zero if v . forces = 0."""
@@ -119,8 +124,12 @@ class Located:
         parameter: float,
         mode: np.ndarray,
     ):
-        self.inputs, self.line, self.kind = inputs, line, kind
-        self.state, self.parameter, self.problem = state, parameter, ""
+        self.inputs: Inputs = inputs
+        self.line: Line = line
+        self.kind: str = kind
+        self.state: np.ndarray = state
+        self.parameter: float = parameter
+        self.problem: str = ""
         self._angle_branches, self._mode = angle_branches, mode
         try:
             with inputs.in_core():

@@ -56,7 +56,9 @@ class Residual:
     def __init__(
         self, inputs: Inputs, state: np.ndarray, angle_branches: list[list[float]], controls: np.ndarray
     ):
-        self.inputs, self.state, self.controls = inputs, state, controls
+        self.inputs: Inputs = inputs
+        self.state: np.ndarray = state
+        self.controls: np.ndarray = controls
         self._model, self._angle_branches = inputs.scene._model, angle_branches
 
     def at(self, state: np.ndarray, controls: np.ndarray) -> Residual:
