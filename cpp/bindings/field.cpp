@@ -8,6 +8,7 @@
 
 #include "bindings/call_python.h"
 #include "magshell/core/errors.h"
+#include "magshell/energy/face_points.h"
 #include "magshell/field/dipoles.h"
 #include "magshell/field/magnet.h"
 #include "magshell/field/posed_field.h"
@@ -108,6 +109,18 @@ py::tuple sample_fields(const std::vector<std::shared_ptr<AppliedField>>& fields
                           from_matrices(samples.curvature));
 }
 
+py::array_t<double> fine_face_points() {
+    py::array_t<double> rows({static_cast<py::ssize_t>(face_points::fine.size()), py::ssize_t{5}});
+    auto at = rows.mutable_unchecked<2>();
+    for (py::ssize_t k = 0; k < at.shape(0); ++k) {
+        const FacePoint& point = face_points::fine[k];
+        for (int i = 0; i < 3; ++i) at(k, i) = point.at[i];
+        at(k, 3) = point.height;
+        at(k, 4) = point.weight;
+    }
+    return rows;
+}
+
 std::shared_ptr<SampledField> make_sampled_field(const std::array<double, 3>& origin,
                                                  const std::array<double, 3>& spacing,
                                                  const Array& flux_density) {
@@ -176,6 +189,10 @@ void register_field(py::module_& module) {
             }),
             py::arg("field"), py::arg("center"), py::arg("rotation"));
 
+    module.def("fine_face_points", &fine_face_points,
+               "The points at which a face near a source samples the field: barycentric coordinates, height "
+               "over the "
+               "thickness, weight, (n, 5).");
     module.def(
         "sample_fields", &sample_fields, py::arg("fields"), py::arg("scales"), py::arg("points"),
         py::arg("moments"), py::arg("order"),

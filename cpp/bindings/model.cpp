@@ -240,6 +240,16 @@ void register_model(py::module_& module) {
         .def("term_energies", &term_energies, "[(name, J)] of each term, at a state with these turns.",
              py::arg("q"), py::arg("turns"), py::arg("controls"))
         .def(
+            "field_sampling_error",
+            [](Model& model, const VectorXd& q, const LoadParameters& load_parameters) {
+                const std::lock_guard lock(model.in_use());
+                for (const std::unique_ptr<Term>& term : model.terms().energies)
+                    if (term->name() == "magnetic") term->prepare_assembly(q.data(), load_parameters);
+                return model.field_sampling_error(q, load_parameters);
+            },
+            "The estimate of find_equilibrium's result at a state, from samples of its own.", py::arg("q"),
+            py::arg("controls"), py::call_guard<py::gil_scoped_release>())
+        .def(
             "refusal",
             [](const Model& model, const VectorXd& q) {
                 return model.capabilities().invalid_state_reason(q);

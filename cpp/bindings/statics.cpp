@@ -23,6 +23,18 @@ StaticsResult solve(Model& model, const VectorXd& start, const Model::AngleBranc
         varying);
 }
 
+void add_effort(StaticsResult& result, const StaticsResult& earlier) {
+    result.log.insert(result.log.begin(), earlier.log.begin(), earlier.log.end());
+    result.iterations += earlier.iterations;
+    result.factorizations += earlier.factorizations;
+    result.failed_factorizations += earlier.failed_factorizations;
+    result.load_steps += earlier.load_steps;
+    result.relaxation_steps += earlier.relaxation_steps;
+    result.saddles_escaped += earlier.saddles_escaped;
+    result.symmetric_saddles += earlier.symmetric_saddles;
+    result.linear_time += earlier.linear_time;
+}
+
 // Makes an obstacle, by its number, from points on its middle (k, 3) and faces (m, 3) of the caller's vertices.
 WatchedObstacle watched_obstacle(Index obstacle, const Array& middles, const IndexArray& faces) {
     WatchedObstacle watched{obstacle, {}, {}};
@@ -156,7 +168,9 @@ void register_statics(py::module_& module) {
         .def_readonly("n_negative_eigenvalues", &StaticsResult::unstable_directions)
         .def_readonly("linear_time", &StaticsResult::linear_time)
         .def_readonly("bytes", &StaticsResult::bytes)
-        .def_readonly("factorization", &StaticsResult::factorization);
+        .def_readonly("factorization", &StaticsResult::factorization)
+        .def("add_effort_of", &add_effort, "Count what an earlier part of the same search did as well.",
+             py::arg("earlier"));
 
     module.def("find_equilibrium", &solve, py::arg("model"), py::arg("start"), py::arg("turns"),
                py::arg("from_"), py::arg("to"), py::arg("options"), py::arg("progress") = py::none(),

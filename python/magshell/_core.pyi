@@ -416,6 +416,14 @@ class Model:
     def expand(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    def field_sampling_error(
+        self,
+        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    ) -> float:
+        """
+        The estimate of find_equilibrium's result at a state, from samples of its own.
+        """
     def free_weight_values(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
     ) -> numpy.typing.NDArray[numpy.float64]:
@@ -727,6 +735,10 @@ class SolveStep:
     def negative_pivots(self) -> int: ...
 
 class StaticsResult:
+    def add_effort_of(self, earlier: StaticsResult) -> None:
+        """
+        Count what an earlier part of the same search did as well.
+        """
     @property
     def at_roundoff(self) -> bool: ...
     @property
@@ -1100,6 +1112,11 @@ def find_equilibrium(
     progress: typing.Any = None,
     varying: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = [],
 ) -> StaticsResult: ...
+def fine_face_points() -> numpy.typing.NDArray[numpy.float64]:
+    """
+    The points at which a face near a source samples the field: barycentric coordinates, height over the thickness, weight, (n, 5).
+    """
+
 def first_order_change(
     model: Model,
     equilibrium: StaticsResult,

@@ -120,9 +120,10 @@ class StepErrorWarning(UserWarning):
 
 
 class FieldSamplingWarning(UserWarning):
-    """A warning about a magnetic force on a shell that is wrong by more than 1 %, raised once per solve.
+    """A warning about a magnetic force on a shell or skin that is wrong by more than 1 %, or by an unknown amount.
 
-    Each face samples the applied field at one point; the field of a nearby source varies too much over the face for that.
+    Faces that are near a source when a solve begins sample its field at many points (docs/theory.md). The warning comes
+    where that is not enough, and where bodies come near a source in a motion or on a path.
     """
 
 

@@ -24,6 +24,7 @@ from gradient_kinds_growth import GROWTH_MAKERS
 from gradient_kinds_linear import LINEAR_MAKERS
 from gradient_kinds_magnetization import rotating_magnetization
 from gradient_kinds_muscles import muscles_at_rest, muscles_in_motion
+from gradient_kinds_near_magnets import near_magnets
 from gradient_kinds_own_field import own_field
 from gradient_kinds_pressure import pressed_sheet, pressed_solid
 from gradient_kinds_six_nodes import six_nodes_at_rest, six_nodes_in_motion
@@ -362,6 +363,8 @@ MAKERS = {
         ms.TRBDF2(implicit_contact=True), 1e-5, activation_distance=1.4e-4, lagged_friction=True
     ),
     "a driven skeleton on a Plane, contact implicit": motorized_skeleton_on_a_plane,
+    "bodies near magnets at rest": lambda: near_magnets(False),
+    "bodies near magnets in motion": lambda: near_magnets(True),
     "two sheets with their own field at rest": lambda: own_field(False),
     "two sheets with their own field in motion": lambda: own_field(True),
     "custom energies at rest": custom_energies_at_rest,

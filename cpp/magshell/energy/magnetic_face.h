@@ -27,6 +27,13 @@ struct FieldAtPoint {
     SimdMat3 curvature;  // d2(M . B)/dx_j dx_k    [A/m T/m2]
 };
 
+/// Returns G^T v.
+inline SimdVec3 transposed_times(const SimdMat3& matrix, const SimdVec3& v) {
+    const SimdDouble* g = matrix.at;
+    return {g[0] * v.x + g[3] * v.y + g[6] * v.z, g[1] * v.x + g[4] * v.y + g[7] * v.z,
+            g[2] * v.x + g[5] * v.y + g[8] * v.z};
+}
+
 template <class Law>
 struct MagneticFace : FaceFrame {
     using FaceFrame::FaceFrame;
@@ -49,9 +56,7 @@ struct MagneticFace : FaceFrame {
     template <class Element>
     SimdVec3 gradient_by_position(const Element& e, const FieldAtPoint& field) const {
         const SimdVec3 m = law().magnetization(e);
-        const SimdDouble* g = field.gradient.at;
-        const SimdVec3 pull = {g[0] * m.x + g[3] * m.y + g[6] * m.z, g[1] * m.x + g[4] * m.y + g[7] * m.z,
-                               g[2] * m.x + g[5] * m.y + g[8] * m.z};
+        const SimdVec3 pull = transposed_times(field.gradient, m);
         return (e.volume * SimdDouble(-1.0 / 3.0)) * pull;
     }
 
@@ -60,6 +65,11 @@ struct MagneticFace : FaceFrame {
     void hessian(const Element& e, const SimdVec3& flux, SimdMat3 h[6]) const {
         SimdMat3 h11, h12, h22;
         law().edge_hessian(e, flux, h11, h12, h22);
+        node_blocks(h11, h12, h22, h);
+    }
+
+    /// Computes the lower blocks of the nodes from those of the edge vectors.
+    static void node_blocks(const SimdMat3& h11, const SimdMat3& h12, const SimdMat3& h22, SimdMat3 h[6]) {
         for (int row = 0; row < 3; ++row)
             for (int column = 0; column < 3; ++column) {
                 const int k = 3 * row + column, transposed = 3 * column + row;
@@ -76,24 +86,29 @@ struct MagneticFace : FaceFrame {
     /// Adds the part due to the variation of the field in space: d2(M . B(x_b)) with one or two derivatives by x_b.
     template <class Element>
     void add_hessian_by_position(const Element& e, const FieldAtPoint& field, SimdMat3 h[6]) const {
-        SimdMat3 by_node[3];  // d(M . dB/dx_j)/dx_node, row = component of the node, column = j
-        for (int j = 0; j < 3; ++j) {
-            SimdVec3 d1, d2;
-            law().by_edges(e, {field.gradient.at[j], field.gradient.at[3 + j], field.gradient.at[6 + j]}, d1,
-                           d2);
-            const SimdVec3 d0 = -(d1 + d2);
-            const SimdVec3* of_node[3] = {&d0, &d1, &d2};
-            for (int k = 0; k < 3; ++k) {
-                by_node[k].at[j] = of_node[k]->x;
-                by_node[k].at[3 + j] = of_node[k]->y;
-                by_node[k].at[6 + j] = of_node[k]->z;
-            }
-        }
+        SimdMat3 mixed[3];
+        by_node(e, field.gradient, mixed);
         const SimdMat3 both = (e.volume * SimdDouble(-1.0 / 9.0)) * field.curvature;
         const SimdDouble third = e.volume * SimdDouble(-1.0 / 3.0);
         for (int k = 0; k < 3; ++k)
             for (int l = 0; l <= k; ++l)
-                h[lower_index(k, l)] += both + third * (by_node[k] + transpose(by_node[l]));
+                h[lower_index(k, l)] += both + third * (mixed[k] + transpose(mixed[l]));
+    }
+
+    /// Computes (dM/dx_k)^T G for each node k: d(M . G_j)/dx_k of the columns G_j, row = component of the node, column = j.
+    template <class Element>
+    void by_node(const Element& e, const SimdMat3& g, SimdMat3 out[3]) const {
+        for (int j = 0; j < 3; ++j) {
+            SimdVec3 d1, d2;
+            law().by_edges(e, {g.at[j], g.at[3 + j], g.at[6 + j]}, d1, d2);
+            const SimdVec3 d0 = -(d1 + d2);
+            const SimdVec3* of_node[3] = {&d0, &d1, &d2};
+            for (int k = 0; k < 3; ++k) {
+                out[k].at[j] = of_node[k]->x;
+                out[k].at[3 + j] = of_node[k]->y;
+                out[k].at[6 + j] = of_node[k]->z;
+            }
+        }
     }
 
   private:

@@ -1,13 +1,15 @@
-"""Warnings of ms.FieldSamplingWarning: a magnet's field varies over faces that sample it once each."""
+"""The error of faces that sample a magnet's field once each, and when they sample it finely instead."""
 
 import warnings
 from functools import cache
 
 import numpy as np
 import pytest
+from magnet_forces import VACUUM_PERMEABILITY, cuboid_force
 
 import magshell as ms
 from magshell.model.scene.field_sampling import is_suspect, sampling_errors
+from magshell.model.scene.fine_faces import fine_faces
 from magshell.solve.statics.single_solve import inputs_of
 from magshell.solve.statics.start import starting_point
 
@@ -29,8 +31,10 @@ def between_plates(cells, gap, *, width=WIDTH, more_field=(), irregular=0.0, **s
 
 
 def true_error(cells, gap) -> float:
-    """Compute the relative error of the force at one point per face, against a mesh of 128 by 128 cells."""
-    return abs(force_at_one_point(cells, gap) / force_at_one_point(128, gap) - 1.0)
+    """Compute the relative error of the force at one point per face."""
+    size = (WIDTH, WIDTH, THICKNESS)
+    exact = cuboid_force(size, size, (0, 0, gap + THICKNESS), 2, VACUUM_PERMEABILITY * MAGNETIZATION)[2]
+    return abs(force_at_one_point(cells, gap) / exact - 1.0)
 
 
 @cache
@@ -38,7 +42,7 @@ def force_at_one_point(cells, gap) -> float:
     mesh = between_plates(cells, gap).mesh
     magnet = ms.CuboidMagnet((WIDTH, WIDTH, THICKNESS), remanent_magnetization=(0, 0, MAGNETIZATION))
     gradient = magnet.gradient(mesh.rest_positions[mesh.faces].mean(axis=1))
-    return (mesh.face_areas * gradient[:, 2, 2]).sum()
+    return MAGNETIZATION * THICKNESS * (mesh.face_areas * gradient[:, 2, 2]).sum()
 
 
 def warned(call) -> list[str]:
@@ -56,15 +60,18 @@ def test_the_estimated_error_of_a_force_is_its_error_within_a_tenth(cells, gap):
 
 
 @pytest.mark.parametrize(("cells", "too_coarse"), [(11, True), (14, False)])
-def test_a_warning_comes_where_the_force_is_off_by_more_than_1_percent(cells, too_coarse):
-    """Check two meshes whose true errors are 1.25 % and 0.77 %."""
+def test_faces_sample_finely_where_the_force_is_off_by_more_than_1_percent(cells, too_coarse):
+    """Check two meshes whose true errors are 1.20 % and 0.68 %."""
     gap = 2e-3
     assert (true_error(cells, gap) > 0.01) == too_coarse
-    told = warned(lambda: ms.equilibrium(between_plates(cells, gap)))
-    assert len(told) == too_coarse
-    if told:
-        assert "this equilibrium: the magnetic force on Shell(" in told[0]
-        assert "is off by about 1.2" in told[0] and "faces" in told[0]
+    scene = between_plates(cells, gap)
+    assert fine_faces(ms.equilibrium(scene)._values).any() == too_coarse
+
+
+def test_faces_too_coarse_for_fine_sampling_are_warned_of():
+    """Check a gap of a fiftieth of a face."""
+    (told,) = warned(lambda: ms.equilibrium(between_plates(2, 0.1e-3)))
+    assert "this equilibrium: the magnetic force on Shell(" in told and "at many points" in told
 
 
 def test_a_uniform_field_is_never_warned_of():
@@ -85,13 +92,7 @@ def test_couples_of_a_uniform_field_count_beside_the_force_of_a_weak_source():
     assert beside < 0.1 * coarse
 
 
-def test_motion_is_warned_of_once_at_its_closest_approach():
-    scene = between_plates(6, 1e-3, mass_density=1e3)
-    told = warned(lambda: ms.simulate(scene, steps=2, time_step=1e-4, progress=False))
-    assert len(told) == 1 and "the motion, in recorded state" in told[0]
-
-
-def test_faces_of_a_skin_are_warned_of_too():
+def test_faces_of_a_skin_sample_finely_too():
     mesh = ms.meshes.box((WIDTH, WIDTH, 2e-3), cells=(4, 4, 1))
     skin = ms.Skin(thickness=1e-4, faces=mesh.faces_at(z=0.0), remanent_magnetization=(0, 0, MAGNETIZATION))
     law = ms.NeoHookean(young_modulus=1e10, poisson_ratio=0.3)
@@ -100,8 +101,10 @@ def test_faces_of_a_skin_are_warned_of_too():
         (WIDTH, WIDTH, 1e-3), center=(WIDTH / 2, WIDTH / 2, -1.5e-3), remanent_magnetization=(0, 0, 1e5)
     )
     scene = ms.Scene(body, supports=[ms.Pin(body.mesh.vertices_at(z=2e-3))], field=magnet)
-    (told,) = warned(lambda: ms.equilibrium(scene))
-    assert "the magnetic force on Skin(" in told
+    found = ms.equilibrium(scene)
+    assert fine_faces(found._values).any()
+    (left,) = sampling_errors(found._values, found.positions, 1.0, None)
+    assert isinstance(left.body, ms.Skin) and left.error < 1e-3
 
 
 def test_six_node_elements_are_not_warned_of():
@@ -140,7 +143,7 @@ def test_the_estimate_of_the_core_does_not_miss_an_error_on_a_mesh_far_too_coars
 
 
 def test_a_field_that_a_mesh_resolves_is_sampled_at_no_more_points(monkeypatch):
-    """Check that fields are sampled at seven points of a face only if the estimate of the error is not small.
+    """Check that fields are sampled at many points of a face only if the estimate of the error is not small.
 
     The samples took up to 62 % of a solve.
     """
@@ -149,18 +152,17 @@ def test_a_field_that_a_mesh_resolves_is_sampled_at_no_more_points(monkeypatch):
     monkeypatch.setattr(ms._core, "sample_fields", lambda *each: asked.append(each) or whole(*each))
     ms.equilibrium(between_plates(16, 4e-3))
     assert not asked
-    with pytest.warns(ms.FieldSamplingWarning):
-        ms.equilibrium(between_plates(11, 2e-3))
-    assert len(asked) == 2
+    ms.equilibrium(between_plates(11, 2e-3))
+    assert len(asked) >= 4
 
 
 @pytest.mark.parametrize(("gap", "too_coarse"), [(2e-3, True), (8e-3, False)])
-def test_a_path_is_warned_of_at_the_point_where_the_error_is_largest(gap, too_coarse):
-    scene = between_plates(6, 20e-3, young_modulus=1e9)
+def test_a_path_of_a_magnet_that_comes_near_has_fine_faces_from_its_start(gap, too_coarse):
+    scene = between_plates(6, 20e-3, young_modulus=1e11)
     magnet = scene.fields[0]
     start = ms.equilibrium(scene)
     nearer = {magnet: {"center": (0.0, 0.0, 20e-3 - gap)}}
-    told = warned(lambda: ms.follow_path(scene, values=nearer, start=start, first_step=0.5, max_step=1.0))
-    assert len(told) == too_coarse
-    if told:
-        assert "the path, at point" in told[0] and "parameter 1:" in told[0]
+    path = ms.follow_path(scene, values=nearer, start=start, first_step=0.5, max_step=1.0)
+    assert fine_faces(path._values_at(0)).any() == too_coarse
+    (left,) = sampling_errors(path._values_at(len(path) - 1), path.positions[-1], 1.0, None)
+    assert left.error < 0.01

@@ -2,10 +2,13 @@
 
 #include <Eigen/LU>
 #include <limits>
+#include <optional>
 
 #include "magshell/energy/magnetic.h"
+#include "magshell/energy/magnetic_face_fine.h"
 #include "magshell/energy/magnetic_rotating.h"
 #include "magshell/mesh/half_edges.h"
+#include "magshell/terms/magnetic/face_sampling.h"
 #include "magshell/terms/magnetic/field_groups.h"
 #include "magshell/terms/magnetic/total_applied_field.h"
 
@@ -37,11 +40,18 @@ class MagneticTerm final : public Term {
   private:
     // Finds the face across each edge of every face, if it is not known yet.
     void find_neighbours();
-    // Computes the barycenters [m] of all faces and the magnetizations [A/m] there.
+    // The applied field on every face in SIMD vectors.
+    struct Fields {
+        std::vector<FieldAtPoint>
+            at_barycenter;  // empty in a uniform field; not set where a face samples finely
+        std::vector<FieldOverFace> over_face;  // FaceSampling::moments
+
+        bool vary() const { return !at_barycenter.empty(); }
+    };
+    // Computes the points [m] at which the faces sample the field, and the magnetizations [A/m] there.
     void find_points(const double* q, std::vector<Vec3>& points, std::vector<Vec3>& magnetizations) const;
-    // Returns the applied field at every barycenter in SIMD vectors; empty in a uniform field. Order as in
-    // AppliedField::add_samples.
-    std::vector<FieldAtPoint> sample(const double* q, const LoadParameters& load_parameters, int order) const;
+    // Returns the applied field on all faces. Order as in AppliedField::add_samples.
+    Fields sample(const double* q, const LoadParameters& load_parameters, int order) const;
     Mat3 rest_frame(Index face) const {
         const std::array<Vec3, 3>& x = surface_.rest_corners(face);
         return Law::rest_frame(x[1] - x[0], x[2] - x[0]);
@@ -52,9 +62,12 @@ class MagneticTerm final : public Term {
     const FaceLoop& loop_;
     const TotalAppliedField field_;
     ParameterSlice magnetization_, thickness_;  // values
+    std::optional<ParameterSlice>
+        finely_;  // value, 1 for a face that samples finely, if the field can vary in space
     std::vector<double> thicknesses_;
+    FaceSampling sampling_;
     LargeVector<typename Law::Element> elements_;
-    std::vector<FieldAtPoint> fields_;  // sampled for the current assembly; empty in a uniform field
+    Fields fields_;  // sampled for the current assembly
     std::vector<std::array<Index, 3>>
         neighbours_;      // across the edge opposite each corner, -1 for none; see find_neighbours
     bool linear_ = true;  // every magnetization is linear in the positions
@@ -70,11 +83,19 @@ MagneticTerm<Law>::MagneticTerm(const Surface& surface, Index body, const FaceLo
       magnetization_(registry.values.add(surface.owner, "remanent_magnetization", "A/m", surface.n_faces(), 3,
                                          &surface.faces)),
       thickness_(registry.values.add(surface.owner, "thickness", "m", surface.n_faces(), 1, &surface.faces)),
-      elements_(loop.groups()) {}
+      sampling_(loop),
+      elements_(loop.groups()) {
+    if (!sources.empty())
+        finely_ =
+            registry.values.add(surface.owner, "field_sampling", "1", surface.n_faces(), 1, &surface.faces);
+    sampling_.set(nullptr, surface.n_faces());
+}
 
 template <class Law>
 bool MagneticTerm<Law>::set_values(const Values& values) {
-    if (!values.changed(magnetization_, thickness_)) return false;
+    const bool resampled = finely_ && values.changed(*finely_);
+    if (resampled) sampling_.set(values[*finely_], surface_.n_faces());
+    if (!values.changed(magnetization_, thickness_)) return resampled;
     linear_ = true;
     thicknesses_.assign(values[thickness_], values[thickness_] + thickness_.size());
     for (Index group = 0; group < loop_.groups(); ++group)
@@ -101,60 +122,83 @@ bool MagneticTerm<Law>::set_values(const Values& values) {
 template <class Law>
 void MagneticTerm<Law>::find_points(const double* q, std::vector<Vec3>& points,
                                     std::vector<Vec3>& magnetizations) const {
-    points.resize(surface_.n_faces());
-    magnetizations.resize(surface_.n_faces());
+    points.resize(sampling_.n_points());
+    magnetizations.resize(points.size());
     loop_.each_group([&](Index group) {
         SimdVec3 x[3];
         loop_.gather(group, q, x);
         const SimdVec3 center = SimdDouble(1.0 / 3.0) * (x[0] + x[1] + x[2]);
-        const SimdVec3 m = Law(x, elements_[group]).magnetization(elements_[group]);
+        const Law face(x, elements_[group]);
+        const SimdVec3 m = face.magnetization(elements_[group]);
         for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
-            points[loop_.face(group, lane)] = lane_of(center, lane);
-            magnetizations[loop_.face(group, lane)] = lane_of(m, lane);
+            const Index f = loop_.face(group, lane);
+            Index n = sampling_.first(f);
+            if (!sampling_.is_fine(f)) {
+                points[n] = lane_of(center, lane);
+                magnetizations[n] = lane_of(m, lane);
+                continue;
+            }
+            const Vec3 corners[3] = {lane_of(x[0], lane), lane_of(x[1], lane), lane_of(x[2], lane)},
+                       across = thicknesses_[f] * lane_of(face.normal, lane);
+            for (const FacePoint& point : sampling_.points(f)) {
+                points[n] = point.at[0] * corners[0] + point.at[1] * corners[1] + point.at[2] * corners[2] +
+                            point.height * across;
+                magnetizations[n++] = lane_of(m, lane);
+            }
         }
     });
 }
 
 template <class Law>
-std::vector<FieldAtPoint> MagneticTerm<Law>::sample(const double* q, const LoadParameters& load_parameters,
-                                                    int order) const {
+auto MagneticTerm<Law>::sample(const double* q, const LoadParameters& load_parameters, int order) const
+    -> Fields {
     if (!field_.varies(load_parameters)) return {};
     std::vector<Vec3> points, moments;
     find_points(q, points, moments);
     const FieldSamples samples = field_.sample(points, moments, order, load_parameters);
     const Vec3 everywhere = field_.uniform(load_parameters);
-    std::vector<FieldAtPoint> groups(loop_.groups());
+    Fields fields;
+    fields.at_barycenter.resize(loop_.groups());
     for (Index group = 0; group < loop_.groups(); ++group)
-        for (int lane = 0; lane < SimdDouble::width; ++lane)
-            set_field(groups[group], lane, samples, loop_.face(group, lane), order, everywhere);
-    return groups;
+        for (int lane = 0; lane < SimdDouble::width && !sampling_.any_fine_in(group); ++lane)
+            set_field(fields.at_barycenter[group], lane, samples, sampling_.first(loop_.face(group, lane)),
+                      order, everywhere);
+    if (sampling_.any_fine()) fields.over_face = sampling_.moments(samples, order, everywhere, thicknesses_);
+    return fields;
 }
 
 template <class Law>
 double MagneticTerm<Law>::energy(const double* q, const LoadParameters& load_parameters) const {
-    const std::vector<FieldAtPoint> fields = sample(q, load_parameters, 0);
+    const Fields fields = sample(q, load_parameters, 0);
     const SimdVec3 everywhere = broadcast(field_.uniform(load_parameters));
     return loop_.sum([&](Index group) {
         SimdVec3 x[3];
         loop_.gather(group, q, x);
-        return Law(x, elements_[group])
-            .energy(elements_[group], fields.empty() ? everywhere : fields[group].flux);
+        const SimdVec3& flux = !fields.vary()                 ? everywhere
+                               : sampling_.any_fine_in(group) ? fields.over_face[sampling_.at(group)].flux
+                                                              : fields.at_barycenter[group].flux;
+        return Law(x, elements_[group]).energy(elements_[group], flux);
     });
 }
 
 template <class Law>
 void MagneticTerm<Law>::evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) {
-    const std::vector<FieldAtPoint> fields = sample(q, load_parameters, 1);
-    const bool varies = !fields.empty();
+    const Fields fields = sample(q, load_parameters, 1);
+    const bool varies = fields.vary();
     const SimdVec3 everywhere = broadcast(field_.uniform(load_parameters));
     loop_.scatter_groups([&](Index group) {
         SimdVec3 x[3], g[3];
         loop_.gather(group, q, x);
         const Law face(x, elements_[group]);
-        face.gradient(elements_[group], varies ? fields[group].flux : everywhere, g);
-        if (varies) {
-            const SimdVec3 pull = face.gradient_by_position(elements_[group], fields[group]);
-            for (SimdVec3& at_node : g) at_node += pull;
+        if (varies && sampling_.any_fine_in(group)) {
+            magnetic_face_fine::gradient(face, elements_[group], fields.over_face[sampling_.at(group)], g);
+        } else {
+            face.gradient(elements_[group], varies ? fields.at_barycenter[group].flux : everywhere, g);
+            if (varies) {
+                const SimdVec3 pull =
+                    face.gradient_by_position(elements_[group], fields.at_barycenter[group]);
+                for (SimdVec3& at_node : g) at_node += pull;
+            }
         }
         loop_.scatter(group, g, out);
     });
@@ -168,7 +212,7 @@ void MagneticTerm<Law>::prepare_assembly(const double* q, const LoadParameters& 
 template <class Law>
 void MagneticTerm<Law>::assemble(const ElementBlock& element_block, const double* q,
                                  const LoadParameters& load_parameters, bool, SystemMatrix& out) const {
-    const bool varies = !fields_.empty();
+    const bool varies = fields_.vary();
     const Vec3 uniform = field_.uniform(load_parameters);
     if (!varies && (linear_ || uniform.isZero(0.0))) return;
     const SimdVec3 everywhere = broadcast(uniform);
@@ -177,29 +221,35 @@ void MagneticTerm<Law>::assemble(const ElementBlock& element_block, const double
         SimdMat3 h[6];
         loop_.gather(group, q, x);
         const Law face(x, elements_[group]);
-        face.hessian(elements_[group], varies ? fields_[group].flux : everywhere, h);
-        if (varies) face.add_hessian_by_position(elements_[group], fields_[group], h);
+        if (varies && sampling_.any_fine_in(group)) {
+            magnetic_face_fine::hessian(face, elements_[group], fields_.over_face[sampling_.at(group)], h);
+        } else {
+            face.hessian(elements_[group], varies ? fields_.at_barycenter[group].flux : everywhere, h);
+            if (varies) face.add_hessian_by_position(elements_[group], fields_.at_barycenter[group], h);
+        }
         loop_.scatter(group, h, out);
     });
 }
 
-// The rate of the energy along lambda, with M' and v the rates of M and of x_b and G = dB/dx,
+// The rate of the energy along lambda, with M' and v_p the rates of M and of the points x_p and G_p = dB/dx there,
 //
-//   D = - A~ h (M' . B + M . G v),   M' = alpha f_1' + beta f_2' + gamma n',
+//   D = - A~ h sum_p w_p (M' . B_p + M . G_p v_p),   M' = alpha f_1' + beta f_2' + gamma n',
 //
-// is linear in (alpha, beta, gamma), in the thickness and in the field.
+// is linear in (alpha, beta, gamma) and in the field. By the thickness it is, with x_p = ... + z_p h n and C_p = d2(M . B_p)/dx2,
+//
+//   dD/dh = D/h - A~ h sum_p w_p z_p (M' . G_p n + n . C_p v_p + M . G_p n').
 template <class Law>
 void MagneticTerm<Law>::vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
                             Gradient& out) {
-    const Index n = surface_.n_faces();
     const double factor = field_.factor(load_parameters);
     const Vec3 everywhere = field_.uniform(load_parameters);
     std::vector<Vec3> points, magnetizations;
     find_points(q, points, magnetizations);
-    const FieldSamples samples = field_.at_factor_one(points, magnetizations);
+    const FieldSamples samples = field_.at_factor_one(points, magnetizations, sampling_.any_fine() ? 2 : 1);
 
-    FieldProbe probe;  // - A~ h (M', M, v)
-    probe.flux.resize(n), probe.moment.resize(n), probe.direction.resize(n);
+    FieldProbe probe;  // - A~ h w_p (M', M, v_p)
+    probe.flux.resize(points.size()), probe.moment.resize(points.size()),
+        probe.direction.resize(points.size());
     loop_.each_group([&](Index group) {
         SimdVec3 x[3], rate[3];
         loop_.gather(group, q, x);
@@ -217,18 +267,32 @@ void MagneticTerm<Law>::vjp(const double* q, const LoadParameters& load_paramete
             frame << lane_of(columns[0], lane), lane_of(columns[1], lane), lane_of(columns[2], lane);
             frame_rate << lane_of(column_rates[0], lane), lane_of(column_rates[1], lane),
                 lane_of(column_rates[2], lane);
-            const Vec3 v = (at[0] + at[1] + at[2]) / 3.0;
-            const Vec3 flux = everywhere + factor * samples.flux[f];
-            const Vec3 flux_rate = factor * (samples.gradient[f] * v);
-            const double volume = e.volume[lane];
+            const Vec3 m_rate = frame_rate * coordinates;
+            const double volume = e.volume[lane], h = thicknesses_[f];
+            Vec3 flux = everywhere, flux_rate = Vec3::Zero();
+            Index n = sampling_.first(f);
+            for (const FacePoint& point : sampling_.points(f)) {
+                const Vec3 v = sampling_.is_fine(f)
+                                   ? Vec3(point.at[0] * at[0] + point.at[1] * at[1] + point.at[2] * at[2] +
+                                          (point.height * h) * frame_rate.col(2))
+                                   : Vec3((at[0] + at[1] + at[2]) / 3.0);
+                flux += (factor * point.weight) * samples.flux[n];
+                flux_rate += (factor * point.weight) * (samples.gradient[n] * v);
+                if (point.height != 0.0)
+                    out.values[thickness_.at(f)] -=
+                        volume * factor * point.weight * point.height *
+                        (m_rate.dot(samples.gradient[n] * frame.col(2)) +
+                         frame.col(2).dot(samples.curvature[n] * v) +
+                         magnetizations[n].dot(samples.gradient[n] * frame_rate.col(2)));
+                probe.flux[n] = (-volume * point.weight) * (frame_rate * coordinates);
+                probe.moment[n] = -volume * point.weight * magnetizations[n];
+                probe.direction[n++] = v;
+            }
             const Vec3 by_coordinates =
                 -volume * (frame_rate.transpose() * flux + frame.transpose() * flux_rate);
             out.values.segment<3>(magnetization_.at(f)) +=
                 rest_frame(f).transpose().inverse() * by_coordinates;
-            out.values[thickness_.at(f)] += by_coordinates.dot(coordinates) / thicknesses_[f];
-            probe.flux[f] = -volume * (frame_rate * coordinates);
-            probe.moment[f] = -volume * magnetizations[f];
-            probe.direction[f] = v;
+            out.values[thickness_.at(f)] += by_coordinates.dot(coordinates) / h;
         }
     });
     field_.add_vjp(points, probe, samples, load_parameters, out);
@@ -259,14 +323,20 @@ void MagneticTerm<Law>::find_neighbours() {
 //
 //   (|d_i| / |e_i|)^2 (G(x_b + e_i)^T m - F - F' e_i).
 //
-// Across an edge of the border it is taken as the mean of the others.
+// Across an edge of the border it is taken as the mean of the others. Through the thickness h the force changes too: div F'' = 0 in
+// free space, so its second derivative along the normal is minus that in the plane, which S = s I takes to be 1/s of F'' : S; together
+//
+//   1/2 F'' : S (1 - h^2 / 12 s),   s = tr S / 2.
+//
+// The error of faces that sample the field finely cannot be told from their samples.
 template <class Law>
 double MagneticTerm<Law>::field_sampling_error(const double* q, const LoadParameters& load_parameters,
                                                double extent) {
     constexpr double cancelling = 0.1;  // [-] of the sum of the forces, as in field_sampling.py
     constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
     if (!field_.varies(load_parameters)) return 0.0;
-    if (fields_.empty()) return unknown;
+    if (sampling_.any_fine()) return unknown;
+    if (!fields_.vary()) return unknown;
     find_neighbours();
     const Index n = surface_.n_faces();
     struct Sample {
@@ -289,31 +359,33 @@ double MagneticTerm<Law>::field_sampling_error(const double* q, const LoadParame
             here.point = lane_of(center, lane);
             here.moment = lane_of(moment, lane);
             for (int k = 0; k < 9; ++k) {
-                here.gradient(k / 3, k % 3) = fields_[group].gradient.at[k][lane];
-                rates[f](k / 3, k % 3) = e.volume[lane] * fields_[group].curvature.at[k][lane];
+                here.gradient(k / 3, k % 3) = fields_.at_barycenter[group].gradient.at[k][lane];
+                rates[f](k / 3, k % 3) = e.volume[lane] * fields_.at_barycenter[group].curvature.at[k][lane];
             }
             const Vec3 pull = here.gradient.transpose() * here.moment;
             force += pull;
             forces += pull.norm();
-            couples += here.moment.cross(lane_of(fields_[group].flux, lane)).norm();
+            couples += here.moment.cross(lane_of(fields_.at_barycenter[group].flux, lane)).norm();
         }
     });
     for (Index f = 0; f < n; ++f) {
         const Sample& here = samples[f];
         if (here.moment.isZero(0.0)) continue;
         Vec3 sum = Vec3::Zero();
+        double spread = 0.0;  // s [m2]
         int count = 0;
         for (int i = 0; i < 3; ++i) {
+            const Vec3 corner = Eigen::Map<const Vec3>(q + 3 * surface_.corners[f][i]) - here.point;
+            spread += corner.squaredNorm() / 24.0;
             if (neighbours_[f][i] < 0) continue;
             const Sample& there = samples[neighbours_[f][i]];
-            const Vec3 step = there.point - here.point,
-                       corner = Eigen::Map<const Vec3>(q + 3 * surface_.corners[f][i]) - here.point;
+            const Vec3 step = there.point - here.point;
             const Vec3 beyond = (there.gradient - here.gradient).transpose() * here.moment - rates[f] * step;
             sum += (corner.squaredNorm() / step.squaredNorm()) * beyond;
             ++count;
         }
         if (count == 0) return unknown;
-        error += sum * (3.0 / (12.0 * count));
+        error += sum * (3.0 / (12.0 * count) * (1.0 - thicknesses_[f] * thicknesses_[f] / (12.0 * spread)));
     }
     const double total = std::max({(force + error).norm(), cancelling * forces, couples / extent});
     if (!(total > 0.0)) return total == 0.0 ? 0.0 : unknown;
@@ -322,7 +394,8 @@ double MagneticTerm<Law>::field_sampling_error(const double* q, const LoadParame
 
 template <class Law>
 std::size_t MagneticTerm<Law>::bytes() const {
-    return bytes_of(elements_) + bytes_of(thicknesses_) + bytes_of(fields_) + bytes_of(neighbours_);
+    return bytes_of(elements_) + bytes_of(thicknesses_) + bytes_of(fields_.at_barycenter) +
+           bytes_of(fields_.over_face) + bytes_of(neighbours_) + sampling_.bytes();
 }
 
 }  // namespace

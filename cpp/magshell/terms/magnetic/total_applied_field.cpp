@@ -17,10 +17,10 @@ FieldSamples TotalAppliedField::sample(const std::vector<Vec3>& places, const st
 }
 
 FieldSamples TotalAppliedField::at_factor_one(const std::vector<Vec3>& places,
-                                              const std::vector<Vec3>& moments) const {
+                                              const std::vector<Vec3>& moments, int order) const {
     FieldSamples samples;
-    samples.reset(places.size(), 1);
-    sources_.add_samples(places, moments, 1, 1.0, samples);
+    samples.reset(places.size(), order);
+    sources_.add_samples(places, moments, order, 1.0, samples);
     return samples;
 }
 

@@ -28,8 +28,10 @@ class TotalAppliedField {
     /// as in AppliedField::add_samples.
     FieldSamples sample(const std::vector<Vec3>& places, const std::vector<Vec3>& moments, int order,
                         const LoadParameters& load_parameters) const;
-    /// Returns flux density and gradient of the sources for a field factor of 1, as add_vjp() requires them.
-    FieldSamples at_factor_one(const std::vector<Vec3>& places, const std::vector<Vec3>& moments) const;
+    /// Returns flux density and gradient of the sources for a field factor of 1, as add_vjp() requires them, and with order 2 the
+    /// curvature.
+    FieldSamples at_factor_one(const std::vector<Vec3>& places, const std::vector<Vec3>& moments,
+                               int order = 1) const;
 
     /// Adds the gradient of a probe of the total field by both load parameters and by the parameters of the
     /// sources.

@@ -81,6 +81,8 @@ class Values:
         for label, name in scene._value_layout:
             if name == "remanent_magnetization":  # zero for sheets whose magnetization nobody gave
                 numbers.setdefault((label, name), 0.0)
+            if name == "field_sampling":  # fine_faces.py chooses the faces that sample the field finely
+                numbers[label, name] = np.zeros(1)
         self.numbers = scene._value_layout.packed(numbers)
 
     @contextmanager

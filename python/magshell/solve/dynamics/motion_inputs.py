@@ -15,7 +15,9 @@ from ..._runtime.memory import check_memory
 from ..._runtime.solve_keywords import SOLVE_KEYWORDS
 from ...model.contact.contacts_to_core import check_outside, poses
 from ...model.contact.watched_obstacles import watched_obstacles
+from ...model.fields.field import AppliedField
 from ...model.rigid.equimomental_points import check_joints, check_rigid, own_velocities
+from ...model.scene.fine_faces import keeping_fine_faces, with_fine_faces
 from ...model.scene.plausible import warn_of_field
 from ...model.scene.solve_inputs import Inputs
 from ..options import Adaptive, Clock, Integrator, Newton, clock_of
@@ -29,7 +31,11 @@ from .time_steps import TimePoints, TimeSteps, steps_of
 from .trajectory import MotionState, Trajectory
 
 if TYPE_CHECKING:
+    from ...model.scene.values import Values
     from ..options import AdjointStorage
+
+# Times at which sources that move are looked at, for the faces that come near them.
+_TIMES_OF_MOVING_SOURCES = 8
 
 
 class MotionInputs:
@@ -37,6 +43,7 @@ class MotionInputs:
 
     arguments: the keywords of ms.simulate that are in the table of solve_keywords.py, but those of `inputs`.
     chosen: the lengths of the steps that an Adaptive has accepted [s]; None: it is still to choose them.
+    fine_faces_of: values whose faces that sample the field finely are those of the motion; None: to be decided.
     """
 
     inputs: Inputs
@@ -60,6 +67,7 @@ class MotionInputs:
         solver: Newton,
         schedules: Iterable[Schedule] = (),
         chosen: list[float] | None = None,
+        fine_faces_of: Values | None = None,
     ):
         self.inputs, self.integrator = inputs, integrator
         self.steps, self.record_every = count("steps", steps), count("record_every", record_every)
@@ -96,6 +104,11 @@ class MotionInputs:
         }
         self._load_parameters = {name: self._controls(each) for name, each in self._schedules.items()}
         self._scheduled = ScheduledValues(self, list(schedules))
+        self.inputs = (
+            self._with_fine_faces(start)
+            if fine_faces_of is None
+            else keeping_fine_faces(self.inputs, fine_faces_of)
+        )
         if self._outside is not None:
             check_outside(inputs.scene, inputs.values, self._outside, 0.0)
         self.core: _core.MotionInput = _core.MotionInput(
@@ -130,6 +143,38 @@ class MotionInputs:
         """Return the varying values of objects at the states recorded after so many steps, {(object, name): (n, ...)}."""
         at = self.time_points.recorded(after)
         return {key: rows[at] for key, rows in self._scheduled.varied.items()}
+
+    def _with_fine_faces(self, start: Any) -> Inputs:
+        """Return the inputs with the faces that sample the field finely during the motion.
+
+        They are those that need it in its first state, with the sources where they are then and at some later times, and
+        those of `start`.
+        """
+        inputs, scheduled = self.inputs, self._scheduled.varied
+        if isinstance(start, Equilibrium | Trajectory):
+            inputs = keeping_fine_faces(inputs, start._values)
+        moving = {each: rows for each, rows in scheduled.items() if isinstance(each[0], AppliedField)}
+        factors = np.abs(np.asarray(detached(self._load_parameters["field_factor"]), dtype=np.float64))
+        strongest = int(np.argmax(factors))
+        layout = inputs.scene._control_layout
+        controls = layout.packed(
+            {
+                ("scene", name): np.asarray(detached(rows), dtype=np.float64)[strongest]
+                for name, rows in self._load_parameters.items()
+                if ("scene", name) in layout
+            },
+            layout.zeros(),
+        )
+        last = len(self.time_points) - 1
+        times = np.unique(np.linspace(0, last, _TIMES_OF_MOVING_SOURCES, dtype=int)) if moving else [0]
+        for k in times:
+            now: dict[Any, Any] = {}
+            for (owner, name), rows in moving.items():
+                numbers = np.asarray(detached(rows), dtype=np.float64)[k]
+                now[owner] = now.get(owner, inputs.values.current(owner)).replaced(**{name: numbers})
+            there = inputs.with_values(inputs.values.with_objects(now)) if now else inputs
+            inputs = keeping_fine_faces(inputs, with_fine_faces(there, self.start.state, controls).values)
+        return inputs
 
     def _ladder(self, adaptive: Adaptive) -> dict[str, Any]:
         """Return the core's description of steps that are to be chosen."""

@@ -20,6 +20,7 @@ from ...model.scene.field_sampling import warn_of_sampling
 from ...model.scene.replacements import requested
 from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs
+from ...model.scene.values import Values
 from ...model.shells.obtuse_faces import warn_of_obtuse_faces
 from ...model.shells.shell import Shell
 from ...model.shells.strains import StrainHistory, warn_if_large
@@ -64,10 +65,11 @@ class Motion(NamedTuple):
 
 def preparation(
     scene: Scene, arguments: dict[str, Any], options: MotionOptions
-) -> Callable[[list[float] | None], MotionInputs]:
+) -> Callable[..., MotionInputs]:
     """Return a function that checks the arguments of ms.simulate and translates them for the core.
 
-    Its argument: the lengths of the steps that an Adaptive has chosen, or None. Raises ValueError on bad input.
+    Its arguments: the lengths of the steps that an Adaptive has chosen, or None, and values of the scene whose faces that
+    sample the field finely are those of the motion, by default none. Raises ValueError on bad input.
     """
     arguments = dict(arguments)
     integrator, solver = options.integrator, MixedNewton() if options.solver is None else options.solver
@@ -105,7 +107,7 @@ def preparation(
         )
     magnetization = arguments.pop("remanent_magnetization")
 
-    def prepared(chosen: list[float] | None) -> MotionInputs:
+    def prepared(chosen: list[float] | None, fine_faces_of: Values | None = None) -> MotionInputs:
         inputs = Inputs(scene, magnetization, uniform, replaced=replaced, differentiable=True, moving=True)
         return MotionInputs(
             inputs,
@@ -118,6 +120,7 @@ def preparation(
             solver=solver,
             schedules=schedules,
             chosen=chosen,
+            fine_faces_of=fine_faces_of,
         )
 
     return prepared
@@ -148,7 +151,7 @@ def run(
             lambda fraction, residual: progress(fraction),
         )
     if isinstance(time_step, Adaptive):
-        asked = prepared(found.time_steps)
+        asked = prepared(found.time_steps, asked.inputs.values)
     result = _with_strains(_trajectory(asked, found, time.perf_counter() - began))
     log.debug(
         "simulate: %s, %d of %d steps, %d in parts, %d iterations, %d factorizations, %.3g s",

@@ -13,6 +13,7 @@ from ..._input.tensors import dtype_like, like
 from ..._runtime.solve_keywords import given_to
 from ..._runtime.solver_entry_point import solve_entry
 from ...model.bodies.bodies import checked_body
+from ...model.scene.fine_faces import with_fine_faces
 from ...model.scene.scene import Scene
 from ...model.shells.shell import Shell
 from ...model.solids.solid import Solid
@@ -325,7 +326,10 @@ def _point(function: str, scene: Scene, positions, edge_rotations, arguments: di
         rotations = inputs.take("edge_rotations", edge_rotations)
         rotations = quantity("edge_rotations", "rad", rotations, (bodies.n_rotations,))
     with inputs.in_core():
-        adjoint = EnergyAdjoint(function, inputs, model.state(places, rotations))
+        state = model.state(places, rotations)
+    inputs = with_fine_faces(inputs, state, inputs.controls)
+    with inputs.in_core():
+        adjoint = EnergyAdjoint(function, inputs, state)
         if reason := model.refusal(adjoint.state(inputs.controls)):
             raise ValueError(f"there is no energy at these positions: {reason}")
     return _Point(adjoint, dtype_like(*inputs.given) if inputs.leaves else None)

@@ -26,6 +26,7 @@ from ...model.contact.watched_obstacles import watched_obstacles
 from ...model.results.result_lookup import OfOneBody, result_of
 from ...model.results.solid_result import describe_strains
 from ...model.scene.field_sampling import is_suspect, warn_of_sampling
+from ...model.scene.fine_faces import keeping_fine_faces, with_fine_faces
 from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs, plain_inputs
 from ...model.scene.values import Values
@@ -312,7 +313,10 @@ def follow_path(
     if start is not None and not isinstance(start, Equilibrium):
         raise ValueError(f"start must be an Equilibrium of this scene, got {type(start).__name__}")
     inputs = plain_inputs(scene, differentiable=True, **arguments)
+    if start is not None:
+        inputs = keeping_fine_faces(inputs, start._values)
     state, angle_branches, from_, _ = starting_point(scene, start, inputs)
+    inputs = with_fine_faces(inputs, state, inputs.controls)
     moving = AlongPath(inputs, start)
     options = _core.PathOptions()
     options.newton = solver._newton_options()

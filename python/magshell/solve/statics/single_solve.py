@@ -19,6 +19,7 @@ from ...errors import Interrupted, NotConverged
 from ...model.contact.contacts_to_core import check_apart
 from ...model.contact.watched_obstacles import watched_obstacles
 from ...model.scene.field_sampling import is_suspect, warn_of_sampling
+from ...model.scene.fine_faces import keeping_fine_faces, with_fine_faces
 from ...model.scene.replacements import requested
 from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs
@@ -30,11 +31,14 @@ from .along_path import AlongPath, all_can_move, moving_obstacles
 from .diagnosis import why_not
 from .equilibrium import Equilibrium
 from .solve_log import steps_of
-from .start import starting_point
+from .start import Origin, starting_point
 
 if TYPE_CHECKING:
     from ..._input.kinds import Starting
-    from .start import Origin
+
+
+# Searches with more fine faces that one search is followed by at most; each adds faces, so that one is usually enough.
+_MOST_REFINEMENTS = 4
 
 
 class Solution(NamedTuple):
@@ -86,6 +90,10 @@ def find(
     """Find the equilibrium of one load case, with the arguments and the errors of ms.equilibrium."""
     search = Search() if search is None else search
     inputs = inputs_of(scene, arguments, search.ignore_velocity_forces)
+    if isinstance(start, Equilibrium | Origin):
+        inputs = keeping_fine_faces(
+            inputs, start._values if isinstance(start, Equilibrium) else start.inputs.values
+        )
     state, angle_branches, from_, at_rest = starting_point(scene, start, inputs)
     moving = None
     if isinstance(start, Equilibrium) and not at_rest:
@@ -141,6 +149,7 @@ def solve(
     moving: values of the scene that change along with the load parameters.
     """
     scene, entries = inputs.scene, []
+    inputs = with_fine_faces(inputs, state, to)
     options.watched = watched_obstacles(scene, moving_obstacles(scene, moving, from_, to))
     if moving is not None:
         from_, to = np.concatenate([from_, moving.before]), np.concatenate([to, moving.after])
@@ -153,6 +162,7 @@ def solve(
         )
         if moving is not None and found.load_fraction < 1.0:
             inputs = inputs.with_values(moving.values(found.load_fraction))
+    found, inputs = _with_fine_faces_at_end(found, inputs, to, options, progress)
     with inputs.in_core():
         energies, arrays = _energies(scene, found), arrays_of(scene, found)
         strain = largest_of(scene, found.state, inputs.values.all_sheets.thickness)
@@ -186,6 +196,30 @@ def solve(
     except KeyboardInterrupt as stopped:
         raise Interrupted("interrupted while the sampling of the field was checked", result) from stopped
     return Solution(result, found, inputs)
+
+
+def _with_fine_faces_at_end(
+    found: _core.StaticsResult,
+    inputs: Inputs,
+    to: np.ndarray,
+    options: _core.StaticsOptions,
+    progress: Callable[[float, float], None] | None,
+) -> tuple[_core.StaticsResult, Inputs]:
+    """Return the result and the inputs after further searches with more fine faces, as long as the state needs more."""
+    for _ in range(_MOST_REFINEMENTS):
+        if found.outcome != _core.Outcome.converged:
+            break
+        finer = with_fine_faces(inputs, found.state, found.controls, found.field_sampling_error)
+        if finer is inputs:
+            break
+        options.start_at_rest = False
+        with finer.in_core():
+            again = _core.find_equilibrium(
+                inputs.scene._model, found.state, found.turns, found.controls, to, options, progress, []
+            )
+        again.add_effort_of(found)
+        found, inputs = again, finer
+    return found, inputs
 
 
 def _energies(scene: Scene, found) -> dict[str, float] | None:

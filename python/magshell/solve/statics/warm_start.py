@@ -13,6 +13,7 @@ from ..._input.tensors import require_torch
 from ..._runtime.frozen import Frozen, remember
 from ..._runtime.keywords import CONTROLS, as_keywords
 from ...errors import EquilibriumJumped, Interrupted, NotConverged
+from ...model.scene.fine_faces import fine_faces, having_fine_faces
 from ...model.scene.scene import Scene
 from ..options import MixedNewton, Newton
 from .cases import join, of_case, split, starts_of
@@ -107,7 +108,14 @@ class WarmStart(Frozen):
     def state_dict(self) -> dict[Any, Any]:
         """Return what a later WarmStart of an equal scene needs to continue with the same bits: tensors and plain values."""
         torch = require_torch("a state_dict")
-        states = [{"state": torch.tensor(s.found.state), "angle_branches": s.found.turns} for s in self._last]
+        states = [
+            {
+                "state": torch.tensor(s.found.state),
+                "angle_branches": s.found.turns,
+                "fine_faces": torch.from_numpy(fine_faces(s.inputs.values)),
+            }
+            for s in self._last
+        ]
         designs = [packed(self.scene, arguments, torch.from_numpy) for arguments in self._design]
         return {"states": states, "designs": designs, "of_cases": self._of_cases}
 
@@ -116,9 +124,8 @@ class WarmStart(Frozen):
         designs = [unpacked(self.scene, arguments) for arguments in state["designs"]]
         last = []
         for arguments, stored in zip(designs, state["states"], strict=True):
-            origin = Origin(
-                stored["state"].numpy(), stored["angle_branches"], inputs_of(self.scene, arguments)
-            )
+            inputs = having_fine_faces(inputs_of(self.scene, arguments), stored["fine_faces"].numpy())
+            origin = Origin(stored["state"].numpy(), stored["angle_branches"], inputs)
             last.append(find(self.scene, arguments, origin, self._search, store_factor=True))
         remember(self, _last=last, _design=designs, _of_cases=state["of_cases"])
 

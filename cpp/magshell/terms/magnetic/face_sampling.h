@@ -1,0 +1,47 @@
+// FaceSampling: the points at which each face of a surface samples the applied field: once at its barycenter, or finely, in its plane and
+// through its thickness (energy/face_points.h).
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "magshell/assembly/element_loop.h"
+#include "magshell/energy/face_points.h"
+#include "magshell/energy/magnetic_face_fine.h"
+#include "magshell/field/applied_field.h"
+
+namespace magshell {
+
+class FaceSampling {
+  public:
+    explicit FaceSampling(const FaceLoop& loop) : loop_(loop) {}
+
+    /// Sets which faces sample the field finely, by numbers that are not zero; nullptr: none of them.
+    void set(const double* fine, Index n_faces);
+
+    bool any_fine() const { return !groups_.empty(); }
+    bool is_fine(Index face) const { return any_fine() && first_[face + 1] - first_[face] > 1; }
+    /// Returns true if a face of a SIMD vector samples finely.
+    bool any_fine_in(Index group) const { return any_fine() && groups_[group] >= 0; }
+
+    Index n_points() const { return any_fine() ? first_.back() : n_faces_; }
+    /// Returns the number of a face's first point. Those of a face follow each other, in the order of points().
+    Index first(Index face) const { return any_fine() ? first_[face] : face; }
+    std::span<const FacePoint> points(Index face) const;
+
+    /// Returns the moments of the samples of those SIMD vectors in which a face samples finely, in their order; see at().
+    std::vector<FieldOverFace> moments(const FieldSamples& samples, int order, const Vec3& everywhere,
+                                       const std::vector<double>& thicknesses) const;
+    /// Returns the place of a SIMD vector in moments().
+    Index at(Index group) const { return groups_[group]; }
+
+    std::size_t bytes() const { return bytes_of(first_) + bytes_of(groups_); }
+
+  private:
+    const FaceLoop& loop_;
+    Index n_faces_ = 0, fine_groups_ = 0;
+    std::vector<Index> first_;   // of each face, and the number of all; empty if no face samples finely
+    std::vector<Index> groups_;  // of each SIMD vector its place in moments(), -1 for none; or empty
+};
+
+}  // namespace magshell

@@ -1,0 +1,106 @@
+"""Decides which three-node faces sample the applied field finely, in their plane and through their thickness.
+
+At the state in which a solve begins, with the fields as they will be at its end, the error of the magnetic force on each
+body is computed (field_sampling.py). Where it is more than 1 %, faces sample finely from then on, those with the largest
+errors first, until the others together are off by at most 0.02 %. They stay the same during the solve, its linear algebra
+and its gradients: the energy would jump where they changed. A search for one equilibrium looks again at its end, and goes on
+from there with more fine faces if they are needed; paths and motions warn. A solve that starts from an earlier result keeps
+its fine faces.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .field_sampling import KEY, TRUSTED, SamplingError, is_suspect, sampling_errors
+
+if TYPE_CHECKING:
+    from .parameter_layout import Layout
+    from .solve_inputs import Inputs
+    from .values import Values
+
+# [-] Largest part of a body's magnetic force that the sum of the errors of faces may be that sample once beside fine ones;
+# fixed by test_the_force_of_a_near_magnet_is_right_to_0_1_percent
+_LEFT = 0.0002
+
+
+def keeping_fine_faces(inputs: Inputs, before: Values) -> Inputs:
+    """Return the inputs with the fine faces of the values of an earlier solve in addition to their own."""
+    layout = inputs.scene._value_layout
+    numbers = {}
+    for key in _keys(layout):
+        own, other = (layout.of(each.numbers, *key) for each in (inputs.values, before))
+        if np.any(other > own):
+            numbers[key] = np.maximum(own, other)
+    return _with(inputs, numbers)
+
+
+def fine_faces(values: Values) -> np.ndarray:
+    """Return which faces sample finely, as numbers 0 and 1, body after body, (n,)."""
+    layout = values.scene._value_layout
+    return np.concatenate([np.zeros(0), *(layout.of(values.numbers, *key) for key in _keys(layout))])
+
+
+def having_fine_faces(inputs: Inputs, numbers: np.ndarray) -> Inputs:
+    """Return the inputs with the fine faces that fine_faces() returned for an equal scene."""
+    layout, first, found = inputs.scene._value_layout, 0, {}
+    for key in _keys(layout):
+        count = len(layout.of(inputs.values.numbers, *key))
+        found[key] = numbers[first : first + count]
+        first += count
+    return _with(inputs, found)
+
+
+def with_fine_faces(
+    inputs: Inputs, state: np.ndarray, controls: np.ndarray, estimate: float | None = None
+) -> Inputs:
+    """Return the inputs with more fine faces, as the fields in a state need them; the inputs themselves if they need none.
+
+    estimate: of the core for this state, if it is known.
+    """
+    scene = inputs.scene
+    if not _keys(scene._value_layout):
+        return inputs
+    if estimate is None:
+        with inputs.in_core():
+            estimate = scene._model.field_sampling_error(state, controls)
+    if not is_suspect(estimate):
+        return inputs
+    layout = scene._control_layout
+    errors = sampling_errors(
+        inputs.values,
+        scene._model.positions(state),
+        float(layout.of(controls, "scene", "field_factor")[0]),
+        layout.of(controls, "scene", "applied_flux_density")[0],
+    )
+    numbers = {}
+    for each in errors:
+        more = _faces_to_refine(each)
+        if len(more):
+            numbers[each.label, KEY] = each.fine.astype(np.float64)
+            numbers[each.label, KEY][more] = 1.0
+    return _with(inputs, numbers)
+
+
+def _faces_to_refine(found: SamplingError) -> np.ndarray:
+    """Return the faces that have to sample finely for the others to be off by little."""
+    if not found.error > TRUSTED:
+        return np.zeros(0, dtype=int)
+    once = np.flatnonzero(~found.fine & np.isfinite(found.off))
+    order = once[np.argsort(found.off[once], kind="stable")]
+    return order[np.cumsum(found.off[order]) > _LEFT]
+
+
+def _keys(layout: Layout) -> list[tuple[str, str]]:
+    return [key for key in layout if key[1] == KEY]
+
+
+def _with(inputs: Inputs, numbers: dict[tuple[str, str], np.ndarray]) -> Inputs:
+    if not numbers:
+        return inputs
+    values = copy(inputs.values)
+    values.numbers = inputs.scene._value_layout.packed(numbers, inputs.values.numbers)
+    return inputs.with_values(values)
