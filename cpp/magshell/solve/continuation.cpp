@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "magshell/core/bracket.h"
 #include "magshell/core/errors.h"
 #include "magshell/solve/modes.h"
 #include "magshell/solve/nonsymmetric_modes.h"
@@ -310,30 +311,25 @@ class Follower {
         const PathPoint& base = result_.points.back();
         const Index count = below.point.unstable_directions;
         if (!probe(base, along, below.step)) return;
-        double low = below.step, high = above.step, at_low = signed_eigenvalue(below.point, count);
+        const double at_low = signed_eigenvalue(below.point, count);
         if (!probe(base, along, above.step)) return;
-        double at_high = signed_eigenvalue(above.point, count);
-        const double tolerance = eigenvalue_tolerance * std::max(std::abs(at_low), std::abs(at_high));
+        Bracket bracket{below.step, at_low, above.step, signed_eigenvalue(above.point, count)};
+        const double tolerance =
+            eigenvalue_tolerance * std::max(std::abs(bracket.at_lower), std::abs(bracket.at_upper));
         PathPoint best = above.point;
         int side = 0;
-        for (int k = 0; k < 30 && high - low > location_tolerance * step_; ++k) {
-            const double step = low + (high - low) * at_low / (at_low - at_high);
+        for (int k = 0; k < 30 && bracket.width() > location_tolerance * step_; ++k) {
+            const double step = bracket.secant_zero();
             const std::optional<Probe> between = probe(base, along, step);
             if (!between) break;
             const double value = signed_eigenvalue(between->point, count);
             best = between->point;
             if (std::abs(value) <= tolerance) break;
-            if (value > 0.0) {
-                low = step;
-                at_low = value;
-                if (side == 1) at_high *= 0.5;
-                side = 1;
-            } else {
-                high = step;
-                at_high = value;
-                if (side == -1) at_low *= 0.5;
-                side = -1;
-            }
+            if (value > 0.0)
+                bracket.move_lower(step, value, side == 1 ? 0.5 : 1.0);
+            else
+                bracket.move_upper(step, value, side == -1 ? 0.5 : 1.0);
+            side = value > 0.0 ? 1 : -1;
         }
         if (nearest_.shape.size() == 0)
             return;  // the numbers of unstable directions of the points tell of it

@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "magshell/core/bracket.h"
 #include "magshell/core/errors.h"
 #include "magshell/solve/newton/unsymmetric.h"
 
@@ -146,33 +147,21 @@ double Newton::contact_step_length(const VectorXd& q, const VectorXd& step, doub
         return (alpha * alpha_contact - 1.0) * slope + pushed_back(alpha_contact) - at_begin -
                alpha_contact * stiffness;
     };
-    double lower = 0.0, upper = 1.0, slope_lower = -slope, slope_upper = slope_at(1.0);
-    while (alpha == 1.0 && slope_upper < -remaining_slope * slope && upper < longest) {
-        lower = upper;
-        slope_lower = slope_upper;
-        upper *= 2.0;
-        slope_upper = slope_at(upper);
-    }
-    if (slope_upper <= max_rise * slope) return upper;
+    Bracket ends{0.0, -slope, 1.0, slope_at(1.0)};
+    while (alpha == 1.0 && ends.at_upper < -remaining_slope * slope && ends.upper < longest)
+        ends = {ends.upper, ends.at_upper, 2.0 * ends.upper, slope_at(2.0 * ends.upper)};
+    if (ends.at_upper <= max_rise * slope) return ends.upper;
     for (int trial = 0; trial < max_trials; ++trial) {
         // Contact forces grow faster than linearly, so a secant falls short; the Illinois rule halves the slope of the end that stays.
-        const double alpha_contact =
-            std::clamp(lower + (upper - lower) * slope_lower / (slope_lower - slope_upper),
-                       lower + bracket_margin * (upper - lower), upper - bracket_margin * (upper - lower));
-        const double there = slope_at(alpha_contact);
-        if (there > max_rise * slope) {
-            upper = alpha_contact;
-            slope_upper = there;
-            slope_lower *= trial > 0 ? 0.5 : 1.0;
-        } else if (there < -max_fall * slope) {
-            lower = alpha_contact;
-            slope_lower = there;
-            slope_upper *= 0.5;
-        } else {
+        const double alpha_contact = ends.secant_zero(bracket_margin), there = slope_at(alpha_contact);
+        if (there > max_rise * slope)
+            ends.move_upper(alpha_contact, there, trial > 0 ? 0.5 : 1.0);
+        else if (there < -max_fall * slope)
+            ends.move_lower(alpha_contact, there, 0.5);
+        else
             return alpha_contact;
-        }
     }
-    return lower > 0.0 ? lower : upper;
+    return ends.lower > 0.0 ? ends.lower : ends.upper;
 }
 
 void Newton::describe_contact(NewtonReport& report) const {
@@ -188,28 +177,21 @@ double Newton::line_search(VectorXd& q, const LoadParameters& load_parameters, c
         0.5;  // [-] slope at the end over the initial one; see test_strip_folds_onto_itself
     constexpr int max_trials = 12;  // see test_strip_folds_onto_itself
     const auto slope_here = [&] { return gradient(q, proximal).dot(step); };
-    double alpha_contact = 1.0, lower = 0.0, upper = 1.0, slope_lower = -slope, slope_upper = slope_here();
-    if (slope_upper <= enough * slope) return alpha_contact;
+    double alpha_contact = 1.0;
+    Bracket ends{0.0, -slope, 1.0, slope_here()};
+    if (ends.at_upper <= enough * slope) return alpha_contact;
     for (int trial = 0; trial < max_trials; ++trial) {
         // The contact force grows faster than linearly: the Illinois rule halves the slope of the end that stays.
-        alpha_contact =
-            std::clamp(lower + (upper - lower) * slope_lower / (slope_lower - slope_upper),
-                       lower + bracket_margin * (upper - lower), upper - bracket_margin * (upper - lower));
+        alpha_contact = ends.secant_zero(bracket_margin);
         q = from;
         model_.dof_map().retract(q, alpha_contact * step);
         evaluate(q, load_parameters, proximal);
         const double there = slope_here();
-        if (there > enough * slope) {
-            upper = alpha_contact;
-            slope_upper = there;
-            slope_lower *= trial > 0 ? 0.5 : 1.0;
-        } else if (there < -enough * slope) {
-            lower = alpha_contact;
-            slope_lower = there;
-            slope_upper *= trial > 0 ? 0.5 : 1.0;
-        } else {
-            break;
-        }
+        if (!(std::abs(there) > enough * slope)) break;
+        if (there > 0.0)
+            ends.move_upper(alpha_contact, there, trial > 0 ? 0.5 : 1.0);
+        else
+            ends.move_lower(alpha_contact, there, trial > 0 ? 0.5 : 1.0);
     }
     return alpha_contact;
 }
