@@ -281,7 +281,7 @@ def _solves(s: Sample) -> Iterator[Call]:
         "progress": False,
     }
     yield Call("simulate", ms.simulate, motion)
-    twice = {"scene": s.scene, "steps": 1, "time_step": 1e-3, "batch": 2, "threads": 1, "progress": False}
+    twice = {"scene": s.scene, "steps": 3, "time_step": 1e-3, "batch": 2, "threads": 1, "progress": False}
     yield Call("simulate a batch", ms.simulate, {**twice, "gravity_factor": [0.5, 1.0]})
     listed = {"scene": s.scene, "steps": 2, "time_step": [1e-3, 2e-3], "progress": False}
     yield Call("simulate in given steps", ms.simulate, listed)

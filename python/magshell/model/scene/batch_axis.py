@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..._input.keyword_value import keyword_value
 from ..._input.tensors import detached, is_tensor, requires_gradient
 from ..._runtime.solve_keywords import SOLVE_KEYWORDS, names_of
+from .scene import Scene
 from .values import Values
-
-if TYPE_CHECKING:
-    from .scene import Scene
 
 
 @dataclass(frozen=True)
@@ -72,6 +70,8 @@ class BatchAxis:
         """Split the arguments. known: values (owner, name) that have the axis for certain, and whether gradients are
         computed for them. refusal_in_time: for a value that may vary in time, the error of its numbers or None; "" for
         another value."""
+        if not isinstance(scene, Scene):
+            raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
         self._scene, self.members, self._known = scene, members, known or {}
         self._refusal_in_time = refusal_in_time
         self._owners = arguments.get("values") or {}
@@ -134,7 +134,7 @@ class BatchAxis:
         count = len(numbers)
         if count == 0 or (owner is not None and name not in getattr(owner, "_replaceable", ())):
             return "shared"  # the solve refuses it
-        whole, part = (self._refusal(owner, name, each) for each in (numbers, numbers[0]))
+        whole, part = (self._refusal(owner, name, each) for each in (numbers, np.asarray(numbers[0])))
         if whole is None and (part is not None or count not in (1, self.members)):
             return "shared"
         if whole is None:
@@ -149,7 +149,7 @@ class BatchAxis:
         if part is not None:
             raise ValueError(f"{whole}; as the value of member 0 of the batch: {part}")
         for k, row in enumerate(numbers[1:], start=1):
-            if (refusal := self._refusal(owner, name, row, thorough=False)) is not None:
+            if (refusal := self._refusal(owner, name, np.asarray(row), thorough=False)) is not None:
                 raise ValueError(f"member {k} of the batch: {refusal}")
         return "batched" if count == self.members else "repeated"
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._input.arrays import count
+from ..._input.quantity import quantity
 from ..._input.tensors import is_tensor
 from ..._runtime.solve_keywords import SOLVE_KEYWORDS
 from ..._runtime.worker_threads import checked_threads
@@ -40,11 +41,12 @@ def simulate_batch(
     """Simulate the motions of all members, with the arguments of ms.simulate. Raises ValueError on bad input before any
     motion, Interrupted with those that were found; errors of single motions are in the result."""
     members = count("batch", members)
-    on = OnThreads(scene, checked_threads(threads, members))
+    threads = checked_threads(threads, members)
     steps = count("steps", options.steps)
     arguments = dict(arguments)
     time_step = arguments.pop("time_step")  # of all members
     axis = BatchAxis(scene, arguments, members, refusal_in_time=_InTime(scene, steps))
+    on = OnThreads(scene, threads)
     storage = as_adjoint_storage(options.adjoint_storage)
     storage = replace(storage, memory_budget=storage.memory_budget / members)
     each = [
@@ -123,10 +125,10 @@ class _InTime:
             shapes.append((self._steps, *row))
         if numbers.shape not in shapes:
             return ValueError(f"{name} must have shape {' or '.join(map(str, shapes))}, got {numbers.shape}")
-        if not np.isfinite(numbers).all():
-            return ValueError(
-                f"{name} must be finite, but {np.count_nonzero(~np.isfinite(numbers))} numbers are not"
-            )
+        try:
+            quantity(name, "" if keyword is None else keyword.unit, numbers, numbers.shape)
+        except ValueError as error:
+            return error
         return None
 
 
