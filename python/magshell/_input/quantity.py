@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,8 @@ def quantity(name: str, unit: str, values: Any, shape: tuple[int | str, ...]) ->
     >>> quantity("positions", "m", [[0, 0, 1]], ("n", 3)).shape
     (1, 3)
     """
+    if shape == () and type(values) is float and math.isfinite(values):  # most values of a solve
+        return _read_only(np.array(values))
     named = label(name, unit)
     array = real_numbers(named, values)
     if not fits(array.shape, shape):
@@ -27,6 +30,10 @@ def quantity(name: str, unit: str, values: Any, shape: tuple[int | str, ...]) ->
         index = tuple(np.argwhere(~np.isfinite(array))[0].tolist())
         entry = f"{name}[{', '.join(map(str, index))}]" if index else name
         raise ValueError(f"{named} must be finite, but {entry} is {array[index]}")
+    return _read_only(array)
+
+
+def _read_only(array: np.ndarray) -> np.ndarray:
     array.flags.writeable = False
     return array
 
@@ -58,6 +65,8 @@ def label(name: str, unit: str) -> str:
 
 def real_numbers(label: str, values: Any) -> np.ndarray:
     """Return a float64 copy of any shape. Raises ValueError on booleans, strings and masked entries."""
+    if type(values) is np.ndarray and values.dtype == np.float64 and values.dtype.isnative:
+        return values.copy()
     array = array_of(label, values, "be an array of real numbers")
     if array.dtype == bool or not np.can_cast(array.dtype, np.float64, casting="same_kind"):
         what = f"{values!r:.60}" if array.ndim == 0 else f"dtype {array.dtype}"

@@ -414,4 +414,10 @@ class AdjointStorage:
 
 def as_adjoint_storage(given: str | AdjointStorage | None) -> AdjointStorage:
     """Return the argument `adjoint_storage` of a motion as an AdjointStorage. Raises ValueError for an unknown kind."""
+    if given is None:
+        return _ANY_STORAGE
     return given if isinstance(given, AdjointStorage) else AdjointStorage(given)
+
+
+_ANY_STORAGE = AdjointStorage()
+DEFAULT_SOLVER = MixedNewton()

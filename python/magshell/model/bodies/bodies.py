@@ -215,12 +215,12 @@ class Bodies:
         """The skins of those solids that have one, in the order of the solids."""
         return tuple(body.skin for body in self.solids if body.skin is not None)
 
-    @property
+    @cached_property
     def size(self) -> float:
         """The diagonal of the bounding box of the largest body, m."""
         return max((mesh.size for mesh in self.meshes), default=0.0)
 
-    @property
+    @cached_property
     def extent(self) -> float:
         """The longest side of a bounding box among all bodies, m."""
         return max((float(np.ptp(mesh.rest_positions, axis=0).max()) for mesh in self.meshes), default=0.0)

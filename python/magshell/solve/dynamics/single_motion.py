@@ -26,6 +26,7 @@ from ...model.shells.shell import Shell
 from ...model.shells.strains import StrainHistory, warn_if_large
 from ..adjoint.dynamic import MotionAdjoint
 from ..options import (
+    DEFAULT_SOLVER,
     SDIRK2,
     SDIRK3,
     TRBDF2,
@@ -33,7 +34,6 @@ from ..options import (
     AdjointStorage,
     ImplicitEuler,
     Integrator,
-    MixedNewton,
     Newton,
     as_adjoint_storage,
 )
@@ -72,7 +72,7 @@ def preparation(
     sample the field finely are those of the motion, by default none. Raises ValueError on bad input.
     """
     arguments = dict(arguments)
-    integrator, solver = options.integrator, MixedNewton() if options.solver is None else options.solver
+    integrator, solver = options.integrator, DEFAULT_SOLVER if options.solver is None else options.solver
     if integrator is not None and not isinstance(integrator, Integrator):
         what = (
             f"the class {integrator.__name__}: call it" if isinstance(integrator, type) else repr(integrator)
