@@ -15,7 +15,7 @@ import magshell as ms
 from magshell import _core
 from magshell.model.scene.solve_inputs import Inputs
 
-from . import busy_machine, skeleton_scaling, solid_scaling
+from . import batches, busy_machine, skeleton_scaling, solid_scaling
 from .ratios import note
 from .report import add_rounds, bar, chosen, print_table
 from .statics import strongly_bent
@@ -89,6 +89,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         "solids": solid_scaling.measure(options.rounds, options.quick),
         "skeletons": skeleton_scaling.measure(options.rounds, options.quick),
         "busy machine": busy_machine.measure(company),
+        "batches": batches.measure(options.rounds, options.quick),
         "bending": options.bending,
         "sizes": {str(threads): each for threads, each in zip(THREADS, (one, two), strict=True)},
         "exponents": exponents,
