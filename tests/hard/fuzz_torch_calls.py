@@ -133,6 +133,13 @@ def _objectives(s: Sample) -> Iterator[Call]:
         parametrize.log_shares,
         {"values": np.full(n_f, 2.0), "lower": 1.0, "upper": 10.0},
     )
+    border = s.mesh.rest_positions[s.mesh.boundary_vertices]
+    yield Call("parametrize.with_boundary", parametrize.with_boundary, {"mesh": s.mesh, "boundary": border})
+    yield Call(
+        "parametrize.outline",
+        parametrize.outline,
+        {"mesh": s.mesh, "controls": np.full((5, 3), 0.1), "loop": 0},
+    )
     yield Call("parametrize.softly_limited", parametrize.softly_limited, {"vectors": vectors, "limit": 1.0})
     yield Call("parametrize.clip_to_limit", parametrize.clip_to_limit, {"vectors": vectors, "limit": 1.0})
 

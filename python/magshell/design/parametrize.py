@@ -10,6 +10,7 @@ import numpy as np
 
 from .._input.quantity import quantity
 from .._input.tensors import detached, positive_number, real_tensor, require_torch, tensor_of
+from .outlines import outline, with_boundary
 
 if TYPE_CHECKING:
     import torch
@@ -26,8 +27,10 @@ __all__ = [
     "from_regions",
     "log_scaled",
     "log_shares",
+    "outline",
     "radial_frames",
     "softly_limited",
+    "with_boundary",
 ]
 
 

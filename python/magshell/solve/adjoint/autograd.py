@@ -376,6 +376,29 @@ def is_followed_in_map(tensor: torch.Tensor) -> bool:
     return False
 
 
+class _LinearMap(torch.autograd.Function):
+    """A linear map of a tensor, computed on arrays."""
+
+    @staticmethod
+    def forward(ctx: Any, apply: Callable[..., Any], transposed: Callable[..., Any], given: torch.Tensor):
+        ctx.maps = apply, transposed
+        return torch.from_numpy(apply(given.detach().cpu().numpy())).to(given)
+
+    @staticmethod
+    def backward(ctx: Any, by_image: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
+        apply, transposed = ctx.maps
+        return None, None, _LinearMap.apply(transposed, apply, by_image)
+
+
+def linear_map(
+    apply: Callable[[np.ndarray], np.ndarray],
+    transposed: Callable[[np.ndarray], np.ndarray],
+    given: torch.Tensor,
+) -> torch.Tensor:
+    """Return a linear function of a tensor that is computed on arrays; `transposed` is its transpose."""
+    return _LinearMap.apply(apply, transposed, given)
+
+
 def depends_on(tensor: torch.Tensor, other: torch.Tensor) -> bool:
     """Return whether torch can differentiate one tensor by another."""
     if not tensor.requires_grad:
