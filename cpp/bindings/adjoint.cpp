@@ -6,18 +6,33 @@
 namespace magshell::bindings {
 namespace {
 
+// Returns the rows of all vertices (n_v, 3) and of the directions (n_d, 3) of a vector of three numbers per node, or of all dofs.
+py::tuple at_nodes(const Model& model, const VectorXd& of_nodes) {
+    const Nodes& nodes = model.nodes();
+    VectorXd of_dofs = VectorXd::Zero(nodes.n_dofs());
+    of_dofs.head(of_nodes.size()) = of_nodes;
+    return py::make_tuple(model.bodies().gradient_by_vectors(of_dofs),
+                          Rows3(Eigen::Map<const Rows3>(of_dofs.data() + nodes.n_coordinates(),
+                                                        nodes.n_nodes() - nodes.n_vertices(), 3)));
+}
+
 py::tuple pull_back_to_inputs(Model& model, const StaticsResult& equilibrium, const Array& by_positions,
-                              const Array& by_edge_rotations, const VectorXd& by_driving) {
+                              const Array& by_edge_rotations, const VectorXd& by_driving,
+                              const std::vector<VectorXd>& curvature_scales) {
     const Rows3 positions = to_rows3(by_positions);
     const VectorXd rotations = to_vector(by_edge_rotations);
     Gradient gradient;
+    RestGradient rest{curvature_scales, {}, {}};
     {
         const py::gil_scoped_release unlocked;
         const std::lock_guard lock(model.in_use());
         gradient = equilibrium_vjp(model, equilibrium, model.bodies().gradient_by_state(positions, rotations),
-                                   by_driving);
+                                   by_driving, curvature_scales.empty() ? nullptr : &rest);
     }
-    return py::make_tuple(values_to_user(model, gradient.values), gradient.load_parameters);
+    if (curvature_scales.empty())
+        return py::make_tuple(values_to_user(model, gradient.values), gradient.load_parameters);
+    return py::make_tuple(values_to_user(model, gradient.values), gradient.load_parameters,
+                          at_nodes(model, rest.by_nodes), at_nodes(model, rest.by_prescribed));
 }
 
 py::tuple by_parameters(const Model& model, const Gradient& gradient) {
@@ -58,8 +73,12 @@ void register_adjoint(py::module_& module) {
     module.def(
         "pull_back", &pull_back_to_inputs, py::arg("model"), py::arg("equilibrium"), py::arg("by_positions"),
         py::arg("by_edge_rotations"), py::arg("by_driving") = VectorXd(),
+        py::arg("curvature_scales") = std::vector<VectorXd>(),
         "The gradients by everything a solve takes, of a function of positions (n_v, 3), edge rotations "
-        "(n_e,) and what motors do (m,) with these gradients. The model must hold the values of that solve.");
+        "(n_e,) and what motors do (m,) with these gradients; with the curvature scales of all three-node "
+        "shells also those by rest "
+        "positions and directions, of the elastic energies and by what supports prescribe there. The model "
+        "must hold the values of that solve.");
     module.def(
         "vjp", &residual_vjp, py::arg("model"), py::arg("q"), py::arg("controls"), py::arg("adjoint"),
         "adjoint . dg/dk at a state q, g the gradient of the energy: (n,) by every value and (m,) by the "

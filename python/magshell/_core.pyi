@@ -1271,9 +1271,12 @@ def pull_back(
     by_positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     by_edge_rotations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     by_driving: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ...,
+    curvature_scales: collections.abc.Sequence[
+        typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
+    ] = [],
 ) -> tuple[typing.Any, ...]:
     """
-    The gradients by everything a solve takes, of a function of positions (n_v, 3), edge rotations (n_e,) and what motors do (m,) with these gradients. The model must hold the values of that solve.
+    The gradients by everything a solve takes, of a function of positions (n_v, 3), edge rotations (n_e,) and what motors do (m,) with these gradients; with the curvature scales of all three-node shells also those by rest positions and directions, of the elastic energies and by what supports prescribe there. The model must hold the values of that solve.
     """
 
 def pull_back_motion(

@@ -11,10 +11,13 @@ from dataclasses import dataclass, field
 from functools import cache, cached_property
 
 import numpy as np
+import pytest
 
 import magshell as ms
+from magshell.model.scene.reshaped import reshaped
 from magshell.model.solids.materials import SolidMaterial
 
+torch = pytest.importorskip("torch")
 IN_TIME = ", in time"
 # Keywords of a solve that are no numbers to differentiate by.
 SETTINGS = {"batch", "threads", "scene", "values", "solver", "progress"}
@@ -38,7 +41,7 @@ class Kind:
     solve: (scene, start=None, **keywords) to what has positions; function: the one of magshell behind it. controls: by
     keyword, the inputs that belong to no object. fixed: other keywords. step: of differences, over the size of a
     value; reach: that size, where it is not the value's own. in_time: steps of the motion over which everything
-    varies_in_time somewhere that can, or 0.
+    varies_in_time somewhere that can, or 0. without: values that this solve does not take.
     """
 
     scene: ms.Scene
@@ -49,6 +52,7 @@ class Kind:
     step: float = 1e-4
     reach: dict[str, float] = field(default_factory=dict)
     in_time: int = 0
+    without: tuple[str, ...] = ()
 
     def found(self, given: dict[tuple, object], start=None):
         """Find the solution with these inputs, {(object or None, name): value}, in place of its own."""
@@ -71,6 +75,7 @@ class Kind:
             (owner, name): self._over_time(owner, name, np.array(value, dtype=np.float64))
             for owner in owners
             for name, value in _values_of(self.scene, owner, moving).items()
+            if name not in self.without
         }
 
     def varies_in_time(self, owner, name: str) -> bool:
@@ -190,6 +195,18 @@ def _names_of(kind: type) -> tuple[str, ...]:
     )
 
 
+def rest_positions_follow(scene: ms.Scene, body) -> bool:
+    """Return whether there is a gradient by the rest positions of a body of the scene, in all directions."""
+    if any(isinstance(support, ms.SymmetryPlane) for support in scene.supports):
+        return False  # vertices must stay in the plane: test_rest_positions.py moves them within
+    given = torch.tensor(body.rest_positions, requires_grad=True)
+    try:
+        reshaped(scene, {body: {"rest_positions": given}})
+    except (ms.NoGradient, ValueError):
+        return False
+    return True
+
+
 def _values_of(scene: ms.Scene, owner, moving: bool) -> dict[str, object]:
     """Return the present values of an object that a solve of this scene may override; a new one must be added here."""
     names = getattr(owner, "_replaceable", ())
@@ -227,4 +244,6 @@ def _values_of(scene: ms.Scene, owner, moving: bool) -> dict[str, object]:
             absent = {"mass_density"} if weightless else set()
             if owner.remanent_magnetization is None:  # the solve says it
                 absent.add("remanent_magnetization")
+            if moving or not rest_positions_follow(scene, owner):
+                absent.add("rest_positions")
     return {name: values[name] for name in names if name not in absent}

@@ -224,6 +224,10 @@ class TriangleMesh(MeshBase):
         positions = moved(self.rest_positions, rotation, translation)
         return TriangleMesh(positions, self.faces)._with_members(self._groups)
 
+    def _with_rest_positions(self, rest_positions: np.ndarray) -> TriangleMesh:
+        """Return the same faces with other rest positions (n_v, 3) m."""
+        return TriangleMesh(rest_positions, self.faces)._with_members(self._groups)
+
     def scaled(self, factor: float) -> TriangleMesh:
         """Return the mesh with all coordinates multiplied by a positive factor."""
         positions = self.rest_positions * positive("factor", "", factor)

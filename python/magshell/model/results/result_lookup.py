@@ -23,6 +23,7 @@ def result_of(
     result: SolveResult, body: Shell | Solid | RigidBody | Joint | Muscle
 ) -> BodyResult | SolidResult | RigidBodyResult | JointResult | MuscleResult:
     """Return `result[body]`, `result[joint]` or `result[actuator]`. Raises ValueError if it is not in the scene."""
+    body = result.scene._own(body)
     if hasattr(body, "_result_in"):  # an actuator
         return body._result_in(result)
     if isinstance(body, Joint):
@@ -37,6 +38,9 @@ def result_of(
 def displacements_of(result: Any) -> Any:
     """Return the displacements of a result from the rest shape, m: an array, or a tensor if its positions are one."""
     rest = result.scene.mesh.rest_positions
+    given = getattr(result, "_rest", None)  # a tensor: positions are a function of it, too
+    if given is not None and not isinstance(result.positions, np.ndarray):
+        return result.positions - given.to(result.positions)
     if isinstance(result.positions, np.ndarray):
         return result.positions - rest
     return result.positions - result.positions.new_tensor(np.array(rest))

@@ -87,6 +87,10 @@ class BatchAxis:
                 raise ValueError(
                     f"values of {owner!r} must be a dict {{name: value}}, got {type(named).__name__}"
                 )
+            if "rest_positions" in named:
+                raise ValueError(
+                    "rest_positions cannot be replaced in a batch yet: solve its members one by one"
+                )
             found += [(owner, name, value) for name, value in named.items()]
         self.values = [self._value(*each) for each in found]
 

@@ -59,6 +59,7 @@ def reaction_in(scene: Scene, support: Support, state: np.ndarray, held: np.ndar
     held: (m, 3) N, the forces on the nodes that the constraints hold. Raises ValueError if the scene has no such
     support.
     """
+    support = scene._own(support)
     if not any(each is support for each in scene.supports):
         raise ValueError(f"support must be one of scene.supports, got {support!r:.80}")
     constraints = scene._constraints

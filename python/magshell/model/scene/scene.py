@@ -107,6 +107,8 @@ class Scene(PlotMixin):
     """
 
     _replaceable = ("gravity", "vertex_loads")
+    _shares_directions = True  # whether edges with equal directions across them share one
+    _stand_ins: dict[int, Any] = {}  # noqa: RUF012 - of a reshaped scene, its objects by the ids of those they stand for
 
     @grouped()
     def __init__(
@@ -181,7 +183,7 @@ class Scene(PlotMixin):
         bodies = self._bodies
         edges = moment_edges(bodies, self.loads)
         self._moment_directions = moment_directions(bodies, edges)
-        constraints = gather(bodies, self.supports, self._moment_directions)
+        constraints = gather(bodies, self.supports, self._moment_directions, self._shares_directions)
         self._rigid = rigid_body_points(bodies)
         check_shapes(self._obstacle_contacts, self.rigid_parts, self._rigid)
         for k, part in enumerate(self.rigid_parts):
@@ -298,6 +300,15 @@ class Scene(PlotMixin):
     @property
     def _solving(self) -> bool:
         return self._cores.current.solving
+
+    def _own(self, item: Any) -> Any:
+        """Return the object of this scene that stands for one of the scene from which it was reshaped; others unchanged."""
+        return self._stand_ins.get(id(item), item)
+
+    @cached_property
+    def _family(self) -> object:
+        """The mark that this scene shares with those that differ from it in rest positions only."""
+        return object()
 
     @cached_property
     def _obtuse_faces(self) -> ObtuseFaces:

@@ -16,6 +16,7 @@ from ..shells.shell import magnetization_of
 from .magnetization import check_given_once, check_on_skins, of_all_bodies
 from .plausible import warn_of_field, warn_of_units
 from .replacements import checked, requested
+from .reshaped import given_rest, without_rest_positions
 from .scene import Scene
 from .values import Values
 
@@ -134,6 +135,7 @@ class Inputs:
 
     def _values(self, replaced: dict[object, dict[Any, Any]]) -> Values:
         scene = self.scene
+        self.given_rest: Any = given_rest(scene, replaced)
         arrays = {
             owner: {
                 name: checked(scene, owner, name, self._numbers(name, value, owner))
@@ -141,6 +143,7 @@ class Inputs:
             }
             for owner, named in replaced.items()
         }
+        arrays = without_rest_positions(scene, arrays)
         if not arrays and self.magnetization is None:
             return scene._values
         values = Values(scene, arrays, self.magnetization)

@@ -274,7 +274,7 @@ class Values:
         """Return the scene's constraints with the support displacements of this solve."""
         scene = self.scene
         supports = [self.current(support) for support in scene.supports]
-        moved = gather(scene._bodies, supports, scene._moment_directions)
+        moved = gather(scene._bodies, supports, scene._moment_directions, scene._shares_directions)
         if not np.array_equal(moved.held_nodes, scene._constraints.held_nodes):
             raise ValueError(
                 "a support that stays cannot be moved by a solve: "
@@ -287,13 +287,20 @@ class Gradient:
     """The core's gradient of a scalar by all values and load parameters of a scene.
 
     values: (n,). controls: (m,), or (time points, m) of a motion. others: {name: gradient} by the further inputs of a
-    motion.
+    motion. rest: the gradients by rest positions (n_v, 3) and directions across edges (n_d, 3), of the elastic energies of
+    shells, and the same by where supports hold them; or None.
     """
 
     def __init__(
-        self, scene: Scene, values: np.ndarray, controls: np.ndarray, others: dict[Any, Any] | None = None
+        self,
+        scene: Scene,
+        values: np.ndarray,
+        controls: np.ndarray,
+        others: dict[Any, Any] | None = None,
+        rest: Any = None,
     ):
         self._scene, self._values, self._controls = scene, values, controls
+        self.rest = rest
         self.others: dict[Any, Any] = others or {}
         self.of_owners: dict[Any, Any] = {}  # cache of Values.gradients: {object: {name: array}}
 

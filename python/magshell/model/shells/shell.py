@@ -11,6 +11,7 @@ from ..._input.owner import Owner
 from ..._input.quantity import quantity, real_numbers
 from ..._runtime.solver_entry_point import grouped
 from ...mesh.face_shapes import corner_axes, sides
+from ...mesh.rest_shape import moved_mesh
 from ...mesh.triangles.face_quality import MeshQuality
 from ...mesh.triangles.six_node_checks import shape_integrals, shape_products
 from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
@@ -148,6 +149,9 @@ class Shell(Owner):
         tensor as above, np.outer(d, d) / R bends along d; per grown length. Positive where normals lean together. None:
         zero, and no solve can change it.
 
+    A solve can replace all of these but the mesh, the bending and the law, and `rest_positions`, (n_v, 3) m, of the mesh
+    (docs/how-to/rest-shape.md).
+
     Growth changes the stress-free state that stretching and bending are measured from, and the area of the energy. A
     uniform growth keeps the angles of a curved rest shape, so that it scales the shape (in general its second fundamental
     form is multiplied by the root of det G). Everything else stays: thickness is that of the grown sheet; mass, weight,
@@ -179,6 +183,7 @@ class Shell(Owner):
         "remanent_magnetization",
         "growth",
         "rest_curvature",
+        "rest_positions",
     )
     _in_time = ("growth", "rest_curvature")
 
@@ -225,7 +230,8 @@ class Shell(Owner):
                 raise ValueError(
                     'curvature_scale [1] must be 1 with bending="midedge2": make the thickness or the modulus another'
                 )
-            self._replaceable = tuple(name for name in self._replaceable if name != "curvature_scale")
+            absent_here = ("curvature_scale", "rest_positions")
+            self._replaceable = tuple(name for name in self._replaceable if name not in absent_here)
         self.remanent_magnetization: np.ndarray | None = (
             None
             if remanent_magnetization is None
@@ -245,14 +251,22 @@ class Shell(Owner):
 
     def replaced(self, **values: Any) -> Shell:
         """Return the same sheet with other properties."""
-        properties = {name: getattr(self, name) for name in self._replaceable}
+        properties = {name: getattr(self, name) for name in self._replaceable if name != "rest_positions"}
+        mesh = self.mesh
+        if "rest_positions" in values:
+            mesh = moved_mesh(mesh, values.pop("rest_positions"))
         grown = {
             name: self._growth.checked(name, values[name], getattr(self, name))
             for name in self._in_time
             if name in values
         }
         kept = {"bending": self.bending, "magnetization_law": self.magnetization_law}
-        return Shell(self.mesh, **kept, **{**properties, **values, **grown})
+        return Shell(mesh, **kept, **{**properties, **values, **grown})
+
+    @property
+    def rest_positions(self) -> np.ndarray:
+        """The positions of the mesh's vertices at rest, (n_v, 3) m."""
+        return self.mesh.rest_positions
 
     def _add_numbers(self, label: str, values: Values, numbers: dict[Any, Any]) -> None:
         for name in self._stiffnesses:

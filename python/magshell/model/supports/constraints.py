@@ -40,17 +40,20 @@ class Constraints:
     direction_owners: tuple[Any, ...]  # (n_d,), the support that holds each direction, or None
 
 
-def gather(bodies: Bodies, supports: Sequence[Support], free_directions: np.ndarray) -> Constraints:
+def gather(
+    bodies: Bodies, supports: Sequence[Support], free_directions: np.ndarray, sharing: bool = True
+) -> Constraints:
     """Combine all supports of a scene.
 
-    free_directions: (k, 3), appended to the fixed directions; they do not move.
+    free_directions: (k, 3), appended to the fixed directions; they do not move. sharing: let edges with equal directions
+    across them share one.
     """
     moves: list[RigidMove] = []
     mesh, pairs_of = bodies.mesh, [(s, bodies.of(s)) for s in supports]
     held = [h for s, span in pairs_of for h in held_by(s, span, bodies)]
     nodes, frames = _held_vertices(bodies, held, moves)
     pairs, directions, direction_moves, owners = _directed_edges(
-        [(s, d) for s, span in pairs_of for d in _directed(s, span)], moves
+        [(s, d) for s, span in pairs_of for d in _directed(s, span)], moves, sharing
     )
     directions = np.concatenate([directions, free_directions])
     direction_moves += [-1] * len(free_directions)
@@ -221,7 +224,7 @@ def _move_along(axis: np.ndarray, moving: list[VertexConstraint]) -> RigidMove |
     return next((each.move for each in moving if (np.abs(each.along @ axis) == 1.0).any()), None)
 
 
-def _directed_edges(directed: list[tuple[object, DirectedEdges]], moves: list[RigidMove]):
+def _directed_edges(directed: list[tuple[object, DirectedEdges]], moves: list[RigidMove], sharing: bool):
     pairs, directions, direction_moves, owners = [], [], [], []
     seen: set[int] = set()
     for support, group in directed:
@@ -230,7 +233,7 @@ def _directed_edges(directed: list[tuple[object, DirectedEdges]], moves: list[Ri
             move = len(moves)
             moves.append(group.move)
         # Edges that share a direction share a node.
-        keys = np.round(group.directions, 12) + 0.0
+        keys = np.round(group.directions, 12) + 0.0 if sharing else np.arange(len(group.edges))[:, None]
         _, first, inverse = np.unique(keys, axis=0, return_index=True, return_inverse=True)
         for edge, which in zip(group.edges.tolist(), inverse.ravel().tolist(), strict=True):
             if edge in seen:

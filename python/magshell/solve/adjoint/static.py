@@ -9,6 +9,8 @@ import numpy as np
 
 from ... import _core
 from ...errors import NoGradient
+from ...model.scene.reshaped import REST
+from ...model.scene.rest_gradient import by_rest_positions
 from ...model.scene.solve_inputs import Inputs
 from ...model.scene.values import Gradient
 from .tangent import motor_tangent, state_tangent
@@ -37,7 +39,9 @@ class Adjoint:
                 for leaf, asked in zip(inputs.leaves, wanted, strict=True)
             ]
         with inputs.in_core():
-            gradient = Gradient(inputs.scene, *_core.pull_back(model, self._found, *by_outputs))
+            scales = self._curvature_scales() if _requires_rest(inputs, wanted) else []
+            by_values, by_controls, *rest = _core.pull_back(model, self._found, *by_outputs, scales)
+        gradient = Gradient(inputs.scene, by_values, by_controls, rest=rest or None)
         leaves = zip(inputs.leaves, wanted, strict=True)
         return [by_leaf(inputs, leaf, gradient) if asked else None for leaf, asked in leaves]
 
@@ -56,6 +60,11 @@ class Adjoint:
         driving = motor_tangent(inputs, found, along, change) if n_driven else np.zeros(0)
         return [np.ascontiguousarray(model.points(change)), model.edge_rotations(change), driving]
 
+    def _curvature_scales(self) -> list[np.ndarray]:
+        """Return the curvature scales of all shells of three-node faces, (n_e,) each."""
+        values = self._inputs.values
+        return [values.current(sheet).curvature_scale for sheet in values.scene._bodies.flat_sheets]
+
     def _refuse(self) -> None:
         found = self._found
         if found.load_fraction < 1.0 or found.outcome != _core.Outcome.converged:
@@ -71,12 +80,20 @@ class Adjoint:
             )
 
 
+def _requires_rest(inputs: Inputs, wanted: Sequence[bool]) -> bool:
+    """Return whether one of the wanted leaves holds rest positions."""
+    leaves = zip(inputs.leaves, wanted, strict=True)
+    return any(asked and leaf.owner is not None and leaf.name == REST for leaf, asked in leaves)
+
+
 def by_leaf(inputs: Inputs, leaf: Leaf, gradient: Gradient) -> np.ndarray:
     """Return the gradient by one leaf, in its shape, from the core's gradients. Raises NoGradient where it has none."""
     if leaf.refusal:
         raise NoGradient(f"no gradient by {leaf.name}: {leaf.refusal}")
     if leaf.owner is None:
         by_rows = np.asarray(gradient.own(leaf.name))
+    elif leaf.name == REST:
+        by_rows = by_rest_positions(inputs, leaf.owner, gradient)
     elif hasattr(leaf.owner, "by_time_points"):
         by_rows = np.asarray(leaf.owner.by_time_points(gradient))
     else:

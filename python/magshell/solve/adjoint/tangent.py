@@ -16,6 +16,7 @@ import numpy as np
 from ... import _core
 from ...errors import NoGradient
 from ...model.rigid.joints import Joint
+from ...model.scene.reshaped import REST
 from ...model.scene.values import Values
 from .differences import directional_derivative
 
@@ -111,7 +112,7 @@ def _rates(inputs: Inputs, found: _core.StaticsResult, leaf: Leaf, change: np.nd
     advice = "take gradients with backward(), torch.func.vjp or jacrev"
     if leaf.refusal:
         raise NoGradient(f"no tangent by {leaf.name}: {leaf.refusal}")
-    if isinstance(leaf.owner, Joint) and leaf.name in leaf.owner._geometry:
+    if leaf.name == REST or (isinstance(leaf.owner, Joint) and leaf.name in leaf.owner._geometry):
         raise NoGradient(f"no tangent by the {leaf.name} of a {type(leaf.owner).__name__}: {advice}")
     model, state = inputs.scene._model, found.state
 

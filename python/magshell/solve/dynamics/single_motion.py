@@ -18,6 +18,7 @@ from ...model.contact.contacts_to_core import check_apart
 from ...model.fields.magnet_overlap import describe_magnet_overlap
 from ...model.scene.field_sampling import warn_of_sampling
 from ...model.scene.replacements import requested
+from ...model.scene.reshaped import reshaped
 from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs
 from ...model.scene.values import Values
@@ -85,10 +86,11 @@ def preparation(
         raise ValueError(f"solver must be a MixedNewton or a Newton, got {type(solver).__name__}")
     if not isinstance(scene, Scene):
         raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
+    scene, values = reshaped(scene, arguments.pop("values"), differentiable=False)
     replaced = requested(
         scene,
         arguments.pop("vertex_loads"),
-        arguments.pop("values"),
+        values,
         moving=True,
         in_time=True,
         **{name: arguments.pop(name) for name in names_of("shell")},

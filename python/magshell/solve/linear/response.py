@@ -13,6 +13,7 @@ from ..._runtime.frozen import immutable
 from ..._runtime.mixins import PlotMixin
 from ..._runtime.solve_keywords import given_to
 from ..._runtime.solver_entry_point import solve_entry
+from ...model.scene.reshaped import reshaped
 from ...model.scene.scene import Scene
 from ..statics.equilibrium import Equilibrium
 from .base_state import StiffnessAbout, asked_inputs
@@ -97,6 +98,7 @@ def linear_response(
     """
     arguments = given_to("linear_response", locals())
     began = time.perf_counter()
+    scene, arguments["values"] = reshaped(scene, arguments["values"], differentiable=False)
     inputs = asked_inputs("linear_response", scene, equilibrium, arguments)
     given = inputs.given if equilibrium is None else [*inputs.given, equilibrium.positions]
     at_rest = forces_at_rest(inputs) if equilibrium is None else None

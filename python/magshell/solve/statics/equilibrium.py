@@ -82,6 +82,7 @@ class Equilibrium(SaveMixin, OfOneBody):
     _driving: Any = field(repr=False, default=None)  # (m,) N m or N, of motors in joints, in the core's order
     _steps: tuple[tuple[Any, ...], ...] = field(repr=False, default=())  # as in SolveStep
     _inputs: Any = field(repr=False, default=None)  # the Inputs, if tensors are among them
+    _rest: Any = field(repr=False, default=None)  # (n_v, 3) m, the rest positions, if a tensor was given
 
     def __copy__(self) -> Equilibrium:
         return self  # immutable

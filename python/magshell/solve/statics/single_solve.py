@@ -21,6 +21,7 @@ from ...model.contact.watched_obstacles import watched_obstacles
 from ...model.scene.field_sampling import is_suspect, warn_of_sampling
 from ...model.scene.fine_faces import keeping_fine_faces, with_fine_faces
 from ...model.scene.replacements import requested
+from ...model.scene.reshaped import reshaped
 from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs
 from ...model.shells.obtuse_faces import warn_of_obtuse_faces
@@ -89,6 +90,8 @@ def find(
 ) -> Solution:
     """Find the equilibrium of one load case, with the arguments and the errors of ms.equilibrium."""
     search = Search() if search is None else search
+    scene, values = reshaped(scene, arguments.get("values"))
+    arguments = {**arguments, "values": values}
     inputs = inputs_of(scene, arguments, search.ignore_velocity_forces)
     if isinstance(start, Equilibrium | Origin):
         inputs = keeping_fine_faces(
@@ -96,7 +99,7 @@ def find(
         )
     state, angle_branches, from_, at_rest = starting_point(scene, start, inputs)
     moving = None
-    if isinstance(start, Equilibrium) and not at_rest:
+    if isinstance(start, Equilibrium) and start.scene is scene and not at_rest:
         at_rest = all_can_move(inputs, start)
         # Obstacles and supports push bodies along, and pass through them where they jump.
         moving = AlongPath(inputs, start, at_once=True) if scene.obstacles and not at_rest else None
@@ -275,6 +278,7 @@ def _result(
         _driving=driving,
         _steps=steps_of(found),
         _inputs=inputs if inputs.given else None,
+        _rest=inputs.given_rest,
     )
 
 

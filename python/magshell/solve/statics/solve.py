@@ -54,10 +54,11 @@ def equilibrium(
     {keywords}
     values: {object of the scene: {name: value}}, stand in for what the objects were made with: the values of loads, the
         displacement, rotation and center of supports that move, positions and moments of Dipoles, the sizes,
-        magnetization, center and rotation of a magnet, the flux_density of a SampledField, the center and rotation of a
-        PlacedField, the law of a Contact, the center and rotation of an obstacle, the numbers of Water, and
-        {scene: {"gravity": value}}. Of applied_flux_density and the factors, the keywords are short forms of
-        {scene: {name: value}}. The scene is not analysed again. `scene.objects` lists the objects.
+        magnetization, center and rotation of a magnet, the rest_positions of shells, the flux_density of a
+        SampledField, the center and rotation of a PlacedField, the law of a Contact, the center and rotation of an
+        obstacle, the numbers of Water, and {scene: {"gravity": value}}. Of applied_flux_density and the factors, the
+        keywords are short forms of {scene: {name: value}}. The scene is not analysed again, but for rest_positions.
+        `scene.objects` lists the objects.
     start: an earlier Equilibrium of this scene, from whose controls the solve goes to the new ones; or positions
         (n_v, 3) m. By default the rest shape, unloaded. Load cases may have an EquilibriumSet. From an Equilibrium,
         obstacles and supports go to their new places on straight ways, in load steps so short that no point of a body
@@ -85,7 +86,8 @@ def equilibrium(
 
     Tangents (forward mode) along a change of the inputs cost one back-substitution too, and four or eight evaluations of
     forces: by torch.autograd.forward_ad, torch.func.jvp and jacfwd. torch.func.grad, vjp, jacrev and functional_call work as
-    well; torch.func.vmap solves a batch. By the origins, axes and pitches of joints there are gradients, but no tangents.
+    well; torch.func.vmap solves a batch. By the origins, axes and pitches of joints, and by rest positions, there are
+    gradients, but no tangents.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))

@@ -38,6 +38,8 @@ def starting_point(
     if isinstance(start, Origin):
         return start.state, start.angle_branches, start.inputs.controls, True
     if isinstance(start, Equilibrium):
+        if start.scene is not scene and start.scene._family is scene._family:
+            return state_in(scene, start), start._angle_branches, start._controls, False
         if start.scene is not scene:
             raise ValueError("start is an equilibrium of another scene; hand over its positions instead")
         return start._state, start._angle_branches, start._controls, start._values.same_as(inputs.values)
@@ -52,6 +54,14 @@ def starting_point(
         state = model.state(positions, np.zeros(scene._bodies.n_rotations))
     check_rigid(scene, positions, model.positions(state), "start [m]", scene.mesh.size)
     return state, [], inputs.controls, False
+
+
+def state_in(scene: Scene, start: Equilibrium) -> np.ndarray:
+    """Return the state of an equilibrium in a scene that is the same but for rest positions."""
+    if start.scene is scene:
+        return start._state
+    theirs = start.scene._model
+    return scene._model.state(theirs.positions(start._state), theirs.edge_rotations(start._state))
 
 
 def check_faces(scene: Scene, positions: np.ndarray, name: str = "start") -> None:

@@ -14,6 +14,7 @@ from ..._runtime.frozen import Frozen, remember
 from ..._runtime.keywords import CONTROLS, as_keywords
 from ...errors import EquilibriumJumped, Interrupted, NotConverged
 from ...model.scene.fine_faces import fine_faces, having_fine_faces
+from ...model.scene.reshaped import REST
 from ...model.scene.scene import Scene
 from ..options import MixedNewton, Newton
 from .cases import join, of_case, split, starts_of
@@ -76,6 +77,7 @@ class WarmStart(Frozen):
     def __call__(self, **design: Any) -> Equilibrium | Any:
         """Find the equilibrium, or the equilibria, of a design, given by the arguments of ms.equilibrium."""
         design = as_keywords(self.scene, design, CONTROLS)
+        _refuse_rest_positions(design.get("values"))
         cases = split(design)
         self._check(cases)
         starts = starts_of(self._start, len(cases or [design]))
@@ -184,6 +186,14 @@ class WarmStart(Frozen):
             raise ValueError(
                 f"this WarmStart holds {len(self._last)} load cases, and is asked for {count}: make another one for those"
             )
+
+
+def _refuse_rest_positions(values: Any) -> None:
+    """Raise ValueError for rest positions: an equilibrium of one rest shape is not compared with that of another yet."""
+    if isinstance(values, dict) and any(
+        isinstance(named, dict) and REST in named for named in values.values()
+    ):
+        raise ValueError(f"{REST} cannot be replaced in a WarmStart yet: use ms.equilibrium with start=")
 
 
 def _largest(displacements: np.ndarray) -> float:

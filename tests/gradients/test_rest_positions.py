@@ -1,0 +1,240 @@
+"""Solves with other rest positions: against scenes made of that mesh, scaling laws, beam theory and differences."""
+
+import numpy as np
+import pytest
+from adjoint_scenes import BENDINGS, DEFAULTS, MESH, N_V, everything, shell
+
+import magshell as ms
+
+torch = pytest.importorskip("torch")
+
+EXACT = {"solver": ms.MixedNewton(tolerance=1e-13), "progress": False}
+FACTORS = {"load_factor": 0.9, "gravity_factor": 0.8, "field_factor": 1.1, "support_factor": 0.7}
+MOVED = MESH.rest_positions + 1e-3 * np.random.default_rng(2).standard_normal((N_V, 3))
+WEIGHTS = torch.from_numpy(np.random.default_rng(3).standard_normal((N_V, 3)))
+
+
+def solved(scene, x, start=None, **inputs):
+    return ms.equilibrium(
+        scene, values={scene.bodies[0]: {"rest_positions": x}}, start=start, **inputs, **EXACT
+    )
+
+
+def tensor(values):
+    """Return a result as a tensor; arrays of results are read-only, of which torch warns."""
+    return values if torch.is_tensor(values) else torch.tensor(values)
+
+
+def loss_of(rest):
+    return 1e3 * (WEIGHTS * tensor(rest.positions)).sum() + 0.1 * (tensor(rest.edge_rotations) ** 2).sum()
+
+
+def gradient_of(scene, x, loss=loss_of, **inputs):
+    given = torch.tensor(x, requires_grad=True)
+    rest = solved(scene, given, **inputs)
+    loss(rest).backward()
+    return given.grad.numpy(), rest
+
+
+def difference(scene, x, direction, start, step, loss=loss_of, **inputs):
+    """Return the derivative of the loss along a direction by differences of fourth order."""
+    at = [float(loss(solved(scene, x + k * step * direction, start, **inputs))) for k in (-2, -1, 1, 2)]
+    return (at[0] - 8.0 * at[1] + 8.0 * at[2] - at[3]) / (12.0 * step)
+
+
+@pytest.mark.parametrize("bending", BENDINGS)
+def test_a_solve_with_rest_positions_is_that_of_a_scene_made_of_them(bending):
+    x = MOVED
+    rest = solved(everything(bending), x, **DEFAULTS, **FACTORS)
+    mesh = ms.TriangleMesh(x, MESH.faces)
+    own = everything(bending)
+    other = ms.Scene(
+        shell(bending, mesh),
+        supports=own.supports,
+        loads=own.loads,
+        field=own.fields,
+        gravity=own.gravity,
+    )
+    found = ms.equilibrium(other, **DEFAULTS, **FACTORS, **EXACT)
+    assert rest.positions == pytest.approx(found.positions, rel=0, abs=1e-11)
+    assert rest.displacements == pytest.approx(found.displacements, rel=0, abs=1e-11)
+    assert np.array_equal(rest.scene.mesh.rest_positions, x)
+    reactions = [
+        each.reaction(support).force for each, support in ((rest, own.supports[0]), (found, own.supports[0]))
+    ]
+    assert reactions[0] == pytest.approx(reactions[1], rel=1e-6)
+
+
+@pytest.mark.parametrize("bending", BENDINGS)
+def test_gradient_by_rest_positions_of_a_loaded_sheet_in_fields_agrees_with_differences(bending):
+    scene = everything(bending)
+    by, rest = gradient_of(scene, MOVED, **DEFAULTS, **FACTORS)
+    some = np.random.default_rng(5).standard_normal(by.shape)
+    for direction in (by / np.linalg.norm(by), some / np.linalg.norm(some)):
+        exact = float((by * direction).sum())
+        found = difference(scene, MOVED, direction, rest, 2e-5, **DEFAULTS, **FACTORS)
+        assert found == pytest.approx(exact, rel=0, abs=1e-6 * np.linalg.norm(by))
+
+
+@pytest.mark.parametrize("bending", BENDINGS)
+def test_all_lengths_times_a_factor_scale_the_shape_of_a_sheet_in_a_field(bending):
+    """Check Euler's theorem: positions are of degree one in rest positions and thickness together."""
+    scene = ms.Scene(shell(bending), supports=[ms.Clamp(MESH.edges_at(x=0.0))], field=ms.UniformField())
+    x, h = torch.tensor(MOVED, requires_grad=True), torch.tensor(1e-3, requires_grad=True)
+    values = {scene.bodies[0]: {"rest_positions": x, "thickness": h}}
+    rest = ms.equilibrium(scene, values=values, **DEFAULTS, **EXACT)
+    value = (WEIGHTS * rest.positions).sum()
+    value.backward()
+    degree_one = float((x.grad * x.detach()).sum() + h.grad * h.detach())
+    assert degree_one == pytest.approx(float(value.detach()), rel=1e-8)
+
+
+def test_a_sheet_moved_as_a_whole_moves_its_equilibrium():
+    scene = ms.Scene(shell(), supports=[ms.Clamp(MESH.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    x = torch.tensor(MOVED, requires_grad=True)
+    rest = solved(scene, x)
+    (WEIGHTS * rest.positions).sum().backward()
+    assert x.grad.sum(dim=0).numpy() == pytest.approx(WEIGHTS.sum(dim=0).numpy(), rel=1e-8)
+
+
+def cantilever(load):
+    mesh = ms.meshes.rectangle(0.1, 0.01, cells=(20, 2))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e7, poisson_ratio=0.0, mass_density=1e3)
+    end = mesh.vertices_at(x=0.1)
+    loads = {
+        "force": {"loads": [ms.PointLoad(end, (0, 0, 1e-6))]},
+        "weight": {"gravity": (0, 0, -1e-3)},
+        "area load": {"loads": [ms.AreaLoad((0, 0, 1e-3))]},
+        "edge load": {"loads": [ms.EdgeLoad(mesh.edges_at(x=0.1), (0, 0, 1e-4))]},
+        "couple": {"loads": [ms.EdgeCouple(mesh.edges_at(x=0.1), 1e-6)]},
+    }[load]
+    return ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], **loads), end
+
+
+@pytest.mark.parametrize(
+    "load, by_length, by_width",
+    [("force", 3, -1), ("weight", 4, 0), ("area load", 4, 0), ("edge load", 3, 0), ("couple", 2, 0)],
+)
+def test_deflection_of_a_cantilever_is_a_power_of_its_length_and_of_its_width(load, by_length, by_width):
+    scene, end = cantilever(load)
+    by, rest = gradient_of(
+        scene, scene.mesh.rest_positions, lambda found: tensor(found.positions)[end, 2].mean()
+    )
+    tip = float(rest.positions.detach()[end, 2].mean())
+    powers = (by * scene.mesh.rest_positions).sum(axis=0) / tip
+    assert powers[:2] == pytest.approx([by_length, by_width], abs=5e-3)  # of the load on few vertices
+
+
+def test_displacements_are_measured_from_the_rest_positions_that_were_given():
+    scene = everything()
+    x = torch.tensor(MOVED, requires_grad=True)
+    rest = solved(scene, x, **DEFAULTS, **FACTORS)
+    own = rest[scene.bodies[0]]
+    for moved in (rest.displacements, own.displacements):
+        assert moved.detach().numpy() == pytest.approx(rest.positions.detach().numpy() - MOVED)
+    by_moved = torch.autograd.grad(rest.displacements.sum(), x, retain_graph=True)[0]
+    by_place = torch.autograd.grad(rest.positions.sum(), x)[0]
+    assert (by_moved - by_place + 1.0).abs().max() < 1e-12
+
+
+def test_a_gradient_by_rest_positions_goes_through_load_cases():
+    scene = everything()
+    fields = np.array([(1e-3, -2e-3, 3e-3), (0, 0, -2e-3)])
+    x = torch.tensor(MOVED, requires_grad=True)
+    both = solved(
+        scene, x, remanent_magnetization=DEFAULTS["remanent_magnetization"], applied_flux_density=fields
+    )
+    both.positions.sum().backward()
+    total = sum(
+        gradient_of(
+            scene, MOVED, lambda rest: rest.positions.sum(), **{**DEFAULTS, "applied_flux_density": each}
+        )[0]
+        for each in fields
+    )
+    assert x.grad.numpy() == pytest.approx(total, rel=1e-8)
+
+
+def test_loads_that_a_solve_gives_per_vertex_do_not_follow_rest_positions():
+    scene = everything()
+    loads = 1e-3 * np.random.default_rng(8).standard_normal((N_V, 3))
+    inputs = {**DEFAULTS, **FACTORS, "vertex_loads": loads}
+    by, rest = gradient_of(scene, MOVED, **inputs)
+    direction = by / np.linalg.norm(by)
+    found = difference(scene, MOVED, direction, rest, 2e-5, **inputs)
+    assert found == pytest.approx(np.linalg.norm(by), rel=1e-6)
+
+
+def test_vertices_move_within_a_symmetry_plane_but_not_out_of_it():
+    mesh = ms.meshes.rectangle(0.1, 0.06, cells=(4, 2), irregular=0.2, seed=3)
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.3, mass_density=1e3)
+    planes = [ms.Clamp(mesh.edges_at(x=0.0)), ms.SymmetryPlane((0, 1, 0))]
+    scene = ms.Scene(sheet, supports=planes, gravity=(0, 0, -9.81))
+    start = mesh.rest_positions
+    weights = torch.from_numpy(np.random.default_rng(4).standard_normal(start.shape))
+
+    def loss(rest):
+        return (weights * tensor(rest.positions)).sum()
+
+    by, rest = gradient_of(scene, start, loss)
+    direction = np.random.default_rng(5).standard_normal(start.shape)
+    direction[mesh.vertices_at(y=0.0), 1] = 0.0
+    found = difference(scene, start, direction / 10.0, rest, 2e-4, loss)
+    assert found == pytest.approx((by * direction).sum() / 10.0, rel=0, abs=1e-6 * np.linalg.norm(by))
+    off = start.copy()
+    off[mesh.vertices_at(y=0.0)[-1], 1] = 1e-3
+    with pytest.raises(ValueError, match=r"change what supports hold at vertex \d+: it must stay in, or off"):
+        solved(scene, off)
+
+
+def test_rest_positions_that_degenerate_name_the_faces():
+    scene = everything()
+    flat, folded = MESH.rest_positions.copy(), MESH.rest_positions.copy()
+    face = MESH.faces[3]
+    flat[face[0]] = 0.5 * (flat[face[1]] + flat[face[2]])
+    inner = np.setdiff1d(np.arange(N_V), MESH.boundary_vertices)[0]
+    folded[inner] = folded[inner] + (0.2, 0.0, 0.0)
+    with pytest.raises(ValueError, match=r"rest_positions \[m\] leave faces 3, 7 without area"):
+        solved(scene, flat, **DEFAULTS)
+    with pytest.raises(
+        ValueError, match=r"rest_positions \[m\] fold faces [\d, ]+onto each other|fold faces"
+    ):
+        solved(scene, folded, **DEFAULTS)
+
+
+def test_rest_positions_of_another_shape_or_kind_are_refused():
+    scene = everything()
+    sheet = scene.bodies[0]
+    for wrong in (MOVED[:-1], MOVED[None], np.zeros(3), np.full((N_V, 3), np.nan)):
+        with pytest.raises(ValueError, match="rest_positions"):
+            ms.equilibrium(scene, values={sheet: {"rest_positions": wrong}}, **DEFAULTS)
+    with pytest.raises(ValueError, match="give numbers"):
+        ms.equilibrium(scene, values={sheet: {"rest_positions": lambda t: MOVED}}, **DEFAULTS)
+    with pytest.raises(ValueError, match="cannot be replaced in this solve"):
+        ms.energy(scene, MOVED, **DEFAULTS, values={sheet: {"rest_positions": MOVED}})
+    for solve, steps in ((ms.equilibrium, {}), (ms.simulate, {"steps": 1, "time_step": 1e-3})):
+        with pytest.raises(ValueError, match="cannot be replaced in a batch yet"):
+            solve(
+                scene,
+                **DEFAULTS,
+                **steps,
+                batch=2,
+                values={sheet: {"rest_positions": np.stack([MOVED, MOVED])}},
+            )
+    with pytest.raises(ValueError, match="cannot be replaced in a WarmStart yet"):
+        ms.WarmStart(scene)(**DEFAULTS, values={sheet: {"rest_positions": MOVED}})
+    with pytest.raises(ms.NoGradient, match=r"only ms.equilibrium has one"):
+        given = torch.tensor(MOVED, requires_grad=True)
+        ms.linear_response(scene, **DEFAULTS, values={sheet: {"rest_positions": given}})
+
+
+def test_terms_without_a_derivative_by_rest_positions_are_named_before_the_solve():
+    grown = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, growth=1.1)
+    scene = ms.Scene(grown, supports=[ms.Clamp(MESH.edges_at(x=0.0))])
+    solved(scene, MOVED)
+    with pytest.raises(ms.NoGradient, match="derivative by them of growth yet"):
+        solved(scene, torch.tensor(MOVED, requires_grad=True))
+    sheet = shell()
+    rigid = ms.RigidBody(MESH.faces[-1], mass=1e-3, inertia=np.full(3, 1e-6))
+    scene = ms.Scene([sheet, rigid], supports=[ms.Clamp(MESH.edges_at(x=0.0))])
+    with pytest.raises(ValueError, match="rigid bodies yet"):
+        ms.equilibrium(scene, values={sheet: {"rest_positions": MOVED}})
