@@ -6,16 +6,6 @@
 namespace magshell::bindings {
 namespace {
 
-// Returns the rows of all vertices (n_v, 3) and of the directions (n_d, 3) of a vector of three numbers per node, or of all dofs.
-py::tuple at_nodes(const Model& model, const VectorXd& of_nodes) {
-    const Nodes& nodes = model.nodes();
-    VectorXd of_dofs = VectorXd::Zero(nodes.n_dofs());
-    of_dofs.head(of_nodes.size()) = of_nodes;
-    return py::make_tuple(model.bodies().gradient_by_vectors(of_dofs),
-                          Rows3(Eigen::Map<const Rows3>(of_dofs.data() + nodes.n_coordinates(),
-                                                        nodes.n_nodes() - nodes.n_vertices(), 3)));
-}
-
 py::tuple pull_back_to_inputs(Model& model, const StaticsResult& equilibrium, const Array& by_positions,
                               const Array& by_edge_rotations, const VectorXd& by_driving,
                               const std::vector<VectorXd>& curvature_scales) {
@@ -27,9 +17,9 @@ py::tuple pull_back_to_inputs(Model& model, const StaticsResult& equilibrium, co
         const py::gil_scoped_release unlocked;
         const std::lock_guard lock(model.in_use());
         gradient = equilibrium_vjp(model, equilibrium, model.bodies().gradient_by_state(positions, rotations),
-                                   by_driving, curvature_scales.empty() ? nullptr : &rest);
+                                   by_driving, rest);
     }
-    if (curvature_scales.empty())
+    if (!rest.asked())
         return py::make_tuple(values_to_user(model, gradient.values), gradient.load_parameters);
     return py::make_tuple(values_to_user(model, gradient.values), gradient.load_parameters,
                           at_nodes(model, rest.by_nodes), at_nodes(model, rest.by_prescribed));

@@ -222,7 +222,7 @@ def test_rest_positions_of_another_shape_or_kind_are_refused():
             )
     with pytest.raises(ValueError, match="cannot be replaced in a WarmStart yet"):
         ms.WarmStart(scene)(**DEFAULTS, values={sheet: {"rest_positions": MOVED}})
-    with pytest.raises(ms.NoGradient, match=r"only ms.equilibrium has one"):
+    with pytest.raises(ms.NoGradient, match=r"only ms.equilibrium and ms.simulate have one"):
         given = torch.tensor(MOVED, requires_grad=True)
         ms.linear_response(scene, **DEFAULTS, values={sheet: {"rest_positions": given}})
 

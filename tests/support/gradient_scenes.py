@@ -75,8 +75,22 @@ class Kind:
             (owner, name): self._over_time(owner, name, np.array(value, dtype=np.float64))
             for owner in owners
             for name, value in _values_of(self.scene, owner, moving).items()
-            if name not in self.without
+            if self._takes(owner, name)
         }
+
+    def _takes(self, owner, name: str) -> bool:
+        """Return whether the solve takes this value, and has a gradient by it."""
+        if name != "rest_positions" or name in self.without:
+            return name not in self.without
+        if self.function is ms.simulate:
+            turning = any(
+                isinstance(each, ms.Pin | ms.Clamp) and each._move.rotation is not None
+                for each in self.scene.supports
+            )
+            viscous = {"stiffness_damping", "maxwell_modulus"} & {*self.controls, *self.fixed}
+            if turning or viscous:
+                return False
+        return rest_positions_follow(self.scene, owner)
 
     def varies_in_time(self, owner, name: str) -> bool:
         """Return whether this value is another at each end of a step."""
@@ -244,6 +258,4 @@ def _values_of(scene: ms.Scene, owner, moving: bool) -> dict[str, object]:
             absent = {"mass_density"} if weightless else set()
             if owner.remanent_magnetization is None:  # the solve says it
                 absent.add("remanent_magnetization")
-            if moving or not rest_positions_follow(scene, owner):
-                absent.add("rest_positions")
     return {name: values[name] for name in names if name not in absent}

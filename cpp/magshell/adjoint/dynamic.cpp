@@ -32,6 +32,8 @@ class Backward {
         g_.positions = g_.velocities = g_.mass = g_.damping = VectorXd::Zero(model_.size());
         g_.time_steps.assign(input.time_steps.size(), 0.0);
         g_.load_parameters.assign(input.load_parameters.size(), model_.parameters().zero_load_parameters());
+        g_.rest.curvature_scales = by.curvature_scales;
+        if (g_.rest.asked()) g_.rest.clear(model_);
     }
 
     MotionGradient run() {
@@ -387,18 +389,21 @@ class Backward {
             by_motor_forces.size() > 0 ? VectorXd(lambda + dof_map.motor_motion(by_motor_forces)) : lambda;
         scene_.load_parameters.setZero();
         model_.parameters().vjp(q, load_parameters, all, scene_);
+        if (g_.rest.asked()) g_.rest.add(model_, q, all);
         KinematicsGradient by_forces;
         if (model_.capabilities().has_velocity_forces)
             by_forces = model_.parameters().forces_vjp(model_.kinematics(), load_parameters, all, scene_);
         if (by_contact.size() > 0)
             model_.contacts().vjp(q, model_.kinematics(), load_parameters, by_contact, by_forces, scene_);
-        if (dof_map.has_values()) {
+        if (dof_map.has_values() || g_.rest.asked()) {
             // Assembles again, because the factorization has rotated the blocks of rotated nodes.
             model_.assemble(q, load_parameters, false);
             model_.assemble_forces(load_parameters);
             const VectorXd reaction = product(lambda, *proximal.weights) + by_q;
-            dof_map.vjp(reaction, lambda, newton_.gradient(q, proximal), load_parameters, scene_,
-                        by_motor_forces);
+            if (g_.rest.asked()) g_.rest.add_prescribed(dof_map, reaction);
+            if (dof_map.has_values())
+                dof_map.vjp(reaction, lambda, newton_.gradient(q, proximal), load_parameters, scene_,
+                            by_motor_forces);
         }
         model_.parameters().time_varying().move_gradient(scene_);
         add_by_load_parameters(step, fraction, scene_.load_parameters);
@@ -435,6 +440,7 @@ class Backward {
         g_.positions += reaction;
         scene_.load_parameters.setZero();
         model_.parameters().vjp(q, load_parameters, lambda, scene_);
+        if (g_.rest.asked()) g_.rest.add(model_, q, lambda);
         model_.parameters().time_varying().move_gradient(scene_);
         g_.load_parameters[0] += scene_.load_parameters;
     }

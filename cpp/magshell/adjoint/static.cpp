@@ -1,13 +1,12 @@
 #include "magshell/adjoint/static.h"
 
 #include "magshell/core/errors.h"
-#include "magshell/scene/shells_rest_gradient.h"
 #include "magshell/solve/newton/unsymmetric.h"
 
 namespace magshell {
 
 Gradient equilibrium_vjp(Model& model, const StaticsResult& equilibrium, const VectorXd& by_state,
-                         const VectorXd& by_motor_forces, RestGradient* rest) {
+                         const VectorXd& by_motor_forces, RestGradient& rest) {
     if (!equilibrium.factor)
         throw InvalidInput("the equilibrium has no factorization: it was solved without gradients");
     const VectorXd& q = equilibrium.state;
@@ -17,7 +16,7 @@ Gradient equilibrium_vjp(Model& model, const StaticsResult& equilibrium, const V
 
     model.set_angle_branches(equilibrium.angle_branches);
     model.evaluate(q, load_parameters);
-    if (model.capabilities().has_unsymmetric_tangent || dof_map.has_values() || rest)
+    if (model.capabilities().has_unsymmetric_tangent || dof_map.has_values() || rest.asked())
         model.assemble(q, load_parameters, false);
     const auto add_product = [&](const VectorXd& motion, VectorXd& forces) {
         VectorXd product(q.size());
@@ -38,10 +37,11 @@ Gradient equilibrium_vjp(Model& model, const StaticsResult& equilibrium, const V
     const VectorXd lambda = dof_map.expand(reduced);
     Gradient gradient(model.parameters().registry());
     model.parameters().vjp(q, load_parameters, lambda + motors, gradient);
-    if (dof_map.has_values() || rest) add_product(lambda, by_q);
-    if (rest) {
-        rest->by_nodes = shells_rest_vjp(model, q, lambda, rest->curvature_scales);
-        rest->by_prescribed = by_q - dof_map.expand(dof_map.vector(by_q));
+    if (dof_map.has_values() || rest.asked()) add_product(lambda, by_q);
+    if (rest.asked()) {
+        rest.clear(model);
+        rest.add(model, q, lambda);
+        rest.add_prescribed(dof_map, by_q);
     }
     if (dof_map.has_values()) {
         dof_map.vjp(by_q, lambda, model.residual().gradient, load_parameters, gradient,

@@ -6,21 +6,15 @@
 // gradients by all k. Motor forces are g . B z along the prescribed joints; for a gradient z by them, lambda + B z replaces lambda.
 #pragma once
 
+#include "magshell/adjoint/rest_gradient.h"
 #include "magshell/solve/statics.h"
 
 namespace magshell {
 
-/// The gradient by rest positions: of the elastic energies of shells, three numbers per node (scene/shells_rest_gradient.h), and of all dofs by what supports
-/// prescribe.
-struct RestGradient {
-    std::vector<VectorXd> curvature_scales;  // given, as in scene/shells_rest_gradient.h
-    VectorXd by_nodes, by_prescribed;
-};
-
 /// Returns dF/dk from dF/dq, of all dofs, and from the gradient by the motor forces, in the order of DofMap::motor_forces, or none. The
 /// equilibrium must have a stored factorization, and the model the parameters that it was found with. Throws InvalidInput without a
-/// factorization. rest: filled in if given.
+/// factorization. rest: filled in if asked for.
 Gradient equilibrium_vjp(Model& model, const StaticsResult& equilibrium, const VectorXd& by_state,
-                         const VectorXd& by_motor_forces = {}, RestGradient* rest = nullptr);
+                         const VectorXd& by_motor_forces, RestGradient& rest);
 
 }  // namespace magshell

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,10 +31,11 @@ class ReshapedScene(Scene):
     _shares_directions = False
 
 
-def reshaped(scene: Scene, values: Any, differentiable: bool = True) -> tuple[Scene, Any]:
+def reshaped(scene: Scene, values: Any, no_gradient_with: Sequence[str] | None = ()) -> tuple[Scene, Any]:
     """Return the scene in which a solve computes with these values, and the values by the objects of that scene.
 
-    differentiable: the solve has gradients by rest positions.
+    no_gradient_with: what the solve has, besides the scene, that has no derivative by rest positions; None if the solve
+    has no gradients.
 
     Without rest_positions among the values they are returned as they are. Raises ValueError for rest positions that do
     not fit, or in a scene with something that cannot follow them; NoGradient if a gradient by them is asked for and
@@ -45,11 +47,12 @@ def reshaped(scene: Scene, values: Any, differentiable: bool = True) -> tuple[Sc
     _refuse_what_cannot_follow(scene)
     numbers = {body: _numbers(body, value) for body, value in given.items()}
     there = _made(scene, numbers)
-    asked = any(requires_gradient(value) for value in given.values())
-    if asked and not differentiable:
-        raise NoGradient(f"no gradient by {REST}: only ms.equilibrium has one. Detach them here")
-    if asked:
-        _refuse_without_gradient(there, [there._own(body) for body in given])
+    if any(requires_gradient(value) for value in given.values()):
+        if no_gradient_with is None:
+            raise NoGradient(
+                f"no gradient by {REST}: only ms.equilibrium and ms.simulate have one. Detach them here"
+            )
+        _refuse_without_gradient(there, [there._own(body) for body in given], no_gradient_with)
     return there, {there._own(owner): named for owner, named in values.items()}
 
 
@@ -171,9 +174,9 @@ def _refuse_what_cannot_follow(scene: Scene) -> None:
         )
 
 
-def _refuse_without_gradient(scene: Scene, bodies: Any) -> None:
-    if names := without_rest_gradient(scene, bodies):
+def _refuse_without_gradient(scene: Scene, bodies: Any, others: Sequence[str]) -> None:
+    if names := [*without_rest_gradient(scene, bodies), *others]:
         raise NoGradient(
-            f"no gradient by {REST}: the scene has no derivative by them of {', '.join(names)} yet. Detach them, or leave "
-            "that out of the scene"
+            f"no gradient by {REST}: there is no derivative by them of {', '.join(names)} yet. Detach them, or leave that "
+            "out"
         )

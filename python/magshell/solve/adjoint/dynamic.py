@@ -14,7 +14,7 @@ from ..._runtime.warning_stacklevel import callers_level
 from ...errors import NoGradient, StepErrorWarning
 from ...model.scene.values import Gradient
 from ..options import ProjectiveDynamics
-from .static import by_leaf
+from .static import by_leaf, curvature_scales, requires_rest
 
 if TYPE_CHECKING:
     from ...model.scene.scene import Scene
@@ -44,8 +44,15 @@ class MotionAdjoint:
                 raise NoGradient(f"no gradient here: {why}")
         _warn_of_jumps(inputs.scene, found.divided)
         with inputs.in_core():
-            found_by = _core.pull_back_motion(inputs.scene._model, asked.core, found, *by_outputs)
-        gradient = Gradient(inputs.scene, found_by.pop("values"), found_by.pop("controls"), found_by)
+            scales = curvature_scales(inputs) if requires_rest(inputs, wanted) else []
+            found_by = _core.pull_back_motion(inputs.scene._model, asked.core, found, *by_outputs, scales)
+        rest = found_by.pop("rest", None)
+        if rest is not None and asked.starts_at_rest:
+            (by_vertices, by_directions), prescribed = rest
+            rest = (by_vertices + found_by["positions"], by_directions), prescribed
+        gradient = Gradient(
+            inputs.scene, found_by.pop("values"), found_by.pop("controls"), found_by, rest=rest
+        )
         leaves = zip(inputs.leaves, wanted, strict=True)
         return [by_leaf(inputs, leaf, gradient) if is_wanted else None for leaf, is_wanted in leaves]
 

@@ -39,7 +39,7 @@ class Adjoint:
                 for leaf, asked in zip(inputs.leaves, wanted, strict=True)
             ]
         with inputs.in_core():
-            scales = self._curvature_scales() if _requires_rest(inputs, wanted) else []
+            scales = curvature_scales(inputs) if requires_rest(inputs, wanted) else []
             by_values, by_controls, *rest = _core.pull_back(model, self._found, *by_outputs, scales)
         gradient = Gradient(inputs.scene, by_values, by_controls, rest=rest or None)
         leaves = zip(inputs.leaves, wanted, strict=True)
@@ -60,11 +60,6 @@ class Adjoint:
         driving = motor_tangent(inputs, found, along, change) if n_driven else np.zeros(0)
         return [np.ascontiguousarray(model.points(change)), model.edge_rotations(change), driving]
 
-    def _curvature_scales(self) -> list[np.ndarray]:
-        """Return the curvature scales of all shells of three-node faces, (n_e,) each."""
-        values = self._inputs.values
-        return [values.current(sheet).curvature_scale for sheet in values.scene._bodies.flat_sheets]
-
     def _refuse(self) -> None:
         found = self._found
         if found.load_fraction < 1.0 or found.outcome != _core.Outcome.converged:
@@ -80,7 +75,13 @@ class Adjoint:
             )
 
 
-def _requires_rest(inputs: Inputs, wanted: Sequence[bool]) -> bool:
+def curvature_scales(inputs: Inputs) -> list[np.ndarray]:
+    """Return the curvature scales of all shells of three-node faces, (n_e,) each."""
+    values = inputs.values
+    return [values.current(sheet).curvature_scale for sheet in values.scene._bodies.flat_sheets]
+
+
+def requires_rest(inputs: Inputs, wanted: Sequence[bool]) -> bool:
     """Return whether one of the wanted leaves holds rest positions."""
     leaves = zip(inputs.leaves, wanted, strict=True)
     return any(asked and leaf.owner is not None and leaf.name == REST for leaf, asked in leaves)

@@ -86,6 +86,7 @@ class MotionInputs:
         )
         chooses = adaptive is not None and chosen is None
         self._outside = None
+        self.starts_at_rest: bool = start is None
         self.tolerance: float = tolerance_of(inputs.scene, adaptive)
         self._mass = inputs.values.masses
         self._damping = self._damping_of_points(arguments["damping"])

@@ -25,6 +25,7 @@ from ...model.scene.values import Values
 from ...model.shells.obtuse_faces import warn_of_obtuse_faces
 from ...model.shells.shell import Shell
 from ...model.shells.strains import StrainHistory, warn_if_large
+from ...model.supports.supports import Clamp, Pin
 from ..adjoint.dynamic import MotionAdjoint
 from ..options import (
     DEFAULT_SOLVER,
@@ -86,7 +87,9 @@ def preparation(
         raise ValueError(f"solver must be a MixedNewton or a Newton, got {type(solver).__name__}")
     if not isinstance(scene, Scene):
         raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
-    scene, values = reshaped(scene, arguments.pop("values"), differentiable=False)
+    scene, values = reshaped(
+        scene, arguments.pop("values"), no_gradient_with=_without_rest_gradient(scene, arguments)
+    )
     replaced = requested(
         scene,
         arguments.pop("vertex_loads"),
@@ -188,6 +191,17 @@ def run(
     except KeyboardInterrupt as stopped:
         raise Interrupted("interrupted while the sampling of the field was checked", result) from stopped
     return Motion(result, asked, found)
+
+
+def _without_rest_gradient(scene: Scene, arguments: dict[str, Any]) -> list[str]:
+    """Return words for what the gradient of a motion by rest positions does not include yet."""
+    found = [
+        name
+        for name in ("stiffness_damping", "maxwell_modulus")
+        if arguments[name] is not None and np.any(np.asarray(detached(arguments[name])))
+    ]
+    moved = [support for support in scene.supports if isinstance(support, Pin | Clamp)]
+    return found + ["supports that rotate"] * any(each._move.rotation is not None for each in moved)
 
 
 def _advice(result: Trajectory, chosen: bool) -> str:
@@ -296,6 +310,7 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
         _own_points=points[:, n_v:] if rigid else None,
         _own_velocities=velocities[:, n_v:] if rigid else None,
         _driving=driving,
+        _rest=asked.inputs.given_rest,
     )
 
 

@@ -181,6 +181,7 @@ class Trajectory(AnimateMixin, OfOneBody):
     _own_points: Any = field(repr=False, default=None)  # (n, 10 a rigid part, 3)
     _own_velocities: Any = field(repr=False, default=None)
     _driving: Any = field(repr=False, default=None)  # (n, m) N m or N, of motors in joints
+    _rest: Any = field(repr=False, default=None)  # (n_v, 3) m, the rest positions, if a tensor was given
 
     def __copy__(self) -> Trajectory:
         return self  # immutable

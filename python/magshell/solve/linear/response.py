@@ -98,7 +98,7 @@ def linear_response(
     """
     arguments = given_to("linear_response", locals())
     began = time.perf_counter()
-    scene, arguments["values"] = reshaped(scene, arguments["values"], differentiable=False)
+    scene, arguments["values"] = reshaped(scene, arguments["values"], no_gradient_with=None)
     inputs = asked_inputs("linear_response", scene, equilibrium, arguments)
     given = inputs.given if equilibrium is None else [*inputs.given, equilibrium.positions]
     at_rest = forces_at_rest(inputs) if equilibrium is None else None
