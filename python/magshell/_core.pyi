@@ -1287,6 +1287,9 @@ def pull_back_motion(
     by_edge_rotations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     by_velocities: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     by_driving: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"] = ...,
+    curvature_scales: collections.abc.Sequence[
+        typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
+    ] = [],
     progress: typing.Any = None,
 ) -> dict[str, typing.Any]: ...
 def push_forward(

@@ -186,6 +186,81 @@ def test_vertices_move_within_a_symmetry_plane_but_not_out_of_it():
         solved(scene, off)
 
 
+@pytest.mark.parametrize("integrator", [ms.TRBDF2(), ms.ImplicitEuler(), ms.SDIRK3()], ids=str)
+def test_gradient_by_rest_positions_of_a_motion_agrees_with_differences(integrator):
+    clamp = ms.Clamp(MESH.edges_at(x=0.0), displacement=(0.0, 0.0, 1e-3))
+    loads = [ms.AreaLoad((0.1, 0.0, 1.0)), ms.EdgeLoad(MESH.edges_at(x=0.1), (0.0, 0.02, 0.05))]
+    scene = ms.Scene(
+        shell(), supports=[clamp], loads=loads, field=ms.UniformField(), gravity=(1.0, 0.5, -9.81)
+    )
+    options = {**DEFAULTS, **EXACT, "steps": 4, "time_step": 2e-3, "integrator": integrator}
+
+    def loss(x):
+        move = ms.simulate(scene, values={scene.bodies[0]: {"rest_positions": x}}, damping=1e-3, **options)
+        moved = tensor(move.displacements)[-1]
+        return 1e3 * (WEIGHTS * moved).sum() + (WEIGHTS.flip(0) * tensor(move.velocities)[-2]).sum()
+
+    x = torch.tensor(MOVED, requires_grad=True)
+    loss(x).backward()
+    by = x.grad.numpy()
+    some = np.random.default_rng(5).standard_normal(by.shape)
+    for direction in (by / np.linalg.norm(by), some / np.linalg.norm(some)):
+        at = [float(loss(MOVED + k * 2e-5 * direction)) for k in (-2, -1, 1, 2)]
+        found = (at[0] - 8.0 * at[1] + 8.0 * at[2] - at[3]) / (12.0 * 2e-5)
+        assert found == pytest.approx((by * direction).sum(), rel=0, abs=1e-6 * np.linalg.norm(by))
+
+
+def test_terms_of_a_motion_without_a_derivative_by_rest_positions_are_named():
+    scene = ms.Scene(shell(), supports=[ms.Clamp(MESH.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    given = torch.tensor(MOVED, requires_grad=True)
+    values, steps = {scene.bodies[0]: {"rest_positions": given}}, {"steps": 1, "time_step": 1e-3}
+    with pytest.raises(ms.NoGradient, match="stiffness_damping yet"):
+        ms.simulate(scene, values=values, stiffness_damping=1e-3, **steps)
+    turned = ms.Scene(
+        shell(), supports=[ms.Clamp(MESH.edges_at(x=0.0), rotation=(0, 0.1, 0))], gravity=(0, 0, -9.81)
+    )
+    with pytest.raises(ms.NoGradient, match="supports that rotate yet"):
+        ms.simulate(turned, values={turned.bodies[0]: {"rest_positions": given}}, **steps)
+    wet = ms.Scene(shell(), supports=[ms.Clamp(MESH.edges_at(x=0.0))], water=ms.Water())
+    with pytest.raises(ms.NoGradient, match="water yet"):
+        ms.simulate(wet, values={wet.bodies[0]: {"rest_positions": given}}, **steps)
+
+
+def stretched(length):
+    return MESH.rest_positions * (length, 1.0, 1.0)
+
+
+def test_a_warm_start_follows_rest_positions_in_one_solve_each():
+    scene = everything()
+    warm = ms.WarmStart(scene, solver=EXACT["solver"])
+    for count, length in enumerate((1.0, 1.01, 1.02), start=1):
+        rest = warm(**DEFAULTS, values={scene.bodies[0]: {"rest_positions": stretched(length)}})
+        assert warm.solves == count
+    alone = solved(scene, stretched(1.02), **DEFAULTS)
+    assert rest.positions == pytest.approx(alone.positions, rel=0, abs=1e-10)
+    with pytest.raises(ValueError, match="must be given in every call of a WarmStart, or in none"):
+        warm(**DEFAULTS)
+
+
+def test_a_warm_start_refuses_a_buckling_that_rest_positions_bring():
+    """Check a strip between two ends that stay apart: longer at rest, it buckles."""
+    mesh = ms.meshes.rectangle(0.1, 0.01, cells=(20, 2))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e7, poisson_ratio=0.0)
+    ends = [ms.Clamp(mesh.edges_at(x=0.0)), ms.Clamp(mesh.edges_at(x=0.1), displacement=(0.0, 0, 0))]
+    scene = ms.Scene(sheet, supports=ends)
+    warm = ms.WarmStart(scene)
+
+    def call(longer):
+        inside = mesh.rest_positions * (1.0 + longer, 1.0, 1.0)
+        back = {"displacement": (-0.1 * longer, 0.0, 0.0)}
+        return warm(values={sheet: {"rest_positions": inside}, ends[1]: back})
+
+    call(1e-6)
+    call(1e-5)
+    with pytest.raises(ms.EquilibriumJumped):
+        call(3e-3)
+
+
 def test_rest_positions_that_degenerate_name_the_faces():
     scene = everything()
     flat, folded = MESH.rest_positions.copy(), MESH.rest_positions.copy()
@@ -220,8 +295,6 @@ def test_rest_positions_of_another_shape_or_kind_are_refused():
                 batch=2,
                 values={sheet: {"rest_positions": np.stack([MOVED, MOVED])}},
             )
-    with pytest.raises(ValueError, match="cannot be replaced in a WarmStart yet"):
-        ms.WarmStart(scene)(**DEFAULTS, values={sheet: {"rest_positions": MOVED}})
     with pytest.raises(ms.NoGradient, match=r"only ms.equilibrium and ms.simulate have one"):
         given = torch.tensor(MOVED, requires_grad=True)
         ms.linear_response(scene, **DEFAULTS, values={sheet: {"rest_positions": given}})

@@ -265,7 +265,6 @@ MAKERS = {
         solve=warm,
         fixed=EXACT,
         reach=REACH,
-        without=("rest_positions",),
     ),
     **{f"at rest on a {shape.__name__}": lambda shape=shape: resting_on(shape) for shape in UNDER},
     "at rest on a Plane, hinge": lambda: resting_on(ob.Plane, "hinge", face_samples=1),

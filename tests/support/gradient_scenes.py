@@ -41,7 +41,7 @@ class Kind:
     solve: (scene, start=None, **keywords) to what has positions; function: the one of magshell behind it. controls: by
     keyword, the inputs that belong to no object. fixed: other keywords. step: of differences, over the size of a
     value; reach: that size, where it is not the value's own. in_time: steps of the motion over which everything
-    varies_in_time somewhere that can, or 0. without: values that this solve does not take.
+    varies_in_time somewhere that can, or 0.
     """
 
     scene: ms.Scene
@@ -52,7 +52,6 @@ class Kind:
     step: float = 1e-4
     reach: dict[str, float] = field(default_factory=dict)
     in_time: int = 0
-    without: tuple[str, ...] = ()
 
     def found(self, given: dict[tuple, object], start=None):
         """Find the solution with these inputs, {(object or None, name): value}, in place of its own."""
@@ -80,8 +79,8 @@ class Kind:
 
     def _takes(self, owner, name: str) -> bool:
         """Return whether the solve takes this value, and has a gradient by it."""
-        if name != "rest_positions" or name in self.without:
-            return name not in self.without
+        if name != "rest_positions":
+            return True
         if self.function is ms.simulate:
             turning = any(
                 isinstance(each, ms.Pin | ms.Clamp) and each._move.rotation is not None

@@ -57,11 +57,24 @@ def starting_point(
 
 
 def state_in(scene: Scene, start: Equilibrium) -> np.ndarray:
-    """Return the state of an equilibrium in a scene that is the same but for rest positions."""
-    if start.scene is scene:
+    """Return the state of an equilibrium in a scene that is the same but for rest positions.
+
+    Each scene has a numbering of its own. Directions across held edges are carried over if both have as many.
+    """
+    theirs = start.scene
+    if theirs is scene:
         return start._state
-    theirs = start.scene._model
-    return scene._model.state(theirs.positions(start._state), theirs.edge_rotations(start._state))
+    at = theirs._model.positions(start._state), theirs._model.edge_rotations(start._state)
+    state = scene._model.state(*at)
+    if directions_of(theirs) == directions_of(scene):
+        state[directions_of(scene)] = start._state[directions_of(theirs)]
+    return state
+
+
+def directions_of(scene: Scene) -> slice:
+    """Return where the directions across held edges are among all unknowns of a scene."""
+    first = 3 * scene._bodies.n_points
+    return slice(first, first + 3 * len(scene._constraints.directions))
 
 
 def check_faces(scene: Scene, positions: np.ndarray, name: str = "start") -> None:

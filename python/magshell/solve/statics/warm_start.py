@@ -14,7 +14,7 @@ from ..._runtime.frozen import Frozen, remember
 from ..._runtime.keywords import CONTROLS, as_keywords
 from ...errors import EquilibriumJumped, Interrupted, NotConverged
 from ...model.scene.fine_faces import fine_faces, having_fine_faces
-from ...model.scene.reshaped import REST
+from ...model.scene.reshaped import REST, reshaped
 from ...model.scene.scene import Scene
 from ..options import MixedNewton, Newton
 from .cases import join, of_case, split, starts_of
@@ -22,7 +22,7 @@ from .designs import between, numbers_only, packed, unpacked
 from .equilibria import EquilibriumSet
 from .equilibrium import Equilibrium
 from .single_solve import Search, Solution, find, inputs_of
-from .start import Origin
+from .start import Origin, directions_of, state_in
 
 if TYPE_CHECKING:
     from ..._input.kinds import Starting
@@ -77,7 +77,6 @@ class WarmStart(Frozen):
     def __call__(self, **design: Any) -> Equilibrium | Any:
         """Find the equilibrium, or the equilibria, of a design, given by the arguments of ms.equilibrium."""
         design = as_keywords(self.scene, design, CONTROLS)
-        _refuse_rest_positions(design.get("values"))
         cases = split(design)
         self._check(cases)
         starts = starts_of(self._start, len(cases or [design]))
@@ -126,7 +125,9 @@ class WarmStart(Frozen):
         designs = [unpacked(self.scene, arguments) for arguments in state["designs"]]
         last = []
         for arguments, stored in zip(designs, state["states"], strict=True):
-            inputs = having_fine_faces(inputs_of(self.scene, arguments), stored["fine_faces"].numpy())
+            scene, values = reshaped(self.scene, arguments.get("values"))
+            inputs = inputs_of(scene, {**arguments, "values": values})
+            inputs = having_fine_faces(inputs, stored["fine_faces"].numpy())
             origin = Origin(stored["state"].numpy(), stored["angle_branches"], inputs)
             last.append(find(self.scene, arguments, origin, self._search, store_factor=True))
         remember(self, _last=last, _design=designs, _of_cases=state["of_cases"])
@@ -172,11 +173,14 @@ class WarmStart(Frozen):
         return find(self.scene, arguments, last.equilibrium, self._search, store_factor=True)
 
     def _continues(self, last: Solution, there: Solution) -> bool:
-        model = self.scene._model
-        with there.inputs.in_core():
-            expected = _core.first_order_change(model, last.found, there.inputs.controls)
-        expected = model.positions(expected)
-        moved = model.positions(there.found.state - last.found.state)
+        model, before = there.inputs.scene._model, last.inputs.scene._model
+        if model is before:
+            with there.inputs.in_core():
+                expected = _core.first_order_change(model, last.found, there.inputs.controls)
+            expected = model.positions(expected)
+        else:
+            expected = _first_order_change(last, there)
+        moved = model.positions(there.found.state) - before.positions(last.found.state)
         strayed, size = _largest(moved - expected), _largest(expected)
         return strayed <= max(_LARGEST_SECOND_ORDER * size, _NO_JUMP * self.scene._bodies.extent)
 
@@ -188,12 +192,29 @@ class WarmStart(Frozen):
             )
 
 
-def _refuse_rest_positions(values: Any) -> None:
-    """Raise ValueError for rest positions: an equilibrium of one rest shape is not compared with that of another yet."""
-    if isinstance(values, dict) and any(
-        isinstance(named, dict) and REST in named for named in values.values()
-    ):
-        raise ValueError(f"{REST} cannot be replaced in a WarmStart yet: use ms.equilibrium with start=")
+def _first_order_change(last: Solution, there: Solution) -> np.ndarray:
+    """Return the change of positions to first order, from an equilibrium to one with other rest positions, (n_v, 3) m.
+
+    Both scenes have their own numbering of unknowns, so that forces and motions go from one to the other by vertices and
+    edges.
+    """
+    theirs, ours = last.inputs.scene, there.inputs.scene
+    if (held := directions_of(ours)) != directions_of(theirs):
+        raise ValueError(f"{REST} must be given in every call of a WarmStart, or in none")
+    state, model = state_in(ours, last.equilibrium), ours._model
+    with there.inputs.in_core():
+        forces = _renumbered(ours, theirs, model.gradient(state, there.inputs.controls))
+        increment = model.driven_increment(state, there.inputs.controls)
+    moved = _renumbered(ours, theirs, increment)
+    moved[held] = increment[held]
+    with last.inputs.in_core():
+        return theirs._model.positions(_core.push_forward(theirs._model, last.found, forces, moved))
+
+
+def _renumbered(ours: Scene, theirs: Scene, vector: np.ndarray) -> np.ndarray:
+    """Return a vector of all unknowns in the numbering of another scene, zero for directions."""
+    at = ours._model.positions(vector), ours._model.edge_rotations(vector)
+    return theirs._model.state(*at) - theirs._model.state(*map(np.zeros_like, at))
 
 
 def _largest(displacements: np.ndarray) -> float:
