@@ -144,6 +144,7 @@ def run(
     time_step = arguments["time_step"]
     prepared = preparation(scene, arguments, options)
     asked = prepared(None)
+    scene = asked.inputs.scene  # with other rest positions than the given one, perhaps
     began = time.perf_counter()
     with asked.inputs.in_core():
         check_apart(scene, asked.start.state)
