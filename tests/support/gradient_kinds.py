@@ -260,11 +260,7 @@ MAKERS = {
     "at rest, load cases": load_cases,
     "at rest among magnets": among_magnets,
     "at rest, warm start": lambda: Kind(
-        everything(),
-        {**DEFAULTS, **FACTORS},
-        solve=warm,
-        fixed=EXACT,
-        reach=REACH,
+        everything(), {**DEFAULTS, **FACTORS}, solve=warm, fixed=EXACT, reach=REACH
     ),
     **{f"at rest on a {shape.__name__}": lambda shape=shape: resting_on(shape) for shape in UNDER},
     "at rest on a Plane, hinge": lambda: resting_on(ob.Plane, "hinge", face_samples=1),

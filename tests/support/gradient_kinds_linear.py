@@ -36,7 +36,9 @@ def as_tensor(values):
 
 def vibrating_sheet() -> Kind:
     """Build the sheet on which everything acts, vibrating about its equilibrium."""
-    return Kind(everything(), {**DEFAULTS, **FACTORS}, solve=frequencies, fixed=EXACT, reach=REACH)
+    return Kind(
+        everything(), {**DEFAULTS, **FACTORS}, solve=frequencies, fixed=EXACT, reach=REACH, of_linear=True
+    )
 
 
 def vibrating_solid() -> Kind:
@@ -51,14 +53,14 @@ def vibrating_solid() -> Kind:
     pin = ms.Pin(block.mesh.vertices_at(x=0.0))
     scene = ms.Scene(block, supports=[pin], field=ms.UniformField(), gravity=(0.2, 0.1, -9.81))
     controls = {"applied_flux_density": (2e-3, 1e-3, 2e-2), "gravity_factor": 0.9}
-    return Kind(scene, controls, solve=frequencies, fixed=EXACT, reach=REACH)
+    return Kind(scene, controls, solve=frequencies, fixed=EXACT, reach=REACH, of_linear=True)
 
 
 def vibrating_at_rest() -> Kind:
     """Build a sheet that vibrates about its rest shape, without loads."""
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
     scene = ms.Scene(sheet, supports=[ms.Clamp(MESH.edges_at(x=0.0))])
-    return Kind(scene, {}, solve=frequencies_at_rest, reach=REACH)
+    return Kind(scene, {}, solve=frequencies_at_rest, reach=REACH, of_linear=True)
 
 
 def numbers_of(given):
@@ -114,7 +116,7 @@ def buckling_column() -> Kind:
         "remanent_magnetization": (3e3, 1e3, 0),
         "applied_flux_density": (-1e-3, 3e-4, 0),
     }
-    return Kind(column(), controls, solve=buckling, reach=REACH)
+    return Kind(column(), controls, solve=buckling, reach=REACH, of_linear=True)
 
 
 def buckling_bent_column() -> Kind:
@@ -125,7 +127,7 @@ def buckling_bent_column() -> Kind:
         "applied_flux_density": (-1e-3, 3e-4, 0),
     }
     # Long steps: the change of the stiffness along the way is a difference, with round-off of its own.
-    return Kind(column(), controls, solve=buckling_about, fixed=EXACT, step=2e-3, reach=REACH)
+    return Kind(column(), controls, solve=buckling_about, fixed=EXACT, step=2e-3, reach=REACH, of_linear=True)
 
 
 def snap(scene, values, start=None, solver=None, **given):
@@ -179,7 +181,7 @@ def snapping_beam() -> Kind:
         **FACTORS,
     }
     reach = {**REACH, "displacement": 3e-4, "rotation": 0.01, "center": 1e-3}
-    return Kind(scene, controls, solve=snap, fixed=EXACT, reach=reach)
+    return Kind(scene, controls, solve=snap, fixed=EXACT, reach=reach, of_linear=True)
 
 
 LINEAR_MAKERS = {

@@ -41,7 +41,8 @@ class Kind:
     solve: (scene, start=None, **keywords) to what has positions; function: the one of magshell behind it. controls: by
     keyword, the inputs that belong to no object. fixed: other keywords. step: of differences, over the size of a
     value; reach: that size, where it is not the value's own. in_time: steps of the motion over which everything
-    varies_in_time somewhere that can, or 0.
+    varies_in_time somewhere that can, or 0. of_linear: whether it gives numbers of the stiffness, which have no gradient by
+    rest positions yet.
     """
 
     scene: ms.Scene
@@ -52,6 +53,7 @@ class Kind:
     step: float = 1e-4
     reach: dict[str, float] = field(default_factory=dict)
     in_time: int = 0
+    of_linear: bool = False
 
     def found(self, given: dict[tuple, object], start=None):
         """Find the solution with these inputs, {(object or None, name): value}, in place of its own."""
@@ -81,6 +83,8 @@ class Kind:
         """Return whether the solve takes this value, and has a gradient by it."""
         if name != "rest_positions":
             return True
+        if self.of_linear:
+            return False
         if self.function is ms.simulate:
             turning = any(
                 isinstance(each, ms.Pin | ms.Clamp) and each._move.rotation is not None
