@@ -23,6 +23,8 @@ NOT_CALLED = {
     "PrintableMinimum": "a result",
     "PrintableStage": "a result",
     "MultistartResult": "a result",
+    "Study": "a result",
+    "StudyRow": "a result",
     "MultistartFailed": "an error",
     "NoGradient": "an error",
     "NotConverged": "an error",
