@@ -26,7 +26,7 @@ def draw_lift(axes, result: dict) -> None:
         motion,
         states=frames,
         titles=[f"{motion.times[frame]:.2f} s" for frame in frames],
-        color=ms.Color([_which(result["gripper"])] * len(frames), label="sheet 0, ball 1"),
+        color=ms.Color([_which(result["gripper"])] * len(frames), names={0: "sheet", 1: "ball"}),
         obstacles=[],
         view=VIEW,
         columns=len(frames),

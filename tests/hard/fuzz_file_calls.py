@@ -69,7 +69,13 @@ def _meshes_and_pictures(s: Sample) -> Iterator[Call]:
     }
     yield Call("AdjointStorage", ms.AdjointStorage, {"what": "stages", "memory_budget": 1e6})
     yield Call("View", ms.View, {"elevation": 20.0, "azimuth": 30.0, "frame": [(0, 0, 0), (1, 1, 1)]})
-    color = {"values": np.zeros(n_f), "label": "u", "range": (0.0, 1.0), "scale": "diverging"}
+    color = {
+        "values": np.zeros(n_f),
+        "label": "u",
+        "range": (0.0, 1.0),
+        "scale": "diverging",
+        "names": {0: "low"},
+    }
     yield Call("Color", lambda **a: ms.plot(s.mesh, color=ms.Color(**a), style=painted), color, cost=30)
     shown = ("show_field", "rest", "mesh_lines")
     style = {"arrows": 3, **dict.fromkeys(shown, True), "contacts": False, "backend": "matplotlib"}

@@ -364,11 +364,21 @@ def test_plot_refuses_other_objects(what, message) -> None:
         ms.plot(what, style=ms.Style(backend="matplotlib"))
 
 
+@pytest.mark.parametrize(("ending", "beginning"), [("pdf", b"%PDF-"), ("svg", b"<?xml")])
+def test_vector_files_have_texts_and_the_same_bytes_again(mesh, tmp_path, ending, beginning) -> None:
+    heights = ms.Color(mesh.rest_positions[:, 0], label="length [m]")
+    picture = ms.plot(mesh, color=heights, titles="flat", width=400, style=ms.Style(backend="matplotlib"))
+    contents = [picture.save(tmp_path / f"{name}.{ending}").read_bytes() for name in "ab"]
+    assert contents[0].startswith(beginning) and contents[0] == contents[1]
+    if ending == "svg":
+        assert contents[0].count(b"<path") > mesh.n_faces  # each face is a polygon, not a pixel
+
+
 def test_a_picture_goes_to_a_png_in_a_folder_that_exists(mesh, tmp_path) -> None:
     picture = ms.plot(mesh, width=400, style=ms.Style(backend="matplotlib"))
     with pytest.raises(FileNotFoundError, match="there is no folder"):
         picture.save(tmp_path / "none" / "a.png")
-    with pytest.raises(ValueError, match=r"saved as \.png"):
+    with pytest.raises(ValueError, match=r"saved as \.png or \.pdf or \.svg"):
         picture.save(tmp_path / "a.jpg")
     with pytest.raises(RuntimeError, match="no display"):
         picture.show()

@@ -53,6 +53,7 @@ class Scalar:
     values: one array per state; NaN is drawn grey. limits: the ends of the scale, in the unit of the values.
     inside: the values on a section, one array per state: (n_t,) of the tetrahedra of all bodies if `of_tetrahedra`,
         otherwise (n_v,).
+    names: texts at values on the colour bar, instead of numbers, {value: text}.
     """
 
     label: str
@@ -61,6 +62,7 @@ class Scalar:
     scale: str = "sequential"
     inside: list[np.ndarray] | None = None
     of_tetrahedra: bool = False
+    names: tuple[tuple[float, str], ...] = ()
 
     def colors(self, state: int) -> np.ndarray:
         """Return the colours of the values in a state, (n, 3) from 0 to 1."""

@@ -28,6 +28,7 @@ SCALE_BAR = 0.85  # [inch] left end of the scale bar
 KEY, KEY_ROW = (0.38, 0.2)
 # [inch] widths of a colour bar; how far tick labels may reach beyond it
 NARROWEST, WIDEST, OVERHANG = (0.8, 2.4, 0.25)
+APART = 0.08  # [inch] distance between the names of values
 LINE = 0.15  # [inch] height of an additional line of the colour bar's text
 
 
@@ -85,12 +86,14 @@ def _arranged(drawing: Drawing, inches: float, inches_per_meter: float, scale: f
     bar, width, label = None, 0.0, ("", TEXT)
     if (scalar := drawing.scalar) is not None:
         asked = min(ruler.size(scalar.label, TEXT)[0], 0.45 * inches)
-        needed = max(NARROWEST + 2 * OVERHANG, asked)
+        named = sum(ruler.size(text, TEXT - 1)[0] + APART for _, text in scalar.names)
+        needed = max(NARROWEST + 2 * OVERHANG, asked, named)
         if end + SPACE + needed > inches - EDGE:
             rows.append(ROW)
             end = EDGE - SPACE
         room = inches - EDGE - end - SPACE
         width = max(min(WIDEST, 0.32 * inches, room - 2 * OVERHANG), min(NARROWEST, room - 2 * OVERHANG))
+        width = max(width, min(named, room - 2 * OVERHANG))
         bar = len(rows) - 1, end + SPACE
         label = ruler.fitted(scalar.label, TEXT, room, 4 * LINE)
         rows[-1] = max(rows[-1], ROW) + label[0].count("\n") * LINE
@@ -184,10 +187,17 @@ def _color_bar(writer: _Writer, scalar: Scalar, legend: Legend) -> None:
     extent = (left, right, 0.30, 0.42)
     writer.axes.imshow(shades[None], extent=extent, aspect="auto", interpolation="bilinear")
     writer.set_limits()
-    for tick, text in ticks_of(scalar, legend.width, writer.ruler):
-        x = left + (tick - low) / (high - low) * legend.width
+    ticks = ticks_of(scalar, legend.width, writer.ruler)
+    at = np.array([left + (tick - low) / (high - low) * legend.width for tick, _ in ticks])
+    widths = np.array([writer.ruler.size(text, TEXT - 1)[0] for _, text in ticks])
+    room = legend.width + 2 * OVERHANG
+    shrunk = min(1.0, room / (widths.sum() + APART * len(ticks))) if scalar.names else 1.0
+    places = (
+        side_by_side(at, shrunk * (widths + APART), left - OVERHANG, right + OVERHANG) if scalar.names else at
+    )
+    for x, place, (_, text) in zip(at, places, ticks, strict=True):
         writer.line([x, x], [0.27, 0.30], 0.7)
-        writer.text((x, 0.25), text, TEXT - 1, "center", "top")
+        writer.text((place, 0.25), text, shrunk * (TEXT - 1), "center", "top")
     text, points = legend.label
     half = 0.5 * writer.ruler.size(text, points)[0]
     middle = min((left + right) / 2, writer.width - EDGE - half)  # the text may be longer than the bar
@@ -197,11 +207,13 @@ def _color_bar(writer: _Writer, scalar: Scalar, legend: Legend) -> None:
 def ticks_of(scalar: Scalar, width: float, ruler: Ruler) -> list[tuple[float, str]]:
     """Choose the ticks of a colour bar of a given width [inches]: (number, text) each.
 
-    There are as many as do not overlap, and at least one.
+    There are as many as do not overlap, and at least one; or the names of values, if there are any.
     """
     from matplotlib.ticker import MaxNLocator
 
     low, high = scalar.limits
+    if scalar.names:
+        return [(value, text) for value, text in scalar.names if low <= value <= high]
     tried = [MaxNLocator(count).tick_values(low, high) for count in (4, 3, 2)]
     if scalar.scale == "cyclic" and (low, high) == (0.0, 360.0):
         tried = [np.array([0, 90, 180, 270, 360.0]), np.array([0, 180, 360.0])]
@@ -218,6 +230,23 @@ def ticks_of(scalar: Scalar, width: float, ruler: Ruler) -> list[tuple[float, st
             return list(zip(inside.tolist(), texts, strict=True))
     middle = 0.5 * (low + high)
     return [(middle, _written(np.array([middle]), high - low)[0])]
+
+
+def side_by_side(centers: np.ndarray, widths: np.ndarray, low: float, high: float) -> np.ndarray:
+    """Return the places of texts next to each other, moved as little as needed between two limits.
+
+    centers: ascending. The sum of the widths must be at most the distance of the limits.
+    """
+    places = np.array(centers, dtype=float)
+    least = low
+    for k, width in enumerate(widths):
+        places[k] = max(places[k], least + 0.5 * width)
+        least = places[k] + 0.5 * width
+    most = high
+    for k in range(len(places) - 1, -1, -1):
+        places[k] = min(places[k], most - 0.5 * widths[k])
+        most = places[k] - 0.5 * widths[k]
+    return places
 
 
 def _written(ticks: np.ndarray, extent: float) -> list[str]:

@@ -166,11 +166,17 @@ def _scalar(scalar: Scalar, chosen: list[int], dtype: str) -> dict[Any, Any]:
     """Encode a scalar, with one array if it is the same in all states, otherwise one per state."""
     values = scalar.values[:1] if _is_constant(scalar) else [scalar.values[k] for k in chosen]
     return {
-        "label": _plain(scalar.label),
+        "label": _plain(_label(scalar)),
         "limits": list(scalar.limits),
         "anchors": list(colors.SCALES[scalar.scale]),
         "values": [_packed(value, dtype) for value in values],
     }
+
+
+def _label(scalar: Scalar) -> str:
+    """Return the text of a colour bar, with the names of values in brackets."""
+    named = ", ".join(f"{value:g}: {text}" for value, text in scalar.names)
+    return f"{scalar.label} ({named})".strip() if named else scalar.label
 
 
 def _choose_states(count: int, numbers: int, size_limit: float) -> tuple[str, list[int]]:

@@ -30,6 +30,7 @@ DPI = 200
 MARGIN = 0.08  # [inch] margin of the picture
 # [inch] height of a line of a title, and the gap below it, which is part of the height
 TITLE, TITLE_GAP = (0.26, 0.055)
+FORMATS = (".png", ".pdf", ".svg")  # endings of the files of pictures
 TITLE_LINES = 3  # largest number of lines of a title
 FLATTEST, TALLEST = 0.16, 1.1  # [-] smallest and largest ratio of a panel's height to its width
 # [inch] distance of the points that represent what texts should not cover, and their largest number along a side of a face
@@ -49,17 +50,18 @@ class Picture(Frozen):
         self.backend = backend
 
     def save(self, path: FilePath, dpi: float | None = None) -> Path:
-        """Write a PNG file. dpi: dots per inch, by default those of the figure.
+        """Write a PNG, PDF or SVG file. dpi: dots per inch, by default those of the figure.
 
+        Texts, curves and what matplotlib painted are vectors in a PDF or SVG; bodies that pyvista painted are images in it.
         An existing file is replaced once the new one is complete. Raises ValueError for another ending or too many pixels,
         FileNotFoundError if the folder does not exist, and OSError if the file cannot be written.
         """
         path = Path(path)
-        if path.suffix.lower() != ".png":
-            raise ValueError(f"a picture is saved as .png, got {path.name!r}")
+        if path.suffix.lower() not in FORMATS:
+            raise ValueError(f"a picture is saved as {' or '.join(FORMATS)}, got {path.name!r}")
         if not path.parent.is_dir():
             raise FileNotFoundError(f"cannot save {path.name!r}: there is no folder {str(path.parent)!r}")
-        content = self._repr_png_(dpi)
+        content = self._written(path.suffix.lower()[1:], dpi)
         replace_file(path, lambda file: file.write(content))
         return path
 
@@ -81,10 +83,18 @@ class Picture(Frozen):
         pyplot.show()
 
     def _repr_png_(self, dpi: float | None = None) -> bytes:
+        return self._written("png", dpi)
+
+    def _written(self, kind: str, dpi: float | None) -> bytes:
+        """Return the contents of a file; the same picture gives the same bytes."""
+        from matplotlib import rc_context
+
         dpi = self.figure.dpi if dpi is None else positive("dpi", "", dpi)
         check_pixels(*(dpi * self.figure.get_size_inches()), "ask for fewer dots an inch (`dpi`)")
         buffer = io.BytesIO()
-        self.figure.savefig(buffer, format="png", dpi=dpi)
+        undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
+        with rc_context({"svg.hashsalt": "magshell", "pdf.fonttype": 42}):
+            self.figure.savefig(buffer, format=kind, dpi=dpi, metadata=undated)
         return buffer.getvalue()
 
     def __repr__(self) -> str:

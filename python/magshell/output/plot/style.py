@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -69,7 +71,7 @@ class Color:
     values: as `color` of ms.plot: a name, or numbers on faces or vertices. label: the text at the colour bar, with the unit.
     range: (low, high), in the unit of the values; by default the range of the values. scale: "sequential", "diverging"
     (symmetric about 0 unless `range` is given) or "cyclic"; by default the one that suits the name, "sequential" for
-    numbers.
+    numbers. names: texts for values, {0: "sheet", 1: "ball"}, which the colour bar shows instead of numbers.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -82,8 +84,10 @@ class Color:
     label: str | None = None
     range: Any = None
     scale: str | None = None
+    names: Any = None
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "names", _checked_names(self.names))
         if isinstance(self.values, np.ndarray):
             object.__setattr__(self, "values", self.values.copy())
         if not isinstance(self.label, str | None):
@@ -94,10 +98,24 @@ class Color:
             )
 
 
+def _checked_names(names: Any) -> tuple[tuple[float, str], ...]:
+    """Return the names of values in the order of the values. Raises ValueError unless it is {number: text}."""
+    pairs = {} if names is None else dict(names) if isinstance(names, Mapping | tuple) else None
+    numbers = pairs is not None and all(
+        isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+        for value in pairs
+    )
+    if pairs is None or not numbers or not all(isinstance(text, str) and text for text in pairs.values()):
+        raise ValueError(f"the names of a color must be {{value: text}}, got {names!r:.60}")
+    return tuple(sorted((float(value), text) for value, text in pairs.items()))
+
+
 def colored(states: list[State], color: Any, unit: LengthUnit, cut: bool = False) -> Scalar | None:
     """Return the scalar that a caller gives, as in `scalar_of` or as a Color."""
     asked = color if isinstance(color, Color) else Color(color)
     scalar = scalar_of(states, asked.values, asked.label, asked.range, unit, cut)
+    if scalar is not None and asked.names:
+        scalar = replace(scalar, names=asked.names)
     if scalar is None or asked.scale is None:
         return scalar
     bound = max(map(abs, scalar.limits))
