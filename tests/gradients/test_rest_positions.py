@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from adjoint_scenes import BENDINGS, DEFAULTS, MESH, N_V, everything, shell
+from gradient_kinds import kind
 
 import magshell as ms
 
@@ -210,6 +211,36 @@ def test_gradient_by_rest_positions_of_a_motion_agrees_with_differences(integrat
         assert found == pytest.approx((by * direction).sum(), rel=0, abs=1e-6 * np.linalg.norm(by))
 
 
+def test_gradient_of_a_motion_from_an_equilibrium_near_a_magnet_agrees_with_differences():
+    magnet = ms.CuboidMagnet(
+        (0.02, 0.02, 0.02), remanent_magnetization=(0.0, 3e3, 6e4), center=(0.05, 0.01, -0.03)
+    )
+    scene = ms.Scene(
+        shell(),
+        supports=[ms.Clamp(MESH.edges_at(x=0.0))],
+        loads=[ms.Pressure(2.0)],
+        field=magnet,
+        gravity=(1.0, 0.5, -9.81),
+    )
+    given = {"remanent_magnetization": DEFAULTS["remanent_magnetization"], **EXACT}
+
+    def loss(x):
+        values = {scene.bodies[0]: {"rest_positions": x}}
+        rest = ms.equilibrium(scene, values=values, field_factor=0.2, **given)
+        move = ms.simulate(
+            scene, values=values, start=rest, steps=3, time_step=2e-3, field_factor=0.3, damping=1e-3, **given
+        )
+        return 1e3 * (WEIGHTS * tensor(move.displacements)[-1]).sum()
+
+    x = torch.tensor(MOVED, requires_grad=True)
+    loss(x).backward()
+    by = x.grad.numpy()
+    direction = by / np.linalg.norm(by)
+    at = [float(loss(MOVED + k * 5e-6 * direction)) for k in (-2, -1, 1, 2)]
+    found = (at[0] - 8.0 * at[1] + 8.0 * at[2] - at[3]) / (12.0 * 5e-6)
+    assert found == pytest.approx((by * direction).sum(), rel=1e-6)
+
+
 def test_terms_of_a_motion_without_a_derivative_by_rest_positions_are_named():
     scene = ms.Scene(shell(), supports=[ms.Clamp(MESH.edges_at(x=0.0))], gravity=(0, 0, -9.81))
     given = torch.tensor(MOVED, requires_grad=True)
@@ -311,3 +342,22 @@ def test_terms_without_a_derivative_by_rest_positions_are_named_before_the_solve
     scene = ms.Scene([sheet, rigid], supports=[ms.Clamp(MESH.edges_at(x=0.0))])
     with pytest.raises(ValueError, match="rigid bodies yet"):
         ms.equilibrium(scene, values={sheet: {"rest_positions": MOVED}})
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "at rest, midedge",
+        "at rest, load cases",
+        "at rest, warm start",
+        "at rest among magnets",
+        "at rest on a MeshObstacle",
+        "a sheet under pressure at rest",
+        "two sheets at rest",
+        "onto a Plane",
+    ],
+)
+def test_kinds_of_scene_with_rest_positions_are_compared_with_differences(name):
+    """Check that test_every_gradient.py does not leave them out as kinds without that gradient."""
+    of = kind(name)
+    assert all((body, "rest_positions") in of.entries for body in of.scene.bodies)
