@@ -58,7 +58,7 @@ def test_failures_of_motions_and_solves_name_vertices_inside_a_magnet() -> None:
             scene,
             steps=20,
             time_step=1e-2,
-            values={magnet: {"center": lambda t: (0.035, 0.005, -0.03 + 0.2 * t)}},
+            values={magnet: {"center": lambda t: (0.035, 0.005, -0.03 + 0.4 * t)}},
             solver=few,
             progress=False,
             **magnetized,

@@ -107,6 +107,22 @@ def test_faces_far_from_a_magnet_sample_its_field_once(gap):
     assert not fine_faces(ms.equilibrium(plate_at_magnet(16, gap, young_modulus=1e9))._values).any()
 
 
+@pytest.mark.parametrize("moment", [(0, 0, 1), (1, 0, 0), (1, 1, 1)])
+@pytest.mark.parametrize("along", [(0, 0, 1), (1, 1, 0)])
+def test_no_face_beyond_eight_edges_from_a_dipole_samples_finely(moment, along):
+    """Check that the error at eight edges is not one that faces sample finely for."""
+    mesh = ms.meshes.rectangle(WIDTH, WIDTH, cells=(4, 4), diagonals="aligned")
+    direction = np.array(along) / np.linalg.norm(along)
+    nearest = (mesh.rest_positions @ direction).max() - WIDTH / 2 * direction[:2].sum()
+    center = np.array([WIDTH / 2, WIDTH / 2, 0.0]) + (nearest + 8 * mesh.edge_lengths.max()) * direction
+    sheet = ms.Shell(
+        mesh, thickness=THICKNESS, young_modulus=1e9, remanent_magnetization=np.array(moment) * 1e5
+    )
+    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.Dipoles([center], [moment]))
+    (found,) = sampling_errors(scene._values, mesh.rest_positions, 1.0, None)
+    assert found.error < 0.01
+
+
 def flap(young_modulus=2e7, **extra):
     """Return a scene of a flap 4 mm above a magnet, with a load on its tip of 1 N per unit load factor."""
     mesh = ms.meshes.rectangle(WIDTH, WIDTH / 2, cells=(8, 4))

@@ -75,6 +75,12 @@ class AppliedField(Owner):
         """
         return np.zeros(len(points), dtype=bool)
 
+    def _sphere_around_sources(self) -> tuple[np.ndarray, float] | None:
+        """Return the center (3,) m and the radius [m] of a sphere that holds all sources; None if it is not known where
+        they are.
+        """
+        return None
+
     def gradient(self, points: Numbers) -> np.ndarray:
         """Return dB_i/dx_j [T/m], (..., 3, 3) as [..., i, j], at points [m], (..., 3); NaN where the field has no
         value.
@@ -133,6 +139,10 @@ class Dipoles(AppliedField):
         if len(changed.positions) != len(self.positions):
             raise ValueError(f"there must be {len(self.positions)} dipoles, got {len(changed.positions)}")
         return changed
+
+    def _sphere_around_sources(self) -> tuple[np.ndarray, float]:
+        center = self.positions.mean(axis=0)
+        return center, float(np.linalg.norm(self.positions - center, axis=1).max())
 
     def __repr__(self) -> str:
         count = len(self.positions)

@@ -97,6 +97,9 @@ class CuboidMagnet(Magnet):
         self.dimensions: np.ndarray = all_positive("dimensions", "m", dimensions, (3,))
         super().__init__(remanent_magnetization, center, rotation)
 
+    def _sphere_around_sources(self) -> tuple[np.ndarray, float]:
+        return self.center, 0.5 * float(np.linalg.norm(self.dimensions))
+
     def _holds(self, points: np.ndarray) -> np.ndarray:
         return (np.abs(points) < 0.5 * self.dimensions).all(axis=1)
 
@@ -140,6 +143,9 @@ class CylinderMagnet(Magnet):
         self.radius: float = positive("radius", "m", radius)
         self.height: float = positive("height", "m", height)
         super().__init__(remanent_magnetization, center, rotation)
+
+    def _sphere_around_sources(self) -> tuple[np.ndarray, float]:
+        return self.center, float(np.hypot(self.radius, 0.5 * self.height))
 
     def _holds(self, points: np.ndarray) -> np.ndarray:
         within = np.linalg.norm(points[:, :2], axis=1) < self.radius

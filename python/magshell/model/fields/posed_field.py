@@ -76,6 +76,13 @@ class PlacedField(AppliedField):  # plain-words: ok
         to_own = scipy.spatial.transform.Rotation.from_rotvec(np.array(self.rotation)).inv()
         return self.field._in_magnets(to_own.apply(points - self.center))
 
+    def _sphere_around_sources(self) -> tuple[np.ndarray, float] | None:
+        own = self.field._sphere_around_sources()
+        if own is None:
+            return None
+        turned = scipy.spatial.transform.Rotation.from_rotvec(np.array(self.rotation)).apply(own[0])
+        return turned + self.center, own[1]
+
     def __repr__(self) -> str:
         parts = [repr(self.field)]
         if self.center.any():

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..fields.field import UniformField
 from .field_sampling import KEY, TRUSTED, SamplingError, is_suspect, sampling_errors
 
 if TYPE_CHECKING:
@@ -25,6 +26,10 @@ if TYPE_CHECKING:
 # [-] Largest part of a body's magnetic force that the sum of the errors of faces may be that sample once beside fine ones;
 # fixed by test_the_force_of_a_near_magnet_is_right_to_0_1_percent
 _LEFT = 0.0002
+# Distance d from sources, over the longest edge a, beyond which no estimate is made before a solve: the mean of a dipole's
+# force over a face is that at its barycenter to (a/d)^2 10/18, 0.9 % here; fixed by
+# test_no_face_beyond_eight_edges_from_a_dipole_samples_finely
+_FAR = 8.0
 
 
 def keeping_fine_faces(inputs: Inputs, before: Values) -> Inputs:
@@ -65,14 +70,19 @@ def with_fine_faces(
     if not _keys(scene._value_layout):
         return inputs
     if estimate is None:
+        if _is_far(inputs.values, state):
+            return inputs
         with inputs.in_core():
             estimate = scene._model.field_sampling_error(state, controls)
     if not is_suspect(estimate):
         return inputs
+    positions = scene._model.positions(state)
+    if any(field._in_magnets(positions).any() for field in map(inputs.values.current, scene.fields)):
+        return inputs  # the field has another formula inside of a magnet, and fine faces would not mend that
     layout = scene._control_layout
     errors = sampling_errors(
         inputs.values,
-        scene._model.positions(state),
+        positions,
         float(layout.of(controls, "scene", "field_factor")[0]),
         layout.of(controls, "scene", "applied_flux_density")[0],
     )
@@ -83,6 +93,25 @@ def with_fine_faces(
             numbers[each.label, KEY] = each.fine.astype(np.float64)
             numbers[each.label, KEY][more] = 1.0
     return _with(inputs, numbers)
+
+
+def _is_far(values: Values, state: np.ndarray) -> bool:
+    """Return whether all sources are known to be so far that one sample a face is enough."""
+    scene = values.scene
+    layout = scene._value_layout
+    thickness = max(float(layout.of(values.numbers, label, "thickness").max()) for label, _ in _keys(layout))
+    size = max(float(scene.mesh.edge_lengths.max()), thickness)
+    positions = scene._model.positions(state)
+    for field in map(values.current, scene.fields):
+        if isinstance(field, UniformField):
+            continue
+        sphere = field._sphere_around_sources()
+        if sphere is None:
+            return False
+        center, radius = sphere
+        if not np.linalg.norm(positions - center, axis=1).min() - radius > _FAR * size:
+            return False
+    return True
 
 
 def _faces_to_refine(found: SamplingError) -> np.ndarray:
