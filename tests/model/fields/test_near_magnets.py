@@ -102,6 +102,12 @@ def test_faces_that_need_it_sample_finely_from_the_start_and_results_keep_them()
     assert again.positions == pytest.approx(found.positions, abs=1e-12)
 
 
+def test_a_start_of_another_scene_is_refused_by_name_where_faces_sample_finely():
+    other = ms.equilibrium(plate_at_magnet(8, 0.2e-3, young_modulus=1e10))
+    with pytest.raises(ValueError, match="equilibrium of another scene"):
+        ms.equilibrium(plate_at_magnet(4, 0.2e-3, young_modulus=1e10), start=other)
+
+
 @pytest.mark.parametrize("gap", [4e-3, 0.1])
 def test_faces_far_from_a_magnet_sample_its_field_once(gap):
     assert not fine_faces(ms.equilibrium(plate_at_magnet(16, gap, young_modulus=1e9))._values).any()

@@ -33,12 +33,17 @@ _FAR = 8.0
 
 
 def keeping_fine_faces(inputs: Inputs, before: Values) -> Inputs:
-    """Return the inputs with the fine faces of the values of an earlier solve in addition to their own."""
-    layout = inputs.scene._value_layout
+    """Return the inputs with the fine faces of the values of an earlier solve in addition to their own.
+
+    The earlier solve may be one of another scene, whose bodies with as many faces count as the same.
+    """
+    layout, earlier = inputs.scene._value_layout, before.scene._value_layout
     numbers = {}
     for key in _keys(layout):
-        own, other = (layout.of(each.numbers, *key) for each in (inputs.values, before))
-        if np.any(other > own):
+        if key not in earlier:
+            continue
+        own, other = layout.of(inputs.values.numbers, *key), earlier.of(before.numbers, *key)
+        if own.shape == other.shape and np.any(other > own):
             numbers[key] = np.maximum(own, other)
     return _with(inputs, numbers)
 
