@@ -79,7 +79,7 @@ def shape_of(label: str, values: Any) -> tuple[int, ...]:
     if why := why_not(values):
         raise ValueError(f"{label} {why}")
     try:
-        return np.shape(values)
+        return np.shape(of_dlpack(label, values))
     except ValueError as error:  # a ragged list
         raise ValueError(f"{label} must be an array of real numbers: {error}") from None
 
@@ -97,9 +97,36 @@ def array_of(label: str, values: Any, wanted: str) -> np.ndarray:
     if np.ma.is_masked(values):
         raise ValueError(f"{label} has masked entries: fill them first")
     try:
-        return numbers_of(values) if is_tensor(values) else np.asarray(values)
+        return numbers_of(values) if is_tensor(values) else np.asarray(of_dlpack(label, values))
     except (TypeError, ValueError, RuntimeError) as error:  # ragged lists, tensors of unknown kinds
         raise ValueError(f"{label} must {wanted}: {error}") from None
+
+
+def of_dlpack(label: str, values: Any) -> Any:
+    """Return the array of another library that offers DLPack alone as an array without a copy, and anything else as it is.
+
+    Raises ValueError if it is not in the memory of the processor, or of a kind that numpy does not have.
+    """
+    if not hasattr(values, "__dlpack__") or isinstance(values, np.ndarray) or hasattr(values, "__array__"):
+        return values
+    try:
+        return np.from_dlpack(values)
+    except (BufferError, RuntimeError, TypeError, ValueError) as error:
+        raise ValueError(
+            f"{label} cannot be read by DLPack ({error}): move it to the processor's memory"
+        ) from None
+
+
+def arguments_of_dlpack(arguments: dict[str, Any]) -> dict[str, Any]:
+    """Return the keywords of a solve, `values` among them, with what `of_dlpack` makes of them."""
+    read = {name: of_dlpack(name, value) for name, value in arguments.items()}
+    values = read.get("values")
+    if isinstance(values, dict) and all(isinstance(named, dict) for named in values.values()):
+        read["values"] = {
+            owner: {name: of_dlpack(name, value) for name, value in named.items()}
+            for owner, named in values.items()
+        }
+    return read
 
 
 def fits(actual: tuple[int, ...], wanted: tuple[int | str, ...]) -> bool:

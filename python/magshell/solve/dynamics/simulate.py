@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ..._input.quantity import arguments_of_dlpack
 from ..._runtime.progress import SolveBar
 from ..._runtime.solve_keywords import given_to
 from ..._runtime.solver_entry_point import grouped, solve_entry
@@ -102,7 +103,7 @@ def simulate(
     >>> move.positions.shape, bool(move.positions[-1, :, 2].max() > 1e-4)
     ((21, 33, 3), True)
     """
-    arguments = given_to("simulate", locals())
+    arguments = arguments_of_dlpack(given_to("simulate", locals()))
     options = MotionOptions(steps, start, integrator, record_every, adjoint_storage, solver)
     if batch is not None:
         with SolveBar("simulate", progress) as bar:

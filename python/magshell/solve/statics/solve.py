@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..._input.quantity import arguments_of_dlpack
 from ..._runtime.progress import solve_progress
 from ..._runtime.solve_keywords import given_to
 from ..._runtime.solver_entry_point import grouped, solve_entry
@@ -97,7 +98,7 @@ def equilibrium(
     >>> rest.stable, bool(rest.positions[:, 2].max() > 0.01)
     (True, True)
     """
-    arguments = given_to("equilibrium", locals())
+    arguments = arguments_of_dlpack(given_to("equilibrium", locals()))
     with solve_progress("equilibrium", progress) as (advance, note):
         search = Search(
             MixedNewton() if solver is None else solver, require_stable, advance, ignore_velocity_forces, note
