@@ -24,6 +24,7 @@ suppress_warnings = ["myst.header"]
 html_theme = "furo"
 html_title = f"magshell {version}"
 html_copy_source = False
+html_scaled_image_link = False  # pictures lead to the pages of their examples
 html_static_path: list[str] = []
 html_theme_options = {"navigation_with_keys": True}
 
