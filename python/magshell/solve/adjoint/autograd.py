@@ -46,8 +46,9 @@ class Solved(torch.autograd.Function):
         found = iter(_Transposed.apply(ctx.products.by(wanted), *by_outputs))
         by_leaves = [next(found) if is_wanted else None for is_wanted in wanted]
         if torch.is_grad_enabled():  # create_graph=True
-            once = _Once.apply(*ctx.leaves)
-            by_leaves = [None if each is None else each + once.to(each) for each in by_leaves]
+            products = ctx.products.by(wanted)
+            zeros = iter(_ZeroWithCurvature.apply(products, len(by_outputs), *by_outputs, *ctx.leaves))
+            by_leaves = [None if each is None else each + next(zeros) for each in by_leaves]
         return None, None, None, *by_leaves
 
     @staticmethod
@@ -98,6 +99,29 @@ class _Products:
         return [
             torch.from_numpy(each).to(dtype=dtype) for each, dtype in zip(found, self._outputs, strict=True)
         ]
+
+    def zeros(self) -> list[torch.Tensor]:
+        """Return zeros in the shapes of the wanted leaves."""
+        shapes = zip(self._wanted, self._leaves, strict=True)
+        return [
+            torch.zeros(shape, dtype=dtype, device=device)
+            for is_wanted, (shape, dtype, device) in shapes
+            if is_wanted
+        ]
+
+    def curvature(
+        self, by_outputs: Sequence[torch.Tensor], along: Sequence[torch.Tensor]
+    ) -> list[torch.Tensor]:
+        """Return the change of the gradients by all leaves along changes of all leaves. Raises NoGradient without one."""
+        if not hasattr(self._adjoint, "curvature"):
+            raise NoGradient(_SECOND)
+        found = self._adjoint.curvature(*([_numbers(each) for each in of] for of in (by_outputs, along)))
+        like = zip(found, self._leaves, strict=True)
+        return [torch.from_numpy(each).to(dtype=dtype, device=device) for each, (_, dtype, device) in like]
+
+    def wanted_of(self, all_leaves: Sequence[torch.Tensor]) -> list[torch.Tensor]:
+        """Return those of tensors of all leaves that are wanted."""
+        return [each for each, is_wanted in zip(all_leaves, self._wanted, strict=True) if is_wanted]
 
     def all_along(self, given: Sequence[torch.Tensor]) -> list[torch.Tensor]:
         """Return tangents of all leaves from those of the wanted ones; zeros for the others."""
@@ -171,11 +195,77 @@ def _looped(function: Any, count: int, in_dims: tuple[Any, ...], inputs: tuple[A
     return stacked, (0,) * len(stacked)
 
 
-class _Once(torch.autograd.Function):
-    """A zero connected to the leaves, added to first derivatives, so that second derivatives raise NoGradient.
+class _ZeroWithCurvature(torch.autograd.Function):
+    """Zeros added to gradients by the wanted leaves, with the derivatives that these gradients have by all leaves.
 
-    First derivatives are linear in the derivatives by the results, or in tangents, and are differentiable by these. They
-    depend on the leaves as well, in a way that has no derivative here.
+    Gradients are linear in the derivatives by the results, and are differentiable by these otherwise. count: of results.
+    """
+
+    @staticmethod
+    def forward(products: _Products, count: int, *tensors: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        return tuple(products.zeros())
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: tuple[torch.Tensor, ...]) -> None:
+        ctx.products, ctx.count, *tensors = inputs
+        ctx.leaves = tensors[ctx.count :]
+        ctx.save_for_backward(*tensors[: ctx.count])
+        ctx.save_for_forward(*tensors[: ctx.count])
+
+    @staticmethod
+    def backward(ctx: Any, *motions: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
+        along = ctx.products.all_along(motions)
+        found = _Curvature.apply(ctx.products, ctx.count, *ctx.saved_tensors, *ctx.leaves, *along)
+        return (None, None, *(None for _ in range(ctx.count)), *found)
+
+    @staticmethod
+    def jvp(ctx: Any, *tangents: torch.Tensor | None) -> tuple[torch.Tensor, ...]:
+        leaves = zip(tangents[2 + ctx.count :], ctx.leaves, strict=True)
+        along = [torch.zeros_like(_primal(leaf)) if each is None else each for each, leaf in leaves]
+        given = map(_primal, (*ctx.saved_tensors, *ctx.leaves))
+        found = _Curvature.apply(ctx.products, ctx.count, *given, *along)
+        return tuple(ctx.products.wanted_of(found))
+
+    @staticmethod
+    def vmap(info: Any, in_dims: tuple[Any, ...], *inputs: Any) -> tuple[tuple[torch.Tensor, ...], Any]:
+        return _looped(_ZeroWithCurvature, info.batch_size, in_dims, inputs)
+
+
+class _Curvature(torch.autograd.Function):
+    """The changes of gradients by all leaves along changes of all leaves, at fixed derivatives by the results."""
+
+    @staticmethod
+    def forward(products: _Products, count: int, *tensors: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        along = tensors[
+            (count + len(tensors)) // 2 :
+        ]  # after the leaves, which only connect the result to themselves
+        return tuple(products.curvature(tensors[:count], along))
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: tuple[torch.Tensor, ...]) -> None:
+        pass
+
+    @staticmethod
+    def backward(ctx: Any, *_: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
+        raise NoGradient(_THIRD_OF_SOLVES)
+
+    @staticmethod
+    def jvp(ctx: Any, *_: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        raise NoGradient(_THIRD_OF_SOLVES)
+
+    @staticmethod
+    def vmap(info: Any, in_dims: tuple[Any, ...], *inputs: Any) -> tuple[tuple[torch.Tensor, ...], Any]:
+        return _looped(_Curvature, info.batch_size, in_dims, inputs)
+
+
+_THIRD_OF_SOLVES = "no third derivatives of a solve: take differences of the second ones"
+
+
+class _Once(torch.autograd.Function):
+    """A zero connected to the leaves, added to tangents, so that their derivatives by the leaves raise NoGradient.
+
+    Tangents are linear in those of the leaves, and are differentiable by these. They depend on the leaves as well, in a way
+    that has no derivative here.
     """
 
     @staticmethod
@@ -200,8 +290,9 @@ class _Once(torch.autograd.Function):
 
 
 _SECOND = (
-    "no second derivatives: a solve's gradient is exact, but it has none itself (create_graph=True, "
-    "torch.autograd.functional.hessian). Take differences of gradients: H v = (g(x + h v) - g(x - h v)) / 2h."
+    "no second derivatives of this solve, in this order: equilibria have those of gradients (create_graph=True, "
+    "torch.func.hessian), other solves and tangents have none. Take differences of gradients: "
+    "H v = (g(x + h v) - g(x - h v)) / 2h."
 )
 
 

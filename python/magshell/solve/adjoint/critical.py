@@ -23,8 +23,8 @@ from ...model.scene.values import Gradient
 from .critical_system import CriticalSystem, Located, forces_and_prescribed
 from .differences import directional_derivative
 from .energy import Unknowns
+from .leaf_gradient import by_leaf
 from .residual import Slopes
-from .static import by_leaf
 from .tangent import changed, steps_along
 
 if TYPE_CHECKING:

@@ -14,7 +14,8 @@ from ..._runtime.warning_stacklevel import callers_level
 from ...errors import NoGradient, StepErrorWarning
 from ...model.scene.values import Gradient
 from ..options import ProjectiveDynamics
-from .static import by_leaf, curvature_scales, requires_rest
+from .leaf_gradient import by_leaf
+from .static import curvature_scales, requires_rest
 
 if TYPE_CHECKING:
     from ...model.scene.scene import Scene

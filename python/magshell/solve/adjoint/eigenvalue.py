@@ -15,8 +15,8 @@ import numpy as np
 
 from ...errors import NoGradient
 from .factorized import Factorized
+from .leaf_gradient import by_leaf
 from .residual import Residual, Slopes
-from .static import by_leaf
 
 if TYPE_CHECKING:
     from ...model.scene.solve_inputs import Inputs, Leaf

@@ -14,7 +14,7 @@ from ...errors import NoGradient
 from ...model.scene.solve_inputs import Inputs
 from ...model.scene.values import Gradient
 from .differences import EIGHTH, SIXTH
-from .static import by_leaf
+from .leaf_gradient import by_leaf
 
 if TYPE_CHECKING:
     from ...model.scene.scene import Scene

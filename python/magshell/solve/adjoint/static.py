@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ... import _core
 from ...errors import NoGradient
 from ...model.scene.reshaped import REST
-from ...model.scene.rest_gradient import by_rest_positions
 from ...model.scene.solve_inputs import Inputs
 from ...model.scene.values import Gradient
+from .curvature import curvature
+from .leaf_gradient import by_leaf
 from .tangent import motor_tangent, state_tangent
-
-if TYPE_CHECKING:
-    from ...model.scene.solve_inputs import Leaf
 
 
 class Adjoint:
@@ -60,6 +57,16 @@ class Adjoint:
         driving = motor_tangent(inputs, found, along, change) if n_driven else np.zeros(0)
         return [np.ascontiguousarray(model.points(change)), model.edge_rotations(change), driving]
 
+    def curvature(self, by_outputs: list[np.ndarray], along: list[np.ndarray]) -> list[np.ndarray]:
+        """Compute the change of the gradients by all leaves along changes of these, at fixed derivatives by the results.
+
+        Raises NoGradient where there is none.
+        """
+        self._refuse()
+        if np.any(by_outputs[2]):
+            raise NoGradient("no second derivatives of the forces of motors")
+        return curvature(self._inputs, self._found, by_outputs, along)
+
     def _refuse(self) -> None:
         found = self._found
         if found.load_fraction < 1.0 or found.outcome != _core.Outcome.converged:
@@ -85,20 +92,3 @@ def requires_rest(inputs: Inputs, wanted: Sequence[bool]) -> bool:
     """Return whether one of the wanted leaves holds rest positions."""
     leaves = zip(inputs.leaves, wanted, strict=True)
     return any(asked and leaf.owner is not None and leaf.name == REST for leaf, asked in leaves)
-
-
-def by_leaf(inputs: Inputs, leaf: Leaf, gradient: Gradient) -> np.ndarray:
-    """Return the gradient by one leaf, in its shape, from the core's gradients. Raises NoGradient where it has none."""
-    if leaf.refusal:
-        raise NoGradient(f"no gradient by {leaf.name}: {leaf.refusal}")
-    if leaf.owner is None:
-        by_rows = np.asarray(gradient.own(leaf.name))
-    elif leaf.name == REST:
-        by_rows = by_rest_positions(inputs, leaf.owner, gradient)
-    elif hasattr(leaf.owner, "by_time_points"):
-        by_rows = np.asarray(leaf.owner.by_time_points(gradient))
-    else:
-        by_rows = np.asarray(inputs.values.gradients(leaf.owner, gradient)[leaf.name])
-    if by_rows.size == np.prod(leaf.shape, dtype=int):
-        return by_rows.reshape(leaf.shape)
-    return by_rows.sum(axis=0).reshape(leaf.shape)  # one value stands for all rows

@@ -86,7 +86,7 @@ def simulate(
     velocities and edge rotations come back as tensors, and gradients go back from them to every input that is
     continuous, time_step, damping, start (positions or an Equilibrium) and velocities among them. Where an input has
     none (a Trajectory as start; time_step where a function of the time leaves torch), they raise NoGradient; so do
-    second derivatives, as in ms.equilibrium.
+    second derivatives: (g(x + h v) - g(x - h v)) / 2h is the Hessian's product with v.
 
     They are exact where the motion is differentiable: through impact, stick and slip on smooth obstacles too. It is not
     where a point touches a kink of an obstacle (Trajectory.nonsmooth_vertices says where), where a little more

@@ -82,8 +82,12 @@ def equilibrium(
     be as rough as its residual says; ValueError on bad input. With torch tensors among the inputs, positions and edge
     rotations come back as tensors, and gradients go back from them to every input above but `start`. Each costs one
     back-substitution with the factorization at the solution, kept as long as the result is. Asked for where the solve did
-    not converge, or at an equilibrium that is not stable, they raise NoGradient. So do second derivatives: differences of
-    gradients are exact to some 1e-8, and (g(x + h v) - g(x - h v)) / 2h is the Hessian's product with v.
+    not converge, or at an equilibrium that is not stable, they raise NoGradient.
+
+    Second derivatives are those of gradients (create_graph=True, torch.func.hessian, torch.autograd.functional.hvp): a
+    product of a Hessian with a direction costs three back-substitutions and four or eight evaluations of the stiffness, and
+    is right to some 1e-8. They raise NoGradient with rigid bodies, own_field and pressures without potential, and after
+    forward mode. Third ones do too.
 
     Tangents (forward mode) along a change of the inputs cost one back-substitution too, and four or eight evaluations of
     forces: by torch.autograd.forward_ad, torch.func.jvp and jacfwd. torch.func.grad, vjp, jacrev and functional_call work as

@@ -1,0 +1,141 @@
+"""Second derivatives of functions of an equilibrium, times a direction. Works on arrays; autograd.py has the tensors.
+
+For a function y . q of the state q that is an equilibrium for the inputs k, with fixed weights y, the gradient is
+mu . dg/dk with K mu = -y. Along a direction of k, q changes by dq (a tangent), and the gradient by
+
+    mu . d(dg/dk) + dmu . dg/dk,      K dmu = -(dK) mu
+
+where d( ) is the change of both along the direction, with dq. It is a difference of (K mu, mu . dg/dk) at a fixed mu.
+"""
+
+from __future__ import annotations
+
+import copy
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ... import _core
+from ..._input.tensors import detached
+from ...errors import NoGradient
+from ...model.scene.reshaped import REST
+from ...model.scene.values import Gradient, Values
+from .differences import ROUNDING, directional_derivative
+from .energy import Unknowns
+from .leaf_gradient import by_leaf
+from .residual import Residual
+from .tangent import state_tangent, steps_along
+
+if TYPE_CHECKING:
+    from ...model.scene.solve_inputs import Inputs
+
+# The first step moves a vertex by this fraction (1) of the shortest edge at most, or changes an input by as much of its
+# value; and the fractions (1) of it that are tried. Tested by test_hessians_agree_with_differences_of_gradients.
+_STEP, _SHORTER = 1 / 64, (1.0, 0.25, 0.1, 1e-2, 1e-3)
+
+
+def curvature(
+    inputs: Inputs, found: _core.StaticsResult, by_outputs: list[np.ndarray], along: list[np.ndarray]
+) -> list[np.ndarray]:
+    """Return the change of the gradient by each leaf along changes of all leaves, at fixed derivatives by the results.
+
+    Raises NoGradient where there is none.
+    """
+    scene, model = inputs.scene, inputs.scene._model
+    if scene.own_field is not None:
+        raise NoGradient("no second derivatives with own_field: its stiffness is not a sparse matrix")
+    if scene.rigid_parts:
+        raise NoGradient("no second derivatives in scenes with rigid bodies or skeletons")
+    if any(leaf.name == REST and leaf.owner is not None for leaf in inputs.leaves):
+        raise NoGradient(f"no second derivatives with {REST} among the inputs: detach them")
+    if not any(np.any(each) for each in along) or not any(np.any(each) for each in by_outputs):
+        return [np.zeros(leaf.shape) for leaf in inputs.leaves]
+    weights = Unknowns("equilibrium", scene).gathered.T @ np.concatenate(
+        [by_outputs[0].ravel(), by_outputs[1]]
+    )
+    motion = state_tangent(inputs, found, along)
+    nothing = np.zeros(model.size)
+    with inputs.in_core():
+        Residual(
+            inputs, found.state, found.turns, inputs.controls
+        ).hessian()  # refuses one that is not symmetric
+        multiplier = _core.push_forward(model, found, weights, nothing)
+
+    def at(step: float, multiplier: np.ndarray, weights: np.ndarray) -> list[np.ndarray]:
+        there = _moved(inputs, [step * each for each in along])
+        with there.in_core():
+            residual = Residual(there, found.state + step * motion, found.turns, there.controls)
+            slopes = residual.slopes(multiplier)
+            through = residual.prescribed(slopes.by_state + weights)
+        gradient = Gradient(scene, slopes.by_values + through[0], slopes.by_controls + through[1])
+        return [slopes.by_state, *(by_leaf(there, leaf, gradient).ravel() for leaf in inputs.leaves)]
+
+    parts = at(0.0, multiplier, weights)
+    rates = directional_derivative(
+        lambda step: _rows(at(step, multiplier, weights)),
+        _steps(inputs, motion, along),
+        ROUNDING,
+        _sizes(inputs),
+    )
+    if rates is None:
+        raise NoGradient(
+            "no second derivatives here: the forces are not smooth in the inputs, or one is at the end of its range"
+        )
+    with inputs.in_core():
+        change = _core.push_forward(model, found, rates[0][: model.size], nothing)
+    others = at(0.0, change, nothing)
+    return [
+        (rates[k][: parts[k].size] + others[k]).reshape(leaf.shape)
+        for k, leaf in enumerate(inputs.leaves, start=1)
+    ]
+
+
+def _rows(parts: list[np.ndarray]) -> np.ndarray:
+    """Return vectors of different lengths as rows of one array, filled up with zeros."""
+    rows = np.zeros((len(parts), max(part.size for part in parts)))
+    for row, part in zip(rows, parts, strict=True):
+        row[: part.size] = part
+    return rows
+
+
+def _moved(inputs: Inputs, changes: list[np.ndarray]) -> Inputs:
+    """Return the inputs after changes of all leaves. Raises ValueError beyond the range of a value."""
+    scene, replaced = inputs.scene, {owner: dict(named) for owner, named in inputs.values.replaced.items()}
+    magnetization, controls = inputs.magnetization, inputs.controls
+    for leaf, change in zip(inputs.leaves, changes, strict=True):
+        if leaf.owner is not None:
+            before = np.asarray(replaced[leaf.owner][leaf.name], dtype=np.float64)
+            replaced[leaf.owner][leaf.name] = before + np.broadcast_to(change, before.shape)
+        elif leaf.name == "remanent_magnetization":
+            magnetization = magnetization + np.broadcast_to(change, magnetization.shape)
+        else:
+            layout, key = scene._control_layout, ("scene", leaf.name)
+            controls = layout.packed({key: layout.of(controls, *key)[0] + change}, controls)
+    there = copy.copy(inputs)
+    there.values = (
+        Values(scene, replaced, magnetization) if replaced or magnetization is not None else inputs.values
+    )
+    there.controls = controls
+    return there
+
+
+def _steps(inputs: Inputs, motion: np.ndarray, along: list[np.ndarray]) -> list[float]:
+    """Return the steps that are tried one after another."""
+    scene = inputs.scene
+    moved = np.abs(scene._model.positions(motion)).max(initial=0.0) / scene.mesh.edge_lengths.min(
+        initial=np.inf
+    )
+    rotated = np.abs(scene._model.edge_rotations(motion)).max(initial=0.0)
+    first = [_STEP / size for size in (moved, rotated) if size > 0.0]
+    for leaf, change in zip(inputs.leaves, along, strict=True):
+        if np.any(change):
+            first.append(steps_along(inputs, leaf, change)[0])
+    return [min(first) * shorter for shorter in _SHORTER]
+
+
+def _sizes(inputs: Inputs) -> np.ndarray:
+    """Return the sizes of the rows of derivatives: the shortest edge, and the largest number of each leaf."""
+    edge = inputs.scene.mesh.edge_lengths.min(initial=np.inf)
+    numbers = (np.asarray(detached(leaf.tensor)) for leaf in inputs.leaves)
+    sizes = [edge, *(np.abs(each).max(initial=0.0) for each in numbers)]
+    return np.where(np.isfinite(sizes), sizes, 0.0)

@@ -1,0 +1,95 @@
+"""Second derivatives of equilibria: Hessian-vector products against differences of gradients, in every kind of scene."""
+
+import numpy as np
+import pytest
+from gradient_kinds import MAKERS, kind
+from gradient_kinds_linear import LINEAR_MAKERS
+from gradient_scenes import admissible, label
+from test_tangents import is_geometry, results_of
+
+import magshell as ms
+
+torch = pytest.importorskip("torch")
+
+
+def has_hessian(name):
+    made = kind(name)
+    return (
+        made.function is ms.equilibrium
+        and name not in LINEAR_MAKERS
+        and not made.scene.rigid_parts
+        and made.scene.own_field is None
+    )
+
+
+WITHOUT_POTENTIAL = (
+    "a solid under pressure at rest",
+    "a sheet under pressure at rest",
+    "a six-node sheet at rest",
+)
+KINDS = [name for name in MAKERS if has_hessian(name) and name not in WITHOUT_POTENTIAL]
+PRECISION = 1e-5
+
+
+def inputs_of(name):
+    together = kind(name).together
+    return {
+        key: value for key, value in together.items() if not is_geometry(key) and key[1] != "rest_positions"
+    }
+
+
+def directions(name, given, rng):
+    made = kind(name)
+    return {
+        key: made.reach.get(key[1], np.abs(value).max(initial=0.0) or 1.0)
+        * admissible(key, rng.standard_normal(value.shape))
+        for key, value in given.items()
+    }
+
+
+def gradient(name, given, weights, start, differentiable=False):
+    """Return the gradient of a loss that is linear in all results, with its inputs."""
+    tensors = {key: torch.tensor(value, requires_grad=True) for key, value in given.items()}
+    results = [each for each in results_of(kind(name).found(tensors, start)) if each.requires_grad]
+    loss = sum((w * each).sum() for w, each in zip(weights, results, strict=False))
+    inputs = list(tensors.values())
+    return inputs, torch.autograd.grad(loss, inputs, create_graph=differentiable)
+
+
+@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.filterwarnings("ignore::magshell.FieldSamplingWarning")
+def test_hessians_agree_with_differences_of_gradients(name):
+    rng = np.random.default_rng(len(name))
+    start = kind(name).found({})
+    start = start if isinstance(start, ms.Equilibrium | ms.EquilibriumSet) else None
+    given = inputs_of(name)
+    shapes = [each.shape for each in results_of(kind(name).found(given, start))]
+    weights = [torch.as_tensor(rng.standard_normal(shape)) for shape in shapes]
+    along, across = directions(name, given, rng), directions(name, given, rng)
+    inputs, first = gradient(name, given, weights, start, differentiable=True)
+    motion = [torch.as_tensor(np.asarray(each)) for each in along.values()]
+    products = torch.autograd.grad(first, inputs, motion)
+    sides = [torch.as_tensor(np.asarray(each)) for each in across.values()]
+    found = sum(float((p * s).sum()) for p, s in zip(products, sides, strict=True))
+    size = sum(float(p.norm() * s.norm()) for p, s in zip(products, sides, strict=True))
+    slopes = []
+    for step in (kind(name).step, 0.5 * kind(name).step):
+        ends = []
+        for sign in (1, -1):
+            moved = {key: value + sign * step * along[key] for key, value in given.items()}
+            _, by = gradient(name, moved, weights, start)
+            ends.append(sum(float((g * s).sum()) for g, s in zip(by, sides, strict=True)))
+        slopes.append((ends[0] - ends[1]) / (2.0 * step))
+    wanted = (4.0 * slopes[1] - slopes[0]) / 3.0
+    told = ", ".join(label(kind(name), key) for key in given)
+    assert found == pytest.approx(wanted, rel=0.0, abs=PRECISION * size), told
+
+
+@pytest.mark.parametrize("name", WITHOUT_POTENTIAL)
+def test_pressures_without_potential_refuse_hessians(name):
+    given = inputs_of(name)
+    shapes = [each.shape for each in results_of(kind(name).found(given))]
+    weights = [torch.ones(shape, dtype=torch.float64) for shape in shapes]
+    inputs, first = gradient(name, given, weights, None, differentiable=True)
+    with pytest.raises(ms.NoGradient, match="no potential"):
+        torch.autograd.grad(first, inputs, [torch.ones_like(each) for each in inputs])
