@@ -33,9 +33,7 @@ PRECISION = 1e-5
 
 def inputs_of(name):
     together = kind(name).together
-    return {
-        key: value for key, value in together.items() if not is_geometry(key) and key[1] != "rest_positions"
-    }
+    return {key: value for key, value in together.items() if not is_geometry(key)}
 
 
 def directions(name, given, rng):

@@ -23,7 +23,9 @@ def by_leaf(inputs: Inputs, leaf: Leaf, gradient: Gradient) -> np.ndarray:
         by_rows = np.asarray(gradient.own(leaf.name))
     elif leaf.name == REST:
         if gradient.rest is None:
-            raise NoGradient(f"no gradient by {REST} of this result: positions of ms.equilibrium and ms.simulate have one")
+            raise NoGradient(
+                f"no gradient by {REST} of this result: positions of ms.equilibrium and ms.simulate have one"
+            )
         by_rows = by_rest_positions(inputs, leaf.owner, gradient)
     elif hasattr(leaf.owner, "by_time_points"):
         by_rows = np.asarray(leaf.owner.by_time_points(gradient))
