@@ -252,9 +252,20 @@ def test_terms_of_a_motion_without_a_derivative_by_rest_positions_are_named():
     )
     with pytest.raises(ms.NoGradient, match="supports that rotate yet"):
         ms.simulate(turned, values={turned.bodies[0]: {"rest_positions": given}}, **steps)
-    wet = ms.Scene(shell(), supports=[ms.Clamp(MESH.edges_at(x=0.0))], water=ms.Water())
-    with pytest.raises(ms.NoGradient, match="water yet"):
-        ms.simulate(wet, values={wet.bodies[0]: {"rest_positions": given}}, **steps)
+
+
+def test_friction_needs_a_sticking_speed_of_its_own_for_a_gradient_by_rest_positions():
+    plane = ms.obstacles.Plane((0, 0, 1), center=(0, 0, -0.01))
+    given = torch.tensor(MOVED, requires_grad=True)
+    for speed in (None, 1e-3):
+        rough = ms.Contact(plane, contact_stiffness=50.0, friction_coefficient=0.4, sticking_speed=speed)
+        scene = ms.Scene(shell(), contacts=[rough], gravity=(0, 0, -9.81), allow_rigid_motions=True)
+        move = {"values": {scene.bodies[0]: {"rest_positions": given}}, "steps": 1, "time_step": 1e-3}
+        if speed is None:
+            with pytest.raises(ms.NoGradient, match="friction without a sticking_speed of its own yet"):
+                ms.simulate(scene, **move)
+        else:
+            assert ms.simulate(scene, **move).positions.requires_grad
 
 
 def stretched(length):
@@ -355,6 +366,8 @@ def test_terms_without_a_derivative_by_rest_positions_are_named_before_the_solve
         "a sheet under pressure at rest",
         "two sheets at rest",
         "onto a Plane",
+        "onto a Sphere, its law given",
+        "through water",
     ],
 )
 def test_kinds_of_scene_with_rest_positions_are_compared_with_differences(name):

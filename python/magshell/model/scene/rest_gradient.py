@@ -34,8 +34,11 @@ class AtNodes(NamedTuple):
 def without_rest_gradient(scene: Scene, bodies: Any) -> list[str]:
     """Return words for everything in a scene that has no derivative by the rest positions of these bodies."""
     found = [f"{type(load).__name__}" for load in scene.loads if not isinstance(load, _LOADS)]
-    found += ["water"] * (scene.water is not None)
-    found += ["friction"] * any(contact.friction_coefficient is not None for contact in scene.contacts)
+    rubbing = [contact for contact in scene.contacts if contact.friction_coefficient is not None]
+    if any(
+        contact.sticking_speed is None for contact in rubbing
+    ):  # by default in proportion to the width of the mesh
+        found.append("friction without a sticking_speed of its own")
     if any(not isinstance(body.mesh, TriangleMesh) for body in scene.bodies):
         found.append("bodies that are no shells of three-node faces")
     for body in bodies:
