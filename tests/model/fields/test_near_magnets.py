@@ -221,6 +221,21 @@ def test_a_motion_takes_fine_faces_where_the_magnet_comes_near():
     assert 0 < fine.sum()
 
 
+def test_a_motion_goes_on_with_the_same_fine_faces_from_a_file_too(tmp_path):
+    scene = plate_at_magnet(6, 1e-3, young_modulus=1e7)
+    go = {"time_step": 1e-4, "progress": False}
+    whole = ms.simulate(scene, steps=4, **go)
+    first = ms.simulate(scene, steps=2, **go)
+    assert first.end.fine_faces.any()
+    first.end.save(tmp_path / "end.npz")
+    again = ms.simulate(scene, steps=2, start=ms.MotionState.load(tmp_path / "end.npz"), **go)
+    np.testing.assert_array_equal(again.positions[-1], whole.positions[-1])
+    other = plate_at_magnet(6, 1e-3, young_modulus=1e7)
+    wrong = ms.MotionState(0.0, first.end.state, first.end.velocity, fine_faces=np.ones(3))
+    with pytest.raises(ValueError, match="fine_faces"):
+        ms.simulate(other, steps=2, start=wrong, **go)
+
+
 def test_a_motion_that_comes_near_a_magnet_warns():
     scene = flap(young_modulus=1e4)
     down = np.zeros((scene.mesh.n_vertices, 3))

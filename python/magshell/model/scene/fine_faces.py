@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..._input.quantity import quantity
 from ..fields.field import UniformField
 from .field_sampling import KEY, TRUSTED, SamplingError, is_suspect, sampling_errors
 
@@ -55,8 +56,12 @@ def fine_faces(values: Values) -> np.ndarray:
 
 
 def having_fine_faces(inputs: Inputs, numbers: np.ndarray) -> Inputs:
-    """Return the inputs with the fine faces that fine_faces() returned for an equal scene."""
+    """Return the inputs with the fine faces that fine_faces() returned for an equal scene. Raises ValueError if they do not
+    fit this one.
+    """
     layout, first, found = inputs.scene._value_layout, 0, {}
+    n_faces = len(fine_faces(inputs.values))
+    numbers = quantity("fine_faces", "1", numbers, (n_faces,))
     for key in _keys(layout):
         count = len(layout.of(inputs.values.numbers, *key))
         found[key] = numbers[first : first + count]

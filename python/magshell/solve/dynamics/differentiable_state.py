@@ -50,10 +50,22 @@ class DifferentiableState:
             )
         rows = [each[index] for each in (motion.positions, motion.velocities, motion.edge_rotations)]
         if index == -1:
-            state = MotionState(end.time, end.state, end.velocity, end.angle_branches, clock=end.clock)
+            state = MotionState(
+                end.time,
+                end.state,
+                end.velocity,
+                end.angle_branches,
+                clock=end.clock,
+                fine_faces=end.fine_faces,
+            )
         else:
             model, (x, v, rotations) = scene._model, map(detached, rows)
-            state = MotionState(float(motion.times[0]), model.state(x, rotations), model.full_vector(v))
+            state = MotionState(
+                float(motion.times[0]),
+                model.state(x, rotations),
+                model.full_vector(v),
+                fine_faces=end.fine_faces,
+            )
         tensors = [torch.as_tensor(np.array(each) if isinstance(each, np.ndarray) else each) for each in rows]
         tensors = [each.to(torch.float64) for each in tensors]
         if requires_grad:

@@ -17,7 +17,7 @@ from ...model.contact.contacts_to_core import check_outside, poses
 from ...model.contact.watched_obstacles import watched_obstacles
 from ...model.fields.field import AppliedField
 from ...model.rigid.equimomental_points import check_joints, check_rigid, own_velocities
-from ...model.scene.fine_faces import keeping_fine_faces, with_fine_faces
+from ...model.scene.fine_faces import having_fine_faces, keeping_fine_faces, with_fine_faces
 from ...model.scene.plausible import warn_of_field
 from ...model.scene.solve_inputs import Inputs
 from ..options import Adaptive, Clock, Integrator, Newton, clock_of
@@ -149,10 +149,12 @@ class MotionInputs:
         """Return the inputs with the faces that sample the field finely during the motion.
 
         They are those that need it in its first state, with the sources where they are then and at some later times, and
-        those of `start`.
+        those of an equilibrium at the start. A motion that goes on from another one has the same.
         """
         inputs, scheduled = self.inputs, self._scheduled.varied
-        if isinstance(start, Equilibrium | Trajectory):
+        if len(self.start.fine_faces):
+            return having_fine_faces(inputs, self.start.fine_faces)
+        if isinstance(start, Equilibrium):
             inputs = keeping_fine_faces(inputs, start._values)
         moving = {each: rows for each, rows in scheduled.items() if isinstance(each[0], AppliedField)}
         factors = np.abs(np.asarray(detached(self._load_parameters["field_factor"]), dtype=np.float64))
@@ -323,6 +325,7 @@ class MotionInputs:
             maxwell_strains=origin.maxwell_strains,
             clock=origin.clock,
             rotations_known=origin.rotations_known,
+            fine_faces=origin.fine_faces,
         )
 
     def _origin(self, start) -> MotionState:

@@ -17,6 +17,7 @@ from ...errors import Interrupted, NotConverged
 from ...model.contact.contacts_to_core import check_apart
 from ...model.fields.magnet_overlap import describe_magnet_overlap
 from ...model.scene.field_sampling import warn_of_sampling
+from ...model.scene.fine_faces import fine_faces
 from ...model.scene.replacements import requested
 from ...model.scene.reshaped import reshaped
 from ...model.scene.scene import Scene
@@ -293,6 +294,7 @@ def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
             ended,
             found.begun or asked.start.rotations_known,
             found.last_contact_acceleration,
+            fine_faces(values),
         ),
         iterations=found.iterations,
         factorizations=found.factorizations,

@@ -53,7 +53,8 @@ class MotionState:
     dihedral and joint angles. strain_rates, maxwell_strains, maxwell_strain_rates: of faces.
     Arrays that the motion did not need are empty: accelerations and strain rates are those of TRBDF2, Maxwell strains those
     of a Maxwell branch. contact_acceleration: the share of contact and friction, which `acceleration` does not contain; only
-    with TRBDF2(implicit_contact=True).
+    with TRBDF2(implicit_contact=True). fine_faces: 1 for each magnetized face that samples the applied field finely, else 0;
+    where it is empty, the next motion decides anew.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -75,6 +76,7 @@ class MotionState:
     clock: Clock | None = field(repr=False, default=None)
     rotations_known: bool = field(repr=False, default=True)
     contact_acceleration: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
+    fine_faces: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
 
     def save(self, path: str | Path) -> None:
         """Write the state to an .npz file."""
@@ -100,7 +102,7 @@ class MotionState:
                 remembered = quantity("angle_branches", "SI", file["angle_branches"], ("n",))
                 lengths = index_array("branch_lengths", file["branch_lengths"])
                 known = bool(file["rotations_known"])
-                # Files of earlier versions have no contact_acceleration.
+                # Files of earlier versions have no contact_acceleration and no fine_faces.
                 arrays = {name: file[name] for name in _ARRAYS if name in file or name in _REQUIRED}
             clock = Clock(origin, time_step, int(steps))
             parts = np.split(remembered, np.cumsum(lengths)[:-1]) if len(lengths) else []
@@ -116,7 +118,7 @@ class MotionState:
 
 
 _REQUIRED = ("state", "velocity", "acceleration", "strain_rates", "maxwell_strains", "maxwell_strain_rates")
-_ARRAYS = (*_REQUIRED, "contact_acceleration")
+_ARRAYS = (*_REQUIRED, "contact_acceleration", "fine_faces")
 
 
 @immutable
