@@ -22,13 +22,16 @@ def has_hessian(name):
     )
 
 
-WITHOUT_POTENTIAL = (
+REFUSED = (
+    "bodies near magnets at rest",
     "a solid under pressure at rest",
     "a sheet under pressure at rest",
     "a six-node sheet at rest",
 )
-KINDS = [name for name in MAKERS if has_hessian(name) and name not in WITHOUT_POTENTIAL]
-PRECISION = 1e-5
+KINDS = [name for name in MAKERS if has_hessian(name) and name not in REFUSED]
+PRECISION = {
+    "at rest on a MeshObstacle": 1e-3
+}  # [-] whose distances are sampled: third derivatives jump; else 1e-5
 
 
 def inputs_of(name):
@@ -80,14 +83,14 @@ def test_hessians_agree_with_differences_of_gradients(name):
         slopes.append((ends[0] - ends[1]) / (2.0 * step))
     wanted = (4.0 * slopes[1] - slopes[0]) / 3.0
     told = ", ".join(label(kind(name), key) for key in given)
-    assert found == pytest.approx(wanted, rel=0.0, abs=PRECISION * size), told
+    assert found == pytest.approx(wanted, rel=0.0, abs=PRECISION.get(name, 1e-5) * size), told
 
 
-@pytest.mark.parametrize("name", WITHOUT_POTENTIAL)
-def test_pressures_without_potential_refuse_hessians(name):
+@pytest.mark.parametrize("name", REFUSED)
+def test_pressures_without_potential_and_near_magnets_refuse_hessians(name):
     given = inputs_of(name)
     shapes = [each.shape for each in results_of(kind(name).found(given))]
     weights = [torch.ones(shape, dtype=torch.float64) for shape in shapes]
     inputs, first = gradient(name, given, weights, None, differentiable=True)
-    with pytest.raises(ms.NoGradient, match="no potential"):
+    with pytest.raises(ms.NoGradient, match=r"no potential|sample the field of a near source finely"):
         torch.autograd.grad(first, inputs, [torch.ones_like(each) for each in inputs])
