@@ -316,7 +316,8 @@ def follow_path(
     if start is not None:
         inputs = keeping_fine_faces(inputs, start._values)
     state, angle_branches, from_, _ = starting_point(scene, start, inputs)
-    inputs = with_fine_faces(inputs, state, inputs.controls)
+    if start is None:  # an equilibrium would be none with other fine faces
+        inputs = with_fine_faces(inputs, state, inputs.controls)
     moving = AlongPath(inputs, start)
     options = _core.PathOptions()
     options.newton = solver._newton_options()
