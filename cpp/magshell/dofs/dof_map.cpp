@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <string>
 
+#include "magshell/dofs/reduced_assembly.h"
+
 namespace magshell {
 
 DofMap::DofMap(const SystemMatrix& matrix, std::vector<PrescribedNode> held, const Nodes& nodes, Index moves,
@@ -335,6 +337,67 @@ std::size_t DofMap::bytes() const {
             pattern_->rows.capacity() + pattern_->column_starts.capacity()) *
                sizeof(Index) +
            (reduced_ ? reduced_->bytes() : 0);
+}
+
+DofMap::~DofMap() = default;
+
+bool DofMap::has_motors() const {
+    return reduced_ && reduced_->has_motors();
+}
+
+bool DofMap::has_values() const {
+    return moves() || (reduced_ && reduced_->has_joint_parameters());
+}
+
+void DofMap::add_motor_increment_forces(const VectorXd& gradient, const VectorXd& move,
+                                        VectorXd& forces) const {
+    if (has_motors()) reduced_->add_motor_increment_forces(gradient, move, forces);
+}
+
+VectorXd DofMap::motor_forces(const VectorXd& gradient) const {
+    return has_motors() ? reduced_->motor_forces(gradient) : VectorXd();
+}
+
+VectorXd DofMap::motor_motion(const VectorXd& by_motor_forces) const {
+    return reduced_->motor_motion(by_motor_forces);
+}
+
+void DofMap::add_motor_force_change(const VectorXd& gradient, const VectorXd& by_motor_forces,
+                                    VectorXd& forces) const {
+    reduced_->add_motor_force_change(gradient, by_motor_forces, forces);
+}
+
+std::vector<const RigidNodes*> DofMap::free_bodies() const {
+    return reduced_ ? reduced_->free_bodies() : std::vector<const RigidNodes*>();
+}
+
+void DofMap::linearize(const VectorXd& q) {
+    if (reduced_) reduced_->linearize(q);
+}
+
+void DofMap::add_curvature(const VectorXd& gradient, LargeVector<double>& values) const {
+    if (reduced_) reduced_->add_curvature(gradient, values.data());
+}
+
+void DofMap::add_curvature_product(const VectorXd& gradient, const VectorXd& reduced, VectorXd& out) const {
+    if (reduced_) reduced_->add_curvature_product(gradient, reduced, out);
+}
+
+void DofMap::add_curvature_forces(const VectorXd& gradient, const VectorXd& motion, VectorXd& forces) const {
+    if (reduced_) reduced_->add_curvature_forces(gradient, motion, forces);
+}
+
+VectorXd DofMap::rounding(const VectorXd& q) const {
+    return reduced_ ? reduced_->rounding(q) : VectorXd();
+}
+
+void DofMap::project_state(VectorXd& q, VectorXd* v) const {
+    if (reduced_) reduced_->project_state(q, v);
+}
+
+void DofMap::project_state_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v,
+                               Gradient& out) const {
+    if (reduced_) reduced_->project_state_vjp(q, v, by_q, by_v, out);
 }
 
 }  // namespace magshell

@@ -12,11 +12,15 @@
 #include "magshell/assembly/system_matrix.h"
 #include "magshell/body/nodes.h"
 #include "magshell/core/parameters.h"
-#include "magshell/dofs/reduced_assembly.h"
 #include "magshell/dofs/support_move.h"
 #include "magshell/linalg/factor.h"
 
 namespace magshell {
+
+class ReducedAssembly;
+class ReducedCoordinates;
+class RigidNodes;
+using ReducedCoordinatesList = std::vector<std::unique_ptr<ReducedCoordinates>>;
 
 /// A node and the orthonormal directions along which it is prescribed, the first n_prescribed columns of `frame`; each direction follows the
 /// move of one support, or stays if that is -1.
@@ -31,14 +35,17 @@ class DofMap {
   public:
     /// moves: number of support moves that `held` refers to. The nodes must outlive it. No node may be both prescribed and reduced.
     DofMap(const SystemMatrix& matrix, std::vector<PrescribedNode> prescribed, const Nodes& nodes,
-           Index moves, Registry& registry, ReducedCoordinatesList reduced = {});
+           Index moves, Registry& registry, ReducedCoordinatesList reduced);
+    ~DofMap();
+    DofMap(const DofMap&) = delete;
+    DofMap& operator=(const DofMap&) = delete;
 
     void set_values(const Values& values);
     bool moves() const { return !moves_.empty() || has_motors(); }
     /// Returns true if motors prescribe coordinates of skeletons.
-    bool has_motors() const { return reduced_ && reduced_->has_motors(); }
+    bool has_motors() const;
     /// Returns true if parameters act through it, so that vjp adds gradients by them.
-    bool has_values() const { return moves() || (reduced_ && reduced_->has_joint_parameters()); }
+    bool has_values() const;
 
     /// The free dofs that are not reduced coordinates, ascending; they come first in the reduced order. Those of a rotated node count
     /// along its frame.
@@ -69,23 +76,15 @@ class DofMap {
              const LoadParameters& load_parameters, Gradient& out,
              const VectorXd& by_motor_forces = {}) const;
     /// Adds to the forces K p of a prescribed increment those due to the curved paths of motor-driven nodes.
-    void add_motor_increment_forces(const VectorXd& gradient, const VectorXd& move, VectorXd& forces) const {
-        if (has_motors()) reduced_->add_motor_increment_forces(gradient, move, forces);
-    }
+    void add_motor_increment_forces(const VectorXd& gradient, const VectorXd& move, VectorXd& forces) const;
     /// Returns the forces [N] and moments [N m] of the motors, one after another, for a gradient of the energy.
-    VectorXd motor_forces(const VectorXd& gradient) const {
-        return has_motors() ? reduced_->motor_forces(gradient) : VectorXd();
-    }
+    VectorXd motor_forces(const VectorXd& gradient) const;
 
     /// Returns the motion of all nodes whose power under motor_forces is the weighted sum by_motor_forces; and adds the derivative of this
     /// power as forces on the free dofs. Both at the state linearized last.
-    VectorXd motor_motion(const VectorXd& by_motor_forces) const {
-        return reduced_->motor_motion(by_motor_forces);
-    }
+    VectorXd motor_motion(const VectorXd& by_motor_forces) const;
     void add_motor_force_change(const VectorXd& gradient, const VectorXd& by_motor_forces,
-                                VectorXd& forces) const {
-        reduced_->add_motor_force_change(gradient, by_motor_forces, forces);
-    }
+                                VectorXd& forces) const;
 
     /// Returns true if there are supports.
     bool has_supports() const { return !held_.empty(); }
@@ -101,12 +100,8 @@ class DofMap {
     /// Returns true if there are rigid bodies or skeletons. All of the following is linear at the state linearized last.
     bool has_reduced_coordinates() const { return reduced_ != nullptr; }
     /// Returns the rigid bodies that no joint holds.
-    std::vector<const RigidNodes*> free_bodies() const {
-        return reduced_ ? reduced_->free_bodies() : std::vector<const RigidNodes*>();
-    }
-    void linearize(const VectorXd& q) {
-        if (reduced_) reduced_->linearize(q);
-    }
+    std::vector<const RigidNodes*> free_bodies() const;
+    void linearize(const VectorXd& q);
 
     /// Computes the free rows and columns in the order of pattern(). Rotates the blocks of rotated nodes in place first. `layer`: as in
     /// set_pattern.
@@ -114,12 +109,8 @@ class DofMap {
     /// Adds a diagonal of all dofs that is the same along the three axes of a node, such as masses or areas.
     void add_weights(const VectorXd& full, LargeVector<double>& values) const;
     /// Adds the curvature term of reduced coordinates for a gradient of all dofs; computes its product with a reduced vector.
-    void add_curvature(const VectorXd& gradient, LargeVector<double>& values) const {
-        if (reduced_) reduced_->add_curvature(gradient, values.data());
-    }
-    void add_curvature_product(const VectorXd& gradient, const VectorXd& reduced, VectorXd& out) const {
-        if (reduced_) reduced_->add_curvature_product(gradient, reduced, out);
-    }
+    void add_curvature(const VectorXd& gradient, LargeVector<double>& values) const;
+    void add_curvature_product(const VectorXd& gradient, const VectorXd& reduced, VectorXd& out) const;
     /// Returns the free part of a vector of all dofs, B^T f for reduced coordinates.
     VectorXd vector(const VectorXd& full) const;
     /// Returns the diagonal of what add_weights adds.
@@ -131,21 +122,15 @@ class DofMap {
     VectorXd acceleration(const VectorXd& mass, const VectorXd& force) const;
     /// Adds what the rotation of reduced nodes adds to the forces of B^T g: f with B^T f = sum_i g_i d2x_i/dz2 z for a motion
     /// of all nodes with free coordinates z.
-    void add_curvature_forces(const VectorXd& gradient, const VectorXd& motion, VectorXd& forces) const {
-        if (reduced_) reduced_->add_curvature_forces(gradient, motion, forces);
-    }
+    void add_curvature_forces(const VectorXd& gradient, const VectorXd& motion, VectorXd& forces) const;
     /// Moves a state by p, a vector of all dofs; reduced nodes move along their coordinates.
     void retract(VectorXd& q, const VectorXd& p) const;
     /// See ReducedCoordinates; empty without reduced coordinates.
-    VectorXd rounding(const VectorXd& q) const { return reduced_ ? reduced_->rounding(q) : VectorXd(); }
+    VectorXd rounding(const VectorXd& q) const;
     /// See ReducedCoordinates: make a start consistent, and the adjoint of that.
-    void project_state(VectorXd& q, VectorXd* v) const {
-        if (reduced_) reduced_->project_state(q, v);
-    }
+    void project_state(VectorXd& q, VectorXd* v) const;
     void project_state_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v,
-                           Gradient& out) const {
-        if (reduced_) reduced_->project_state_vjp(q, v, by_q, by_v, out);
-    }
+                           Gradient& out) const;
     /// Selects from points of all dofs those of the free ones.
     std::vector<Vec3> free(const std::vector<Vec3>& full) const;
     /// Returns a vector of all dofs from a free one: zero where prescribed, B z for reduced coordinates.

@@ -17,7 +17,7 @@
 
 namespace magshell {
 
-using ReducedCoordinatesList = std::vector<std::unique_ptr<ReducedCoordinates>>;
+using ReducedCoordinatesList = std::vector<std::unique_ptr<ReducedCoordinates>>;  // as in dof_map.h
 
 class ReducedAssembly {
   public:
