@@ -19,6 +19,11 @@ _DELAY = 2.0  # [s] solves shorter than this show no bar
 _BAR_FORMAT = "{desc} {percentage:3.0f}%|{bar}| {elapsed}<{remaining}{postfix}"
 
 
+def stop_at_once(*_: Any) -> None:
+    """End a solve of the core at its first report of progress, so that a Ctrl-C that came before it hands back its start."""
+    raise KeyboardInterrupt
+
+
 def progress_bar(title: str, total: float, *, shown: bool = True, **options: Any) -> tqdm:
     """Return a progress bar with tqdm's options; a bar that is not shown takes the same calls.
 

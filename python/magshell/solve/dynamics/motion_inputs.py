@@ -105,11 +105,14 @@ class MotionInputs:
         }
         self._load_parameters = {name: self._controls(each) for name, each in self._schedules.items()}
         self._scheduled = ScheduledValues(self, list(schedules))
-        self.inputs = (
-            self._with_fine_faces(start)
-            if fine_faces_of is None
-            else keeping_fine_faces(self.inputs, fine_faces_of)
-        )
+        self.interrupted: bool = False
+        if fine_faces_of is not None:
+            self.inputs = keeping_fine_faces(self.inputs, fine_faces_of)
+        else:
+            try:  # a field may be a function of the caller's, in which Ctrl-C can come
+                self.inputs = self._with_fine_faces(start)
+            except KeyboardInterrupt:
+                self.interrupted = True
         if self._outside is not None:
             check_outside(inputs.scene, inputs.values, self._outside, 0.0)
         self.core: _core.MotionInput = _core.MotionInput(

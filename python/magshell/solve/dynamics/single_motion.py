@@ -12,6 +12,7 @@ import numpy as np
 from ... import _core
 from ..._input.tensors import detached, dtype_like, like
 from ..._runtime.log import log
+from ..._runtime.progress import stop_at_once
 from ..._runtime.solve_keywords import names_of
 from ...errors import Interrupted, NotConverged
 from ...model.contact.contacts_to_core import check_apart
@@ -155,7 +156,7 @@ def run(
             bool(asked.inputs.leaves),
             asked.memory_budget,
             asked.keep,
-            lambda fraction, residual: progress(fraction),
+            stop_at_once if asked.interrupted else lambda fraction, residual: progress(fraction),
         )
     if isinstance(time_step, Adaptive):
         asked = prepared(found.time_steps, asked.inputs.values)

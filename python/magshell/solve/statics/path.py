@@ -17,7 +17,7 @@ from ..._input.tensors import detached
 from ..._runtime.frozen import immutable
 from ..._runtime.log import log
 from ..._runtime.mixins import AnimateMixin
-from ..._runtime.progress import SolveBar
+from ..._runtime.progress import SolveBar, stop_at_once
 from ..._runtime.solve_keywords import given_to
 from ..._runtime.solver_entry_point import grouped, solve_entry
 from ...errors import Interrupted, NotConverged
@@ -316,8 +316,12 @@ def follow_path(
     if start is not None:
         inputs = keeping_fine_faces(inputs, start._values)
     state, angle_branches, from_, _ = starting_point(scene, start, inputs)
+    interrupted = False
     if start is None:  # an equilibrium would be none with other fine faces
-        inputs = with_fine_faces(inputs, state, inputs.controls)
+        try:  # a field may be a function of the caller's, in which Ctrl-C can come
+            inputs = with_fine_faces(inputs, state, inputs.controls)
+        except KeyboardInterrupt:
+            interrupted = True
     moving = AlongPath(inputs, start)
     options = _core.PathOptions()
     options.newton = solver._newton_options()
@@ -326,7 +330,9 @@ def follow_path(
     options.locate_critical = locate_critical
     options.watched = watched_obstacles(scene, moving_obstacles(scene, moving, from_, inputs.controls))
 
-    return _follow(inputs, moving, (state, angle_branches, from_, start), options, until, progress)
+    return _follow(
+        inputs, moving, (state, angle_branches, from_, start), options, until, progress, interrupted
+    )
 
 
 def _checked_until(until: Any) -> Any:
@@ -337,11 +343,18 @@ def _checked_until(until: Any) -> Any:
 
 
 def _follow(
-    inputs: Inputs, moving: AlongPath, start: tuple[Any, ...], options: Any, until: Any, progress: bool
+    inputs: Inputs,
+    moving: AlongPath,
+    start: tuple[Any, ...],
+    options: Any,
+    until: Any,
+    progress: bool,
+    interrupted: bool = False,
 ) -> EquilibriumPath:
     """Follow a path in the core.
 
     start: its state, the branches of its angles and the load parameters at parameter 0, and the Equilibrium there, or None.
+    interrupted: whether Ctrl-C came already; the path ends at its start then.
     """
     scene = inputs.scene
     state, angle_branches, from_, first = start
@@ -356,7 +369,7 @@ def _follow(
             options,
             moving.entries,
             until,
-            _advance(bar),
+            stop_at_once if interrupted else _advance(bar),
         )
         bending = _bending_energies(scene, found, inputs.controls)
     path = _path(inputs, moving, found, (from_, first), options, time.perf_counter() - began)

@@ -14,6 +14,7 @@ from ..._input.scalars import flag
 from ..._input.tensors import dtype_like, is_tensor, like
 from ..._runtime.keywords import FACTORS
 from ..._runtime.log import log
+from ..._runtime.progress import stop_at_once
 from ..._runtime.solve_keywords import names_of
 from ...errors import Interrupted, NotConverged
 from ...model.contact.contacts_to_core import check_apart
@@ -152,7 +153,10 @@ def solve(
     moving: values of the scene that change along with the load parameters.
     """
     scene, entries = inputs.scene, []
-    inputs = with_fine_faces(inputs, state, to)
+    try:  # a field may be a function of the caller's, in which Ctrl-C can come
+        inputs = with_fine_faces(inputs, state, to)
+    except KeyboardInterrupt:
+        progress = stop_at_once
     options.watched = watched_obstacles(scene, moving_obstacles(scene, moving, from_, to))
     if moving is not None:
         from_, to = np.concatenate([from_, moving.before]), np.concatenate([to, moving.after])
@@ -165,7 +169,7 @@ def solve(
         )
         if moving is not None and found.load_fraction < 1.0:
             inputs = inputs.with_values(moving.values(found.load_fraction))
-    found, inputs = _with_fine_faces_at_end(found, inputs, to, options, progress)
+    found, inputs, stopped = _with_fine_faces_at_end(found, inputs, to, options, progress)
     with inputs.in_core():
         energies, arrays = _energies(scene, found), arrays_of(scene, found)
         strain = largest_of(scene, found.state, inputs.values.all_sheets.thickness)
@@ -183,6 +187,8 @@ def solve(
         raise Interrupted(f"interrupted at {found.load_fraction:.3g} of the way to the new controls", result)
     if found.outcome == _core.Outcome.failed:
         raise NotConverged(why_not(inputs, found, options.start_at_rest), result)
+    if stopped is not None:
+        raise Interrupted("interrupted while the sampling of the field was checked", result) from stopped
     positions = scene._model.positions(found.state)
     warn_of_obtuse_faces(
         scene, positions, inputs.values.all_sheets, result.energies.get("bending", 0.0), "this equilibrium"
@@ -207,12 +213,17 @@ def _with_fine_faces_at_end(
     to: np.ndarray,
     options: _core.StaticsOptions,
     progress: Callable[[float, float], None] | None,
-) -> tuple[_core.StaticsResult, Inputs]:
-    """Return the result and the inputs after further searches with more fine faces, as long as the state needs more."""
+) -> tuple[_core.StaticsResult, Inputs, KeyboardInterrupt | None]:
+    """Return the result and the inputs after further searches with more fine faces, as long as the state needs more, and the
+    Ctrl-C that came while this was computed.
+    """
     for _ in range(_MOST_REFINEMENTS):
         if found.outcome != _core.Outcome.converged:
             break
-        finer = with_fine_faces(inputs, found.state, found.controls, found.field_sampling_error)
+        try:
+            finer = with_fine_faces(inputs, found.state, found.controls, found.field_sampling_error)
+        except KeyboardInterrupt as stopped:
+            return found, inputs, stopped
         if finer is inputs:
             break
         options.start_at_rest = False
@@ -222,7 +233,7 @@ def _with_fine_faces_at_end(
             )
         again.add_effort_of(found)
         found, inputs = again, finer
-    return found, inputs
+    return found, inputs, None
 
 
 def _energies(scene: Scene, found) -> dict[str, float] | None:
