@@ -20,6 +20,7 @@ STATEFUL = {
     ),
     "envs.Environment": "an environment of gymnasium, with an episode under way",
     "envs.VectorEnv": "an environment of gymnasium, with episodes under way",
+    "jax.JaxEquilibrium": "a tuple, which Python itself does not let change",
 }
 
 
@@ -313,6 +314,8 @@ def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
     swing = ms.simulate(ms.Scene(made["skeleton"], gravity=(0, 0, -9.81)), steps=1, time_step=1e-3)
     welded = ms.weld(mesh, mesh.transformed(translation=(0.04, 0, 0)))
     joined = ms.weld(made["tets"], made["tets"].transformed(translation=(0.04, 0, 0)))
+    unheld = ms.Scene(sheet, supports=[clamp], field=ms.UniformField())
+    moved = ms.equilibrium(unheld, values={sheet: {"rest_positions": given(mesh.rest_positions)}}, **asked)
     record = ms.MinimizeResult([np.zeros(3)], 1.0, 0.0)
     found = {
         "equilibrium": rest,
@@ -349,6 +352,7 @@ def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
         "snapshot": ms.envs.Snapshot(move, 0, given(np.zeros(3))),
         "minimum": record,
         "window": ms.control.Window(1, 0, 1.0),
+        "scene of other rest positions": moved.scene,
         "windows": ms.control.Windows(np.zeros(3), [(ms.control.Window(1, 0, 1.0), record)]),
         "horizon": ms.control.Horizon(0, 1, 2),
     }

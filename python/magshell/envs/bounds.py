@@ -26,7 +26,7 @@ class Bounds:
         self.clip: bool = flag("clip", clip)
         if not isinstance(dtype, str) or dtype not in _DTYPES:
             raise ValueError(f"dtype must be one of {_DTYPES}, got {dtype!r:.60}")
-        self.dtype = np.dtype(dtype)
+        self.dtype: np.dtype = np.dtype(dtype)
         self._given = observation_bounds
         if observation_bounds is not None and not (
             isinstance(observation_bounds, Sequence | np.ndarray) and len(observation_bounds) == 2

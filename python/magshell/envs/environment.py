@@ -158,7 +158,8 @@ class Environment(gymnasium.Env):
                 )
                 raise ValueError(f"simulate must not hold {name!r}, {why}")
         self._bounds = Bounds(observation_bounds, clip, dtype)
-        self.render_mode, self._width, self._view = render_mode, checked_width(render_width), view
+        self.render_mode: str | None = render_mode
+        self._width, self._view = checked_width(render_width), view
         view_of(states_of(scene), view)  # raises, before there is anything to see
         self._style = style_of(style)
         if self._style.contacts:

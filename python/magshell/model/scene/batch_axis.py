@@ -72,7 +72,8 @@ class BatchAxis:
         another value."""
         if not isinstance(scene, Scene):
             raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
-        self._scene, self.members, self._known = scene, members, known or {}
+        self._scene, self._known = scene, known or {}
+        self.members: int = members
         self._refusal_in_time = refusal_in_time
         self._owners = arguments.get("values") or {}
         if not isinstance(self._owners, dict):
@@ -92,7 +93,7 @@ class BatchAxis:
                     "rest_positions cannot be replaced in a batch yet: solve its members one by one"
                 )
             found += [(owner, name, value) for name, value in named.items()]
-        self.values = [self._value(*each) for each in found]
+        self.values: list[BatchValue] = [self._value(*each) for each in found]
 
     @property
     def followed(self) -> list[BatchValue]:

@@ -21,7 +21,7 @@ class CoreModel:
     def __init__(self, model: _core.Model):
         self.model = model
         self.values: Values | None = None
-        self.solving = False
+        self.solving: bool = False
         self._turn = threading.RLock()
 
     @contextmanager

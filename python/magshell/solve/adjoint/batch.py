@@ -65,7 +65,8 @@ class OnThreads:
     """Calls functions of members of a batch on threads that have a core model of the scene each."""
 
     def __init__(self, scene: Scene, threads: int):
-        self._scene, self.threads = scene, threads
+        self._scene = scene
+        self.threads: int = threads
 
     def call(
         self, function: Callable[[int], Any], members: int, stopped: threading.Event | None = None
@@ -104,7 +105,8 @@ class BatchAdjoint:
     """The gradients of the results of a batch by its values, member by member over threads."""
 
     def __init__(self, on: OnThreads, values: list[BatchValue], members: list[Member | None]):
-        self._on, self.values, self._members = on, values, members
+        self._on, self._members = on, members
+        self.values: list[BatchValue] = values
 
     def gradients(self, by_outputs: list[np.ndarray], wanted: Sequence[bool]) -> list[np.ndarray | None]:
         """Compute the gradients by the wanted values, each in its shape. Raises NoGradient where there is none."""

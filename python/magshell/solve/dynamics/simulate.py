@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 from ..._input.quantity import arguments_of_dlpack
 from ..._runtime.progress import SolveBar
@@ -17,8 +17,75 @@ from .trajectory import MotionState, Trajectory
 if TYPE_CHECKING:
     from ..._input.kinds import InTime, Numbers
     from ..statics.equilibrium import Equilibrium
+    from .trajectory_batch import TrajectoryBatch
 
 
+@overload
+def simulate(
+    scene: Scene,
+    *,
+    steps: int,
+    time_step: Numbers | Adaptive,
+    remanent_magnetization: InTime | None = None,
+    applied_flux_density: InTime | None = None,
+    load_factor: Any = 1.0,
+    gravity_factor: Any = 1.0,
+    field_factor: Any = 1.0,
+    support_factor: Any = 1.0,
+    damping: Any = 0.0,
+    stiffness_damping: Any = 0.0,
+    maxwell_modulus: Any = 0.0,
+    maxwell_time: InTime | None = None,
+    start: Numbers | Equilibrium | Trajectory | MotionState | None = None,
+    velocities: InTime | None = None,
+    thickness: InTime | None = None,
+    young_modulus: InTime | None = None,
+    poisson_ratio: InTime | None = None,
+    mass_density: InTime | None = None,
+    curvature_scale: InTime | None = None,
+    vertex_loads: InTime | None = None,
+    values: dict[Any, Any] | None = None,
+    integrator: Integrator | None = None,
+    record_every: int = 1,
+    adjoint_storage: str | AdjointStorage | None = None,
+    solver: Newton | None = None,
+    progress: bool = True,
+    batch: None = None,
+    threads: int | None = None,
+) -> Trajectory | Any: ...
+@overload
+def simulate(
+    scene: Scene,
+    *,
+    steps: int,
+    time_step: Numbers | Adaptive,
+    remanent_magnetization: InTime | None = None,
+    applied_flux_density: InTime | None = None,
+    load_factor: Any = 1.0,
+    gravity_factor: Any = 1.0,
+    field_factor: Any = 1.0,
+    support_factor: Any = 1.0,
+    damping: Any = 0.0,
+    stiffness_damping: Any = 0.0,
+    maxwell_modulus: Any = 0.0,
+    maxwell_time: InTime | None = None,
+    start: Numbers | Equilibrium | Trajectory | MotionState | None = None,
+    velocities: InTime | None = None,
+    thickness: InTime | None = None,
+    young_modulus: InTime | None = None,
+    poisson_ratio: InTime | None = None,
+    mass_density: InTime | None = None,
+    curvature_scale: InTime | None = None,
+    vertex_loads: InTime | None = None,
+    values: dict[Any, Any] | None = None,
+    integrator: Integrator | None = None,
+    record_every: int = 1,
+    adjoint_storage: str | AdjointStorage | None = None,
+    solver: Newton | None = None,
+    progress: bool = True,
+    batch: int,
+    threads: int | None = None,
+) -> TrajectoryBatch: ...
 @grouped(solver=MixedNewton, adjoint_storage=AdjointStorage)
 @solve_entry
 def simulate(

@@ -326,7 +326,7 @@ def _by_name(names: list[str], by_term: np.ndarray) -> dict[str, np.ndarray]:
     return sums
 
 
-def arrays_of(asked: MotionInputs, found) -> tuple[np.ndarray, ...]:
+def arrays_of(asked: MotionInputs, found: _core.MotionResult) -> tuple[np.ndarray, ...]:
     """Return positions, edge rotations and velocities, with the points of rigid bodies, and the forces of motors."""
     model = asked.inputs.scene._model
     return found.positions(model), found.edge_rotations(model), found.velocities(model), found.driving()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
@@ -22,8 +22,59 @@ from .single_solve import Search, find
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
+    from .equilibrium_batch import EquilibriumBatch
 
 
+@overload
+def equilibrium(
+    scene: Scene,
+    *,
+    remanent_magnetization: Numbers | None = None,
+    applied_flux_density: Numbers | None = None,
+    load_factor: Any = 1.0,
+    gravity_factor: Any = 1.0,
+    field_factor: Any = 1.0,
+    support_factor: Any = 1.0,
+    thickness: Numbers | None = None,
+    young_modulus: Numbers | None = None,
+    poisson_ratio: Numbers | None = None,
+    mass_density: Numbers | None = None,
+    curvature_scale: Numbers | None = None,
+    vertex_loads: Numbers | None = None,
+    values: dict[Any, Any] | None = None,
+    start: Equilibrium | EquilibriumSet | np.ndarray | None = None,
+    require_stable: bool = True,
+    ignore_velocity_forces: bool = False,
+    solver: Newton | None = None,
+    progress: bool | Callable[[float, float], None] = True,
+    batch: None = None,
+    threads: int | None = None,
+) -> Equilibrium | Any: ...  # EquilibriumSet of load cases
+@overload
+def equilibrium(
+    scene: Scene,
+    *,
+    remanent_magnetization: Numbers | None = None,
+    applied_flux_density: Numbers | None = None,
+    load_factor: Any = 1.0,
+    gravity_factor: Any = 1.0,
+    field_factor: Any = 1.0,
+    support_factor: Any = 1.0,
+    thickness: Numbers | None = None,
+    young_modulus: Numbers | None = None,
+    poisson_ratio: Numbers | None = None,
+    mass_density: Numbers | None = None,
+    curvature_scale: Numbers | None = None,
+    vertex_loads: Numbers | None = None,
+    values: dict[Any, Any] | None = None,
+    start: Equilibrium | EquilibriumSet | np.ndarray | None = None,
+    require_stable: bool = True,
+    ignore_velocity_forces: bool = False,
+    solver: Newton | None = None,
+    progress: bool | Callable[[float, float], None] = True,
+    batch: int,
+    threads: int | None = None,
+) -> EquilibriumBatch: ...
 @grouped(solver=MixedNewton)
 @solve_entry
 def equilibrium(
