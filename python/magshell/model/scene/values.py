@@ -35,6 +35,7 @@ class Values:
 
     replaced: {object of the scene: {name: array}}; the scene itself has the names "gravity" and "vertex_loads".
     magnetization: (n_f of all, 3) A/m, in place of the bodies' own; only for a scene in a field.
+    sampling_of: values whose faces that sample the field finely (fine_faces.py) these have too; without it there are none.
 
     The attribute `replaced` is a copy of what was given; `numbers`, (n,), holds all values in the order of the core.
     Raises ValueError if a value does not fit its object.
@@ -45,6 +46,7 @@ class Values:
         scene: Scene,
         replaced: dict[object, dict[Any, Any]] | None = None,
         magnetization: np.ndarray | None = None,
+        sampling_of: Values | None = None,
     ):
         self.scene = scene
         for item, values in (replaced or {}).items():
@@ -82,7 +84,8 @@ class Values:
             if name == "remanent_magnetization":  # zero for sheets whose magnetization nobody gave
                 numbers.setdefault((label, name), 0.0)
             if name == "field_sampling":  # fine_faces.py chooses the faces that sample the field finely
-                numbers[label, name] = np.zeros(1)
+                before = sampling_of and scene._value_layout.of(sampling_of.numbers, label, name)
+                numbers[label, name] = np.zeros(1) if before is None else before
         self.numbers = scene._value_layout.packed(numbers)
 
     @contextmanager

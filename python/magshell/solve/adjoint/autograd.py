@@ -46,8 +46,11 @@ class Solved(torch.autograd.Function):
         found = iter(_Transposed.apply(ctx.products.by(wanted), *by_outputs))
         by_leaves = [next(found) if is_wanted else None for is_wanted in wanted]
         if torch.is_grad_enabled():  # create_graph=True
+            # Connected to the leaves alone: tangents are the derivatives of gradients by by_outputs, and need no curvature.
             products = ctx.products.by(wanted)
-            zeros = iter(_ZeroWithCurvature.apply(products, len(by_outputs), *by_outputs, *ctx.leaves))
+            products.by_outputs = by_outputs
+            values = (each.detach() for each in by_outputs)
+            zeros = iter(_ZeroWithCurvature.apply(products, len(by_outputs), *values, *ctx.leaves))
             by_leaves = [None if each is None else each + next(zeros) for each in by_leaves]
         return None, None, None, *by_leaves
 
@@ -78,6 +81,7 @@ class _Products:
     ):
         self._adjoint, self._outputs, self._leaves = adjoint, outputs, leaves
         self._wanted = (True,) * len(leaves) if wanted is None else wanted
+        self.by_outputs: Sequence[torch.Tensor] = ()  # with their graph
 
     def by(self, wanted: tuple[bool, ...] | None) -> _Products:
         """Return the derivatives by some of the leaves, or by all."""
@@ -215,7 +219,12 @@ class _ZeroWithCurvature(torch.autograd.Function):
     @staticmethod
     def backward(ctx: Any, *motions: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
         along = ctx.products.all_along(motions)
-        found = _Curvature.apply(ctx.products, ctx.count, *ctx.saved_tensors, *ctx.leaves, *along)
+        # With their graph where they are the same, so that third derivatives raise NoGradient by them, too.
+        pairs = zip(ctx.products.by_outputs, ctx.saved_tensors, strict=True)
+        by_outputs = [
+            value if torch._C._functorch.is_functorch_wrapped_tensor(live) else live for live, value in pairs
+        ]
+        found = _Curvature.apply(ctx.products, ctx.count, *by_outputs, *ctx.leaves, *along)
         return (None, None, *(None for _ in range(ctx.count)), *found)
 
     @staticmethod

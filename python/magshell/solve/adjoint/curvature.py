@@ -113,7 +113,9 @@ def _moved(inputs: Inputs, changes: list[np.ndarray]) -> Inputs:
             controls = layout.packed({key: layout.of(controls, *key)[0] + change}, controls)
     there = copy.copy(inputs)
     there.values = (
-        Values(scene, replaced, magnetization) if replaced or magnetization is not None else inputs.values
+        Values(scene, replaced, magnetization, sampling_of=inputs.values)
+        if replaced or magnetization is not None
+        else inputs.values
     )
     there.controls = controls
     return there

@@ -15,7 +15,6 @@ import numpy as np
 
 from ... import _core
 from ...errors import NoGradient
-from ...model.scene.fine_faces import fine_faces
 from ...model.scene.values import Gradient
 from .differences import ROUNDING, directional_derivative
 
@@ -162,10 +161,6 @@ class Residual:
     def _prepare(self) -> None:
         if self.inputs.scene.rigid_parts:
             raise NoGradient("no gradient here: the scene has rigid bodies or skeletons")
-        if fine_faces(self.inputs.values).any():
-            raise NoGradient(
-                "no gradient here: faces sample the field of a near source finely, which has no third derivatives yet"
-            )
         self._model.term_energies(self.state, self._angle_branches, self.controls)
 
     @property

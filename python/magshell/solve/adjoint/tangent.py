@@ -99,7 +99,7 @@ def changed(inputs: Inputs, leaf: Leaf, change: np.ndarray) -> tuple[np.ndarray,
         layout, key = scene._control_layout, ("scene", leaf.name)
         now = _added(layout.of(inputs.controls, *key)[0], change)
         return values.numbers, layout.packed({key: now}, inputs.controls)
-    return Values(scene, replaced, magnetization).numbers, inputs.controls
+    return Values(scene, replaced, magnetization, sampling_of=values).numbers, inputs.controls
 
 
 def _added(value, change: np.ndarray) -> np.ndarray:
