@@ -70,6 +70,7 @@ def test_human_mode_shows_every_state_in_a_window(monkeypatch):
     import matplotlib.pyplot as plt
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
+    open_before = plt.get_fignums()
     unseen = bar(render_mode="human", render_width=400)
     with pytest.warns(UserWarning, match="has no windows"):
         unseen.reset(seed=0)
@@ -91,7 +92,7 @@ def test_human_mode_shows_every_state_in_a_window(monkeypatch):
     assert one.render() is None
     one.close()
     other.close()
-    assert not plt.get_fignums()
+    assert plt.get_fignums() == open_before
 
 
 def test_bounds_refuse_bad_input():
