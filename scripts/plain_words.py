@@ -386,13 +386,13 @@ def check_cpp(name: str, text: str) -> Iterator[Problem]:
 
 
 def check_manual(name: str, text: str) -> Iterator[Problem]:
-    """Yield the long sentences of a page, without its code, tables, headings and pictures."""
+    """Yield the long sentences of a page, without its code, tables and headings."""
     text = re.sub(r"```.*?```", lambda block: "\n" * block[0].count("\n"), text, flags=re.S)
     paragraph: list[str] = []
     start = 1
     for i, line in enumerate([*text.splitlines(), ""], 1):
         plain = line.strip()
-        if plain and not plain.startswith(("|", "#", "- ", "![", "[<img", "<", "1.")):
+        if plain and not plain.startswith(("|", "#", "- ", "![", "1.")):
             start = start if paragraph else i
             paragraph.append(plain)
             continue

@@ -7,19 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..._input.tensors import is_tensor
 from ..._runtime.frozen import immutable
-from ...model.results.result_lookup import displacements_of
+from ...model.results.batch_result import BatchResult
 
 if TYPE_CHECKING:
-    from ..._input.kinds import Computed
     from ...model.scene.scene import Scene
     from .trajectory import Trajectory
 
 
 @immutable
 @dataclass(frozen=True, repr=False)
-class TrajectoryBatch:
+class TrajectoryBatch(BatchResult):
     """The motions of the k members of a batch, of ms.simulate(..., batch=k).
 
     times: (n,) s, of the recorded states. positions: (k, n, n_v, 3) m; velocities: (k, n, n_v, 3) m/s; edge_rotations:
@@ -45,37 +43,12 @@ class TrajectoryBatch:
     failed: dict[int, Any]
     _members: tuple[Trajectory | None, ...] = field(repr=False)
 
-    _as_given = ("failed",)
-
-    @property
-    def converged(self) -> np.ndarray:
-        """Return whether the motion of each member came to its end, (k,)."""
-        return np.array([each is not None for each in self._members])
-
-    @property
-    def displacements(self) -> Computed:
-        """The displacements from the rest shape, (k, n, n_v, 3) m."""
-        return displacements_of(self)
-
     @property
     def energy(self) -> np.ndarray:
         """The kinetic and potential energies together, (k, n) J; nan for members that failed."""
         missing = np.full(len(self.times), np.nan)
         return np.stack([missing if each is None else each.energy for each in self._members])
 
-    def __len__(self) -> int:
-        return len(self._members)
-
     def __getitem__(self, index: int) -> Trajectory:
         """Return the motion of one member, or raise the error that it ended with."""
-        member = range(len(self))[index]  # raises IndexError
-        if member in self.failed:
-            raise self.failed[member]
-        return self._members[member]
-
-    def __repr__(self) -> str:
-        failed = ", ".join(f"{k} ({type(error).__name__})" for k, error in self.failed.items())
-        kind = "tensors" if is_tensor(self.positions) else "arrays"
-        return f"TrajectoryBatch: {len(self)} members as {kind}; " + (
-            f"failed: {failed}" if failed else "none failed"
-        )
+        return self._member(index)

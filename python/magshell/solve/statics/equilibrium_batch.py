@@ -7,20 +7,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..._input.tensors import is_tensor
 from ..._runtime.frozen import immutable
-from ...model.results.result_lookup import displacements_of
+from ...model.results.batch_result import BatchResult
 from .equilibria import EquilibriumSet
 
 if TYPE_CHECKING:
-    from ..._input.kinds import Computed
     from ...model.scene.scene import Scene
     from .equilibrium import Equilibrium
 
 
 @immutable
 @dataclass(frozen=True, repr=False)
-class EquilibriumBatch:
+class EquilibriumBatch(BatchResult):
     """The equilibria of the k members of a batch, of ms.equilibrium(..., batch=k).
 
     positions: (k, n_v, 3) m; edge_rotations: (k, n_e) rad; tensors where an input was one. Rows of members that failed are
@@ -45,18 +43,6 @@ class EquilibriumBatch:
     failed: dict[int, Any]
     _members: tuple[Equilibrium | None, ...] = field(repr=False)
 
-    _as_given = ("failed",)
-
-    @property
-    def converged(self) -> np.ndarray:
-        """Return whether the equilibrium of each member was found, (k,)."""
-        return np.array([each is not None for each in self._members])
-
-    @property
-    def displacements(self) -> Computed:
-        """The displacements from the rest shape, (k, n_v, 3) m."""
-        return displacements_of(self)
-
     @property
     def energy(self) -> np.ndarray:
         """The potential energies, (k,) J; nan for members that failed."""
@@ -77,23 +63,10 @@ class EquilibriumBatch:
         """The equilibria that were found, one after another."""
         return EquilibriumSet([self[k] for k in np.flatnonzero(self.converged)])
 
-    def __len__(self) -> int:
-        return len(self._members)
-
     def __getitem__(self, index: Any) -> Any:
         """Return the equilibrium of one member, or raise the error of its solve; of a body, its results in all members."""
         if isinstance(index, bool) or not isinstance(index, int | np.integer):
             if self.failed:
                 raise ValueError(f"members {sorted(self.failed)} failed: take those of batch.equilibria[...]")
             return self.equilibria[index]
-        member = range(len(self))[index]  # raises IndexError
-        if member in self.failed:
-            raise self.failed[member]
-        return self._members[member]
-
-    def __repr__(self) -> str:
-        failed = ", ".join(f"{k} ({type(error).__name__})" for k, error in self.failed.items())
-        kind = "tensors" if is_tensor(self.positions) else "arrays"
-        return f"EquilibriumBatch: {len(self)} members as {kind}; " + (
-            f"failed: {failed}" if failed else "none failed"
-        )
+        return self._member(index)
