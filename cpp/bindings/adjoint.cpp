@@ -29,32 +29,36 @@ py::tuple by_parameters(const Model& model, const Gradient& gradient) {
     return py::make_tuple(values_to_user(model, gradient.values), gradient.load_parameters);
 }
 
-// Returns lambda . dg/dk at a state, in equilibrium or not, for all parameters and load parameters k.
-py::tuple residual_vjp(Model& model, const VectorXd& q, const LoadParameters& load_parameters,
-                       const VectorXd& lambda) {
+// Returns the gradients by all parameters and load parameters that add(gradient) adds up at a state.
+template <class Add>
+py::tuple by_parameters_at(Model& model, const VectorXd& q, const LoadParameters& load_parameters,
+                           const Add& add) {
     Gradient gradient(model.parameters().registry());
     {
         const py::gil_scoped_release unlocked;
         const std::lock_guard lock(model.in_use());
         model.evaluate(q, load_parameters);
-        model.parameters().vjp(q, load_parameters, lambda, gradient);
+        add(gradient);
     }
     return by_parameters(model, gradient);
+}
+
+// Returns lambda . dg/dk at a state, in equilibrium or not, for all parameters and load parameters k.
+py::tuple residual_vjp(Model& model, const VectorXd& q, const LoadParameters& load_parameters,
+                       const VectorXd& lambda) {
+    return by_parameters_at(model, q, load_parameters, [&](Gradient& gradient) {
+        model.parameters().vjp(q, load_parameters, lambda, gradient);
+    });
 }
 
 // Returns dF/dq_h . dq_h/dk for all parameters and load parameters k, with the prescribed dofs q_h.
 py::tuple prescribed_vjp(Model& model, const VectorXd& q, const LoadParameters& load_parameters,
                          const VectorXd& by_state) {
-    Gradient gradient(model.parameters().registry());
-    {
-        const py::gil_scoped_release unlocked;
-        const std::lock_guard lock(model.in_use());
-        model.evaluate(q, load_parameters);
+    return by_parameters_at(model, q, load_parameters, [&](Gradient& gradient) {
         const VectorXd none = VectorXd::Zero(q.size());
         if (model.dof_map().has_values())
             model.dof_map().vjp(by_state, none, none, load_parameters, gradient, {});
-    }
-    return by_parameters(model, gradient);
+    });
 }
 
 }  // namespace

@@ -162,3 +162,17 @@ def test_torch_checks_first_and_second_derivatives():
 
     assert torch.autograd.gradcheck(scaled, (field,), eps=1e-4, atol=1e-5)
     assert torch.autograd.gradgradcheck(scaled, (field,), eps=1e-4, atol=1e-4)
+
+
+def test_second_derivatives_have_none_by_the_weights_of_an_objective():
+    """Check that what connects second derivatives to the derivatives by the results is not lost without a word."""
+    mesh = ms.meshes.rectangle(0.04, 0.01, cells=(4, 1))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
+    field = torch.tensor([0.0, 0.0, 2e-3], dtype=torch.float64, requires_grad=True)
+    weight = torch.tensor(1.0, dtype=torch.float64, requires_grad=True)
+    rest = ms.equilibrium(scene, remanent_magnetization=(2e4, 0, 0), applied_flux_density=field)
+    (slope,) = torch.autograd.grad(weight * rest.positions[-1, 2], field, create_graph=True)
+    (curved,) = torch.autograd.grad(slope[2], field, create_graph=True)
+    with pytest.raises(ms.NoGradient, match="no third derivatives"):
+        torch.autograd.grad(curved[2], weight)

@@ -221,9 +221,7 @@ class _ZeroWithCurvature(torch.autograd.Function):
         along = ctx.products.all_along(motions)
         # With their graph where they are the same, so that third derivatives raise NoGradient by them, too.
         pairs = zip(ctx.products.by_outputs, ctx.saved_tensors, strict=True)
-        by_outputs = [
-            value if torch._C._functorch.is_functorch_wrapped_tensor(live) else live for live, value in pairs
-        ]
+        by_outputs = [value if is_transformed(live) else live for live, value in pairs]
         found = _Curvature.apply(ctx.products, ctx.count, *by_outputs, *ctx.leaves, *along)
         return (None, None, *(None for _ in range(ctx.count)), *found)
 
