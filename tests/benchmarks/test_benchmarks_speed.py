@@ -78,6 +78,8 @@ def test_dynamics_part_prints_and_writes(tmp_path, capsys) -> None:
     assert [each["kept"] for each in results["solid gradients"]] == ["factors", "checkpoints"]
     projective = results["projective errors"]["Projective"]
     assert projective["accelerated"]["error"][-1] < projective["accelerated"]["error"][0]
+    long, short = results["projective against Newton"]
+    assert long["error"] == sorted(long["error"], reverse=True) and short["error"][1] < long["error"][1]
     assert [each["kept"] for each in results["projective memory"]] == ["stages", "checkpoints"]
     bars = results["thrown bars"]
     assert bars["pairs"] > 100 and bars["touching"]["iterations"] > bars["free"]["iterations"] == 1

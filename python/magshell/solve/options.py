@@ -208,32 +208,39 @@ class MixedNewton(Newton):
 @immutable
 @dataclass(frozen=True)
 class ProjectiveDynamics:
-    """Implicit Euler in local and global steps, with a matrix that stays factorized ([Qiao21] 3, Algorithm 1).
+    """Takes steps of implicit Euler by local and global rounds, with a matrix that stays factorized ([Qiao21] 3).
 
-    The matrix is M/dt^2 + L, L a constant in the place of the stiffness, the same along x, y, z: of
-    `ms.ProjectiveMaterial` solids
-    that of Bouaziz et al. 2014, of other solids with their modulus of waves at rest, 2 mu + lam (Liu, Bouaziz, Kavan 2017),
-    which is slower where they get much stiffer; of shells that of waves in their plane, and their bending as it is at rest,
-    edge rotations with it, along normals that turn with the sheet. It takes more rounds the thinner they are, and with
-    bending="midedge" as many as with "hinge". A round then is a quasi-Newton step on the residual of ms.ImplicitEuler,
-    corrected by the last few steps (L-BFGS); converged, a step is that of ms.ImplicitEuler. A muscle adds w m m^T to L, its
-    stiffness or peak stress along its fibres. Bodies that touch each other or themselves add the stiffness of the pairs
-    that touch to the solution with the matrix in every round; of more than 1000 such numbers, the stiffest. Loads, fields,
-    water, cells, cavities, tendons, joints and obstacles act as they do there, without a share in L; what is stiff among
-    them takes more rounds, and a history.
+    The matrix is M/dt^2 + L, where the constant L stands for the stiffness, equal along x, y and z. A round is a
+    quasi-Newton step with it on the residual of ms.ImplicitEuler, corrected by the last few steps (L-BFGS). Converged, a
+    step is that of ms.ImplicitEuler. It pays for large solids whose steps need not be solved exactly: a table is in
+    docs/what-to-choose.md.
 
-    iterations: rounds of a step, at most.
-    tolerance: of the residual, relative to the forces that cancel in it, as Newton's. A step that does not reach it is taken
-        in halves. None: every step takes just `iterations` rounds, whatever is left; such steps have no gradient.
-    history: steps that L-BFGS goes by, and Anderson's acceleration with contact="coulomb"; 0: the rounds as they are.
-    contact: "penalty": as each ms.Contact and ms.SelfContact says, as in the other integrators. "coulomb": hard, by
-        Coulomb's law, in every round ([Qiao21] 5; Ly et al. 2020): of obstacles vertices keep just the `offset`; bodies keep
-        the reach and the minimal distance together from each other, by vertices and faces and by edges that cross.
-        Stiffness, smoothing and sticking speed do not count. Such motions have no gradient: forces jump where points touch,
-        stick or slip. It takes supports that hold vertices entirely, no rigid parts, no points on faces (`face_samples`)
-        and one coefficient of friction. Where fine surfaces lie flat on each other, a step takes hundreds of rounds.
+    L has these parts:
 
-    Gradients are those of the solved step, by the exact Hessian: as of every integrator, and as exact as the tolerance.
+    - of a solid of `ms.ProjectiveMaterial`, the matrix of Bouaziz et al. 2014; of other solids, their modulus of
+      longitudinal waves at rest, 2 mu + lam (Liu, Bouaziz, Kavan 2017). The latter takes more rounds where a solid becomes
+      much stiffer.
+    - of a shell, its membrane stiffness likewise and its bending stiffness at rest, along normals that turn with the sheet.
+      Thin shells take more rounds. bending="midedge" takes as many as "hinge".
+    - of a muscle, w m m^T along its fibres, with its stiffness or its peak stress as the weight w.
+    - of bodies that touch, the stiffness of the touching pairs, by the Woodbury formula in every round; of more than 1000
+      such numbers, the stiffest.
+
+    Loads, fields, water, cells, cavities, tendons, joints and obstacles act as with ms.ImplicitEuler, but have no part in L.
+    The stiff ones among them take more rounds, and need a history.
+
+    iterations: the largest number of rounds of a step.
+    tolerance: of the residual, relative to the forces that cancel in it, as for Newton's method. A step that does not reach
+        it is taken in halves. None: every step takes exactly `iterations` rounds, and there is no gradient.
+    history: the number of previous rounds that L-BFGS uses, and Anderson's acceleration with contact="coulomb"; 0: none.
+    contact: "penalty": as each ms.Contact and ms.SelfContact says, like the other integrators. "coulomb": hard contact with
+        Coulomb's law in every round ([Qiao21] 5; Ly et al. 2020). Vertices keep the `offset` from obstacles; bodies keep the
+        sum of the reach and the minimal distance from each other, by pairs of a vertex and a face and pairs of two edges.
+        Stiffness, smoothing and sticking speed have no effect. Such motions have no gradient, as forces jump where points
+        touch, stick or slip. Supports must hold vertices entirely; rigid parts, points on faces (`face_samples`) and several
+        coefficients of friction are refused. Where fine surfaces lie flat on each other, a step takes hundreds of rounds.
+
+    The gradient is that of the solved step, by the exact Hessian, and as exact as the tolerance.
 
     >>> import magshell as ms
     >>> bar = ms.meshes.box((0.1, 0.02, 0.02), cells=(10, 2, 2))
@@ -281,8 +288,9 @@ class ProjectiveDynamics:
 @immutable
 @dataclass(frozen=True)
 class ImplicitEuler:
-    """First order, one solve a step, as in [Chen22] (26)-(28). Damps: a vibration of 40 steps a period keeps a share
-    of e^-1 of its energy for about 6.5 steps.
+    """Takes one solve a step and has first order, as in [Chen22] (26)-(28).
+
+    It damps: the energy of a vibration of 40 steps a period falls to a share of 1/e in about 6.5 steps.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
