@@ -131,5 +131,5 @@ class NoGradient(RuntimeError):
     """An error for a gradient that does not exist.
 
     It is raised at a state that did not converge or is not stable, for an input that is not differentiable, and for second
-    derivatives (use finite differences of gradients instead).
+    derivatives of motions (use finite differences of gradients instead).
     """

@@ -40,12 +40,9 @@ class SolveKeyword(NamedTuple):
     varies: bool = False
 
 
-_FACTORS = (
-    "on the loads, gravity, the field sources, and on how far supports with a prescribed motion have gone; (k,) with load "
-    "cases."
-)
+_FACTORS = "multiply the loads, gravity, the field sources, and the prescribed motions of supports; (k,) with k load cases."
 _FACTORS_IN_TIME = "as in ms.equilibrium; numbers, or in time as above."
-_SHELL = "stand in for the shell's own in this solve."
+_SHELL = "replace the shell's own values in this solve."
 _MAXWELL = (
     "a Maxwell branch beside the elastic stiffness: its modulus over the elastic one, and its relaxation time, s. It begins "
     "relaxed."
@@ -84,10 +81,10 @@ _TABLE = (
         "T",
         ((3,),),
         _STATIC + _MOTION,
-        "T, (3,): the value of the scene's UniformField. (k, 3): k load cases, and so many equilibria.",
-        "T: constant (3,), one a step (steps, 3), at the ends of all steps (steps + 1, 3) with straight lines between "
-        "them, or a function of the time [s] that returns (3,). The time is the motion's own, as in `times`: 0 at its "
-        "beginning, and where `start` is a motion it goes on. Arrays begin with the first step taken here.",
+        "T, (3,): the value of the scene's UniformField. (k, 3): k load cases, which return k equilibria.",
+        "T: constant (3,); per step (steps, 3); at the ends of all steps (steps + 1, 3), interpolated linearly; or a "
+        "function of the time [s] that returns (3,). The time is that in `times`: 0 at the beginning of a motion, and it "
+        "goes on if `start` is a motion. Arrays begin with the first step of this call.",
         "load parameter",
         varies=True,
     ),
@@ -102,7 +99,7 @@ _TABLE = (
         "N",
         (("n_v", 3),),
         _FINDERS + _MOTION,
-        "N, (n_v, 3): stand in for all forces of the scene's loads.",
+        "N, (n_v, 3): replace all forces of the scene's loads.",
     ),
     SolveKeyword(
         "damping",
@@ -119,8 +116,8 @@ _TABLE = (
         "s",
         ((),),
         _MOTION,
-        "s. The rate of the strains adds as much stress as this time of it would: for small motions the damping matrix is "
-        "this time the stiffness matrix.",
+        "s: the factor between the stress of the strain rate and that of an equal strain. For small motions the damping "
+        "matrix is this factor times the stiffness matrix.",
         group="damping",
         default=0.0,
         minimum="not negative",
@@ -141,7 +138,7 @@ _TABLE = (
         "m/s",
         (("n_v", 3), (3,)),
         _MOTION,
-        "m/s, (n_v, 3), or (3,) for all; by default those of the motion that `start` is, or none.",
+        "m/s, (n_v, 3), or (3,) for all vertices; by default those of `start` if it is a motion, else zero.",
     ),
 )
 

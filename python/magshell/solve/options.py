@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Clock:
-    """A count of steps that gives a motion in parts the times of a motion in one piece, to the last bit; sums would not.
+    """Counts the steps of a motion, so that one that is continued has the same times, to the last bit, as one in one piece.
 
-    origin: s; time_step: s; steps: that were taken since the origin.
+    Adding up time steps would not give the same bits. origin, time_step: s; steps: the number taken since the origin.
     """
 
     origin: float
@@ -68,16 +68,16 @@ _DEEPEST = 20  # halvings of an interval
 @immutable
 @dataclass(frozen=True)
 class Adaptive:
-    """Time steps of a motion that keep the estimated error of each step below a tolerance: `time_step` of ms.simulate.
+    """Chooses time steps that keep the estimated error of each step below a tolerance: `time_step` of ms.simulate.
 
-    interval: s, of the motion's time grid, whose intervals `steps` counts. States are recorded at its times, arrays in time
-        are given at them, and no step passes one: choose it as long as a step may be, and so that controls bend or jump only
-        at these times. A tensor has a gradient.
-    tolerance: m, of the error of the positions after one step, root mean square over vertices, as Trajectory.step_errors
-        has it. By default 1e-4 of the extent (the diagonal of the largest body's bounding box): a few hundred steps together
-        are then off by a few percent of it at most.
-    max_halvings: the shortest step is interval / 2^max_halvings, at most 2^20 and at least 1e-12 s. By default as many as
-        that allows.
+    interval: the spacing of the motion's time grid, s; `steps` counts these intervals. States are recorded and arrays in
+        time are given at the grid's times, and no step goes beyond one. Choose it as long as a step may be, and so that
+        controls have kinks and jumps only at these times. A tensor has a gradient.
+    tolerance: of the error of the positions after one step, m, as the root mean square over vertices (that of
+        Trajectory.step_errors). By default 1e-4 of the extent, the diagonal of the largest body's bounding box; the error of
+        a few hundred steps together is then a few percent of the extent at most.
+    max_halvings: the shortest step is interval / 2^max_halvings. At most 20, and so many that this is at least 1e-12 s,
+        which is the default.
 
     Steps are interval / 2^k long and begin at multiples of their length. A step whose error exceeds the tolerance, or that
     fails, is repeated with half or a quarter of the length; the next one is doubled if that is expected to keep the error
@@ -130,18 +130,18 @@ class Adaptive:
 @immutable
 @dataclass(frozen=True)
 class Newton:
-    """Newton's method with the stresses of the trial state, in adaptive load steps. For comparison.
+    """Solves by Newton's method with the stresses of the trial state, in adaptive load steps. For comparison.
 
-    tolerance: of the residual, relative to the forces that cancel in it. Beyond what round-off of the positions makes of
-        these forces no solve goes: where parts are stiff, time steps short or chains of links long (angles of 200 links over
-        10 m are known to 1e-13), that is more than the tolerance, and results have fewer digits.
-    max_iterations: a load step that needs more is halved.
-    first_load_step: of the way from the old controls to the new ones, in (0, 1].
-    min_load_step: below it, the solve descends the energy at the final loads instead (proximal continuation). Up
-        to 1/64 it is that of ways of usual length: where the whole way leads many extents far, shorter ones are tried.
-    max_relaxation_steps: how many of those before it gives up.
-    max_factorizations: how many of them before an equilibrium is given up, wherever it is then; 20 iterations without one
-        count as one. The dearest of the cases in tests/hard that end well takes half of the default.
+    tolerance: of the residual, relative to the forces that cancel in it. The residual cannot be smaller than what the
+        round-off of the positions makes of these forces. With stiff parts, short time steps or long chains of links (angles
+        of 200 links over 10 m are known to 1e-13) this floor is above the tolerance, and results have fewer digits.
+    max_iterations: the largest number of iterations in a load step; one that needs more is halved.
+    first_load_step: the first load step, as a share of the change of the loads, in (0, 1].
+    min_load_step: the smallest load step, as a share of the change of the loads. Below it, the solve descends the energy at
+        the final loads (proximal continuation). A value up to 1/64 is made smaller where the displacement is many extents.
+    max_relaxation_steps: the largest number of steps of that descent.
+    max_factorizations: the largest number of factorizations of an equilibrium, after which NotConverged is raised; 20
+        iterations without a factorization count as one. No case of tests/hard takes more than half of the default.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -187,10 +187,10 @@ class Newton:
 @immutable
 @dataclass(frozen=True)
 class MixedNewton(Newton):
-    """Newton's method with stresses of their own (mixed integration points), in adaptive load steps. The default.
+    """Solves by Newton's method with stresses as further unknowns (mixed integration points), in adaptive load steps.
 
-    Takes a thin shell to a large deflection in a handful of iterations where `Newton` takes dozens; same solution.
-    Options as for Newton.
+    It is the default. A large deflection of a thin shell takes a few iterations where `Newton` takes dozens; the solution is
+    the same. Source: D. Magisano, L. Leonetti, G. Garcea, Comput. Methods Appl. Mech. Eng. 313 (2017).
 
     tolerance, max_iterations, first_load_step, min_load_step, max_relaxation_steps, max_factorizations: as in `Newton`.
 
@@ -307,18 +307,18 @@ class ImplicitEuler:
 @immutable
 @dataclass(frozen=True, repr=False)
 class TRBDF2:
-    """Second order, two solves a step, L-stable: the trapezoidal rule, then BDF2. The default.
+    """Takes two solves a step, the trapezoidal rule and then BDF2: second order, L-stable. The default.
 
-    At 40 steps a period, a vibration loses 0.36 % of its energy over 20 periods if it is small, about 1 % if it bends
-    a strip by a third of its length. A field that jumps between two steps is felt half over the first 0.59 of the step
-    after it. The first step is one of SDIRK2; with rigid parts, only the first 64th of it is.
+    At 40 steps a period, a small vibration loses 0.36 % of its energy over 20 periods, and one that bends a strip by a third
+    of its length about 1 %. If a field jumps between two steps, half of its new value acts over the first 0.59 of the next
+    step. The first step has no step before it and is one of SDIRK2; with rigid parts, only the first 64th of it is.
     R. E. Bank et al., IEEE Trans. Electron Devices 32 (1985); M. E. Hosea and L. F. Shampine, Appl. Numer. Math. 20 (1996).
 
-    implicit_contact: let contact and friction act over the whole step as they are at its end, as C. Kane et al., Int. J.
-        Numer. Methods Eng. 49 (2000) do within Newmark's method. False: they act at the stages as all other forces do, and
-        an impact that no step resolves rebounds at any speed. True: it loses energy, and an impact of 20 steps rebounds with
-        0.93 to 0.95 of its speed, of 100 steps with 0.97 to 0.98. The order is one in contact, and two without. Water
-        may have no added mass then.
+    implicit_contact: whether the contact and friction forces at the end of a step act over the whole step, as within
+        Newmark's method in C. Kane et al., Int. J. Numer. Methods Eng. 49 (2000). False: they act at the stages like
+        all other forces, and after an impact shorter than a step the speed may have any value. True: such an impact
+        loses energy, one of 20 steps rebounds with 0.93 to 0.95 of its speed, one of 100 steps with 0.97 to 0.98. The
+        method then has first order in contact and second order without. Water with added mass is refused.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -344,12 +344,12 @@ class TRBDF2:
 @immutable
 @dataclass(frozen=True)
 class SDIRK2:
-    """Second order, two solves a step, L-stable: R. Alexander, SIAM J. Numer. Anal. 14 (1977).
+    """Takes two solves a step: second order, L-stable (R. Alexander, SIAM J. Numer. Anal. 14, 1977).
 
-    Small vibrations go as with TRBDF2, of which it has the stability function. One that bends a thin strip by a tenth
-    of its length loses 5 to 8 % of its energy over 20 periods of 40 steps, four times less with half the step: along a
-    curved motion its stages stretch the sheet, and that is damped. It needs nothing but positions and velocities of the
-    step before: for fields that jump often.
+    Its stability function is that of TRBDF2, so small vibrations are damped alike. Large ones are damped more: one that
+    bends a thin strip by a tenth of its length loses 5 to 8 % of its energy over 20 periods of 40 steps, since the
+    stages stretch the sheet along its curved motion; with half the step, a quarter of that. A step starts from
+    positions and velocities only, without accelerations, which suits fields that jump often.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -366,10 +366,10 @@ class SDIRK2:
 @immutable
 @dataclass(frozen=True)
 class SDIRK3:
-    """Third order, three solves a step, L-stable; same source as SDIRK2.
+    """Takes three solves a step: third order, L-stable (R. Alexander, SIAM J. Numer. Anal. 14, 1977).
 
-    The order shows in small motions, and where steps resolve the waves of the membrane. Thin sheets that move far get
-    second order from it, as they do under stiffness-proportional damping.
+    It has third order in small motions, and where the steps resolve membrane waves. In large motions of thin sheets,
+    and with stiffness-proportional damping, it has second order.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -392,13 +392,12 @@ KINDS = ("stages", "checkpoints", "factors")
 @immutable
 @dataclass(frozen=True)
 class AdjointStorage:
-    """The storage of a motion for its gradients, and its largest size: `adjoint_storage` of ms.simulate.
+    """Says what a motion stores for its gradients, and how much of it: `adjoint_storage` of ms.simulate.
 
-    what: "stages", all states; "checkpoints", between which the steps are taken again on the way back, some of them several
-        times; "factors": all states with their factorizations, which pays where several gradients are taken of one motion.
-        None: all states if they fit into the budget, else checkpoints. `adjoint_storage="factors"` is short
-            for ms.AdjointStorage("factors").
-    memory_budget: bytes.
+    what: "stages": all states. "checkpoints": some states; the gradient repeats the steps between them, some several times.
+        "factors": all states and their factorizations, for several gradients of one motion. None: all states if they fit
+        into the budget, else checkpoints. `adjoint_storage="factors"` is short for ms.AdjointStorage("factors").
+    memory_budget: the largest size of the stored states, bytes.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.05, 0.01, cells=(4, 1))

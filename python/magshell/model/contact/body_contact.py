@@ -43,29 +43,29 @@ class BodyContact(Owner):
 
     a, b: a Shell, a Solid, or a RigidBody. The contact surface of a RigidBody is its shape, or, of one made of vertices of
         a body, the faces between these.
-    min_distance: m, that always remains between the surfaces, because sheets are thick; by default half the largest
-        thickness of each sheet, and zero for solids.
-    activation_distance: m, beyond the minimal distance, at which contact forces begin; by default a tenth of the thickness
-        of a sheet, or a twentieth of the mean edge on the surface of a solid, the smaller of the two bodies'. A lightly
-        pressed body rests at nearly this distance.
+    min_distance: the distance that always remains between the surfaces, m. By default half the largest thickness of each
+        sheet, since sheets are represented by their middle surfaces; zero for solids.
+    activation_distance: the distance, m, beyond the minimal one, at which contact forces begin. By default a tenth of the
+        thickness of a sheet, or a twentieth of the mean edge on the surface of a solid, and the smaller one of the two
+        bodies. A lightly pressed body rests at nearly this distance.
     contact_stiffness: Pa, the contact pressure at about half the activation distance; by default the smaller Young's
         modulus of the two bodies. Forces do not depend on the time step.
     law: "barrier", whose force grows without bound, so that the minimal distance is kept under any load; or "penalty",
         softer and cheaper, whose force `contact_stiffness` limits: a larger load enters the minimal distance, but no step
         of a solve passes through the other surface.
     smoothing: m, of the penalty, as for contacts with obstacles; by default a tenth of the activation distance.
-    friction_coefficient: Coulomb's, or None for contact without friction. It acts in ms.simulate only.
-    static_friction_coefficient: that of sticking, if it is larger; by default the same.
-    sticking_speed: m/s, below which contacts stick, as for contacts with obstacles.
+    friction_coefficient: of Coulomb's law, or None for contact without friction. Friction acts in ms.simulate only.
+    static_friction_coefficient: the coefficient while bodies stick, if it is larger; by default the same.
+    sticking_speed: the speed below which contacts stick, m/s, as for contacts with obstacles.
     lagged_friction: as for contacts with obstacles.
 
     Pairs are a vertex and a face, or two edges; they act on either side of a surface. At a given gap, a flat contact bears
     1.0 to 3.5 times the pressure of the law, depending on how the edges of the two meshes cross, most where the meshes
-    coincide; where single edges cross, the force is proportional to the area of their faces. So a mesh changes the gap at
-    which a load rests, within the activation distance, but not the load. Friction acts at the middle surfaces of sheets. No
-    step of a solve passes through a pair; a start in which faces intersect, or are nearer than the minimal distance, is
-    refused with their numbers. Defaults come from the bodies at construction: a solve with another thickness or modulus
-    does not change them.
+    coincide; where single edges cross, the force is proportional to the area of their faces. The mesh thus changes the
+    gap at which a load rests, within the activation distance, but not the load. Friction acts at the middle surfaces of
+    sheets. No step of a solve passes through a pair; a start in which faces intersect, or are nearer than the minimal
+    distance, is refused with their numbers. Defaults come from the bodies at construction: a solve with another
+    thickness or modulus does not change them.
 
     Gradients through impacts are exact for the computed motion. But the stiffer the contact and the longer the step, the
     smaller is the range of parameters in which they predict the loss: a barrier reverses a body within a fraction of the

@@ -268,22 +268,22 @@ class Fixed(Joint):
 class Revolute(Joint):
     """Turns a link about an axis: a hinge. Its angle is zero at rest, and counts full turns.
 
-    origin, axis: (3,) m, and a direction, both in the world at rest and riding on the parent.
-    spring_stiffness, rest_angle: N m/rad, rad: a spring.
-    damping: N m s/rad, a torque against the rate of the angle, in motions.
-    torque: N m, on the child about the axis, and on the parent against it.
-    target_angle, servo_stiffness, torque_limit: rad, N m/rad, N m: a servo that pulls towards the target, with a torque
-        that stays below the limit (none by default).
-    lower_limit, upper_limit, limit_stiffness, limit_smoothing: rad, rad, N m/rad, rad: beyond a limit the torque grows by
-        a parabola of the length of the smoothing, then at this stiffness.
-    motor_angle: rad, prescribes the angle: a motor, reached by the shorter way round; `result[hinge].motor_torque` says
-        what it takes, in motions to second order. In place of a torque, a servo and limits. How fast it is to start with,
-        `rate` says.
-    rate: rad/s, at the start of a motion from rest positions, in a tree without vertices.
+    origin, axis: a point on the axis (3,) m and its direction (3,) of any length, in the world at rest; the axis moves with
+        the parent.
+    spring_stiffness, rest_angle: N m/rad and rad, of a spring.
+    damping: N m s/rad, of a torque against the rate of the angle, in motions.
+    torque: N m, about the axis on the child; the parent feels the opposite torque.
+    target_angle, servo_stiffness, torque_limit: rad, N m/rad and N m, of a servo whose torque pulls towards the target and
+        stays below the limit (no limit by default).
+    lower_limit, upper_limit, limit_stiffness, limit_smoothing: rad, rad, N m/rad and rad. Beyond a limit, a torque grows
+        like a parabola over the length of the smoothing, then linearly with the stiffness.
+    motor_angle: rad, the angle that a motor prescribes, reached by the shorter way round; it excludes a torque, a servo and
+        limits. `result[hinge].motor_torque` is the torque of the motor, of second order in the time step in motions.
+    rate: rad/s, the rate of the angle at the start of a motion from rest positions, in a tree without vertices.
 
-    Solves take another origin and axis too, with the same links at rest. An axis may have any length, which changes
-    nothing, so that a gradient by it is across the axis. All but the rate and the places may change in ms.simulate, one
-    value a step or at the ends of steps.
+    A solve may replace all of them, the links being the same at rest. The gradient by the axis is perpendicular to it,
+    as its length has no effect. All but the rate, origin and axis may change in ms.simulate, with one value for each
+    step or for the ends of all steps.
 
     >>> import numpy as np
     >>> import magshell as ms
@@ -327,12 +327,12 @@ class Revolute(Joint):
 class Screw(Joint):
     """Turns a link about an axis and slides it along the axis at a fixed ratio: a nut on a lead screw.
 
-    pitch: m/rad, how far it slides per angle, the lead over 2 pi. It is not zero; a negative one is that of a left-handed
-        thread. A solve may replace it, as origin and axis.
+    pitch: m/rad, the displacement per angle, which is the lead over 2 pi; not zero, and negative for a left-handed thread. A
+        solve may replace it.
 
-    child, parent, origin, axis, and the numbers of springs, dampers, torques, servos, limits and motors: as in Revolute,
-    in terms of the angle, which counts full turns. So do the targets of motors, which are not reached by the shorter way.
-    A force F along the axis acts as the torque pitch F. `result[screw]` has an angle and a displacement.
+    child, parent, origin, axis and the numbers of springs, dampers, torques, servos, limits and motors: as in Revolute, in
+    terms of the angle. The angle counts full turns, and so do the targets of motors, which do not take the shorter way. A
+    force F along the axis acts as the torque pitch F. `result[screw]` has an angle and a displacement.
 
     >>> import math
     >>> import magshell as ms
@@ -394,10 +394,9 @@ class Screw(Joint):
 class Prismatic(Joint):
     """Slides a link along an axis. Its displacement [m] is zero at rest; nothing depends on where its origin is.
 
-    As Revolute, with lengths for angles and forces [N] for torques: spring_stiffness N/m, rest_displacement m, damping
-    N s/m, force N, motor_displacement m (`result[slide].motor_force`), target_displacement m, servo_stiffness N/m,
-    force_limit N, lower_limit, upper_limit m, limit_stiffness N/m,
-    limit_smoothing m, rate m/s.
+    Its numbers are those of Revolute, with displacements for angles and forces for torques: spring_stiffness N/m,
+    rest_displacement m, damping N s/m, force N, motor_displacement m (`result[slide].motor_force`), target_displacement m,
+    servo_stiffness N/m, force_limit N, lower_limit, upper_limit m, limit_stiffness N/m, limit_smoothing m, rate m/s.
 
     child, parent, origin, axis: as in Revolute.
 
@@ -437,23 +436,26 @@ class Prismatic(Joint):
 
 
 class Ball(Joint):
-    """Turns a link about a point, any way.
+    """Turns a link about a point, about any axis: a ball joint.
 
-    origin: (3,) m, that point, in the world at rest and riding on the parent.
-    spring_stiffness: N m/rad, pulls the rotation, as one angle, back to none.
-    damping: N m s/rad, a torque against the rate at which the link turns to its parent, in motions.
-    torque: (3,) N m, a moment on the child, and against it on the parent, its axes those of the world: it keeps its
-        direction as they turn. It has no potential, as a following pressure has none.
-    motor_rotation: (3,) rad, prescribes the rotation from the parent to the child as a rotation vector, whose axes are those
-        of the world at rest and ride on the parent: a motor, reached by the shorter way round.
-        `result[ball].motor_torque` is the moment (3,) that it takes, as in Revolute.
-    target_rotation, servo_stiffness, torque_limit: (3,) rad likewise, N m/rad, N m: a servo that turns to the target along
-        one axis, with a torque that stays below the limit (none by default). A target half a turn away has no such axis.
+    origin: the point (3,) m, in the world at rest; it moves with the parent.
+    spring_stiffness: N m/rad, of a spring that turns the angle of the rotation back to zero.
+    damping: N m s/rad, of a torque against the angular velocity of the child relative to the parent, in motions.
+    torque: (3,) N m in the world's axes, on the child; the parent feels the opposite torque. It keeps its direction as they
+        turn, and therefore has no potential.
+    motor_rotation: the rotation from the parent to the child that a motor prescribes, reached by the shorter way round: a
+        rotation vector (3,) rad in axes that are those of the world at rest and move with the parent.
+        `result[ball].motor_torque` (3,) is the torque of the motor, as in Revolute.
+    target_rotation, servo_stiffness, torque_limit: a rotation vector (3,) rad as above, N m/rad and N m, of a servo whose
+        torque turns the child to the target about one axis and stays below the limit (no limit by default). For a
+        target half a turn away this axis does not exist.
     upper_limit: rad, of the angle of the rotation, from 1e-3 to below pi.
-    axis, cone_limit: (3,), a direction in the world at rest, and rad, from 1e-3 to below pi: how far the direction may be
-        off on the child from where it is on the parent: the swing, whatever the twist about it.
-    limit_stiffness, limit_smoothing: N m/rad, rad: of these two limits, as in Revolute.
-    rate: (3,) rad/s, how the child turns to its parent at the start of a motion, as in Revolute; axes of the world.
+    axis, cone_limit: a direction (3,) in the world at rest, and the largest angle, rad from 1e-3 to below pi, between this
+        direction on the child and on the parent. It limits the swing; the twist about the direction is free.
+    limit_stiffness, limit_smoothing: N m/rad and rad, of these two limits, as in Revolute.
+    rate: (3,) rad/s in the world's axes, the angular velocity of the child relative to the parent at the start of a
+    motion, as
+        in Revolute.
 
     >>> import magshell as ms
     >>> bob = ms.Link(mass=1.0, center=(0, 0, -1.0), inertia=0.1)
@@ -507,10 +509,10 @@ class Ball(Joint):
 
 
 class LoopClosure(Joint):
-    """Closes a loop: pulls a point of one link, and the same place on another or in the world, together.
+    """Closes a loop: a spring pulls a point of one link to the same point on another link, or in the world.
 
-    origin: (3,) m, the place at rest, which solves may change. stiffness: N/m; the gap is the force over it, and
-        `result[closure].gap` says it.
+    origin: the point at rest, (3,) m, which a solve may replace. stiffness: of the spring, N/m. A gap remains, which is the
+        force over the stiffness: `result[closure].gap`.
 
     child, parent: the two links; without a parent, the world.
 

@@ -122,44 +122,43 @@ def simulate(
 ) -> Trajectory | Any:  # TrajectoryBatch of a batch
     """Simulate the motion of a scene in time, or one for each member of a batch.
 
-    steps: how many; with ms.Adaptive, or more lengths than that, the number of intervals of the time grid: states are
-        recorded at its times, and arrays in time are given at them.
+    steps: the number of time steps; with ms.Adaptive, or an array of time steps, the number of intervals of the time grid,
+        at whose times states are recorded and arrays in time are given.
     {keywords}
-    start: positions (n_v, 3) m, an Equilibrium of this scene, a Trajectory or MotionState to go on from with the same
-        bits. By default the rest shape.
-    values: as in ms.equilibrium. Load parameters and damping may stand in values={scene: {name: value}} as well:
-        keywords are their short forms. Every shell needs a mass density.
-    values in time: positions and moments of Dipoles, center and rotation of a PlacedField, an obstacle or a magnet, and
-        its magnetization, displacement, rotation and center of a Clamp or Pin that has one of them: a function of the time
-        [s], or an array with one more axis in front, at the ends of all steps (steps + 1, ...). As everything that is given
-        there, they lie on straight lines between (rotation vectors too), also at the stages within a step. Of field sources
-        one a step may be given, which lets them jump. The surface of an obstacle moves, for friction, with the slopes of
-        parabolas through three neighbouring ends, on straight lines between those: of second order, as its places are.
-    integrator: TRBDF2() by default, ImplicitEuler() where the scene has contacts; SDIRK2(), SDIRK3(), ProjectiveDynamics().
-        A method of higher order makes an impact bounce, and each of its steps there is much work, unless the steps resolve
-        it. TRBDF2(implicit_contact=True) bounces right where steps resolve an impact, and loses energy where they do not.
-    record_every: steps (or intervals) between the states that come back, the start first.
-    adjoint_storage: for gradients; "stages" (all states), "checkpoints", "factors", or an ms.AdjointStorage,
-        which says how many bytes it may
-        take. By default all states if they fit into 2 GB, else checkpoints.
-    solver: of a step; MixedNewton() by default, of which the load steps are not used. ProjectiveDynamics needs none.
-    progress: show a bar once the motion has taken two seconds.
+    start: positions (n_v, 3) m, an Equilibrium of this scene, or a Trajectory or MotionState, from which the motion goes on
+        with the same bits as in one piece. By default the rest shape.
+    values: as in ms.equilibrium. Load parameters and damping may also be given as values={scene: {name: value}}; the
+        keywords are short forms of it. Every shell needs a mass density.
+    values in time: positions and moments of Dipoles; center, rotation and magnetization of a PlacedField or a magnet; center
+        and rotation of an obstacle; displacement, rotation and center of a Clamp or Pin that has one of them. Each is a
+        function of the time [s], or an array with one more axis in front for the ends of all steps, (steps + 1, ...),
+        between which values (rotation vectors too) are interpolated linearly, at the stages of a step as well. Field
+        sources may be given per step, (steps, ...), and then jump. For friction, the velocity of an obstacle at the end
+        of a step is that of a parabola through three neighbouring ends, interpolated linearly between them.
+    integrator: TRBDF2() by default, ImplicitEuler() if the scene has contacts; SDIRK2(), SDIRK3(), ProjectiveDynamics().
+        With a method of higher order bodies rebound, but a step through an impact is much work unless the steps resolve the
+        impact. TRBDF2(implicit_contact=True) rebounds correctly where they do, and loses energy where they do not.
+    record_every: the number of steps (or intervals) between recorded states. The start is recorded too.
+    adjoint_storage: what is stored for gradients: "stages" (all states), "checkpoints", "factors", or an ms.AdjointStorage,
+        which also limits the bytes. By default all states if they fit into 2 GB, else checkpoints.
+    solver: of each step, MixedNewton() by default; its load steps are not used. ProjectiveDynamics needs none.
+    progress: whether to show a bar once the motion has taken two seconds.
     batch, threads: as in ms.equilibrium. The result is a TrajectoryBatch. In a value that varies in time the axis of the
         members comes first, (k, steps, ...). The members share the bytes of `adjoint_storage`.
 
-    A step that does not converge is taken in halves, down to 1/64 of it; with ms.Adaptive it is made shorter, as is one
-    whose error is too large. ms.StepErrorWarning warns of steps that are too long. Raises NotConverged and Interrupted
-    with the motion until then as `last_good`; ValueError on bad input. With torch tensors among the inputs, positions,
-    velocities and edge rotations come back as tensors, and gradients go back from them to every input that is
-    continuous, time_step, damping, start (positions or an Equilibrium) and velocities among them. Where an input has
-    none (a Trajectory as start; time_step where a function of the time leaves torch), they raise NoGradient; so do
-    second derivatives: (g(x + h v) - g(x - h v)) / 2h is the Hessian's product with v.
+    A step that does not converge is divided, down to 1/64 of its length; with ms.Adaptive it is repeated with a shorter
+    length, like one whose error is too large. ms.StepErrorWarning warns of steps that are too long. Raises NotConverged and
+    Interrupted with the motion so far as `last_good`, and ValueError on bad input.
 
-    They are exact where the motion is differentiable: through impact, stick and slip on smooth obstacles too. It is not
-    where a point touches a kink of an obstacle (Trajectory.nonsmooth_vertices says where), where a little more
-    makes a step fail or
-    be taken in other parts (Trajectory.substeps), and in water whose tables have kinks (Water.is_smooth); gradients there
-    are those of one side.
+    If an input is a torch tensor, positions, velocities and edge rotations are tensors, with gradients by every continuous
+    input, including time_step, damping, start (positions or an Equilibrium) and velocities. An input without a gradient (a
+    Trajectory as start; time_step if a function of the time leaves torch) raises NoGradient. So do second derivatives; the
+    product of the Hessian with v is (g(x + h v) - g(x - h v)) / 2h.
+
+    Gradients are exact where the motion is differentiable, which includes impact, stick and slip on smooth obstacles. It is
+    not differentiable where a point touches a kink of an obstacle (Trajectory.nonsmooth_vertices), where a small change
+    divides a step differently (Trajectory.substeps), and in water whose tables have kinks (Water.is_smooth). Gradients
+    there are one-sided.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.05, 0.01, cells=(10, 2))

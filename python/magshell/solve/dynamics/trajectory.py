@@ -126,7 +126,7 @@ _ARRAYS = (*_REQUIRED, "contact_acceleration", "fine_faces")
 class Trajectory(AnimateMixin, OfOneBody):
     """The recorded motion of a scene.
 
-    With several bodies, rows are those of one after another; `trajectory[body]` has those of one.
+    Arrays have the rows of all bodies one after another; `trajectory[body]` has those of one body.
 
     times: (n,) s, of the recorded states, the start among them. positions: (n, n_v, 3) m; velocities: (n, n_v, 3) m/s;
     edge_rotations: (n, n_e) rad. kinetic_energy: (n,) J; energies: {term: (n,)} J, NaN where Ctrl-C came meanwhile.

@@ -80,24 +80,25 @@ def linear_buckling(
 
         (K + lambda dK) v = 0,     dK = d/dt K(rest + t u, t c) at t = 0, by a central difference     [Pa m]
 
-    so the state before buckling is assumed proportional to lambda, and K to change linearly along it. Exact
-    in the limit of small displacements before buckling: columns, plates loaded in their plane, closed shells.
-    A shallow arch that softens on its way needs ms.follow_path. The stiffness of a field
-    counts.
+    so the state before buckling is assumed proportional to lambda, and K to change linearly with it. This is exact in the
+    limit of small displacements before buckling: columns, plates loaded in their plane, closed shells. A shallow arch, which
+    softens before it buckles, needs ms.follow_path. The stiffness of a field is included.
 
     {keywords}
     values: as in ms.equilibrium.
 
-    equilibrium: of this scene, a stable one: a grown or loaded sheet, one in a field. K is then that of the equilibrium, u
-        the response to load parameters that go from its own to those given here (`ms.linear_response`), and the factors are
-        fractions of that way: the parameter of ms.follow_path(..., start=). Magnetization and values are its own.
+    equilibrium: a stable one of this scene, such as a grown or loaded sheet, or one in a field. K is then its
+    stiffness, u the
+        response to the change from its load parameters to those given here (`ms.linear_response`), and the factors are
+        fractions of this change: the parameter of ms.follow_path(..., start=). Magnetization and values are those of the
+        equilibrium.
 
-    modes: how many to find. Fewer come back where the others lie beyond what linear theory can tell: where
-        the sheet has moved by a tenth of its size, or at a thousand times the first factor of either sign.
+    modes: the number of modes to find. Modes for which linear theory does not hold are left out: where the sheet has moved
+        by a tenth of its size, or at a thousand times the first factor of either sign.
 
-    Joints that pull at rest or have motors are refused, as no load parameter multiplies them. Bodies in contact are refused:
-    a contact bears in one direction only, so that a mode and its opposite have different factors, and none of them is
-    linear; ms.follow_path passes where contacts open and close. Actuators that are springs of their own are refused too.
+    Refused are joints that pull at rest or have motors, since no load parameter multiplies them; actuators that are springs;
+    and bodies in contact, since a contact bears in one direction only, so that a mode and its opposite have different
+    factors. ms.follow_path follows opening and closing contacts.
 
     Factors are differentiable, by perturbation of first order: by values and load parameters that are tensors, and by the
     inputs of an equilibrium that was found with tensors, with the change of the equilibrium. A gradient costs two

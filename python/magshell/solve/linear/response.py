@@ -68,17 +68,17 @@ def linear_response(
 ) -> LinearResponse:
     """Compute the deflection to first order in the loads, by one factorization of the stiffness at the rest shape.
 
-    The stiffness is that of the unloaded sheet: loads and fields act as the forces they are at rest, without
-    the stiffness they add; supports that move do so at the rate they start with. Torques, springs, servos and limits that
-    pull in joints at rest are loads too, and motors move.
+    The stiffness is that of the unloaded scene. Loads and fields act as the forces they are at rest, without the stiffness
+    that they add; supports that move do so at their initial rate. Torques, springs, servos and limits of joints that pull at
+    rest are loads too, and motors move.
 
-    equilibrium: of this scene, a stable one: a grown or loaded sheet, one in a field. The deflection is then that from there
-        as the load parameters go from its own to those given here, to first order: the tangent of ms.follow_path(...,
-        start=) at its start. The stiffness is that of the equilibrium, with what loads, fields and actuators add to it;
-        magnetization and values are its own. Contacts stay as they are.
+    equilibrium: a stable one of this scene, such as a grown or loaded sheet, or one in a field. The deflection then starts
+        from there, and is of first order in the change from its load parameters to those given here: the tangent of
+        ms.follow_path(..., start=) at its start. The stiffness is that of the equilibrium and includes what loads,
+        fields and actuators add; magnetization and values are those of the equilibrium. Contacts stay as they are.
 
-    What no stiffness couples with a load stays at rest, and costs nothing: of a flat sheet in a coordinate plane, bending
-    where it is loaded across, stretching where it is loaded in its plane.
+    Unknowns that no stiffness couples with a load are left out: a flat sheet in a coordinate plane only bends under loads
+    across it, and only stretches under loads in its plane.
 
     Raises ValueError on bad input, about an equilibrium that is not stable, with its own load parameters, under a pressure
     without a potential, or one that requires a gradient, as there is none here; and where the supports leave a motion

@@ -110,7 +110,7 @@ class VibrationModes:
         that grows: the equilibrium is not stable. A tensor if the equilibrium or a value has tensors.
     modes: (k, n_v, 3), displacements of the vertices, the largest component 1.
     edge_rotations: (k, n_e), rad, that go with them.
-    unstable: how many modes grow, also where k is less.
+    unstable: the number of modes that grow, which may exceed k.
     """
 
     scene: Scene

@@ -31,8 +31,9 @@ class CriticalPoint:
     Where values or load parameters of the path are tensors, `parameter` and `positions` are tensors, located by Newton's
     method to 1e-9, and differentiable at limit points and at symmetric bifurcations; `path.switch_branch` and `start=` take
     the point and its positions as before. The gradient costs one factorization, and one or two back-substitutions and
-    thirty evaluations of the stiffness where positions are asked for, or at a bifurcation. By an input that breaks the
-    symmetry of a bifurcation, at flutter, and where values move along the path, it raises NoGradient.
+    thirty evaluations of the stiffness where positions are asked for, or at a bifurcation. The gradient
+    by an input that breaks the symmetry of a bifurcation raises NoGradient; so do gradients at flutter, and of paths along
+    which values change.
 
     >>> import torch
     >>> import magshell as ms

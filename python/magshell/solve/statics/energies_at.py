@@ -172,9 +172,9 @@ def forces(
     values: as in ms.equilibrium.
 
     Returns (on_vertices (n_v, 3) N, on_edge_rotations (n_e,) N m); the latter are zero on edges that cannot rotate.
-    They include no forces of supports: at an equilibrium, what is left is what supports bear. With tensors they are
-    tensors, differentiable once by positions, edge rotations and everything else above. Vertices that are welded together
-    share their force.
+    They include no forces of supports: at an equilibrium, the remaining forces are those that the supports bear. With
+    tensors they are tensors, differentiable once by positions, edge rotations and everything else above. Vertices that
+    are welded together share their force.
 
     Raises ValueError as ms.energies does, and for scenes with rigid bodies or skeletons.
 

@@ -33,21 +33,23 @@ if TYPE_CHECKING:
 @immutable
 @dataclass(frozen=True, repr=False)
 class Equilibrium(SaveMixin, OfOneBody):
-    """A scene at rest. With several bodies, rows are those of one after another; `equilibrium[body]` has those of one.
+    """A scene at rest. Arrays have the rows of all bodies one after another; `equilibrium[body]` has those of one body.
 
     positions: (n_v, 3) m; edge_rotations: (n_e,) rad, zero where an edge has none.
     remanent_magnetization: (n_f, 3) A/m, or None; applied_flux_density: (3,) T, the uniform part.
-    energies: J, by term. stable: no direction lowers the energy; n_negative_eigenvalues: how many do. Under forces without
-        potential: how many motions against friction grow; it may still flutter.
+    energies: {name of the term: J}.
+    stable: whether no direction lowers the energy. n_negative_eigenvalues: the number of directions that do. Under forces
+        without potential: the number of growing motions if the scene moved against friction; it may still flutter.
     residual: relative to the forces that cancel in it, and to their round-off. at_roundoff: whether round-off ended the
-        solve, above the solver's tolerance, as of very thin sheets and long chains.
-    saddles_escaped: unstable states that the solve left along their lowest modes. symmetric_saddles: those where the
-        energy falls equally on both sides, within 1e-6 of its decrease: a convention chose this equilibrium among
-        others of equal energy (the largest displacement of the mode is positive); ms.find_equilibria finds the others.
-    load_fraction: how far the controls got, 1 unless a solve failed.
-    largest_membrane_strain, largest_bending_strain: magnitudes, 1, of what `strains` has. Beyond 0.2 the sheet leaves
-        the model, of which ms.LargeStrainWarning warns.
-    wall_time, linear_time: s, in all and in factorizations and back-substitutions. memory: bytes, of the core.
+        solve above the solver's tolerance, which happens for very thin sheets and long chains.
+    saddles_escaped: the number of unstable states that the solve left along their lowest modes. symmetric_saddles: the
+    number
+        of those where the energy falls equally on both sides, within 1e-6 of its decrease. The solve then took the side on
+        which the largest displacement of the mode is positive; ms.find_equilibria finds the other equilibria.
+    load_fraction: the share of the change of the load parameters that was reached, 1 unless a solve failed.
+    largest_membrane_strain, largest_bending_strain: the largest magnitudes in `strains`. Beyond 0.2 the material law is not
+        valid, and ms.LargeStrainWarning warns.
+    wall_time, linear_time: s, of the whole solve, and of factorizations and back-substitutions. memory: bytes, of the core.
     """
 
     scene: Scene

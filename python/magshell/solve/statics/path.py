@@ -271,22 +271,23 @@ def follow_path(
 ) -> EquilibriumPath:
     """Follows a path of equilibria by arc length, from `start` as its load parameters go towards the new ones.
 
-    The path parameter is 0 at the load parameters of `start` (an Equilibrium of this scene; by default the rest shape,
-    unloaded) and 1 at those given here; it may turn back on the way, and the path with it. The path ends where the
-    parameter passes 1 or `min_parameter`, or where until(parameter, positions) says so.
+    The path parameter is 0 at the load parameters of `start` (an Equilibrium of this scene; by default the unloaded rest
+    shape) and 1 at those given here; it decreases again beyond limit points. The path ends where the parameter passes 1 or
+    `min_parameter`, or where until(parameter, positions) returns True.
 
     {keywords}
-    values: as in ms.equilibrium. Where `start` was found with other places of field sources, obstacles or supports, or with
-        other activations of muscles, those move along the path, on straight lines from the start's to these; everything
-        else has to be the same.
+    values: as in ms.equilibrium. Places of field sources, obstacles and supports, and activations of muscles, that
+    differ from
+        those of `start` change linearly along the path; everything else has to be the same.
 
-    first_step: of the parameter. max_step: root mean square displacement between points, over the mesh's size.
-    locate_critical: find limit points and bifurcations between points whose numbers of unstable directions differ.
+    first_step: of the parameter. max_step: the largest root mean square displacement between points, over the mesh's size.
+    locate_critical: whether to find limit points and bifurcations between points whose numbers of unstable directions
+    differ.
     progress: show a bar once a path has taken two seconds.
 
     Raises NotConverged and Interrupted with the path so far as `last_good`; ValueError on bad input.
 
-    max_points: where the path ends at the latest.
+    max_points: the largest number of points.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))

@@ -104,44 +104,45 @@ def equilibrium(
     """Find a stable equilibrium of a scene, one for each of several load cases, or one for each member of a batch.
 
     {keywords}
-    values: {object of the scene: {name: value}}, stand in for what the objects were made with: the values of loads, the
-        displacement, rotation and center of supports that move, positions and moments of Dipoles, the sizes,
-        magnetization, center and rotation of a magnet, the rest_positions of shells, the flux_density of a
-        SampledField, the center and rotation of a PlacedField, the law of a Contact, the center and rotation of an
-        obstacle, the numbers of Water, and {scene: {"gravity": value}}. Of applied_flux_density and the factors, the
-        keywords are short forms of {scene: {name: value}}. The scene is not analysed again, but for rest_positions.
-        `scene.objects` lists the objects.
-    start: an earlier Equilibrium of this scene, from whose controls the solve goes to the new ones; or positions
-        (n_v, 3) m. By default the rest shape, unloaded. Load cases may have an EquilibriumSet. From an Equilibrium,
-        obstacles and supports go to their new places on straight ways, in load steps so short that no point of a body
-        passes through an obstacle; where that cannot be had, NotConverged says which vertex would.
-    require_stable: leave saddles downhill. False accepts any equilibrium; `stable` says which kind it is.
-    ignore_velocity_forces: of a scene with friction or water, the equilibrium without them, which act on what
-        moves only. By default such
-        a scene is refused: with friction, where it comes to rest depends on how it got there, which ms.simulate tells.
+    values: {object of the scene: {name: value}}, which replace the values that the objects were made with, in this solve:
+        numbers of loads, actuators, joints, materials and Water; displacement, rotation and center of supports that move;
+        positions and moments of Dipoles; sizes, magnetization, center and rotation of a magnet; center and rotation of
+        an obstacle or a PlacedField; flux_density of a SampledField; the law of a Contact; rest_positions of shells; and
+        {scene: {"gravity": value}}. `scene.objects` lists the objects. The keywords applied_flux_density and the factors are
+        short forms of {scene: {name: value}}. The structure of the matrix is kept, except with rest_positions.
+    start: an earlier Equilibrium of this scene, from whose load parameters and values the solve goes to the new ones; or
+        positions (n_v, 3) m. By default the unloaded rest shape. With load cases also an EquilibriumSet. From an
+        Equilibrium, obstacles and supports move along straight lines to their new places, in load steps so short that
+        no point of a body passes through an obstacle; if that is not possible, NotConverged names the vertex.
+    require_stable: whether saddle points are left along a direction in which the energy falls. False accepts any
+        equilibrium; `stable` tells its kind.
+    ignore_velocity_forces: whether a scene with friction or water is solved without them, since they act on moving bodies
+        only. By default such a scene is refused: with friction, where it comes to rest depends on its motion (ms.simulate).
     solver: MixedNewton() by default.
-    progress: show a bar once it has taken two seconds; or a function, called now and then with how far the controls have
-        come (0 to 1, of all load cases) and the residual.
-    batch: number of members k. Any value or load parameter may then have a leading axis of length k; others are the same for
-        all members. The members are solved at once over threads, each with the bits of a single call, and the result is an
-        EquilibriumBatch: a member that fails loses no other. Gradients are computed over threads too. `start` may have
-        the axis as well.
-    threads: number of threads of a batch, at most the processors that this process may use; by default all of them. Each
-        has a core model of its own.
+    progress: whether to show a bar once the solve has taken two seconds; or a function, called now and then with the
+    share of
+        the load steps done (0 to 1, of all load cases) and the residual.
+    batch: the number of members k. Any value or load parameter, and `start`, may then have a leading axis of length k;
+    others
+        are the same for all members. The members are solved in parallel threads, each with the same bits as in a single
+        call. The result is an EquilibriumBatch; if a member fails, the others are kept. Gradients use the threads too.
+    threads: the number of threads of a batch, at most the number of processors that this process may use, which is the
+        default. Each thread has a core model of its own.
 
-    Raises NotConverged and Interrupted (on Ctrl-C), both with the last converged state as `last_good`, which on Ctrl-C may
-    be as rough as its residual says; ValueError on bad input. With torch tensors among the inputs, positions and edge
-    rotations come back as tensors, and gradients go back from them to every input above but `start`. Each costs one
-    back-substitution with the factorization at the solution, kept as long as the result is. Asked for where the solve did
-    not converge, or at an equilibrium that is not stable, they raise NoGradient.
+    Raises NotConverged, Interrupted (on Ctrl-C) and ValueError (on bad input). The first two have the last converged
+    state as `last_good`; on Ctrl-C its `residual` tells how well it is converged.
+
+    If an input is a torch tensor, positions and edge rotations are tensors, with gradients by every input above but `start`.
+    A gradient costs one back-substitution with the factorization at the solution, which is kept as long as the result.
+    If the solve did not converge, or the equilibrium is not stable, it raises NoGradient.
 
     Second derivatives are those of gradients (create_graph=True, torch.func.hessian, torch.autograd.functional.hvp): a
     product of a Hessian with a direction costs three back-substitutions and four or eight evaluations of the stiffness, and
-    is right to some 1e-8. They raise NoGradient with rigid bodies, own_field and pressures without potential, and after
-    forward mode. Third ones do too.
+    has a relative error of about 1e-8. With rigid bodies, own_field and pressures without potential, and after forward mode,
+    they raise NoGradient. So do third derivatives.
 
-    Tangents (forward mode) along a change of the inputs cost one back-substitution too, and four or eight evaluations of
-    forces: by torch.autograd.forward_ad, torch.func.jvp and jacfwd. torch.func.grad, vjp, jacrev and functional_call work as
+    Tangents (forward mode) along a change of the inputs cost one back-substitution, too, and four or eight evaluations of
+    forces: torch.autograd.forward_ad, torch.func.jvp and jacfwd. torch.func.grad, vjp, jacrev and functional_call work as
     well; torch.func.vmap solves a batch. By the origins, axes and pitches of joints, and by rest positions, there are
     gradients, but no tangents.
 

@@ -38,14 +38,13 @@ class WarmStart(Frozen):
     Called like ms.equilibrium, without `scene` and `start`; load cases too. The first call begins at the rest shape,
     or at `start` as in ms.equilibrium.
 
-    A small change of a design moves its equilibrium a little, unless that loses its stability on the way: the sheet
-    buckles or snaps, and what an objective says of it jumps. Every solve is compared with the change to first order
-    (one back-substitution with the last factorization), and one that strays from it is repeated in halves of the
-    way, down to 1/32. Where the equilibrium still strays, or ceases to be found, it has jumped: the call raises
-    EquilibriumJumped, from which ms.minimize goes back and takes a shorter step, and the last design stays the one
-    to start from. In `with warm.accept_jumps():` the other equilibrium is taken as it is.
+    A small change of a design moves its equilibrium a little, unless the equilibrium loses its stability: the sheet then
+    buckles or snaps, and an objective jumps. Every solve is compared with the change to first order (one back-substitution
+    with the last factorization). If they differ too much, the change is divided, down to 1/32. If they still differ, or no
+    equilibrium is found, it has jumped: the call raises EquilibriumJumped, after which ms.minimize takes a shorter step, and
+    the next call starts from the last design again. Within `with warm.accept_jumps():` the new equilibrium is accepted.
 
-    solver: MixedNewton() by default. `equilibria`: of the last design, or None. `solves`: how many there were.
+    solver: MixedNewton() by default. `equilibria`: of the last design, or None. `solves`: the number of solves so far.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
