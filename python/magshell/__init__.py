@@ -102,6 +102,7 @@ from .output.results.saved import load, save
 from .output.results.series import write_series
 from .output.results.surface_files import write_surface
 from .output.results.tables import to_pandas, to_xarray
+from .solve.accuracy.error_estimate import ErrorEstimate, error_estimate
 from .solve.dynamics.simulate import simulate
 from .solve.dynamics.trajectory import MotionState, Trajectory
 from .solve.dynamics.trajectory_batch import TrajectoryBatch
@@ -165,6 +166,7 @@ __all__ = [
     "EquilibriumJumped",
     "EquilibriumPath",
     "EquilibriumSet",
+    "ErrorEstimate",
     "Extrapolation",
     "Fibres",
     "FieldSamplingWarning",
@@ -261,6 +263,7 @@ __all__ = [
     "energy",
     "envs",
     "equilibrium",
+    "error_estimate",
     "fibres_along",
     "field_of",
     "find_equilibria",

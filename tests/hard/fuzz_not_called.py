@@ -6,6 +6,8 @@ NOT_CALLED = {
     "DesignRejected": "an error",
     "EquilibriumJumped": "an error",
     "Equilibrium": "a result",
+    "ErrorEstimate": "a result",
+    "error_estimate": "takes a result only; tests/solve/accuracy refuses bad input",
     "Extrapolation": "a result",
     "FitResult": "a result",
     "Prediction": "a result",

@@ -75,6 +75,7 @@ ROOMS = [
     "solve.statics",
     "solve.dynamics",
     "solve.linear",
+    "solve.accuracy",
     "design",
     "output",
     "output.results",

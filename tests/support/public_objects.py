@@ -365,6 +365,7 @@ def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
         ms.envs.EnvState,
         ms.Buckling,
         ms.CriticalPoint,
+        ms.ErrorEstimate,
         ms.Extrapolation,
         ms.MultistartResult,
         ms.PathEvent,

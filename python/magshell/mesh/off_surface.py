@@ -26,6 +26,8 @@ _STRAIGHT = 0.1
 # [-] Fraction of the nodes that may stay off without a warning: nodes along ridges of the surface, where the distance has no
 # gradient to follow.
 _FEW = 0.02
+# [-] Bulge over an edge's length below which a mesh is flat to round-off.
+_ROUND_OFF = 1e-7
 
 
 def warn_of_nodes_off(mesh: MeshBase, edges: np.ndarray, middles: np.ndarray, surface: Distance) -> None:
@@ -71,6 +73,11 @@ def warn_of_straight_edges(mesh: TriangleMesh, middles: np.ndarray) -> None:
         MeshQualityWarning,
         stacklevel=callers_level(),
     )
+
+
+def curved_edges(mesh: TriangleMesh) -> np.ndarray:
+    """Return for each edge whether the surface through the vertices bulges over it as a smooth surface does, (n_e,)."""
+    return _bulges(mesh) > _ROUND_OFF * mesh.edge_lengths
 
 
 def _bulges(mesh: TriangleMesh) -> np.ndarray:

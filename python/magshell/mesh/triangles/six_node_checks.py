@@ -162,6 +162,11 @@ _INNER = [(3, 4), (4, 5), (5, 3)]  # ends of the edges inside a divided element
 _PARAMETERS = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5)])
 
 
+def inner_weights() -> np.ndarray:
+    """Return the shape functions at the three nodes that `divided` puts inside an element, (3, 6)."""
+    return shapes(np.array([0.5 * (_PARAMETERS[a] + _PARAMETERS[b]) for a, b in _INNER]))[0]
+
+
 def divided(mesh: QuadraticTriangleMesh) -> tuple[np.ndarray, np.ndarray]:
     """Divide each element into four with the same curved shape.
 

@@ -122,7 +122,7 @@ class QuadraticTriangleMesh(MeshBase):
             raise ValueError("give project= or surface=, not both: each says where the midside nodes lie")
         middles = mesh.edge_midpoints
         if project is not None:
-            middles = _projected("project(midpoints)", "n_e", project, middles)
+            middles = projected("project(midpoints)", "n_e", project, middles)
         elif surface is not None:
             middles = middles_on_fit(
                 mesh, checked_mesh(surface, "surface"), "mesh" if surface is mesh else "surface"
@@ -340,7 +340,7 @@ class QuadraticTriangleMesh(MeshBase):
         """
         new, elements = divided(self)
         if project is not None:
-            new = _projected("project(nodes)", "m", project, new)
+            new = projected("project(nodes)", "m", project, new)
         fine = self._without_warning(np.concatenate([self.rest_positions, new]), elements)
         return fine._with_members(self._refined_groups())
 
@@ -379,7 +379,7 @@ def _checked_attributes(rest_positions: Numbers, elements: Numbers) -> dict[str,
     }
 
 
-def _projected(
+def projected(
     name: str, rows: str, project: Callable[[np.ndarray], np.ndarray], points: np.ndarray
 ) -> np.ndarray:
     """Return project(points), (n, 3) m, after a check of its shape.

@@ -165,22 +165,25 @@ class SmoothSurface:
         return float(a @ b) < np.cos(_SMOOTH) * float(np.linalg.norm(a) * np.linalg.norm(b))
 
 
-def middles_on_fit(mesh: TriangleMesh, fine: TriangleMesh, name: str) -> np.ndarray:
-    """Return the midpoints of all edges of a mesh, moved onto the smooth surface of a finer one, (n_e, 3) m.
+def middles_on_fit(
+    mesh: TriangleMesh, fine: TriangleMesh, name: str, edges: np.ndarray | None = None
+) -> np.ndarray:
+    """Return the midpoints of edges of a mesh, moved onto the smooth surface of a finer one, (k, 3) m.
 
-    name: what error messages call the finer mesh.
+    name: what error messages call the finer mesh. edges: (k,), by default all.
     """
     surface = SmoothSurface(fine, name)
-    middles = np.array(mesh.edge_midpoints)
+    chosen = np.arange(mesh.n_edges) if edges is None else edges
+    middles = np.array(mesh.edge_midpoints[chosen])
     normals = mesh.face_normals
     on_border = set(mesh.boundary_edges.tolist())
-    for edge, (a, b) in enumerate(mesh.rest_positions[mesh.edges]):
+    for k, edge in enumerate(chosen.tolist()):
         if edge in on_border:
-            middles[edge] = surface.border(a, b)
+            middles[k] = surface.border(*mesh.rest_positions[mesh.edges[edge]])
             continue
         normal = normals[mesh.edge_faces[edge]].sum(axis=0)
         normal /= np.linalg.norm(normal)
-        middles[edge] = surface.inside(middles[edge], normal, mesh.edge_lengths[edge])
+        middles[k] = surface.inside(middles[k], normal, mesh.edge_lengths[edge])
     return middles
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from ..._runtime.solve_keywords import given_to
 from ..._runtime.solver_entry_point import solve_entry
 from ...model.scene.reshaped import reshaped
 from ...model.scene.scene import Scene
+from ...model.scene.values import Values
 from ..statics.equilibrium import Equilibrium
 from .base_state import StiffnessAbout, asked_inputs
 from .rest import RestStiffness, forces_at_rest
@@ -39,6 +40,18 @@ class LinearResponse(PlotMixin):
     factorizations: int
     wall_time: float
     equilibrium: Equilibrium | None = None
+    _values: Any = field(repr=False, default=None)
+    _controls: Any = field(repr=False, default=None)
+
+    def __getstate__(self) -> dict[Any, Any]:
+        """Return the data of a copy or another process."""
+        values = None if self._values is None else self._values.to_state()
+        return {**vars(self), "_values": values}
+
+    def __setstate__(self, state: dict[Any, Any]) -> None:
+        stored = state["_values"]
+        values = None if stored is None else Values.from_state(state["scene"], stored)
+        PlotMixin.__setstate__(self, {**state, "_values": values})
 
     @property
     def positions(self) -> Computed:
@@ -115,4 +128,6 @@ def linear_response(
         factorizations=1,
         wall_time=time.perf_counter() - began,
         equilibrium=equilibrium,
+        _values=inputs.values,
+        _controls=inputs.controls,
     )

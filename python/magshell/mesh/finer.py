@@ -1,0 +1,171 @@
+"""Finer meshes of the same sheet: of second order, divided, or bisected, and how they descend from the coarse mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy
+
+from .groups import row_numbers
+from .off_surface import curved_edges
+from .triangles.bisection import bisected_edges, divided_faces
+from .triangles.six_node_checks import inner_weights
+from .triangles.six_node_mesh import QuadraticTriangleMesh, projected
+from .triangles.smooth_fit import middles_on_fit
+from .triangles.triangle_mesh import TriangleMesh
+
+if TYPE_CHECKING:
+    Sheet = TriangleMesh | QuadraticTriangleMesh
+    Project = Callable[[np.ndarray], np.ndarray]
+
+# [-] Weights of the first end, the second end and the midside node of an edge at its first quarter.
+_AT_QUARTER = (0.375, -0.125, 0.75)
+
+
+@dataclass(frozen=True)
+class FinerMesh:
+    """A mesh and the coarser one that it subdivides; vertices of the coarse mesh keep their numbers.
+
+    element_parents: (n,), the coarse element that each element lies in. edge_parents: (n_e,), the coarse edge that each edge
+    lies on, -1 inside elements. new_edges: (n_new,), the coarse edge that each new vertex lies on, -1 inside elements.
+    interpolation: sparse (n_v, n_v of the coarse mesh), which maps values at coarse vertices to values at all vertices.
+    """
+
+    coarse: Any
+    mesh: Any
+    element_parents: np.ndarray
+    edge_parents: np.ndarray
+    new_edges: np.ndarray
+    interpolation: Any
+
+
+def second_order(mesh: TriangleMesh, project: Project | None, planes: Any = ()) -> FinerMesh:
+    """Return the six-node mesh with an element for each face, whose midside nodes lie on the curved surface.
+
+    project: maps the midpoints of edges, (n, 3) m, to the surface. Without it a smooth surface is fitted to the vertices of
+    a curved mesh; edges of a mesh that is flat, or folded without curvature, stay straight. planes: (normal, point) of
+    planes in which the midside nodes of boundary edges stay if their ends lie there.
+
+    Raises ValueError where no smooth surface fits a curved mesh.
+    """
+    middles = surface_middles(mesh, project, planes)
+    nodes = mesh.n_vertices + mesh.face_edges[:, [2, 0, 1]]  # edge i is opposite corner i
+    positions = np.concatenate([mesh.rest_positions, middles])
+    fine = QuadraticTriangleMesh._without_warning(positions, np.concatenate([mesh.faces, nodes], axis=1))
+    edges = np.arange(mesh.n_edges)
+    of_edges = row_numbers(mesh.edges, fine.edges)
+    means = _rows(mesh.n_vertices, mesh.edges, np.full(mesh.edges.shape, 0.5))
+    return FinerMesh(mesh, fine, np.arange(mesh.n_faces), of_edges, edges, means)
+
+
+def divided(mesh: QuadraticTriangleMesh, project: Project | None) -> FinerMesh:
+    """Return the mesh with each six-node element divided into four; see `QuadraticTriangleMesh.refined`."""
+    fine = mesh.refined(project)
+    n = np.arange(mesh.n_elements)
+    ends, middle = mesh.edges, mesh.edge_nodes
+    halves = np.stack([ends[:, 0], middle, middle, ends[:, 1]], axis=1).reshape(-1, 2)
+    of_halves = row_numbers(halves, fine.edges)
+    on_edges = np.repeat(np.arange(mesh.n_edges), 2)
+    new_edges = np.concatenate([on_edges, np.full(3 * mesh.n_elements, -1)])
+    quarters = np.concatenate([ends, middle[:, None], ends[:, ::-1], middle[:, None]], axis=1).reshape(-1, 3)
+    weights = _rows(mesh.n_vertices, quarters, np.broadcast_to(_AT_QUARTER, quarters.shape))
+    inner = np.tile(inner_weights(), (mesh.n_elements, 1))
+    inside = _rows(mesh.n_vertices, np.repeat(mesh.elements, 3, axis=0), inner)
+    inside = inside[mesh.n_vertices :]
+    parents = np.where(of_halves < 0, -1, of_halves // 2)
+    return FinerMesh(
+        mesh, fine, np.repeat(n, 4), parents, new_edges, scipy.sparse.vstack([weights, inside]).tocsr()
+    )
+
+
+def bisected(mesh: TriangleMesh, marked: np.ndarray, project: Project | None, planes: Any = ()) -> FinerMesh:
+    """Return the mesh with the marked faces, (k,), divided into four, and their neighbours so that it stays conforming.
+
+    Edges of marked faces are divided in the middle; every other face with a divided edge is bisected across its longest
+    edge first (Rivara 1984). project, planes: as in `second_order`.
+    """
+    split_edges = bisected_edges(mesh, marked)
+    middles = surface_middles(mesh, project, planes, split_edges)
+    faces, parents = divided_faces(mesh, split_edges)
+    fine = TriangleMesh(np.concatenate([mesh.rest_positions, middles]), faces)
+    new = mesh.n_vertices + np.arange(len(split_edges))
+    ends = mesh.edges[split_edges]
+    segments = np.concatenate(
+        [mesh.edges, np.stack([ends[:, 0], new, new, ends[:, 1]], axis=1).reshape(-1, 2)]
+    )
+    owners = np.concatenate([np.arange(mesh.n_edges), np.repeat(split_edges, 2)])
+    found = row_numbers(segments, fine.edges)
+    fine = fine._with_members(_groups(mesh, split_edges, new, fine, parents))
+    means = _rows(mesh.n_vertices, ends, np.full(ends.shape, 0.5))
+    return FinerMesh(mesh, fine, parents, np.where(found < 0, -1, owners[found]), split_edges, means)
+
+
+def surface_middles(
+    mesh: TriangleMesh, project: Project | None, planes: Any = (), edges: np.ndarray | None = None
+) -> np.ndarray:
+    """Return the points of the surface near the midpoints of all edges, or of some, (n, 3) m; see `second_order`."""
+    chosen = np.arange(mesh.n_edges) if edges is None else edges
+    middles = np.array(mesh.edge_midpoints[chosen])
+    if project is not None:
+        return projected("project(points)", "n", project, middles)
+    if not curved_edges(mesh).any():
+        return middles
+    try:
+        middles = middles_on_fit(mesh, mesh, "the mesh", chosen)
+    except ValueError as error:
+        raise ValueError(
+            f"the mesh is curved, and new vertices between its vertices must lie on the surface: {error}. Give the surface "
+            "by project=, a function of points (n, 3) m"
+        ) from None
+    for normal, point in planes:
+        heights = (mesh.rest_positions - point) @ normal
+        on_it = (np.abs(heights) <= 1e-9 * mesh.size)[mesh.edges[chosen]].all(axis=1)
+        on_it &= (mesh.edge_faces[chosen] < 0).any(axis=1)
+        middles[on_it] -= ((middles[on_it] - point) @ normal)[:, None] * normal
+    return middles
+
+
+def children(parents: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the parts whose parents are among the chosen ones, as (rows of `chosen`, parts), (m,) each.
+
+    A parent that is chosen twice has its parts twice.
+    """
+    order = np.argsort(parents, kind="stable")
+    first, last = (np.searchsorted(parents[order], chosen, side=side) for side in ("left", "right"))
+    counts = last - first
+    rows = np.repeat(np.arange(len(chosen)), counts)
+    within = np.arange(len(rows)) - np.repeat(np.cumsum(counts) - counts, counts)
+    return rows, order[first[rows] + within]
+
+
+def _rows(n_vertices: int, columns: np.ndarray, weights: np.ndarray) -> Any:
+    """Return the identity of the coarse vertices, followed by a row of weights for each new vertex; sparse."""
+    n, m = columns.shape
+    rows = np.concatenate([np.arange(n_vertices), n_vertices + np.repeat(np.arange(n), m)])
+    entries = np.concatenate([np.ones(n_vertices), np.ravel(weights)])
+    places = rows, np.concatenate([np.arange(n_vertices), columns.ravel()])
+    return scipy.sparse.csr_array((entries, places), shape=(n_vertices + n, n_vertices))
+
+
+def _groups(
+    mesh: TriangleMesh, split_edges: np.ndarray, new: np.ndarray, fine: TriangleMesh, parents: np.ndarray
+) -> dict[str, Any]:
+    """Return the groups of the bisected mesh: halves of edges and parts of faces take the place of these."""
+    found = {}
+    for name, group in mesh._groups.items():
+        edges = row_numbers(mesh.edges, group.edges)
+        middle = np.full(mesh.n_edges, -1)
+        middle[split_edges] = new
+        cut = middle[edges] >= 0
+        ends, between = group.edges[cut], middle[edges[cut]]
+        halves = np.stack([ends[:, 0], between, between, ends[:, 1]], axis=1).reshape(-1, 2)
+        _, parts = children(parents, row_numbers(mesh.faces, group.faces))
+        found[name] = group._replace(
+            edges=np.concatenate([group.edges[~cut], halves]), faces=fine.faces[parts]
+        )
+    if found:
+        mesh._warn_of_new_vertices()
+    return found

@@ -1,0 +1,1 @@
+"""Discretization errors of results, and meshes refined until these are small enough."""

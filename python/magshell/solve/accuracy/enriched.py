@@ -1,0 +1,190 @@
+"""The solution of a scene on a finer mesh or with better elements, found from that on the coarse mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ... import _core
+from ..._input.tensors import detached
+from ..._runtime.keywords import FACTORS
+from ...errors import NotConverged
+from ...mesh.finer import FinerMesh
+from ...model.loads.pressure import Pressure
+from ...model.scene.finer_scene import finer_scene
+from ...model.scene.solve_inputs import Inputs
+from ..linear.response import LinearResponse
+from ..linear.rest import RestStiffness
+from ..options import MixedNewton
+from ..statics.equilibrium import Equilibrium
+from ..statics.single_solve import Search, Solution, find, inputs_of, solve
+from .finer_start import positions_on
+
+if TYPE_CHECKING:
+    from ...model.scene.scene import Scene
+
+# Most factorizations of a search from the coarse solution, before one from the rest shape; fixed by
+# test_estimates_take_few_factorizations.
+_MOST_FROM_COARSE = 12
+# [-] Largest change of a position between coarse and finer solution, over the largest displacement; farther away the finer
+# mesh has found another equilibrium. Fixed by test_equilibria_far_from_the_coarse_one_are_refused.
+_NEAR = 0.5
+_SYMMETRIC = (
+    1e-6  # [-] difference of products that is round-off; fixed by test_faces_of_open_pressures_are_refused
+)
+
+
+@dataclass(frozen=True)
+class FinerSolution:
+    """The solution on finer meshes of all bodies, and what the adjoint of an output needs.
+
+    all_positions: (n_v, 3) m, of the finer meshes. inputs: of the solve. state_of_stiffness, controls: all unknowns and the
+    load parameters at which the stiffness is taken: of the solution, or those of the rest shape for a linear response.
+    factorizations: of the search.
+    """
+
+    scene: Scene
+    finer: tuple[FinerMesh, ...]
+    all_positions: np.ndarray
+    inputs: Inputs
+    state_of_stiffness: np.ndarray
+    controls: np.ndarray
+    factorizations: int
+    result: Any
+    _adjoint: Callable[[np.ndarray], np.ndarray]
+
+    @property
+    def positions(self) -> np.ndarray:
+        """The positions at the vertices of the coarse meshes, (n_v of the coarse meshes, 3) m."""
+        parts = zip(self.scene._bodies.spans, self.finer, strict=True)
+        rows = self.all_positions
+        return np.concatenate([rows[span.vertices][: each.coarse.n_vertices] for span, each in parts])
+
+    def adjoint(self, by_positions: np.ndarray) -> np.ndarray:
+        """Return the adjoint of an output, all unknowns, from its derivative by the positions at coarse vertices."""
+        return self._adjoint(self.from_coarse(by_positions))
+
+    def from_coarse(self, rows: np.ndarray) -> np.ndarray:
+        """Return rows at coarse vertices among those of all vertices, which are zero at new ones."""
+        full = np.zeros((self.scene.mesh.n_vertices, 3))
+        first = 0
+        for span, each in zip(self.scene._bodies.spans, self.finer, strict=True):
+            n = each.coarse.n_vertices
+            full[span.first_vertex : span.first_vertex + n] = rows[first : first + n]
+            first += n
+        return full
+
+
+def finer_solution(result: Equilibrium | LinearResponse, finer: tuple[FinerMesh, ...]) -> FinerSolution:
+    """Solve on finer meshes of the bodies, from the solution on the coarse ones.
+
+    Raises ValueError for what does not go over to a finer mesh; NotConverged if no solution is found near the coarse one.
+    """
+    scene = result.scene
+    made = finer_scene(
+        scene, result._values, {id(body): each for body, each in zip(scene.bodies, finer, strict=True)}
+    )
+    inputs = inputs_of(made, load_parameters(result))
+    solved = _linear if isinstance(result, LinearResponse) else _nonlinear
+    return solved(result, made, inputs, finer)
+
+
+def load_parameters(result: Equilibrium | LinearResponse) -> dict[str, Any]:
+    """Return the load parameters of a result as keywords of a solve."""
+    layout, controls = result.scene._control_layout, result._controls
+    found: dict[str, Any] = {name: float(layout.of(controls, "scene", name)[0]) for name in FACTORS}
+    if result.scene.has_uniform_field:
+        found["applied_flux_density"] = layout.of(controls, "scene", "applied_flux_density")[0].copy()
+    return found
+
+
+def _linear(
+    result: LinearResponse, scene: Scene, inputs: Inputs, finer: tuple[FinerMesh, ...]
+) -> FinerSolution:
+    model, controls = scene._model, scene._control_layout.zeros()
+    with inputs.in_core():
+        stiffness = RestStiffness(inputs)
+        state = stiffness.response(inputs)
+        rest, gradient = stiffness.state, stiffness.gradient
+
+    def adjoint(by_positions: np.ndarray) -> np.ndarray:
+        with inputs.in_core():
+            pulled = gradient + model.full_vector(by_positions)
+            return model.small_deflection(rest, controls, controls, pulled).motion
+
+    displaced = model.positions(state)
+    response = replace(result, scene=scene, displacements=displaced)
+    places = scene.mesh.rest_positions + displaced
+    return FinerSolution(scene, finer, places, inputs, rest, controls, 1, response, adjoint)
+
+
+def _nonlinear(
+    result: Equilibrium, scene: Scene, inputs: Inputs, finer: tuple[FinerMesh, ...]
+) -> FinerSolution:
+    model = scene._model
+    parts = zip(_by_body(result.scene, np.asarray(detached(result.positions))), finer, strict=True)
+    placed = np.concatenate([positions_on(each, x) for x, each in parts])
+    with inputs.in_core():
+        start = model.state(placed, np.zeros(scene._bodies.n_rotations))
+        start = start + model.driven_increment(start, inputs.controls)
+    solution, factorizations = _found(result, scene, inputs, start)
+    found = solution.found
+    places = model.positions(found.state)
+    moved = np.abs(places - model.positions(start)).max()
+    largest = np.abs(np.asarray(detached(result.displacements))).max()
+    if moved > _NEAR * largest:
+        raise NotConverged(
+            f"the finer mesh finds an equilibrium that is {moved:.3g} m away from this one, whose largest displacement is "
+            f"{largest:.3g} m: the mesh is too coarse for an estimate, or the equilibrium is near others. Refine the mesh",
+            solution.equilibrium,
+        )
+
+    def adjoint(by_positions: np.ndarray) -> np.ndarray:
+        still = np.zeros(model.size)
+        with solution.inputs.in_core():
+            pulled = model.full_vector(by_positions)
+            found_adjoint = -_core.push_forward(model, found, pulled, still)
+            if any(isinstance(load, Pressure) for load in scene.loads):
+                probe = model.expand(np.random.default_rng(0).uniform(-1.0, 1.0, model.free_size))
+                answer = -_core.push_forward(model, found, probe, still)
+                _refuse_unsymmetric(found_adjoint @ probe, pulled @ answer)
+        return found_adjoint
+
+    there, controls = solution.inputs, found.controls
+    return FinerSolution(
+        scene, finer, places, there, found.state, controls, factorizations, solution.equilibrium, adjoint
+    )
+
+
+def _found(result: Equilibrium, scene: Scene, inputs: Inputs, start: np.ndarray) -> tuple[Solution, int]:
+    """Return the equilibrium near `start`, or else that from the rest shape, and the factorizations of both searches."""
+    search = Search(MixedNewton(), require_stable=result.stable)
+    options = search.options()
+    options.keep_factor = True
+    options.max_relaxation_steps = 0
+    options.max_factorizations = _MOST_FROM_COARSE
+    try:
+        near = solve(inputs, start, [], inputs.controls, inputs.controls, options)
+        return near, near.equilibrium.factorizations
+    except NotConverged as failed:
+        spent = failed.last_good.factorizations
+        if not result.stable:
+            raise
+    from_rest = find(scene, load_parameters(result), None, search, store_factor=True)
+    return from_rest, spent + from_rest.equilibrium.factorizations
+
+
+def _refuse_unsymmetric(one: float, other: float) -> None:
+    """Raise ValueError if two products that a symmetric stiffness makes equal differ."""
+    if abs(one - other) > _SYMMETRIC * max(abs(one), abs(other)):
+        raise ValueError(
+            "the contributions of faces need a stiffness that is symmetric, and a Pressure here has no potential: its faces "
+            "are open. Give by_face=False for the estimate without them"
+        )
+
+
+def _by_body(scene: Scene, rows: Any) -> list[np.ndarray]:
+    return [np.asarray(detached(rows))[span.vertices] for span in scene._bodies.spans]

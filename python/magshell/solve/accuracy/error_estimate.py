@@ -1,0 +1,198 @@
+"""The discretization error of an output of a result: ms.error_estimate."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..._input.scalars import flag
+from ..._input.tensors import detached
+from ..._runtime.frozen import immutable
+from ..._runtime.solver_entry_point import solve_entry
+from ...mesh.finer import FinerMesh, divided, second_order
+from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
+from ...model.scene.finer_scene import refuse_what_stays
+from ...model.supports.supports import SymmetryPlane
+from ..linear.response import LinearResponse
+from ..statics.equilibrium import Equilibrium
+from .contributions import contributions, scaled_to
+from .enriched import FinerSolution, finer_solution
+from .output_value import Output
+
+if TYPE_CHECKING:
+    from ...model.scene.scene import Scene
+
+# [-] Order of convergence of outputs of six-node elements: 4 where the solution is smooth, 2 under point forces (measured by
+# `python -m benchmarks accuracy`, REQUIRED_ORDER, and in test_estimates_of_six_node_meshes_are_within_a_quarter). With 3 the
+# estimate is at most 7 % too large at order 4, and 14 % too small at order 2.
+ORDER_OF_SIX_NODES = 3.0
+_HALF = 0.5  # [-] part of the contributions for which the description counts faces
+
+
+@immutable
+@dataclass(frozen=True, repr=False)
+class ErrorEstimate:
+    """The estimated discretization error of one output of a result.
+
+    value: the output on the mesh of the result. error: what the limit of ever finer meshes has more than that, with its
+        sign, in the unit of the output. by_face: (n,), the contribution of each face, or six-node element, to `error`,
+        one body after another; it sums to `error`. None without them.
+    factorizations, wall_time [s]: of the estimate. n_dofs: the unknowns of the finer mesh.
+    """
+
+    scene: Scene
+    value: float
+    error: float
+    by_face: np.ndarray | None
+    factorizations: int
+    n_dofs: int
+    wall_time: float
+    _enrichment: str = field(repr=False, default="")
+
+    @property
+    def corrected(self) -> float:
+        """The output with the estimated error added: what ever finer meshes are expected to find."""
+        return self.value + self.error
+
+    @property
+    def relative_error(self) -> float:
+        """The magnitude of the error over that of the corrected output; infinite where that is zero."""
+        return abs(self.error) / abs(self.corrected) if self.corrected else float("inf")
+
+    def __repr__(self) -> str:
+        faces = ""
+        if self.by_face is not None and self.by_face.any():
+            sizes = np.sort(np.abs(self.by_face))[::-1]
+            half = int(np.searchsorted(np.cumsum(sizes), _HALF * sizes.sum())) + 1
+            faces = f"\n  half of the contributions come from {half} of {len(sizes)} faces"
+        return (
+            f"ErrorEstimate: {self.value:.6g}, off by {self.error:+.2g} ({100 * self.relative_error:.2g} %), so that finer "
+            f"meshes find {self.corrected:.6g}{faces}\n"
+            f"  by {self._enrichment}, {self.n_dofs} unknowns, {self.factorizations} factorizations, {self.wall_time:.3g} s"
+        )
+
+
+@solve_entry
+def error_estimate(
+    result: Equilibrium | LinearResponse,
+    output: Callable[[Any], Any],
+    *,
+    project: Callable[[np.ndarray], np.ndarray] | None = None,
+    by_face: bool = True,
+) -> ErrorEstimate:
+    """Estimate the error that the mesh causes in an output of a result, with its sign, and the faces it comes from.
+
+    The scene is solved with better elements from the solution given: sheets of three-node faces with six-node elements of
+    second order on the same faces (three times the unknowns), sheets of six-node elements with each divided into four. The
+    difference of the outputs is the estimate; for six-node elements it is divided by 1 - 2^-p with the order p = 3. The
+    contributions of faces are those of dual-weighted residuals (Becker and Rannacher 2001): the residual of the given
+    solution on the finer mesh, times the adjoint of the output there.
+
+    result: of ms.equilibrium or ms.linear_response, of Shells alone, without contacts, ties and actuators.
+    output: a function of the result that returns a scalar tensor, such as `lambda rest: rest.positions[tip, 2].mean()`. It
+        gets `positions`, `displacements`, `scene` and `[body]`. It stays a function of the vertices of this mesh, so that
+        errors of sums over vertices in it are not estimated.
+    project: maps points (n, 3) m near a curved sheet to the surface, on which new vertices are put. By default a smooth
+        surface is fitted to the vertices.
+    by_face: False leaves out the contributions of faces, about half of the time.
+
+    The estimate costs less than a solve of the finer mesh from the rest shape, but more than a fifth of the solve given
+    (three to five times a linear response); `factorizations` and `wall_time` have what it took. It tells errors of the mesh
+    only, not of the model, the loads or the time steps. Errors below the tolerance of the solver (1e-8) cannot be told.
+
+    Raises ValueError for outputs that are not smooth scalar functions of positions, and for results and objects of the scene
+    that do not go over to a finer mesh, with their names; NotConverged if the finer mesh finds no equilibrium near this one.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0)
+    >>> load = ms.EdgeLoad(mesh.edges_at(x=0.1), (0, 0, 0.01))
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[load])
+    >>> tip = mesh.vertices_at(x=0.1)
+    >>> found = ms.error_estimate(ms.linear_response(scene), lambda bent: bent.positions[tip, 2].mean())
+    >>> round(found.corrected, 6)  # p L^3 / (3 E I)
+    0.04
+    """
+    began = time.perf_counter()
+    _check_result(result)
+    flag("by_face", by_face)
+    of = Output(output, result.scene)
+    solution, slope, scale = _solved(result, of, project)
+    positions = np.asarray(detached(result.positions))
+    value = of.value(positions)
+    error = scale * (of.value(solution.positions) - value)
+    parts, more = None, 0
+    if by_face:
+        parts = contributions(solution, solution.adjoint(slope), positions)
+        parts = np.concatenate(scaled_to(parts, error))
+        more = 1 + isinstance(result, LinearResponse)  # those of the inner unknowns, and of the adjoint
+    return ErrorEstimate(
+        scene=result.scene,
+        value=value,
+        error=error,
+        by_face=parts,
+        factorizations=solution.factorizations + more,
+        n_dofs=solution.scene.n_dofs,
+        wall_time=time.perf_counter() - began,
+        _enrichment=_described(result),
+    )
+
+
+def finer_meshes(scene: Scene, project: Callable[[np.ndarray], np.ndarray] | None) -> tuple[FinerMesh, ...]:
+    """Return the meshes of better elements on which the errors of the bodies are estimated."""
+    refuse_what_stays(scene)
+    return tuple(
+        divided(body.mesh, project)
+        if isinstance(body.mesh, QuadraticTriangleMesh)
+        else second_order(body.mesh, project, planes_of(scene, body))
+        for body in scene.bodies
+    )
+
+
+def planes_of(scene: Scene, body: Any) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return the symmetry planes of a body, as (normal, point)."""
+    planes = [each for each in scene.supports if isinstance(each, SymmetryPlane)]
+    return [(each.normal, each.point) for each in planes if each.body is None or each.body is body]
+
+
+def _solved(
+    result: Equilibrium | LinearResponse, output: Output, project: Any
+) -> tuple[FinerSolution, np.ndarray, float]:
+    """Return the solution on the finer mesh, the derivative of the output, and the factor of the difference of outputs."""
+    positions = np.asarray(detached(result.positions))
+    slope = output.gradient(positions)
+    kinds = {isinstance(body.mesh, QuadraticTriangleMesh) for body in result.scene.bodies}
+    if len(kinds) > 1:
+        raise ValueError(
+            "the bodies have three-node and six-node meshes: give all bodies the same kind for an estimate"
+        )
+    solution = finer_solution(result, finer_meshes(result.scene, project))
+    output.check_smooth(positions, slope, solution.positions - positions)
+    scale = 1.0 / (1.0 - 2.0**-ORDER_OF_SIX_NODES) if kinds == {True} else 1.0
+    return solution, slope, scale
+
+
+def _check_result(result: Any) -> None:
+    """Raise ValueError for a result whose discretization error cannot be estimated."""
+    if not isinstance(result, Equilibrium | LinearResponse):
+        raise ValueError(
+            f"result must be an Equilibrium or a LinearResponse, got {type(result).__name__}: of paths, sets, batches and "
+            "motions give one equilibrium of theirs, computed by ms.equilibrium"
+        )
+    if isinstance(result, LinearResponse) and result.equilibrium is not None:
+        raise ValueError(
+            "the response is one about an equilibrium: errors of responses at rest are estimated only"
+        )
+    if isinstance(result, Equilibrium) and result.load_fraction < 1.0:
+        raise ValueError(
+            f"the solve got only {result.load_fraction:.3g} of the way: its result is no equilibrium"
+        )
+
+
+def _described(result: Equilibrium | LinearResponse) -> str:
+    six = isinstance(result.scene.bodies[0].mesh, QuadraticTriangleMesh)
+    return "six-node elements divided into four" if six else "six-node elements on the same faces"
