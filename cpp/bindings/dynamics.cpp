@@ -45,28 +45,40 @@ Knots rows_of(const std::vector<LoadParameters>& load_parameters) {
     return rows;
 }
 
-// Returns the history of each element and elastic term, in the core's order; empty without a Maxwell branch.
-StrainSet strains_of(Model& model, const Array& numbers) {
-    StrainSet strains;
-    if (numbers.size() == 0) return strains;
-    if (numbers.size() != model.elastic().size())
-        throw InvalidInput("the scene has " + std::to_string(model.elastic().size()) + " strains, got " +
-                           std::to_string(numbers.size()));
+// Returns the strains of each element and elastic term in the core's order, once for each branch; none without numbers.
+MaxwellStrains strains_of(Model& model, const Array& numbers, std::size_t branches) {
+    if (numbers.size() == 0) return {};
+    const std::size_t size = static_cast<std::size_t>(model.elastic().size());
+    if (static_cast<std::size_t>(numbers.size()) != branches * size)
+        throw InvalidInput("the scene has " + std::to_string(size) + " strains for each of " +
+                           std::to_string(branches) + " branches, got " + std::to_string(numbers.size()));
     const double* from = numbers.data();
-    strains = model.elastic().zeros();
-    for (Strains& part : strains.of_terms)
-        for (Index element = 0; element < part.elements; ++element)
-            for (int i = 0; i < part.width; ++i) part.set(element, i, *from++);
+    MaxwellStrains strains(branches, model.elastic().zeros());
+    for (StrainSet& of_branch : strains)
+        for (Strains& part : of_branch.of_terms)
+            for (Index element = 0; element < part.elements; ++element)
+                for (int i = 0; i < part.width; ++i) part.set(element, i, *from++);
     return strains;
 }
 
-VectorXd numbers_of(const Model& model, const StrainSet& strains) {
-    VectorXd numbers(strains.empty() ? 0 : model.elastic().size());
+VectorXd numbers_of(const Model& model, const MaxwellStrains& strains) {
+    VectorXd numbers(static_cast<Index>(strains.size()) * model.elastic().size());
     double* to = numbers.data();
-    for (const Strains& part : strains.of_terms)
-        for (Index element = 0; element < part.elements; ++element)
-            for (int i = 0; i < part.width; ++i) *to++ = part.number(element, i);
+    for (const StrainSet& of_branch : strains)
+        for (const Strains& part : of_branch.of_terms)
+            for (Index element = 0; element < part.elements; ++element)
+                for (int i = 0; i < part.width; ++i) *to++ = part.number(element, i);
     return numbers;
+}
+
+Viscosity viscosity_of(const py::dict& given) {
+    Viscosity law;
+    law.stiffness_damping = given["stiffness_damping"].cast<double>();
+    law.damping_varies = given["stiffness_damping_varies"].cast<bool>();
+    const VectorXd moduli = to_vector(given["maxwell_modulus"].cast<Array>()),
+                   times = to_vector(given["maxwell_time"].cast<Array>());
+    for (Index k = 0; k < moduli.size(); ++k) law.branches.push_back({moduli[k], times[k]});
+    return law;
 }
 
 // Copies of the result share the Python function, so that they can be made and destroyed without the GIL.
@@ -93,16 +105,17 @@ MotionInput input_of(Model& model, const py::dict& given) {
     input.start.angle_branches = given["turns"].cast<Model::AngleBranches>();
     input.inertia = {model.bodies().vertex_weights(to_vector(array("mass"))),
                      model.bodies().vertex_weights(to_vector(array("damping")))};
-    input.start.e = strains_of(model, given["maxwell_strains"].cast<Array>());
+    input.viscosity = viscosity_of(given);
+    const std::size_t branches = input.viscosity.branches.size();
+    input.start.e = strains_of(model, array("maxwell_strains"), branches);
     input.start.rates.w = to_vector(array("acceleration"));
     if (input.start.rates.w.size() > 0) {
         input.start.rates.v = input.start.v;
-        input.start.rates.elastic.d = strains_of(model, given["strain_rates"].cast<Array>());
-        input.start.rates.elastic.e = strains_of(model, given["maxwell_strain_rates"].cast<Array>());
+        if (MaxwellStrains rates = strains_of(model, array("strain_rates"), 1); !rates.empty())
+            input.start.rates.elastic.d = std::move(rates.front());
+        input.start.rates.elastic.e = strains_of(model, array("maxwell_strain_rates"), branches);
     }
     input.rotations_given = given["rotations_given"].cast<bool>();
-    input.viscosity = {given["stiffness_damping"].cast<double>(), given["maxwell_modulus"].cast<double>(),
-                       given["maxwell_time"].cast<double>()};
     input.tableau = tableau_of(given["integrator"].cast<std::string>());
     input.tableau.implicit_contact = given["implicit_contact"].cast<bool>() && model.contacts().any();
     if (VectorXd by_contact = to_vector(array("contact_acceleration"));
@@ -253,8 +266,13 @@ py::dict back(Model& model, const MotionInput& input, const MotionResult& motion
     result["time_step"] = VectorXd(Eigen::Map<const VectorXd>(
         gradient.time_steps.data(), static_cast<Eigen::Index>(gradient.time_steps.size())));
     result["stiffness_damping"] = gradient.viscosity.stiffness_damping;
-    result["maxwell_modulus"] = gradient.viscosity.maxwell_modulus;
-    result["maxwell_time"] = gradient.viscosity.maxwell_time;
+    std::vector<double> by_moduli, by_times;
+    for (const MaxwellBranch& by_branch : gradient.viscosity.branches) {
+        by_moduli.push_back(by_branch.modulus);
+        by_times.push_back(by_branch.time);
+    }
+    result["maxwell_modulus"] = by_moduli;
+    result["maxwell_time"] = by_times;
     result["factorizations"] = gradient.factorizations;
     return result;
 }
@@ -290,7 +308,10 @@ void register_dynamics(py::module_& module) {
         .def("last_maxwell_strains",
              [](const MotionResult& r, const Model& m) { return numbers_of(m, r.last.e); })
         .def("last_strain_rates",
-             [](const MotionResult& r, const Model& m) { return numbers_of(m, r.last.rates.elastic.d); })
+             [](const MotionResult& r, const Model& m) {
+                 const StrainSet& rates = r.last.rates.elastic.d;
+                 return numbers_of(m, rates.empty() ? MaxwellStrains{} : MaxwellStrains{rates});
+             })
         .def("last_maxwell_strain_rates",
              [](const MotionResult& r, const Model& m) { return numbers_of(m, r.last.rates.elastic.e); })
         .def_property_readonly("last_turns", [](const MotionResult& r) { return r.last.angle_branches; })

@@ -31,8 +31,8 @@ INPUTS = {
     "support_factor": np.linspace(0, 0.7, STEPS + 1),
     "damping": RNG.uniform(1e-3, 2e-3, N_V),
     "stiffness_damping": np.array(2e-3),
-    "maxwell_modulus": np.array(0.5),
-    "maxwell_time": np.array(4e-3),
+    "maxwell_modulus": np.array((0.5, 0.2)),
+    "maxwell_time": np.array((4e-3, 1.5e-2)),
     "velocities": 0.1 * RNG.standard_normal((N_V, 3)),
     "start": MESH.rest_positions + 1e-4 * RNG.standard_normal((N_V, 3)),
     "time_step": np.array(3e-3),
@@ -150,7 +150,8 @@ def test_over_200_steps_against_differences():
 
 
 @pytest.mark.parametrize(
-    "extra", [{}, {"maxwell_modulus": 0.5, "maxwell_time": 4e-3, "stiffness_damping": 1e-4}]
+    "extra",
+    [{}, {"maxwell_modulus": (0.5, 0.2), "maxwell_time": (4e-3, 1.5e-2), "stiffness_damping": 1e-4}],
 )
 @pytest.mark.parametrize("record_every", [1, 4])
 def test_adjoint_storage_does_not_change_the_gradient(record_every, extra):

@@ -264,7 +264,12 @@ def _solves(s: Sample) -> Iterator[Call]:
     yield Call("linear_buckling", ms.linear_buckling, {**magnetic, "equilibrium": None, "modes": 1}, cost=2)
     modes = {"scene": s.scene, "equilibrium": s.rest, "count": 2, "mass": "consistent"}
     yield Call("vibration_modes", ms.vibration_modes, modes, cost=2)
-    viscous = {"damping": 1e-3, "stiffness_damping": 1e-4, "maxwell_modulus": 0.1, "maxwell_time": 1e-2}
+    viscous = {
+        "damping": 1e-3,
+        "stiffness_damping": 1e-4,
+        "maxwell_modulus": (0.1, 0.2),
+        "maxwell_time": (1e-2, 0.1),
+    }
     motion = {
         **magnetic,
         "applied_flux_density": np.tile(s.field, (3, 1)),

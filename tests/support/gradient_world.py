@@ -27,8 +27,8 @@ REACH = {
 VISCOUS = {
     "damping": RNG.uniform(1e-3, 2e-3, N_V),
     "stiffness_damping": 2e-3,
-    "maxwell_modulus": 0.5,
-    "maxwell_time": 4e-3,
+    "maxwell_modulus": np.array((0.5, 0.2)),
+    "maxwell_time": np.array((4e-3, 1.5e-2)),
 }
 IN_TIME = {
     "applied_flux_density": np.array((1e-3, -2e-3, 3e-3)) * RNG.uniform(0.5, 1.5, (STEPS + 1, 3)),

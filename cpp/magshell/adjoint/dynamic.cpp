@@ -34,6 +34,7 @@ class Backward {
         g_.load_parameters.assign(input.load_parameters.size(), model_.parameters().zero_load_parameters());
         g_.rest.curvature_scales = by.curvature_scales;
         if (g_.rest.asked()) g_.rest.clear(model_);
+        g_.viscosity.branches.assign(input.viscosity.branches.size(), {0.0, 0.0});
     }
 
     MotionGradient run() {
@@ -209,8 +210,10 @@ class Backward {
             by_strains_ = std::move(strains.by_begin);
             by_dt += strains.by_dt;
             g_.viscosity.stiffness_damping += strains.by_law.stiffness_damping;
-            g_.viscosity.maxwell_modulus += strains.by_law.maxwell_modulus;
-            g_.viscosity.maxwell_time += strains.by_law.maxwell_time;
+            for (std::size_t k = 0; k < g_.viscosity.branches.size(); ++k) {
+                g_.viscosity.branches[k].modulus += strains.by_law.branches[k].modulus;
+                g_.viscosity.branches[k].time += strains.by_law.branches[k].time;
+            }
         }
         if (model_.capabilities().has_own_viscosity) {
             if (!input_.viscosity.any())
@@ -425,9 +428,11 @@ class Backward {
         model_.parameters().set_time_varying(input_.load_parameters_at(0, 0.0));
         if (input_.viscosity.maxwell() && input_.start.e.empty()) {
             model_.evaluate(q, input_.load_parameters_at(0, 0.0));
-            g_.positions += model_.elastic().forces(by_strains_.e, model_.size());
+            StrainSet by_strains = model_.elastic().zeros();  // in which every branch begins
+            for (const StrainSet& by_branch : by_strains_.e) by_strains.add(1.0, by_branch);
+            g_.positions += model_.elastic().forces(by_strains, model_.size());
             scene_.load_parameters.setZero();
-            model_.elastic().strains_vjp(by_strains_.e, scene_);
+            model_.elastic().strains_vjp(by_strains, scene_);
             model_.parameters().time_varying().move_gradient(scene_);
             g_.load_parameters[0] += scene_.load_parameters;
         }
@@ -461,7 +466,7 @@ class Backward {
     const GradientsByStates& by_;
     Stepper stepper_;
     Gradient scene_;  // by all parameters, and by the load parameters of the current stage
-    // Gradients by the rates and by the Maxwell branch at the beginning of the last step processed.
+    // Gradients by the rates and by the Maxwell strains at the beginning of the last step processed.
     VectorXd by_w_;
     VectorXd
         by_v_before_;  // by the velocity at the beginning of the step before that; empty if nothing depends on it

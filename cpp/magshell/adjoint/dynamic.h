@@ -22,7 +22,7 @@ struct MotionGradient {
     VectorXd positions, velocities;  // at the start, of all dofs
     VectorXd mass, damping;          // of all dofs
     std::vector<double> time_steps;  // one number a step
-    Viscosity viscosity{0.0, 0.0, 0.0};
+    Viscosity viscosity;
     VectorXd values;                              // of the scene
     RestGradient rest;                            // if asked for; without viscosity
     std::vector<LoadParameters> load_parameters;  // as MotionInput::load_parameters

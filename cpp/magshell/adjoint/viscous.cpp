@@ -21,17 +21,20 @@ ViscousAdjoint::ViscousAdjoint(Model& model, ViscousTerms& terms, const Viscosit
                               rates_.emplace_back().*kind);
     }
     const std::size_t n = substep.stages.size();
+    const MaxwellStrains zeros(law.branches.size(), zero);
     by_d_hat_.assign(n, zero);
-    by_e_.assign(n, zero);
-    by_e_hat_.assign(n, zero);
+    by_e_.assign(n, zeros);
+    by_e_hat_.assign(n, zeros);
     by_d_rate_.assign(rates_.size(), zero);
-    by_e_rate_.assign(rates_.size(), zero);
-    by_ratio_.assign(n, 0.0);
+    by_e_rate_.assign(rates_.size(), zeros);
+    by_ratio_.assign(n, std::vector<double>(law.branches.size(), 0.0));
     by_stage_time_.assign(n, 0.0);
+    by_law.branches.assign(law.branches.size(), {0.0, 0.0});
     if (!by_end.e.empty()) by_e_.back() = by_end.e;
     if (!by_end.d_rate.empty()) by_d_rate_.back() = by_end.d_rate;
     if (!by_end.e_rate.empty()) by_e_rate_.back() = by_end.e_rate;
-    by_d_begin = by_begin.e = zero;
+    by_d_begin = zero;
+    by_begin.e = zeros;
 }
 
 void ViscousAdjoint::set_history(int i) const {
@@ -42,19 +45,21 @@ void ViscousAdjoint::before_solve(int i, VectorXd& by_q, Gradient& scene) {
     if (idle()) return;
     const ViscousStage& stage = stages_[i];
     const StrainRates& rates = this->rates(first_ + i);
-    const StrainSet &by_d_rate = by_d_rate_[first_ + i], &by_e_rate = by_e_rate_[first_ + i];
+    const StrainSet& by_d_rate = by_d_rate_[first_ + i];
     const double T = step_.stage_time();
     StrainSet by_d = by_d_rate.times(1.0 / T);  // d' = (d - d^)/T
     by_d_hat_[i].add(-1.0 / T, by_d_rate);
     by_stage_time_[i] -= by_d_rate.dot(rates.d) / T;
-    if (law_.maxwell()) {
-        const double tau = law_.maxwell_time, r = law_.ratio(T);
+    for (std::size_t k = 0; k < law_.branches.size(); ++k) {
+        const double tau = law_.branches[k].time, r = law_.branches[k].ratio(T);
+        const StrainSet& by_e_rate = by_e_rate_[first_ + i][k];
+        StrainSet& by_e = by_e_[i][k];
         by_d.add(1.0 / tau, by_e_rate);  // e' = (d - e)/tau
-        by_e_[i].add(-1.0 / tau, by_e_rate);
-        by_law.maxwell_time -= by_e_rate.dot(rates.e) / tau;
-        by_e_hat_[i].add(1.0 / (1.0 + r), by_e_[i]);  // e = (e^ + r d)/(1 + r)
-        by_d.add(r / (1.0 + r), by_e_[i]);
-        by_ratio_[i] += (by_e_[i].dot(stage.d) - by_e_[i].dot(stage.e_hat)) / ((1.0 + r) * (1.0 + r));
+        by_e.add(-1.0 / tau, by_e_rate);
+        by_law.branches[k].time -= by_e_rate.dot(rates.e[k]) / tau;
+        by_e_hat_[i][k].add(1.0 / (1.0 + r), by_e);  // e = (e^ + r d)/(1 + r)
+        by_d.add(r / (1.0 + r), by_e);
+        by_ratio_[i][k] += (by_e.dot(stage.d) - by_e.dot(stage.e_hat[k])) / ((1.0 + r) * (1.0 + r));
     }
     by_q += terms_.forces(by_d, unknowns_);
     terms_.strains_vjp(by_d, scene);
@@ -63,9 +68,10 @@ void ViscousAdjoint::before_solve(int i, VectorXd& by_q, Gradient& scene) {
 void ViscousAdjoint::after_solve(int i, const VectorXd& lambda) {
     if (idle()) return;
     add_stress_gradient(i, stages_[i].d, lambda);
-    if (law_.maxwell()) {
-        by_stage_time_[i] += by_ratio_[i] / law_.maxwell_time;
-        by_law.maxwell_time -= by_ratio_[i] * law_.ratio(step_.stage_time()) / law_.maxwell_time;
+    for (std::size_t k = 0; k < law_.branches.size(); ++k) {
+        const MaxwellBranch& branch = law_.branches[k];
+        by_stage_time_[i] += by_ratio_[i][k] / branch.time;
+        by_law.branches[k].time -= by_ratio_[i][k] * branch.ratio(step_.stage_time()) / branch.time;
     }
     by_dt += step_.tableau().diagonal * by_stage_time_[i];
     pass_on(i);
@@ -85,26 +91,28 @@ void ViscousAdjoint::add_stress_gradient(int i, const StrainSet& d, const Vector
     by_d_hat_[i].add(-beta / T, along);
     by_law.stiffness_damping += (by_scale + by_d_share) / T;
     by_stage_time_[i] -= beta / (T * T) * (by_scale + by_d_share);
-    if (law_.maxwell()) {
-        const double r = law_.ratio(T), relaxed = law_.relaxed(T);
-        const double by_relaxed = by_scale - along.dot(stage.e_hat);
-        by_e_hat_[i].add(-relaxed, along);
-        by_law.maxwell_modulus += by_relaxed / (1.0 + r);
-        by_ratio_[i] -= by_relaxed * relaxed / (1.0 + r);
+    for (std::size_t k = 0; k < law_.branches.size(); ++k) {
+        const double r = law_.branches[k].ratio(T), relaxed = law_.branches[k].relaxed(T);
+        const double by_relaxed = by_scale - along.dot(stage.e_hat[k]);
+        by_e_hat_[i][k].add(-relaxed, along);
+        by_law.branches[k].modulus += by_relaxed / (1.0 + r);
+        by_ratio_[i][k] -= by_relaxed * relaxed / (1.0 + r);
     }
 }
 
 // Distributes the gradients by d^_i = d + dt sum a_ij d'_j, and by e^_i. The part of the start of the step is complete after all stages.
 void ViscousAdjoint::pass_on(int i) {
+    const std::size_t branches = law_.branches.size();
     by_d_begin.add(1.0, by_d_hat_[i]);
-    by_begin.e.add(1.0, by_e_hat_[i]);
+    for (std::size_t k = 0; k < branches; ++k) by_begin.e[k].add(1.0, by_e_hat_[i][k]);
     for (std::size_t j = 0; j < first_ + i; ++j) {
         const double a = step_.tableau().a[i][j];
         by_d_rate_[j].add(a * step_.dt(), by_d_hat_[i]);
         by_dt += a * rates(j).d.dot(by_d_hat_[i]);
-        if (!law_.maxwell()) continue;
-        by_e_rate_[j].add(a * step_.dt(), by_e_hat_[i]);
-        by_dt += a * rates(j).e.dot(by_e_hat_[i]);
+        for (std::size_t k = 0; k < branches; ++k) {
+            by_e_rate_[j][k].add(a * step_.dt(), by_e_hat_[i][k]);
+            by_dt += a * rates(j).e[k].dot(by_e_hat_[i][k]);
+        }
     }
     if (i > 0 || first_ == 0) return;
     by_begin.d_rate = by_d_rate_.front();

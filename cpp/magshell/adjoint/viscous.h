@@ -7,7 +7,8 @@ namespace magshell {
 
 /// The gradient by the Maxwell strains between two steps, and by the rates of the strains there; empty if nothing depends on them.
 struct ViscousGradient {
-    StrainSet e, d_rate, e_rate;
+    StrainSet d_rate;
+    MaxwellStrains e, e_rate;
 };
 
 class ViscousAdjoint {
@@ -29,7 +30,7 @@ class ViscousAdjoint {
 
     StrainSet by_d_begin;
     ViscousGradient by_begin;
-    Viscosity by_law{0.0, 0.0, 0.0};
+    Viscosity by_law;  // of the same branches
     double by_dt = 0.0;
 
   private:
@@ -47,9 +48,10 @@ class ViscousAdjoint {
     std::size_t first_ = 0;  // index of the first stage among all rates
     std::vector<ViscousStage> stages_;
     std::vector<StageRates> rates_;
-    std::vector<StrainSet> by_e_, by_d_hat_, by_e_hat_;  // by stage
-    std::vector<StrainSet> by_d_rate_, by_e_rate_;       // by rate
-    std::vector<double> by_ratio_, by_stage_time_;
+    std::vector<StrainSet> by_d_hat_, by_d_rate_;              // by stage; by rate
+    std::vector<MaxwellStrains> by_e_, by_e_hat_, by_e_rate_;  // by stage, stage and rate
+    std::vector<std::vector<double>> by_ratio_;                // by stage and branch
+    std::vector<double> by_stage_time_;
 };
 
 }  // namespace magshell

@@ -14,13 +14,13 @@ from .quantity import label, quantity, shape_of
 def keyword_value(keyword: SolveKeyword, value: Any, sizes: Mapping[str, int]) -> np.ndarray:
     """Return the value as an array of finite numbers of one of the keyword's shapes.
 
-    sizes: {"n_v": number of vertices, ...}, for the letters in the shapes. Raises ValueError with name, unit and shapes, or
-    if a number is below the keyword's minimum.
+    sizes: {"n_v": number of vertices, ...}, for the letters in the shapes; "n" stands for any size but zero. Raises
+    ValueError with name, unit and shapes, or if a number is below the keyword's minimum.
     """
     name, unit, named = keyword.name, keyword.unit, label(keyword.name, keyword.unit)
     shapes = [tuple(sizes.get(each, each) for each in shape) for shape in keyword.shapes]
     shape = shapes[0]
-    if len(shapes) > 1 and (shape := shape_of(named, value)) not in shapes:
+    if len(shapes) > 1 and not any(_fits(shape := shape_of(named, value), each) for each in shapes):
         texts = [_described(*each) for each in zip(keyword.shapes, shapes, strict=True) if each[0]]
         number = "be a number or " if () in shapes else ""
         raise ValueError(f"{named} must {number}have shape {' or '.join(texts)}, got {shape}")
@@ -32,8 +32,13 @@ def keyword_value(keyword: SolveKeyword, value: Any, sizes: Mapping[str, int]) -
     return array
 
 
+def _fits(shape: tuple[int, ...], wanted: tuple[int | str, ...]) -> bool:
+    """Return whether a shape is the wanted one, in which "n" stands for any size but zero."""
+    return len(shape) == len(wanted) and all(
+        w == a or (w == "n" and a > 0) for a, w in zip(shape, wanted, strict=True)
+    )
+
+
 def _described(shape: tuple[int | str, ...], numbers: tuple[Any, ...]) -> str:
-    if shape == numbers:
-        return str(shape)
     letters = f"({', '.join(map(str, shape))}{',' if len(shape) == 1 else ''})"
-    return f"{letters} = {numbers}"
+    return letters if shape == numbers else f"{letters} = {numbers}"

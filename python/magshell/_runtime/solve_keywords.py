@@ -20,7 +20,7 @@ _MOTION = ("simulate",)
 class SolveKeyword(NamedTuple):
     """One row of the table.
 
-    shapes: those of one load case, or at one time; "n_v" stands for the number of vertices of the scene.
+    shapes: those of one load case, or at one time; "n_v" stands for the number of vertices of the scene, "n" for any.
     solves: names of the functions that have the keyword.
     text: for the docstring of the first of them; the others refer to it. motion_text: for ms.simulate, if that differs.
     group: "load parameter", "damping", "shell" (the shell's constructor checks the value) or "solve".
@@ -44,8 +44,9 @@ _FACTORS = "multiply the loads, gravity, the field sources, and the prescribed m
 _FACTORS_IN_TIME = "as in ms.equilibrium; numbers, or in time as above."
 _SHELL = "replace the shell's own values in this solve."
 _MAXWELL = (
-    "a Maxwell branch beside the elastic stiffness: its modulus over the elastic one, and its relaxation time, s. It begins "
-    "relaxed."
+    "Maxwell branches beside the elastic stiffness: their moduli over the elastic one, and their relaxation times, s; "
+    "numbers of one branch, or (n,) of a Prony series of n. The elastic stiffness is that of slow loading and of statics, "
+    "without the branches. They begin relaxed."
 )
 
 
@@ -125,14 +126,14 @@ _TABLE = (
     SolveKeyword(
         "maxwell_modulus",
         "1",
-        ((),),
+        ((), ("n",)),
         _MOTION,
         _MAXWELL,
         group="damping",
         default=0.0,
         minimum="not negative",
     ),
-    SolveKeyword("maxwell_time", "s", ((),), _MOTION, _MAXWELL, group="damping", minimum="positive"),
+    SolveKeyword("maxwell_time", "s", ((), ("n",)), _MOTION, _MAXWELL, group="damping", minimum="positive"),
     SolveKeyword(
         "velocities",
         "m/s",

@@ -65,10 +65,12 @@ def same_bits(uninterrupted, *parts):
 
 
 MAXWELL = {"maxwell_modulus": 0.5, "maxwell_time": 5e-3}
+PRONY = {"maxwell_modulus": (0.5, 0.2), "maxwell_time": (5e-3, 2e-2)}
 KINDS = {
     "elastic": (strip, {}),
     "hinge": (lambda: strip("hinge"), {}),
     "viscous": (strip, {"stiffness_damping": 1e-3, **MAXWELL}),
+    "two Maxwell branches": (strip, PRONY),
     "contact": (lambda: strip(contacts=floor()), {}),
     "friction": (lambda: strip(contacts=floor(heaving, friction_coefficient=0.5)), MAXWELL),
     "lagged friction": (
@@ -112,8 +114,9 @@ def test_arrays_begin_with_the_first_step_of_the_part(rows, integrator):
     same_bits(part(0, STEPS), first, part(FIRST, STEPS, start=first))
 
 
-def test_constants_and_a_file_between(tmp_path):
-    options = {"applied_flux_density": (0, 0, 1e-2), "support_factor": 1.0, **MAXWELL}
+@pytest.mark.parametrize("branches", [MAXWELL, PRONY], ids=["one branch", "two"])
+def test_constants_and_a_file_between(tmp_path, branches):
+    options = {"applied_flux_density": (0, 0, 1e-2), "support_factor": 1.0, **branches}
     scene = strip(contacts=floor(heaving))
     whole, first = simulate(scene, **options), simulate(scene, FIRST, **options)
     first.end.save(tmp_path / "state.npz")

@@ -17,9 +17,11 @@ namespace {
 constexpr double smallest_part = 1.0 / 64.0;  // [-] of a step; see test_a_step_that_fails_is_taken_in_parts
 
 std::size_t bytes_of(const MotionState& state) {
-    return sizeof(double) * (state.q.size() + state.v.size() + state.rates.v.size() + state.rates.w.size() +
-                             state.rates.c.size()) +
-           state.e.bytes() + state.rates.elastic.d.bytes() + state.rates.elastic.e.bytes();
+    std::size_t bytes = state.rates.elastic.d.bytes();
+    for (const StrainSet& strains : state.e) bytes += strains.bytes();
+    for (const StrainSet& rates : state.rates.elastic.e) bytes += rates.bytes();
+    return bytes + sizeof(double) * (state.q.size() + state.v.size() + state.rates.v.size() +
+                                     state.rates.w.size() + state.rates.c.size());
 }
 
 std::size_t bytes_of(const SubstepRecord& substep) {
@@ -30,14 +32,15 @@ std::size_t bytes_of(const SubstepRecord& substep) {
     return bytes;
 }
 
-// Returns the start, with edge rotations in equilibrium if none were given, and a new Maxwell branch without stress.
+// Returns the start, with edge rotations in equilibrium if none were given, and new Maxwell branches without stress.
 MotionState beginning(Model& model, const MotionInput& input) {
     MotionState start = input.start;
     model.set_angle_branches(start.angle_branches);
     model.parameters().set_time_varying(input.load_parameters_at(0, 0.0));
     if (!input.rotations_given)
         start.q += EdgeRotationEquilibrium(model, start.q, input.load_parameters_at(0, 0.0)).correction();
-    if (input.viscosity.maxwell() && start.e.empty()) start.e = model.elastic().strains(start.q);
+    if (input.viscosity.maxwell() && start.e.empty())
+        start.e.assign(input.viscosity.branches.size(), model.elastic().strains(start.q));
     return start;
 }
 
@@ -163,8 +166,9 @@ class Run {
         const std::size_t strains = sizeof(double) * model_.elastic().size();
         const bool implicit_contact = input_.tableau.implicit_contact;
         std::size_t state = ((explicit_first ? 4 : 2) + (implicit_contact ? 1 : 0)) * vector;
-        if (input_.viscosity.maxwell()) state += strains;
-        if (explicit_first && input_.viscosity.any()) state += (input_.viscosity.maxwell() ? 2 : 1) * strains;
+        const std::size_t branches = input_.viscosity.branches.size();
+        state += branches * strains;
+        if (explicit_first && input_.viscosity.any()) state += (1 + branches) * strains;
         const std::size_t step = state + (implicit_contact ? 2 : 1) * input_.tableau.stages * vector;
         const bool fits = step * static_cast<std::size_t>(input_.steps()) <= keep.budget;
         result_.keep = keep.wanted != AdjointStorage::nothing ? keep.wanted

@@ -139,7 +139,7 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative,
     std::vector<StageRates> rates = first_rates(model, tableau, state);
     std::vector<StageState> stages;
     VectorXd q = state.q, x_hat, v_hat;
-    StrainSet e;
+    MaxwellStrains e;
     VectorXd motor_forces, held;
     for (int i = 0; i < tableau.stages; ++i) {
         step.start_of_stage(i, state, rates, x_hat, v_hat);

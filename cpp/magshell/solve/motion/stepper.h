@@ -20,7 +20,7 @@ namespace magshell {
 struct MotionState {
     VectorXd q, v;
     Model::AngleBranches angle_branches;
-    StrainSet e;            // of the Maxwell branch; empty without one
+    MaxwellStrains e;       // empty without a Maxwell branch
     StageRates rates;       // at the end of the step that led here, for a method that needs them; else empty
     VectorXd motor_forces;  // of the motors [N, N m]; empty without motors and before the first step
     VectorXd held =

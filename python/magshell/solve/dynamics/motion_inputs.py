@@ -268,11 +268,20 @@ class MotionInputs:
             return on_vertices
         return np.concatenate([on_vertices, np.zeros(len(self._mass) - n_v)])
 
-    def _history(self, law: dict[str, float]) -> dict[str, np.ndarray]:
-        """Return the rates and Maxwell strains of the starting state that this motion can use."""
-        start, nothing = self.start, np.zeros(0)
-        maxwell = law["maxwell_modulus"] > 0
-        viscous = maxwell or law["stiffness_damping"] > 0
+    def _history(self, law: dict[str, Any]) -> dict[str, np.ndarray]:
+        """Return the rates and Maxwell strains of the starting state that this motion can use.
+
+        Raises ValueError if they are of another number of branches.
+        """
+        start, nothing, n_strains = self.start, np.zeros(0), self.inputs.scene._model.n_strains
+        branches = len(law["maxwell_modulus"])
+        maxwell = branches > 0
+        if maxwell and start.maxwell_strains.size not in (0, branches * n_strains):
+            raise ValueError(
+                f"maxwell_modulus has {branches} branches, but `start` is from a motion with "
+                f"{start.maxwell_strains.size // n_strains}: give as many, or begin with positions and velocities"
+            )
+        viscous = maxwell or law["stiffness_damping"] > 0 or law["stiffness_damping_varies"]
         rates_known = start.strain_rates.size > 0 or not viscous
         known = rates_known and (start.maxwell_strain_rates.size > 0 or not maxwell)
         return {
@@ -280,20 +289,32 @@ class MotionInputs:
             "acceleration": start.acceleration if known else nothing,
             "contact_acceleration": start.contact_acceleration,
             "strain_rates": start.strain_rates,
-            "maxwell_strain_rates": start.maxwell_strain_rates,
+            "maxwell_strain_rates": start.maxwell_strain_rates if maxwell else nothing,
         }
 
-    def _viscosity(self, arguments: dict[str, Any]) -> dict[str, float]:
-        """Return the numbers of the viscous stresses: stiffness damping and the Maxwell branch."""
-        names = ("stiffness_damping", "maxwell_modulus", "maxwell_time")
-        law = {
-            name: float(self.inputs.keyword(name, arguments[name]))
-            for name in names
-            if arguments[name] is not None or SOLVE_KEYWORDS[name].default is not None
+    def _viscosity(self, arguments: dict[str, Any]) -> dict[str, Any]:
+        """Return the numbers of the viscous stresses: stiffness damping and the Maxwell branches.
+
+        Branches whose moduli are all zero are left out, unless gradients by them are computed.
+        """
+        modulus, time = arguments["maxwell_modulus"], arguments["maxwell_time"]
+        damping = arguments["stiffness_damping"]
+        moduli = np.atleast_1d(self.inputs.keyword("maxwell_modulus", modulus))
+        times = moduli if time is None else np.atleast_1d(self.inputs.keyword("maxwell_time", time))
+        has_branches = bool(moduli.any()) or requires_gradient(modulus) or requires_gradient(time)
+        if has_branches and time is None:
+            raise ValueError("maxwell_modulus needs the relaxation time of each branch, maxwell_time [s]")
+        if len(moduli) != len(times):
+            raise ValueError(
+                "maxwell_modulus and maxwell_time must have one number for each branch, but there are "
+                f"{len(moduli)} moduli and {len(times)} times"
+            )
+        return {
+            "stiffness_damping": float(self.inputs.keyword("stiffness_damping", damping)),
+            "stiffness_damping_varies": requires_gradient(damping),
+            "maxwell_modulus": moduli if has_branches else np.zeros(0),
+            "maxwell_time": times if has_branches else np.zeros(0),
         }
-        if law["maxwell_modulus"] and arguments["maxwell_time"] is None:
-            raise ValueError("maxwell_modulus needs the relaxation time of the branch, maxwell_time [s]")
-        return {"maxwell_time": 1.0, **law}
 
     def _begin(self, start, velocities) -> MotionState:
         inputs, model = self.inputs, self.inputs.scene._model
@@ -375,7 +396,8 @@ def _checked_state(start: MotionState, size: int, n_strains: int) -> MotionState
         quantity(f"start.{name}", "SI", values, (0,) if optional else (size,))
     for name in ("strain_rates", "maxwell_strains", "maxwell_strain_rates"):
         values = getattr(start, name)
-        quantity(f"start.{name}", "SI", values, (0 if np.size(values) == 0 else n_strains,))
+        branches = np.size(values) // max(n_strains, 1) if name.startswith("maxwell") else 1
+        quantity(f"start.{name}", "SI", values, (0 if np.size(values) == 0 else branches * n_strains,))
     if not isinstance(start.angle_branches, list | tuple):
         raise ValueError(
             f"start.angle_branches must be a list of lists of numbers, got {type(start.angle_branches).__name__}"

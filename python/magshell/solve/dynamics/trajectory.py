@@ -50,9 +50,10 @@ class MotionState:
     time: s, since the start of the motion; clock: the same time counted in steps. rotations_known: False where the edge
     rotations are still to be computed.
     state, velocity, acceleration: of all degrees of freedom in the core's order, (n,). angle_branches: the full turns of
-    dihedral and joint angles. strain_rates, maxwell_strains, maxwell_strain_rates: of faces.
+    dihedral and joint angles. strain_rates: of faces. maxwell_strains, maxwell_strain_rates: the same for each Maxwell
+    branch, one after another.
     Arrays that the motion did not need are empty: accelerations and strain rates are those of TRBDF2, Maxwell strains those
-    of a Maxwell branch. contact_acceleration: the share of contact and friction, which `acceleration` does not contain; only
+    of Maxwell branches. contact_acceleration: the share of contact and friction, which `acceleration` does not contain; only
     with TRBDF2(implicit_contact=True). fine_faces: 1 for each magnetized face that samples the applied field finely, else 0;
     where it is empty, the next motion decides anew.
 
