@@ -96,6 +96,7 @@ from .model.solids.materials import (
 from .model.solids.skin import Skin
 from .model.solids.solid import Solid
 from .model.supports.supports import Clamp, Pin, SymmetryPlane
+from .output.live import LiveView, show
 from .output.plot import Color, Picture, Style, View, animate, plot, plot_history, plot_study, write_page
 from .output.results.probes import Probe
 from .output.results.saved import load, save
@@ -181,6 +182,7 @@ __all__ = [
     "LargeStrainWarning",
     "LinearResponse",
     "Link",
+    "LiveView",
     "LoopClosure",
     "MagneticState",
     "MagpylibField",
@@ -300,6 +302,7 @@ __all__ = [
     "save",
     "set_num_threads",
     "shapes",
+    "show",
     "show_config",
     "simulate",
     "study",

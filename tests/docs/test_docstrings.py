@@ -24,7 +24,18 @@ from fuzz_not_called import NOT_CALLED
 
 GIVEN = {"a result", "an error", "a warning", "abstract"}
 MADE = sorted(public_names() - {name for name, why in NOT_CALLED.items() if why in GIVEN})
-LIBRARIES = ("torch", "gmsh", "magpylib", "yourdfpy", "meshio", "gymnasium", "matplotlib", "pandas", "xarray")
+LIBRARIES = (
+    "torch",
+    "gmsh",
+    "magpylib",
+    "yourdfpy",
+    "meshio",
+    "gymnasium",
+    "matplotlib",
+    "pandas",
+    "xarray",
+    "viser",
+)
 
 
 def named(name: str):

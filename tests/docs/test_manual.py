@@ -39,6 +39,7 @@ def test_code_of_a_page_runs(page, tmp_path, monkeypatch) -> None:
         "gymnasium",
         "matplotlib",
         "contourpy",
+        "viser",
     ):
         if re.search(rf"\b{library}\b|`{library}`", page.read_text()):
             pytest.importorskip(library)

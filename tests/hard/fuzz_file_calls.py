@@ -124,3 +124,5 @@ def _meshes_and_pictures(s: Sample) -> Iterator[Call]:
         },
         cost=60,
     )
+    arguments = {"what": s.mesh, **states, **look}
+    yield Call("show", lambda **a: ms.show(**a, browser=False).close(), arguments, cost=100)

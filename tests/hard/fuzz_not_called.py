@@ -15,6 +15,7 @@ NOT_CALLED = {
     "Interrupted": "an error",
     "BodyResult": "a result",
     "RigidBodyResult": "a result",
+    "LiveView": "a result",
     "Joint": "abstract",
     "MagneticState": "a result",
     "field_of": "takes a result only",

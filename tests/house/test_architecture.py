@@ -80,6 +80,7 @@ ROOMS = [
     "output",
     "output.results",
     "output.plot",
+    "output.live",
     "envs",
     "jax",
     "__init__",
@@ -107,12 +108,13 @@ HIDDEN_MODULES = {
     "torch.autograd": ("solve/adjoint/autograd.py",),
     "matplotlib": ("output/plot/",),
     "pyvista": ("output/plot/",),
+    "viser": ("output/live/",),
     "gymnasium": ("envs/",),
     "jax": ("jax/",),
 }
 OPTIONAL_MODULES = (
     "torch matplotlib pyvista PIL imageio_ffmpeg meshio gmsh magpylib ipctk distributed cloudpickle gymnasium pandas xarray "
-    "jax"
+    "jax viser"
 ).split()
 LONGEST_FILE = 600
 SPELLINGS = {"cent" + "re": "center"}  # in two halves, as this file is read as well

@@ -18,6 +18,7 @@ STATEFUL = {
     **dict.fromkeys(
         ("optim.MMA", "optim.GCMMA", "optim.LBFGS", "optim.GaussNewton"), "optimizers of torch, with a state"
     ),
+    "LiveView": "a view in a browser, with its server",
     "envs.Environment": "an environment of gymnasium, with an episode under way",
     "envs.VectorEnv": "an environment of gymnasium, with episodes under way",
     "jax.JaxEquilibrium": "a tuple, which Python itself does not let change",

@@ -152,7 +152,7 @@ def solve(
 
     moving: values of the scene that change along with the load parameters.
     """
-    scene, entries = inputs.scene, []
+    scene, entries, end = inputs.scene, [], to
     try:  # a field may be a function of the caller's, in which Ctrl-C can come
         inputs = with_fine_faces(inputs, state, to)
     except KeyboardInterrupt:
@@ -169,7 +169,7 @@ def solve(
         )
         if moving is not None and found.load_fraction < 1.0:
             inputs = inputs.with_values(moving.values(found.load_fraction))
-    found, inputs, stopped = _with_fine_faces_at_end(found, inputs, to, options, progress)
+    found, inputs, stopped = _with_fine_faces_at_end(found, inputs, end, options, progress)
     with inputs.in_core():
         energies, arrays = _energies(scene, found), arrays_of(scene, found)
         strain = largest_of(scene, found.state, inputs.values.all_sheets.thickness)
