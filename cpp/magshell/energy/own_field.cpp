@@ -21,6 +21,24 @@ Index partition_numbers(Index count, std::vector<Index>& order, const First& fir
     return found;
 }
 
+// Numbers the entries that are marked one after another; the others have -1.
+std::vector<Index> numbered(const std::vector<bool>& marked) {
+    std::vector<Index> numbers(marked.size(), -1);
+    Index next = 0;
+    for (std::size_t k = 0; k < marked.size(); ++k)
+        if (marked[k]) numbers[k] = next++;
+    return numbers;
+}
+
+// Returns the entries that are marked.
+template <class Entries>
+Entries selected(const Entries& entries, const std::vector<bool>& marked) {
+    Entries some;
+    for (std::size_t k = 0; k < marked.size(); ++k)
+        if (marked[k]) some.push_back(entries[k]);
+    return some;
+}
+
 }  // namespace
 
 OwnField::OwnField(Faces faces) {
@@ -104,6 +122,44 @@ void OwnField::set(const std::vector<Vec3>& magnetization, const std::vector<dou
         return edge_charges_[e] != 0.0 || side_charges_[at[0]] != 0.0 ||
                (at[1] >= 0 && side_charges_[at[1]] != 0.0);
     });
+}
+
+OwnField OwnField::of_sources() const {
+    std::vector<bool> edges(edges_.size(), false), faces(faces_.size(), false), nodes(nodes_.size(), false);
+    for (Index k = 0; k < active_edges_; ++k) {
+        edges[edge_order_[k]] = true;
+        for (const Index f : edges_[edge_order_[k]].faces)
+            if (f >= 0) faces[f] = true;
+    }
+    for (std::size_t f = 0; f < faces_.size(); ++f)
+        if (faces[f])
+            for (const Index node : faces_[f].nodes) nodes[node] = true;
+    const std::vector<Index> edge_numbers = numbered(edges), face_numbers = numbered(faces),
+                             node_numbers = numbered(nodes);
+    OwnField part;
+    part.nodes_ = selected(nodes_, nodes);
+    part.edges_ = selected(edges_, edges);
+    for (Edge& edge : part.edges_) {
+        for (Index& node : edge.nodes) node = node_numbers[node];
+        for (Index& f : edge.faces) f = f < 0 ? f : face_numbers[f];
+    }
+    part.faces_ = selected(faces_, faces);
+    for (Face& face : part.faces_) {
+        for (Index& node : face.nodes) node = node_numbers[node];
+        face.edges.fill(-1);
+    }
+    for (Index k = 0; k < active_edges_; ++k) part.edge_order_.push_back(edge_numbers[edge_order_[k]]);
+    for (Index k = 0; k < active_faces_; ++k) part.face_order_.push_back(face_numbers[face_order_[k]]);
+    part.active_edges_ = active_edges_;
+    part.active_faces_ = active_faces_;
+    part.edge_charges_ = selected(edge_charges_, edges);
+    part.edge_thickness_ = selected(edge_thickness_, edges);
+    part.thickness_ = selected(thickness_, faces);
+    part.rest_currents_ = selected(rest_currents_, faces);
+    part.magnetization_ = selected(magnetization_, faces);
+    part.side_charges_ = selected(side_charges_, faces);
+    part.has_charges_ = has_charges_;
+    return part;
 }
 
 std::size_t OwnField::bytes() const {

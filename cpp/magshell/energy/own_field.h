@@ -52,6 +52,9 @@ class OwnField {
     /// Returns the number of source points: four per edge with a source, six per face with a normal magnetization if there are charges.
     Index n_points() const { return 4 * active_edges_ + (has_charges_ ? 6 * active_faces_ : 0); }
 
+    /// Returns the edges with a source and the faces at them: the same energy and gradient, without derivatives by the values of faces.
+    OwnField of_sources() const;
+
     /// Finds the near pairs of sources at positions q of all nodes.
     Neighbours neighbours(const double* q) const { return neighbours(q, Targets::sources); }
     /// Returns the energy [J] and sets its gradient [N] by the position of each of nodes().
@@ -83,7 +86,7 @@ class OwnField {
         Vec3 normal;                    // at rest
         std::array<Vec3, 3>
             conormals;  // at rest, outward, times the length of the edge opposite each corner [m]
-        std::array<Index, 3> edges;  // opposite each corner
+        std::array<Index, 3> edges;  // opposite each corner; not in of_sources()
     };
     template <class T>
     struct EdgeAdjoint {
@@ -111,6 +114,8 @@ class OwnField {
         std::vector<EdgeAdjoint<T>> edges;
         std::vector<FaceAdjoint<T>> faces;
     };
+
+    OwnField() = default;
 
     /// Where sums are evaluated: at the sources, or at all edges and faces, for derivatives by values that are zero now.
     enum class Targets { sources, all };

@@ -77,6 +77,12 @@ class Factor {
     /// Factorizes the matrix that was written. Throws InvalidInput for NaN or infinity.
     virtual FactorReport factorize() = 0;
 
+    /// Tells whether factorize() may leave the number of negative eigenvalues open until complete_report(), where counting them takes
+    /// many solves. Direct methods know it at once.
+    virtual void set_count_deferred(bool /*deferred*/) {}
+    /// Returns the report of the last factorize() with the number of negative eigenvalues.
+    virtual FactorReport complete_report() { return report_; }
+
     /// Discards the factorization; its memory is kept.
     void forget() {
         report_ = {};

@@ -197,7 +197,7 @@ class Statics {
             predictor_.reset();
             steps.reset_to(longest_step);
         }
-        return factor.succeeded ? judge(factor) : check_stability();
+        return factor.succeeded ? judge(newton_.complete_report()) : check_stability();
     }
 
     // Shortens a load step until obstacles and supports move through no contact point that stays where it is: beyond it, the
@@ -235,6 +235,7 @@ class Statics {
     NewtonReport solve_load_step(VectorXd& q, const LoadParameters& load_parameters, double step,
                                  bool on_the_way) {
         NewtonPolicy policy;
+        policy.defers_count = true;
         if (!allows_inexact_steps()) return newton_.solve(q, load_parameters, policy);
         policy.inexact = on_the_way;
         if (newton_.model().capabilities().has_stress_prediction()) policy.stress_predictor = &last_;

@@ -110,17 +110,23 @@ std::unique_ptr<Factor> OperatorFactor::shifted(const LargeVector<double>& value
 }
 
 FactorReport OperatorFactor::factorize() {
-    const LargeVector<double> values = operator_ ? values_ : LargeVector<double>();
+    if (operator_) entries_ = values_;
     std::swap(sparse_->values(), values_);
     report_ = sparse_->factorize();
-    if (!report_.succeeded || !operator_) return report_;
+    counted_ = !report_.succeeded || !operator_;
+    return deferred_ ? report_ : complete_report();
+}
+
+FactorReport OperatorFactor::complete_report() {
+    if (counted_) return report_;
+    counted_ = true;
     Count count;
     if (report_.negative_pivots == 0 && report_.perturbed_pivots == 0) {
         count = count_below(*sparse_, operator_, -1.0);
     } else {
         VectorXd shift;
         // K x = 0 means (A + D)^-1 (H - D) x = - x, with the shift D.
-        if (const std::unique_ptr<Factor> positive = shifted(values, shift))
+        if (const std::unique_ptr<Factor> positive = shifted(entries_, shift))
             count = count_below(
                 *positive, [&](const VectorXd& x) { return VectorXd(operator_(x) - shift.cwiseProduct(x)); },
                 -1.0);

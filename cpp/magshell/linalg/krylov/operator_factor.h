@@ -23,6 +23,9 @@ class OperatorFactor final : public Factor {
     /// Sets H until it is set again; an empty function is zero.
     void set_operator(Operator product) { operator_ = std::move(product); }
     FactorReport factorize() override;
+    /// A deferred report has the negative eigenvalues of A.
+    void set_count_deferred(bool deferred) override { deferred_ = deferred; }
+    FactorReport complete_report() override;
     VectorXd image(const VectorXd& x) const override;
     /// Throws InvalidInput if GMRES does not converge.
     void solve(Eigen::Ref<Eigen::MatrixXd> rhs) const override;
@@ -42,6 +45,8 @@ class OperatorFactor final : public Factor {
 
     std::unique_ptr<Factor> sparse_;
     Operator operator_;
+    LargeVector<double> entries_;  // of A, which a factorization overwrites
+    bool deferred_ = false, counted_ = true;
 };
 
 }  // namespace magshell

@@ -58,14 +58,15 @@ NewtonReport Stepper::solve(VectorXd& q, const MotionState& begin, const LoadPar
     }
     const VectorXd predicted = q;
     const Model::AngleBranches angle_branches = model.angle_branches();
-    NewtonReport report = newton_.solve(q, load_parameters, {.proximal = proximal});
+    NewtonReport report = newton_.solve(q, load_parameters, {.proximal = proximal, .defers_count = true});
     // After contact between bodies, Newton has used its line search already.
     const Capabilities& has = model.capabilities();
     const bool searched = has.has_barrier && report.had_contact;
     if (report.converged || searched || !(has.has_stiffness_jumps || newton_.options().mixed)) return report;
     q = predicted;
     model.set_angle_branches(angle_branches);
-    NewtonPolicy standard{.proximal = proximal, .mixed = false, .search_at_barrier = false};
+    NewtonPolicy standard{
+        .proximal = proximal, .mixed = false, .search_at_barrier = false, .defers_count = true};
     if (has.has_stiffness_jumps) {
         standard.steps = NewtonPolicy::Steps::descending;
         // The prediction may lie in another valley: the descent begins where its energy is lower.

@@ -235,6 +235,7 @@ FactorReport Newton::factorize_assembled(const VectorXd& q, const ProximalTerm& 
     ++factorizations_;
     const Stopwatch running(linear_time_);
     FactorReport report;
+    factor_->set_count_deferred(std::exchange(defers_count_, false));
     try {
         report = factor_->factorize();
     } catch (const InvalidInput&) {
@@ -242,6 +243,11 @@ FactorReport Newton::factorize_assembled(const VectorXd& q, const ProximalTerm& 
     }
     if (!report.succeeded) ++failed_factorizations_;
     return report;
+}
+
+FactorReport Newton::complete_report() const {
+    const Stopwatch running(linear_time_);
+    return factor_->complete_report();
 }
 
 FactorReport Newton::factorize_at(const VectorXd& q, const LoadParameters& load_parameters,

@@ -59,6 +59,9 @@ struct NewtonPolicy {
     /// the second step grows too long (early termination on loss of stability; Crisfield 9.5).
     bool stop_on_instability = false;
     bool inexact = false;  // may end once the remaining displacement is small beside the first step
+    /// The caller calls Newton::complete_report() where it needs the negative pivots. The iteration then stops on instability where the
+    /// energy has a negative curvature along a step.
+    bool defers_count = false;
     const StressPredictor* stress_predictor = nullptr;  // of the previous load step
     const FactorReport* factor =
         nullptr;  // of the last factorization, if it was made at the state where the solve begins
@@ -120,13 +123,17 @@ class Newton {
     FactorReport factorize(const VectorXd& q, const LoadParameters& load_parameters, bool extrapolated_stress,
                            const ProximalTerm& proximal, Eigen::Ref<Eigen::MatrixXd> moves,
                            bool project_psd = false);
+    /// Lets the next factorization leave the number of negative pivots open where counting them takes solves.
+    void defer_count() { defers_count_ = true; }
+    /// Returns the report of the last factorization with the number of negative pivots.
+    FactorReport complete_report() const;
     /// Replaces rhs by the solution of K^T p = rhs with the Hessian at q, the last evaluated state, by GMRES with a factorization made
     /// nearby. Both are of all dofs, zero where prescribed. The residual is below 1e-14 of rhs, each component
     /// scaled by the root of its own stiffness.
     GmresReport solve_gmres_adjoint(const VectorXd& q, const LoadParameters& load_parameters,
                                     const ProximalTerm& proximal, const Factor& nearby, VectorXd& rhs);
     /// Returns p with K p = rhs by the last factorization; both are of all dofs, zero where prescribed. tolerance: residual over rhs,
-    /// used only if K is nonsymmetric and GMRES is needed.
+    /// used only where GMRES is needed: if K is nonsymmetric or not a sparse matrix.
     VectorXd solve_with_factor(const VectorXd& rhs, double tolerance = 1e-9) const;
     /// Returns p with K^T p = rhs, to round-off. Throws InvalidInput if K is too nonsymmetric for that.
     VectorXd solve_transposed(const VectorXd& rhs) const;
@@ -198,6 +205,7 @@ class Newton {
     std::vector<Contacts::ObstaclePoint> touched_;  // contacts with obstacles at the last factorization
     bool unsymmetric_ = false;                      // whether the matrix assembled last is
     int factorizations_ = 0, failed_factorizations_ = 0, iterations_ = 0;
+    bool defers_count_ = false;
     int max_factorizations_ = 0;
     mutable double linear_time_ = 0.0;
 };

@@ -148,6 +148,7 @@ class FullSteps final : public NewtonIteration {
         // unless that changes other terms too, whose exact matrix is needed.
         const bool begins = mixed_ && !extrapolated_ && !model_.capabilities().has_psd_projection;
         const bool project_psd = begins || contraction > required_contraction;
+        if (policy_.defers_count) newton_.defer_count();
         report_.factor =
             newton_.factorize(q_, load_parameters_, mixed_ && extrapolated_, proximal_, pull_, project_psd);
         report_.reason = report_.factor.reason;
@@ -178,10 +179,15 @@ class FullSteps final : public NewtonIteration {
     }
 
     // Loads without potential act on few nodes, so GMRES takes few vectors and solves to the usual tolerance.
-    VectorXd solve(const VectorXd& force) const {
-        return move_ + (proximal_.motion
-                            ? newton_.solve_with_factor(force, forcing_term(report_.residual, tolerance_))
-                            : newton_.solve_with_factor(force));
+    VectorXd solve(const VectorXd& force) {
+        const bool has_operators = !model_.operators().empty();
+        const VectorXd step =
+            proximal_.motion || has_operators
+                ? newton_.solve_with_factor(force, forcing_term(report_.residual, tolerance_))
+                : newton_.solve_with_factor(force);
+        if (has_operators && policy_.defers_count && in_place_ && force.dot(step) < 0.0)
+            ++report_.factor.negative_pivots;
+        return move_ + step;
     }
 
     bool step() override {

@@ -28,11 +28,14 @@ class OwnFieldHessian final : public HessianOperator {
     double factor_;
 };
 
-void add_faces(const Surface& surface, OwnField::Faces& faces) {
-    for (Index f = 0; f < surface.n_faces(); ++f) {
-        faces.nodes.push_back(surface.corners[f]);
-        faces.rest.push_back(surface.rest_corners(f));
-    }
+OwnField::Faces faces_of(const std::vector<const Surface*>& surfaces) {
+    OwnField::Faces faces;
+    for (const Surface* surface : surfaces)
+        for (Index f = 0; f < surface->n_faces(); ++f) {
+            faces.nodes.push_back(surface->corners[f]);
+            faces.rest.push_back(surface->rest_corners(f));
+        }
+    return faces;
 }
 
 }  // namespace
@@ -42,16 +45,15 @@ OwnFieldTerm::OwnFieldTerm(std::vector<const Surface*> surfaces, Index max_point
     : surfaces_(std::move(surfaces)),
       max_points_(max_points),
       n_dofs_(n_dofs),
-      factor_(registry.load_parameters.add("scene", "own_field_factor", "1", 1, 1)) {
-    OwnField::Faces faces;
+      factor_(registry.load_parameters.add("scene", "own_field_factor", "1", 1, 1)),
+      field_(faces_of(surfaces_)),
+      sources_(std::make_shared<const OwnField>(field_)) {
     for (const Surface* surface : surfaces_) {
-        add_faces(*surface, faces);
         magnetization_.push_back(registry.values.add(surface->owner, "remanent_magnetization", "A/m",
                                                      surface->n_faces(), 3, &surface->faces));
         thickness_.push_back(
             registry.values.add(surface->owner, "thickness", "m", surface->n_faces(), 1, &surface->faces));
     }
-    field_ = std::make_shared<const OwnField>(std::move(faces));
 }
 
 bool OwnFieldTerm::set_values(const Values& values) {
@@ -66,50 +68,47 @@ bool OwnFieldTerm::set_values(const Values& values) {
             magnetizations_.push_back(values.vector(magnetization_[k], f));
             thicknesses_.push_back(values.number(thickness_[k], f));
         }
-    OwnField field = *field_;
-    field.set(magnetizations_, thicknesses_);
-    if (field.n_points() > max_points_)
-        throw InvalidInput("the own field has " + std::to_string(field.n_points()) +
+    field_.set(magnetizations_, thicknesses_);
+    if (field_.n_points() > max_points_)
+        throw InvalidInput("the own field has " + std::to_string(field_.n_points()) +
                            " source points, more than max_points = " + std::to_string(max_points_) +
                            " of the OwnField: each product with its Hessian takes time in proportion to the "
                            "square of that number. Use a "
                            "coarser mesh, fewer bodies, a uniform tangential magnetization (whose sources "
                            "lie on the border only), or "
                            "ms.OwnField(max_points=...)");
-    field_ = std::make_shared<const OwnField>(std::move(field));
+    sources_ = std::make_shared<const OwnField>(field_.of_sources());
     return true;
 }
 
 double OwnFieldTerm::energy(const double* q, const LoadParameters& load_parameters) const {
     const double factor = load_parameters[factor_.first];
-    if (!field_->acts() || factor == 0.0) return 0.0;
+    if (!sources_->acts() || factor == 0.0) return 0.0;
     std::vector<Vec3> by_position;
-    return factor * field_->gradient(q, field_->neighbours(q), by_position);
+    return factor * sources_->gradient(q, sources_->neighbours(q), by_position);
 }
 
 void OwnFieldTerm::evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) {
     const double factor = load_parameters[factor_.first];
-    if (!field_->acts() || factor == 0.0) return;
+    if (!sources_->acts() || factor == 0.0) return;
     std::vector<Vec3> by_position;
-    field_->gradient(q, field_->neighbours(q), by_position);
+    sources_->gradient(q, sources_->neighbours(q), by_position);
     for (std::size_t k = 0; k < by_position.size(); ++k)
-        for (int i = 0; i < 3; ++i) out.add(3 * field_->nodes()[k] + i, factor * by_position[k][i]);
+        for (int i = 0; i < 3; ++i) out.add(3 * sources_->nodes()[k] + i, factor * by_position[k][i]);
 }
 
 std::shared_ptr<const HessianOperator> OwnFieldTerm::hessian_operator(
     const double* q, const LoadParameters& load_parameters) const {
     const double factor = load_parameters[factor_.first];
-    if (!field_->acts() || factor == 0.0) return nullptr;
-    return std::make_shared<const OwnFieldHessian>(field_, q, n_dofs_, factor);
+    if (!sources_->acts() || factor == 0.0) return nullptr;
+    return std::make_shared<const OwnFieldHessian>(sources_, q, n_dofs_, factor);
 }
 
 std::vector<double> OwnFieldTerm::own_energies(const double* q) const {
     std::vector<double> energies;
     std::ptrdiff_t first = 0;
     for (const Surface* surface : surfaces_) {
-        OwnField::Faces faces;
-        add_faces(*surface, faces);
-        OwnField alone(std::move(faces));
+        OwnField alone(faces_of({surface}));
         const std::ptrdiff_t last = first + surface->n_faces();
         alone.set({magnetizations_.begin() + first, magnetizations_.begin() + last},
                   {thicknesses_.begin() + first, thicknesses_.begin() + last});
@@ -123,19 +122,19 @@ std::vector<double> OwnFieldTerm::own_energies(const double* q) const {
 void OwnFieldTerm::vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
                        Gradient& out) {
     const double factor = load_parameters[factor_.first];
-    const OwnField::FaceGradient by = field_->vjp(q, lambda);
+    const OwnField::FaceGradient by = field_.vjp(q, lambda);
     std::size_t face = 0;
     for (std::size_t k = 0; k < surfaces_.size(); ++k)
         for (Index f = 0; f < surfaces_[k]->n_faces(); ++f, ++face) {
             out.values.segment<3>(magnetization_[k].at(f)) += factor * by.magnetization[face];
             out.values[thickness_[k].at(f)] += factor * by.thickness[face];
         }
-    if (!field_->acts()) return;
+    if (!sources_->acts()) return;
     std::vector<Vec3> by_position;
-    field_->gradient(q, field_->neighbours(q), by_position);
+    sources_->gradient(q, sources_->neighbours(q), by_position);
     for (std::size_t k = 0; k < by_position.size(); ++k)
         out.load_parameters[factor_.first] +=
-            by_position[k].dot(Eigen::Map<const Vec3>(lambda + 3 * field_->nodes()[k]));
+            by_position[k].dot(Eigen::Map<const Vec3>(lambda + 3 * sources_->nodes()[k]));
 }
 
 }  // namespace magshell

@@ -22,9 +22,10 @@ class OwnFieldTerm final : public OperatorTerm {
     bool add_projective_stiffness(NodeMatrix&) const override { return false; }
     void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
              Gradient& out) override;
-    std::size_t bytes() const override { return field_->bytes(); }
+    std::size_t bytes() const override { return field_.bytes() + sources_->bytes(); }
 
-    const OwnField& field() const { return *field_; }
+    /// Returns the own field of the present values.
+    const OwnField& field() const { return *sources_; }
     /// Returns the energy of each surface in its own field alone [J].
     std::vector<double> own_energies(const double* q) const;
 
@@ -35,8 +36,9 @@ class OwnFieldTerm final : public OperatorTerm {
     ParameterSlice factor_;
     std::vector<Vec3> magnetizations_;  // of all faces [A/m]
     std::vector<double> thicknesses_;   // [m]
+    OwnField field_;                    // of all faces
     std::shared_ptr<const OwnField>
-        field_;  // shared with the Hessians of earlier solves, so it is replaced, never changed
+        sources_;  // of the edges with a source; shared with the Hessians of earlier solves, so it is replaced, never changed
 };
 
 }  // namespace magshell
