@@ -149,7 +149,7 @@ def test_docstring_examples_run(test, tmp_path, monkeypatch):
     assert not failed, "".join(told)
 
 
-@pytest.mark.parametrize("name", ["LBFGS", "MMA", "GCMMA", "GaussNewton"])
+@pytest.mark.parametrize("name", ["LBFGS", "MMA", "GCMMA", "GaussNewton", "NewtonCG"])
 def test_help_of_an_optimizer_is_ours(name):
     """Check that the help of torch's own methods stands under its own heading, after everything of ours."""
     told = pydoc.plain(pydoc.render_doc(getattr(ms.optim, name))).split("inherited from torch")[0]

@@ -93,3 +93,32 @@ def test_pressures_without_potential_refuse_hessians(name):
     inputs, first = gradient(name, given, weights, None, differentiable=True)
     with pytest.raises(ms.NoGradient, match="no potential"):
         torch.autograd.grad(first, inputs, [torch.ones_like(each) for each in inputs])
+
+
+def test_hessians_of_a_fine_sheet_are_not_lost_to_round_off():
+    """Check that products with a Hessian are symmetric and those of differences, from no magnetization."""
+    mesh = ms.meshes.rectangle(0.04, 0.01, cells=(48, 12))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.45, mass_density=2e3)
+    clamp = ms.Clamp(mesh.edges_at(x=0.0))
+    scene = ms.Scene(sheet, supports=[clamp], field=ms.UniformField(), gravity=(0, 0, -9.81))
+    rest = ms.equilibrium(scene, remanent_magnetization=(0, 0, 0), applied_flux_density=(0, 0, 30e-3))
+    along, exact = torch.tensor([1.0, 0.0, 0.0], dtype=torch.float64), ms.MixedNewton(tolerance=1e-13)
+
+    def slope(strength):
+        given = {"remanent_magnetization": strength[:, None] * along, "applied_flux_density": (0, 0, 30e-3)}
+        shape = ms.equilibrium(scene, start=rest, solver=exact, **given)
+        return torch.autograd.grad(
+            (1e3 * shape.positions[:, 2]).square().mean(), strength, create_graph=True
+        )[0]
+
+    strength = torch.zeros(mesh.n_faces, dtype=torch.float64, requires_grad=True)
+    first, rng = slope(strength), np.random.default_rng(1)
+    rough, smooth = torch.from_numpy(rng.standard_normal(mesh.n_faces)), torch.ones_like(first).detach()
+    by_rough, by_smooth = (
+        torch.autograd.grad(first, strength, v, retain_graph=True)[0] for v in (rough, smooth)
+    )
+    assert float(by_rough @ smooth) == pytest.approx(float(by_smooth @ rough), rel=1e-8)
+    step = 20.0  # A/m
+    changes = [slope((n * step * smooth).requires_grad_()).detach() for n in (2, 1, -1, -2)]
+    wanted = (-changes[0] + 8 * changes[1] - 8 * changes[2] + changes[3]) / (12 * step)
+    assert float((by_smooth - wanted).norm()) < 1e-7 * float(wanted.norm())

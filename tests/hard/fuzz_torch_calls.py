@@ -313,6 +313,7 @@ def _optimizers() -> Iterator[Call]:
 
     del limits["memory"]
     yield Call("optim.GaussNewton", least_squares, {**box, **limits, "jacobian": "auto"})
+    yield Call("optim.NewtonCG", stepped(optim.NewtonCG), {**box, **limits, "max_products": 5})
 
     x = torch.ones(3, dtype=torch.float64, requires_grad=True)
     options = {

@@ -16,7 +16,8 @@ from magshell._runtime.frozen import Frozen
 # Classes whose objects change by their nature, with the reason.
 STATEFUL = {
     **dict.fromkeys(
-        ("optim.MMA", "optim.GCMMA", "optim.LBFGS", "optim.GaussNewton"), "optimizers of torch, with a state"
+        ("optim.MMA", "optim.GCMMA", "optim.LBFGS", "optim.GaussNewton", "optim.NewtonCG"),
+        "optimizers of torch, with a state",
     ),
     "LiveView": "a view in a browser, with its server",
     "envs.Environment": "an environment of gymnasium, with an episode under way",

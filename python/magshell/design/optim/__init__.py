@@ -1,4 +1,5 @@
-"""Optimizers for designs, as torch optimizers with closures: `MMA`, `GCMMA`, `LBFGS` and `GaussNewton`.
+"""Optimizers for designs, as torch optimizers with closures: `MMA`, `GCMMA`, `LBFGS`, `GaussNewton` and
+`NewtonCG`.
 
 torch is imported when one of them is first asked for.
 """
@@ -10,9 +11,15 @@ from typing import Any
 
 from ..._input.tensors import require_torch
 
-_HOMES = {"GCMMA": ".gcmma", "GaussNewton": ".gauss_newton", "LBFGS": ".lbfgs", "MMA": ".mma"}
+_HOMES = {
+    "GCMMA": ".gcmma",
+    "GaussNewton": ".gauss_newton",
+    "LBFGS": ".lbfgs",
+    "MMA": ".mma",
+    "NewtonCG": ".newton_cg",
+}
 
-__all__ = ["GCMMA", "LBFGS", "MMA", "GaussNewton"]
+__all__ = ["GCMMA", "LBFGS", "MMA", "GaussNewton", "NewtonCG"]
 
 
 def __getattr__(name: str) -> Any:

@@ -173,6 +173,13 @@ def group_options(groups: list[dict[Any, Any]], without: set[str]) -> dict[Any, 
     }
 
 
+def positive_count(name: str, value: Any) -> int:
+    """Return a positive integer. Raises ValueError for anything else."""
+    if isinstance(value, bool) or not (isinstance(value, int) and value > 0):
+        raise ValueError(f"{name} must be a positive integer, got {value!r}")
+    return value
+
+
 def require_range(group: dict[Any, Any], name: str, low: float, high: float) -> None:
     """Check that a group's option lies strictly between two numbers. Raises ValueError."""
     value = group[name]

@@ -8,30 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..._input.scalars import positive
 from ..._runtime.solver_entry_point import grouped
-from ...errors import DesignRejected
-from .base import BoxOptimizer
 from .box import Box
-from .least_squares import DenseModel, ResidualModel
+from .least_squares import DenseModel
 from .least_squares_products import ProductModel
 from .residual_sample import ResidualSample, ResidualTrial
-from .sample import Sample
-from .stagnation import STAGNATION
+from .trust_region import StepModel, TrustRegionOptimizer
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
 
-# [Nocedal and Wright 2006, algorithm 4.1]: a step is taken if the decrease is at least the first fraction [-] of the one
-# expected; the radius shrinks to a quarter below the second, and doubles above the third.
-_ACCEPTED, _POOR, _GOOD = 1e-4, 0.25, 0.75
-_SHORTER, _LONGER = 0.25, 2.0
-_AT_RADIUS = 0.8  # [-] a step that is at least this fraction of the radius was limited by it
-_ROUNDING = 4 * np.finfo(float).eps  # [-] a relative decrease of the objective below this is round-off
 _JACOBIANS = ("auto", "forward", "backward", "products")
 
 
-class GaussNewton(BoxOptimizer):
+class GaussNewton(TrustRegionOptimizer):
     """Gauss-Newton and Levenberg-Marquardt: least squares of residuals, with bounds and no other constraints.
 
     The closure returns residuals r, a tensor (m,), and the objective is |r|^2 / 2. Each step minimizes the linear model
@@ -68,12 +58,10 @@ class GaussNewton(BoxOptimizer):
     """
 
     jacobian: str
-    first_step: float
-    max_evaluations: int
     takes_residuals = True
     _sample_type = ResidualSample
 
-    _copied_attributes = (*BoxOptimizer._copied_attributes, "jacobian", "first_step", "max_evaluations")
+    _copied_attributes = (*TrustRegionOptimizer._copied_attributes, "jacobian")
 
     @grouped()
     def __init__(
@@ -90,100 +78,29 @@ class GaussNewton(BoxOptimizer):
     ):
         if jacobian not in _JACOBIANS:
             raise ValueError(f"jacobian must be one of {', '.join(map(repr, _JACOBIANS))}, got {jacobian!r}")
-        if isinstance(max_evaluations, bool) or not (
-            isinstance(max_evaluations, int) and max_evaluations > 0
-        ):
-            raise ValueError(f"max_evaluations must be a positive integer, got {max_evaluations!r}")
-        self.jacobian, self.first_step = jacobian, positive("first_step", "", first_step)
-        self.max_evaluations = max_evaluations
-        super().__init__(params, {"lower": lower, "upper": upper, "scale": scale}, max_backtracks)
+        self.jacobian = jacobian
+        options = {"lower": lower, "upper": upper, "scale": scale}
+        super().__init__(params, options, first_step, max_evaluations, max_backtracks)
 
     def trial_of(self, closure: Callable[..., Any]) -> ResidualTrial:
         return ResidualTrial(closure, self.parameters, self.jacobian)
 
-    def __getstate__(self) -> dict[Any, Any]:
-        state = super().__getstate__()
-        if not self._sample_state():  # the graph of products is not copied: the closure is called again
-            state["_sample"] = None
-        return state
+    def _model(self, sample: ResidualSample, box: Box, size: np.ndarray) -> StepModel:
+        """Return the linear model of the residuals."""
+        free, trial = box.free, sample.products
+        if trial is None:
+            return DenseModel(sample.slopes[:, free] * size, sample.residuals)
 
-    def _sample_state(self) -> dict[Any, Any]:
-        if self._sample is None or self._sample.products is not None:
-            return {}
-        state = super()._sample_state()
-        return {name: value for name, value in state.items() if not name.endswith("products")}
+        def times(step: np.ndarray) -> np.ndarray:
+            whole = np.zeros(free.size)
+            whole[free] = step * size
+            return trial.times(whole)
 
-    def _advance(self, sample: Sample, box: Box, x: np.ndarray) -> None:
-        self.stagnation = STAGNATION
-        size, lower, upper = _in_sizes(box, x)
-        model = _model(sample, box, size)
-        radius = self._run.get("radius", self.first_step * math.sqrt(size.size))
-        rejected = 0
-        for _ in range(self.max_evaluations):
-            step = model.step(lower, upper, radius)
-            expected, length = model.decrease(step), float(np.linalg.norm(step))
-            if not expected > _ROUNDING * sample.objective:
-                break
-            try:
-                reached, trial = self._trial(box.moved(x, step * size))
-            except DesignRejected:
-                rejected += 1
-                if rejected > self.max_backtracks:
-                    raise
-                radius = _SHORTER * length
-                continue
-            fraction = (sample.objective - trial.objective) / expected
-            radius = _next_radius(radius, length, fraction)
-            if fraction > _ACCEPTED:
-                self._run = {"radius": radius}
-                self._store(reached, trial.differentiate())
-                self._leave_gradients(self._sample.gradient)
-                return
-        else:
-            self.stagnation: str = (
-                "no lower design in as many evaluations of a step as max_evaluations allows, "
-                f"{self.max_evaluations}"
+        def transposed_times(weights: np.ndarray) -> np.ndarray:
+            return trial.transposed_times(weights)[free] * size
+
+        if trial.model is None:
+            trial.model = ProductModel(
+                times, transposed_times, sample.residuals, sample.gradient[free] * size
             )
-        self._write(x)
-        self._leave_gradients(sample.gradient)
-
-    def _full_step(self, sample: Sample, box: Box, x: np.ndarray) -> None:
-        """Take the step of the model at the present radius, even if the objective grows."""
-        size, lower, upper = _in_sizes(box, x)
-        radius = self._run.get("radius", self.first_step * math.sqrt(size.size))
-        step = _model(sample, box, size).step(lower, upper, radius)
-        reached, trial = self._trial(box.moved(x, step * size))
-        self._store(reached, trial.differentiate())
-        self._leave_gradients(self._sample.gradient)
-
-
-def _in_sizes(box: Box, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the sizes of the free entries, and the bounds of a step in these sizes, each (n free,)."""
-    size = np.where(np.isnan(box.scale), 1.0, box.scale)[box.free]
-    return size, (box.lower - x)[box.free] / size, (box.upper - x)[box.free] / size
-
-
-def _model(sample: ResidualSample, box: Box, size: np.ndarray) -> ResidualModel:
-    """Return the linear model of the residuals for steps of the free entries in their sizes."""
-    free, trial = box.free, sample.products
-    if trial is None:
-        return DenseModel(sample.slopes[:, free] * size, sample.residuals)
-
-    def times(step: np.ndarray) -> np.ndarray:
-        whole = np.zeros(free.size)
-        whole[free] = step * size
-        return trial.times(whole)
-
-    def transposed_times(weights: np.ndarray) -> np.ndarray:
-        return trial.transposed_times(weights)[free] * size
-
-    if trial.model is None:
-        trial.model = ProductModel(times, transposed_times, sample.residuals, sample.gradient[free] * size)
-    return trial.model
-
-
-def _next_radius(radius: float, length: float, fraction: float) -> float:
-    """Return the radius after a step of this length whose decrease was this fraction of the expected one."""
-    if not fraction >= _POOR:
-        return _SHORTER * length
-    return _LONGER * radius if fraction > _GOOD and length > _AT_RADIUS * radius else radius
+        return trial.model

@@ -110,7 +110,8 @@ class Restoring:
         if kind is not None:
             with torch.no_grad():
                 for parameter, value, gradient in self._kept:
-                    parameter.copy_(value)
+                    if not torch.equal(parameter, value):  # a copy ends what torch knows of a graph
+                        parameter.copy_(value)
                     parameter.grad = gradient
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..._runtime.solver_entry_point import grouped
 from ...errors import DesignRejected
-from .base import BoxOptimizer
+from .base import BoxOptimizer, positive_count
 from .box import Box
 from .cauchy import Curvature, cauchy_step, shows_curvature, subspace_step, updated_diagonal
 from .line_search import Probe, strong_wolfe
@@ -71,12 +71,11 @@ class LBFGS(BoxOptimizer):
         max_evaluations: int = 20,
         max_backtracks: int = 6,
     ):
-        for name, count in (("memory", memory), ("max_evaluations", max_evaluations)):
-            if isinstance(count, bool) or not (isinstance(count, int) and count > 0):
-                raise ValueError(f"{name} must be a positive integer, got {count!r}")
+        self.memory = positive_count("memory", memory)
+        self.max_evaluations = positive_count("max_evaluations", max_evaluations)
         if not (isinstance(first_step, int | float) and 0 < first_step < math.inf):
             raise ValueError(f"first_step must be a positive number, got {first_step!r}")
-        self.memory, self.first_step, self.max_evaluations = memory, float(first_step), max_evaluations
+        self.first_step = float(first_step)
         super().__init__(params, {"lower": lower, "upper": upper, "scale": scale}, max_backtracks)
 
     def _check_sample(self, sample: Sample) -> None:

@@ -10,8 +10,6 @@ convergence properties ... with convex constraints, J. Comput. Appl. Math. 172 (
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 import scipy
 
@@ -26,18 +24,6 @@ _SINGULAR = 1e-9
 # Changes of the set of entries at a bound, after which scipy's slower method takes over. Tested by
 # test_bounded_step_agrees_with_scipy.
 _SETS = 30
-
-
-class ResidualModel(Protocol):
-    """A linear model of residuals about a design."""
-
-    def decrease(self, step: np.ndarray) -> float:
-        """Return by how much a step lowers half of the sum of squares."""
-        ...
-
-    def step(self, lower: np.ndarray, upper: np.ndarray, radius: float) -> np.ndarray:
-        """Return a step (n,) within the bounds lower <= 0 <= upper and the radius that lowers the model."""
-        ...
 
 
 class DenseModel:

@@ -29,9 +29,11 @@ from .tangent import state_tangent, steps_along
 if TYPE_CHECKING:
     from ...model.scene.solve_inputs import Inputs
 
-# The first step moves a vertex by this fraction (1) of the shortest edge at most, or changes an input by as much of its
-# value; and the fractions (1) of it that are tried. Tested by test_hessians_agree_with_differences_of_gradients.
-_STEP, _SHORTER = 1 / 64, (1.0, 0.25, 0.1, 1e-2, 1e-3)
+# The first step moves the ends of an edge apart by this fraction (1) of its length at most, and turns it by as much in rad;
+# and the fractions (1) of it that are tried. What a bent sheet does is smooth over much longer steps than its edges, and
+# round-off of its stiff stretching is large over shorter ones. Tested by
+# test_hessians_of_a_fine_sheet_are_not_lost_to_round_off.
+_STEP, _SHORTER = 1 / 256, (1.0, 0.25, 0.1, 1e-2, 1e-3)
 
 
 def curvature(
@@ -123,15 +125,21 @@ def _moved(inputs: Inputs, changes: list[np.ndarray]) -> Inputs:
 
 def _steps(inputs: Inputs, motion: np.ndarray, along: list[np.ndarray]) -> list[float]:
     """Return the steps that are tried one after another."""
-    scene = inputs.scene
-    moved = np.abs(scene._model.positions(motion)).max(initial=0.0) / scene.mesh.edge_lengths.min(
-        initial=np.inf
-    )
-    rotated = np.abs(scene._model.edge_rotations(motion)).max(initial=0.0)
-    first = [_STEP / size for size in (moved, rotated) if size > 0.0]
-    for leaf, change in zip(inputs.leaves, along, strict=True):
-        if np.any(change):
-            first.append(steps_along(inputs, leaf, change)[0])
+    scene, model = inputs.scene, inputs.scene._model
+    moved, deformed = model.positions(motion), 0.0
+    for span in scene._bodies.spans:
+        edges, at = span.mesh.edges, moved[span.vertices]
+        apart, length = (
+            np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)
+            for points in (at, span.mesh.rest_positions)
+        )
+        deformed = max(deformed, float((apart / length).max(initial=0.0)))
+    rotated = np.abs(model.edge_rotations(motion)).max(initial=0.0)
+    first = [_STEP / size for size in (deformed, rotated) if size > 0.0]
+    changed = [(leaf, change) for leaf, change in zip(inputs.leaves, along, strict=True) if np.any(change)]
+    # A value that is zero has no size: then the motion says how far to go, if there is one.
+    sized = [each for each in changed if np.any(detached(each[0].tensor))] if first else changed
+    first += [steps_along(inputs, leaf, change)[0] for leaf, change in sized]
     return [min(first) * shorter for shorter in _SHORTER]
 
 
