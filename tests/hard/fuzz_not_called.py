@@ -23,6 +23,7 @@ NOT_CALLED = {
     "MuscleResult": "a result",
     "LinearResponse": "a result",
     "MinimizeResult": "a result",
+    "parametrize.density.RobustDensities": "a result",
     "PrintableMinimum": "a result",
     "PrintableStage": "a result",
     "MultistartResult": "a result",

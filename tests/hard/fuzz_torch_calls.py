@@ -140,8 +140,56 @@ def _objectives(s: Sample) -> Iterator[Call]:
         parametrize.outline,
         {"mesh": s.mesh, "controls": np.full((5, 3), 0.1), "loop": 0},
     )
+    yield from _densities(s)
     yield Call("parametrize.softly_limited", parametrize.softly_limited, {"vectors": vectors, "limit": 1.0})
     yield Call("parametrize.clip_to_limit", parametrize.clip_to_limit, {"vectors": vectors, "limit": 1.0})
+
+
+def _densities(s: Sample) -> Iterator[Call]:
+    density = parametrize.density
+    values = np.linspace(0.1, 0.9, s.mesh.n_faces)
+    for kind in (density.HelmholtzFilter, density.ConeFilter):
+        yield Call(f"parametrize.density.{kind.__name__}", kind, {"mesh": s.mesh, "radius": 0.06})
+        smooth = kind(s.mesh, 0.06)
+        yield Call(f"parametrize.density.{kind.__name__}.__call__", smooth, {"density": values})
+        yield Call(
+            f"parametrize.density.{kind.__name__}.eroded_threshold",
+            smooth.eroded_threshold,
+            {"least_width": 0.02},
+        )
+    yield Call(
+        "parametrize.density.projected",
+        density.projected,
+        {"density": values, "sharpness": 4.0, "threshold": 0.4},
+    )
+    yield Call(
+        "parametrize.density.robust",
+        density.robust,
+        {"density": values, "sharpness": 4.0, "eroded_threshold": 0.6},
+    )
+    yield Call(
+        "parametrize.density.interpolated",
+        density.interpolated,
+        {"density": values, "full": 2.0, "void": 0.01, "power": 3.0, "least_density": 0.1},
+    )
+    yield Call("parametrize.density.fixed", density.fixed, {"density": values, "solid": (0, 1), "void": (2,)})
+    for name in ("volume_fraction", "perimeter"):
+        yield Call(f"parametrize.density.{name}", getattr(density, name), {"mesh": s.mesh, "density": values})
+    holding = np.array((0, 1))
+    yield Call(
+        "parametrize.density.Matter",
+        density.Matter,
+        {"mesh": s.mesh, "density": values, "holding": holding, "least_density": 0.0},
+    )
+    matter = density.Matter(s.mesh, values, holding, 0.0)
+    full = {"young_modulus": 1e6, "mass_density": 1e3, "remanent_magnetization": s.magnetization}
+    voids = {"void_stiffness": 1e-2, "void_mass": 1e-2, "power": 3.0}
+    powers = {"mass_power": 1.0, "magnetization_power": 1.0}
+    yield Call("parametrize.density.Matter.values", matter.values, {**full, **voids, **powers})
+    yield Call(
+        "parametrize.density.Matter.on_all_faces", matter.on_all_faces, {"values": values, "fill": 0.0}
+    )
+    yield Call("parametrize.density.Matter.start", matter.start, {"before": matter, "positions": s.positions})
 
 
 def _controls(s: Sample) -> Iterator[Call]:

@@ -250,6 +250,10 @@ def _options(given: Arrays) -> dict[str, object]:
             given([1.0, 1, 0]), start=given([1.0, 0, 0]), axis=given([0, 0, 1.0]), angle=np.pi / 2
         )
         found |= {"polyline": line, "arc": arc, "chain": ms.control.Chain([line, arc])}
+        mesh, density = ms.meshes.rectangle(0.04, 0.02, cells=(2, 1)), ms.parametrize.density
+        found |= {"filter": density.HelmholtzFilter(mesh, 0.1), "cone filter": density.ConeFilter(mesh, 0.1)}
+        found["matter"] = density.Matter(mesh, given([1.0, 1.0, 0.5, 0.0]), given.numbers(0, 1))
+        found["robust densities"] = density.robust(given([0.2, 0.6]), 8.0, 0.7)
     return found
 
 

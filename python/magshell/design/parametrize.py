@@ -10,6 +10,7 @@ import numpy as np
 
 from .._input.quantity import quantity
 from .._input.tensors import detached, positive_number, real_tensor, require_torch, tensor_of
+from . import density
 from .outlines import outline, with_boundary
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = [
     "along",
     "clip_to_limit",
+    "density",
     "frames_along",
     "from_regions",
     "log_scaled",

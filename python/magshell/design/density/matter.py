@@ -1,0 +1,179 @@
+"""The faces of a sheet that are matter, as a mesh to solve with."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy
+
+from ..._input.quantity import quantity
+from ..._input.tensors import detached, real_tensor, require_torch
+from ..._runtime.frozen import Frozen
+from ...mesh.topology import groups
+from ...mesh.triangles.part_of_mesh import part_of_mesh
+from ...mesh.triangles.triangle_mesh import TriangleMesh, checked_mesh
+from .cells import cells_of, checked_density, laplacian
+from .interpolation import fraction, interpolated
+from .passive import faces_among
+
+if TYPE_CHECKING:
+    import torch
+
+    from ..._input.kinds import Numbers
+
+
+class Matter(Frozen):
+    """The faces of a sheet whose density is not void, with their values for a solve.
+
+    Void is taken out of the sheet. A soft membrane in its place would be compressed and folded by the matter around it,
+    so that Newton's method finds saddles and folds of what is not there (T. E. Bruns, D. A. Tortorelli, An element
+    removal and reintroduction strategy for the topology optimization of structures and compliant mechanisms, Int. J.
+    Numer. Meth. Eng. 57, 2003). Stiffness and magnetization fall to the least together, as the density comes to
+    `least_density`, so that a face leaves with hardly a jump. Faces return when the filter raises their density again:
+    gradients go to the densities of the faces that remain, and through the filter to design variables around them.
+
+    Faces that no chain of common edges connects with the holding ones are taken out as well. Parts that touch at a vertex
+    alone get separate vertices there.
+
+    mesh: the whole sheet, a TriangleMesh. density: (n_f,) in [0, 1], after filter and projection; may be a tensor that
+    needs a gradient. holding: indices of faces at supports, of density `least_density` at least: see `fixed`.
+    least_density: in [0, 1).
+
+    Attributes:
+        mesh: the TriangleMesh of the faces that remain, with the groups of the whole one.
+        faces, vertices: the number in the whole sheet of each face (n,) and vertex (n_v,) of `mesh`.
+        density: of the faces that remain, (n,).
+        left_out: how many faces were taken out although they are dense enough, because nothing holds them.
+
+    >>> import magshell as ms
+    >>> whole = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    >>> matter = ms.parametrize.density.Matter(whole, [1.0] * 30 + [0.0] * 10, holding=[0, 1])
+    >>> matter.mesh.n_faces
+    30
+    """
+
+    mesh: TriangleMesh
+    faces: np.ndarray
+    vertices: np.ndarray
+
+    def __init__(self, mesh: TriangleMesh, density: Numbers, holding: Numbers, least_density: float = 0.1):
+        torch = require_torch("parametrize.density.Matter")
+        self.original: TriangleMesh = checked_mesh(mesh)
+        density = checked_density("density", density, mesh.n_faces)
+        self.least_density: float = fraction("least_density", least_density)
+        held = faces_among("holding", holding, mesh.n_faces)
+        numbers = detached(density)
+        if not len(held):
+            raise ValueError("holding must name the faces at supports, at least one")
+        thin = held[numbers[held] < self.least_density]
+        if len(thin):
+            raise ValueError(
+                f"holding face {thin[0]} has density {numbers[thin[0]]:g}, below least_density {self.least_density:g}: "
+                "make it solid with parametrize.density.fixed"
+            )
+        dense = numbers >= self.least_density
+        pairs = mesh.edge_faces[mesh.interior_edges]
+        part = groups(mesh.n_faces, pairs[dense[pairs].all(axis=1)])
+        remains = dense & np.isin(part, part[held])
+        self.left_out: int = int(np.count_nonzero(dense & ~remains))
+        self.faces = np.flatnonzero(remains)
+        self.density: torch.Tensor = density[torch.tensor(self.faces)]
+        self.mesh, self.vertices = part_of_mesh(mesh, self.faces)
+
+    def __repr__(self) -> str:
+        left_out = f", {self.left_out} left out" if self.left_out else ""
+        return f"Matter({len(self.faces)} of {self.original.n_faces} faces{left_out})"
+
+    def values(
+        self,
+        *,
+        young_modulus: Numbers | None = None,
+        mass_density: Numbers | None = None,
+        remanent_magnetization: Numbers | None = None,
+        void_stiffness: float = 1e-2,
+        void_mass: float = 1e-2,
+        power: float = 3.0,
+        mass_power: float | None = None,
+        magnetization_power: float | None = None,
+    ) -> dict[str, torch.Tensor]:
+        """Return values of a Shell on `mesh`, interpolated by density, for a solve: values={sheet: matter.values(...)}.
+
+        Each property is that of full density in the whole sheet, with a value for each of its faces or one for all.
+
+        young_modulus: Pa. mass_density: kg/m3. remanent_magnetization: (3,) or (n_f, 3) A/m.
+        void_stiffness, void_mass: fractions that remain at `least_density`, positive. Void is not magnetized.
+        power: of the stiffness; see `interpolated`. mass_power, magnetization_power: by default the same, so that no face
+        carries more of its weight and of the field's torque, compared with its stiffness, than a solid one does.
+        """
+        given = {
+            "young_modulus": (young_modulus, "Pa", void_stiffness, power),
+            "mass_density": (mass_density, "kg/m3", void_mass, power if mass_power is None else mass_power),
+            "remanent_magnetization": (
+                remanent_magnetization,
+                "A/m",
+                0.0,
+                power if magnetization_power is None else magnetization_power,
+            ),
+        }
+        for name, void in (("void_stiffness", void_stiffness), ("void_mass", void_mass)):
+            if not fraction(name, void) > 0.0:
+                raise ValueError(f"{name} [1] must be positive, got {void:g}")
+        return {
+            name: interpolated(
+                self.density,
+                self._of_faces(f"{name} [{unit}]", full, vectors=name == "remanent_magnetization"),
+                void=void,
+                power=exponent,
+                least_density=self.least_density,
+            )
+            for name, (full, unit, void, exponent) in given.items()
+            if full is not None
+        }
+
+    def on_all_faces(self, values: Numbers, fill: float = 0.0) -> Any:
+        """Return values of the faces of `mesh`, (n, ...), on the faces of the whole sheet, (n_f, ...).
+
+        values: an array or a tensor. fill: for faces that were taken out.
+        """
+        torch = require_torch("Matter.on_all_faces")
+        given = real_tensor("values", values, ("...",))
+        if given.ndim == 0 or len(given) != len(self.faces):
+            raise ValueError(
+                f"values must have shape (n, ...), n = {len(self.faces)}, got {tuple(given.shape)}"
+            )
+        whole = torch.full((self.original.n_faces, *given.shape[1:]), fill, dtype=given.dtype)
+        whole = whole.index_copy(0, torch.tensor(self.faces), given)
+        return whole if given is values else whole.numpy()
+
+    def start(self, before: Matter, positions: Numbers) -> np.ndarray:
+        """Return positions (n_v, 3) m to start a solve from, carried over from an equilibrium of other matter of the sheet.
+
+        Displacements of vertices that both have are kept; those of new ones are harmonic between them.
+
+        before: the other Matter. positions: of the vertices of its mesh, (n_v, 3) m.
+        """
+        if not isinstance(before, Matter) or before.original is not self.original:
+            raise ValueError("before must be Matter of the same whole mesh")
+        positions = quantity("positions", "m", detached(positions), (before.mesh.n_vertices, 3))
+        moved = np.full((self.original.n_vertices, 3), np.nan)
+        moved[before.vertices] = positions - before.mesh.rest_positions
+        moved = moved[self.vertices]
+        new = np.isnan(moved[:, 0])
+        if new.any() and not new.all():
+            stiffness = laplacian(cells_of(self.mesh))[new]
+            known = stiffness[:, ~new] @ moved[~new]
+            moved[new] = -scipy.sparse.linalg.splu(stiffness[:, new].tocsc()).solve(known)
+        return self.mesh.rest_positions + np.nan_to_num(moved)
+
+    def _of_faces(self, label: str, full: Any, vectors: bool):
+        """Return a property of the whole sheet for the faces that remain: a number, (n,) or (n, 3)."""
+        torch = require_torch("Matter.values")
+        given = real_tensor(label, full, ("...",))
+        shapes = [(3,), (self.original.n_faces, 3)] if vectors else [(), (self.original.n_faces,)]
+        if tuple(given.shape) not in shapes:
+            wanted = " or ".join(map(str, shapes))
+            raise ValueError(f"{label} must have shape {wanted}, got {tuple(given.shape)}")
+        if tuple(given.shape) == shapes[0]:
+            return given.expand(len(self.faces), 3) if vectors else given
+        return given[torch.tensor(self.faces)]
