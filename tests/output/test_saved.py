@@ -201,6 +201,12 @@ def test_a_broken_file_is_refused(change, message, tmp_path):
         ms.load(path, scene)
 
 
+def test_load_refuses_numbers_of_open_files():
+    """Check that True is not taken for the standard output, which would be closed after."""
+    with pytest.raises(TypeError, match="bool"):
+        ms.load(True, strip())
+
+
 def test_load_refuses_other_files(tmp_path):
     scene = strip()
     (tmp_path / "text.npz").write_text("hello")

@@ -173,7 +173,7 @@ def load(path: str | Path, scene: Scene) -> Any:  # which of them, the file tell
     """
     if not isinstance(scene, Scene):
         raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
-    with open(path, "rb") as opened:
+    with Path(path).open("rb") as opened:
         try:
             with open_npz(opened) as file:
                 known = json.loads(file[_CONTENTS].tobytes())
