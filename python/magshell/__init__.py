@@ -97,7 +97,19 @@ from .model.solids.skin import Skin
 from .model.solids.solid import Solid
 from .model.supports.supports import Clamp, Pin, SymmetryPlane
 from .output.live import LiveView, show
-from .output.plot import Color, Picture, Style, View, animate, plot, plot_history, plot_study, write_page
+from .output.plot import (
+    Color,
+    Picture,
+    Style,
+    View,
+    animate,
+    plot,
+    plot_history,
+    plot_study,
+    write_gltf,
+    write_page,
+    write_usd,
+)
 from .output.results.probes import Probe
 from .output.results.saved import load, save
 from .output.results.series import write_series
@@ -310,10 +322,12 @@ __all__ = [
     "to_xarray",
     "vibration_modes",
     "weld",
+    "write_gltf",
     "write_mesh",
     "write_page",
     "write_series",
     "write_surface",
+    "write_usd",
 ]
 
 _GROUPS = ("control", "meshes", "objectives", "obstacles", "optim", "parametrize", "shapes")

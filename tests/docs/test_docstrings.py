@@ -35,6 +35,7 @@ LIBRARIES = (
     "pandas",
     "xarray",
     "viser",
+    "pxr",
 )
 
 

@@ -126,3 +126,7 @@ def _meshes_and_pictures(s: Sample) -> Iterator[Call]:
     )
     arguments = {"what": s.mesh, **states, **look}
     yield Call("show", lambda **a: ms.show(**a, browser=False).close(), arguments, cost=100)
+    moving = {name: value for name, value in arguments.items() if name != "view"}
+    moving |= {"obstacles": (), "color": None, "speed": 1.0}
+    yield Call("write_gltf", ms.write_gltf, {"path": s.folder / "out.glb", **moving}, cost=5)
+    yield Call("write_usd", ms.write_usd, {"path": s.folder / "out.usda", **moving, "fps": 5.0}, cost=5)

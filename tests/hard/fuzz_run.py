@@ -63,7 +63,7 @@ def documented(call: Call, error: BaseException) -> bool:
     if isinstance(error, OSError):
         return "path" in call.arguments or "checkpoint" in call.arguments
     if isinstance(error, ImportError):
-        return call.name in ("MagpylibField", "read_mesh", "read_fields", "write_mesh", "show")
+        return call.name in ("MagpylibField", "read_mesh", "read_fields", "write_mesh", "show", "write_usd")
     if isinstance(error, FloatingPointError):
         return call.name.startswith(("optim.", "minimize", "fit"))
     if isinstance(error, IndexError):

@@ -24,6 +24,7 @@ import magshell as ms
 
 HERE = Path(__file__).parent
 CALLS, PROCESSES = 10_000, 4
+OPTIONAL = {"show": "viser", "write_usd": "pxr"}  # the packages that functions need
 
 
 @pytest.fixture
@@ -52,7 +53,7 @@ def test_arguments_work_before_they_are_spoilt(table):
     """Check that all calls work; otherwise only their first refusal would be tested."""
     pytest.importorskip("magpylib")
     for call in table:
-        if call.name == "show" and importlib.util.find_spec("viser") is None:
+        if call.name in OPTIONAL and importlib.util.find_spec(OPTIONAL[call.name]) is None:
             continue
         call.function(**call.arguments)
 

@@ -109,12 +109,13 @@ HIDDEN_MODULES = {
     "matplotlib": ("output/plot/",),
     "pyvista": ("output/plot/",),
     "viser": ("output/live/",),
+    "pxr": ("output/plot/",),
     "gymnasium": ("envs/",),
     "jax": ("jax/",),
 }
 OPTIONAL_MODULES = (
     "torch matplotlib pyvista PIL imageio_ffmpeg meshio gmsh magpylib ipctk distributed cloudpickle gymnasium pandas xarray "
-    "jax viser"
+    "jax viser pxr"
 ).split()
 LONGEST_FILE = 600
 SPELLINGS = {"cent" + "re": "center"}  # in two halves, as this file is read as well

@@ -53,6 +53,7 @@ WRITERS = {
     "figure.png": write_figure,
     "movie.gif": write_gif,
     "sheet.stl": lambda path: ms.write_surface(path, MESH),
+    "sheet.glb": lambda path: ms.write_gltf(path, MESH),
     "sheet.obj": lambda path: ms.write_surface(path, MESH),
     "result.npz": lambda path: ms.save(path, lifted_strip(MESH, steps=1)),
     "state.npz": lambda path: lifted_strip(MESH, steps=1).end.save(path),

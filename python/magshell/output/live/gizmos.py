@@ -14,7 +14,6 @@ from .patches import bytes_of
 from .stage import SHOWN_SIZE, Stage
 
 _GIZMO = 0.22  # [-] length of a handle's arrows over the size of the bodies
-Rotation = scipy.spatial.transform.Rotation
 
 
 class Gizmo:
@@ -34,7 +33,9 @@ class Gizmo:
         @self.handle.on_update
         async def _(event: Any) -> None:  # in the server's loop, so that poses keep their order
             movable.center = stage.from_view(self.handle.position)
-            movable.rotation = Rotation.from_quat(np.asarray(self.handle.wxyz), scalar_first=True).as_rotvec()
+            movable.rotation = scipy.spatial.transform.Rotation.from_quat(
+                np.asarray(self.handle.wxyz), scalar_first=True
+            ).as_rotvec()
             moved()
 
     def show(self) -> None:
@@ -48,7 +49,9 @@ class Gizmo:
         self.show()
 
     def _pose(self) -> dict[str, tuple[float, ...]]:
-        turned = Rotation.from_rotvec(np.array(self.movable.rotation)).as_quat(scalar_first=True)
+        turned = scipy.spatial.transform.Rotation.from_rotvec(np.array(self.movable.rotation)).as_quat(
+            scalar_first=True
+        )
         return {
             "position": tuple(self._stage.to_view(self.movable.center).tolist()),
             "wxyz": tuple(turned.tolist()),

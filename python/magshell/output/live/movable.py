@@ -25,7 +25,6 @@ _POSE = ("center", "rotation")
 _SAME = 1e-9  # [m] distance of centers at which an obstacle belongs to a magnet
 
 Surface = tuple[np.ndarray, np.ndarray, str]  # vertices (n, 3) m, faces (m, 3), "#rrggbb"
-Rotation = scipy.spatial.transform.Rotation
 
 
 @dataclass
@@ -48,11 +47,16 @@ class Movable:
         if self.row is None:
             found = {self.source: {"center": self.center, "rotation": self.rotation}}
         else:
-            moment = Rotation.from_rotvec(self.rotation).apply(self.moment)
+            moment = scipy.spatial.transform.Rotation.from_rotvec(self.rotation).apply(self.moment)
             found = {self.source: {"positions": self.center, "moments": moment}}
-        turned = Rotation.from_rotvec(self.rotation) * Rotation.from_rotvec(self.first_rotation).inv()
+        turned = (
+            scipy.spatial.transform.Rotation.from_rotvec(self.rotation)
+            * scipy.spatial.transform.Rotation.from_rotvec(self.first_rotation).inv()
+        )
         for cover in self.covers:
-            rotation = (turned * Rotation.from_rotvec(np.array(cover.rotation))).as_rotvec()
+            rotation = (
+                turned * scipy.spatial.transform.Rotation.from_rotvec(np.array(cover.rotation))
+            ).as_rotvec()
             found[cover] = {"center": self.center, "rotation": rotation}
         return found
 
@@ -65,7 +69,7 @@ class Movable:
             along = self.moment / (np.linalg.norm(self.moment) or 1.0) * (_DIPOLE * size)
             arrow = arrows(-0.5 * along[None], along[None], 0.1 * _DIPOLE * size, colors.MAGNET)
             return [(arrow.positions, arrow.faces, colors.MAGNET)]
-        back = Rotation.from_rotvec(np.array(self.source.rotation)).inv()
+        back = scipy.spatial.transform.Rotation.from_rotvec(np.array(self.source.rotation)).inv()
         own = [(back.apply(points - self.source.center), faces) for points, faces in surfaces_of(self.source)]
         if not isinstance(self.source, Magnet):
             return [(points, faces, colors.MAGNET) for points, faces in own]

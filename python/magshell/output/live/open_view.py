@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import webbrowser
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -121,6 +120,8 @@ def show(
             server.stop()
         raise
     if browser and "ipykernel" not in sys.modules and _has_display():
+        import webbrowser  # for a display alone
+
         webbrowser.open(shown.url)
     return shown
 

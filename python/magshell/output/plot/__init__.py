@@ -3,11 +3,25 @@
 from .animation import animate
 from .drawing import plot
 from .fits import plot_fit as _  # noqa: F401 - registers FitResult.plot
+from .gltf import write_gltf
 from .histories import plot_history
 from .page import write_page
 from .picture import Picture
 from .studies import plot_study
 from .style import Color, Style
+from .usd import write_usd
 from .view import View
 
-__all__ = ["Color", "Picture", "Style", "View", "animate", "plot", "plot_history", "plot_study", "write_page"]
+__all__ = [
+    "Color",
+    "Picture",
+    "Style",
+    "View",
+    "animate",
+    "plot",
+    "plot_history",
+    "plot_study",
+    "write_gltf",
+    "write_page",
+    "write_usd",
+]
