@@ -116,6 +116,7 @@ from .output.results.series import write_series
 from .output.results.surface_files import write_surface
 from .output.results.tables import to_pandas, to_xarray
 from .solve.accuracy.error_estimate import ErrorEstimate, error_estimate
+from .solve.accuracy.refined_for import RefinedResult, refined_for
 from .solve.dynamics.simulate import simulate
 from .solve.dynamics.trajectory import MotionState, Trajectory
 from .solve.dynamics.trajectory_batch import TrajectoryBatch
@@ -231,6 +232,7 @@ __all__ = [
     "ProjectiveMaterial",
     "QuadraticTriangleMesh",
     "Reaction",
+    "RefinedResult",
     "ResidualTests",
     "Revolute",
     "RigidBody",
@@ -309,6 +311,7 @@ __all__ = [
     "random_starts",
     "read_fields",
     "read_mesh",
+    "refined_for",
     "residual_to_remanent",
     "richardson_extrapolation",
     "save",

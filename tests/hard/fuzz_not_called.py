@@ -7,6 +7,8 @@ NOT_CALLED = {
     "EquilibriumJumped": "an error",
     "Equilibrium": "a result",
     "ErrorEstimate": "a result",
+    "RefinedResult": "a result",
+    "refined_for": "takes a result only; tests/solve/accuracy refuses bad input",
     "error_estimate": "takes a result only; tests/solve/accuracy refuses bad input",
     "Extrapolation": "a result",
     "FitResult": "a result",

@@ -377,6 +377,7 @@ def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
         ms.PathEvent,
         ms.PrintableMinimum,
         ms.PrintableStage,
+        ms.RefinedResult,
         ms.Study,
         ms.StudyRow,
     )

@@ -12,7 +12,7 @@ import scipy
 from .groups import row_numbers
 from .off_surface import curved_edges
 from .triangles.bisection import bisected_edges, divided_faces
-from .triangles.six_node_checks import inner_weights
+from .triangles.six_node_checks import inner_weights, weights_between
 from .triangles.six_node_mesh import QuadraticTriangleMesh, projected
 from .triangles.smooth_fit import middles_on_fit
 from .triangles.triangle_mesh import TriangleMesh
@@ -31,6 +31,7 @@ class FinerMesh:
 
     element_parents: (n,), the coarse element that each element lies in. edge_parents: (n_e,), the coarse edge that each edge
     lies on, -1 inside elements. new_edges: (n_new,), the coarse edge that each new vertex lies on, -1 inside elements.
+    new_elements: (n_new,), the coarse element that each new vertex lies inside, -1 on edges.
     interpolation: sparse (n_v, n_v of the coarse mesh), which maps values at coarse vertices to values at all vertices.
     """
 
@@ -39,6 +40,7 @@ class FinerMesh:
     element_parents: np.ndarray
     edge_parents: np.ndarray
     new_edges: np.ndarray
+    new_elements: np.ndarray
     interpolation: Any
 
 
@@ -58,7 +60,8 @@ def second_order(mesh: TriangleMesh, project: Project | None, planes: Any = ()) 
     edges = np.arange(mesh.n_edges)
     of_edges = row_numbers(mesh.edges, fine.edges)
     means = _rows(mesh.n_vertices, mesh.edges, np.full(mesh.edges.shape, 0.5))
-    return FinerMesh(mesh, fine, np.arange(mesh.n_faces), of_edges, edges, means)
+    inside = np.full(mesh.n_edges, -1)
+    return FinerMesh(mesh, fine, np.arange(mesh.n_faces), of_edges, edges, inside, means)
 
 
 def divided(mesh: QuadraticTriangleMesh, project: Project | None) -> FinerMesh:
@@ -76,31 +79,76 @@ def divided(mesh: QuadraticTriangleMesh, project: Project | None) -> FinerMesh:
     inside = _rows(mesh.n_vertices, np.repeat(mesh.elements, 3, axis=0), inner)
     inside = inside[mesh.n_vertices :]
     parents = np.where(of_halves < 0, -1, of_halves // 2)
-    return FinerMesh(
-        mesh, fine, np.repeat(n, 4), parents, new_edges, scipy.sparse.vstack([weights, inside]).tocsr()
-    )
+    interpolation = scipy.sparse.vstack([weights, inside]).tocsr()
+    new_elements = np.concatenate([np.full(len(on_edges), -1), np.repeat(n, 3)])
+    return FinerMesh(mesh, fine, np.repeat(n, 4), parents, new_edges, new_elements, interpolation)
 
 
-def bisected(mesh: TriangleMesh, marked: np.ndarray, project: Project | None, planes: Any = ()) -> FinerMesh:
-    """Return the mesh with the marked faces, (k,), divided into four, and their neighbours so that it stays conforming.
+def bisected(mesh: Sheet, marked: np.ndarray, project: Project | None, planes: Any = ()) -> FinerMesh:
+    """Return the mesh with the marked elements, (k,), divided into four, and their neighbours so that it stays conforming.
 
-    Edges of marked faces are divided in the middle; every other face with a divided edge is bisected across its longest
-    edge first (Rivara 1984). project, planes: as in `second_order`.
+    Edges of marked elements are divided in the middle; every other element with a divided edge is bisected across its
+    longest edge first (Rivara 1984). project, planes: as in `second_order`; six-node elements keep their curved shape
+    without them.
     """
+    if isinstance(mesh, QuadraticTriangleMesh):
+        return _bisected_six(mesh, marked, project)
     split_edges = bisected_edges(mesh, marked)
     middles = surface_middles(mesh, project, planes, split_edges)
     faces, parents = divided_faces(mesh, split_edges)
     fine = TriangleMesh(np.concatenate([mesh.rest_positions, middles]), faces)
-    new = mesh.n_vertices + np.arange(len(split_edges))
-    ends = mesh.edges[split_edges]
-    segments = np.concatenate(
-        [mesh.edges, np.stack([ends[:, 0], new, new, ends[:, 1]], axis=1).reshape(-1, 2)]
-    )
-    owners = np.concatenate([np.arange(mesh.n_edges), np.repeat(split_edges, 2)])
-    found = row_numbers(segments, fine.edges)
+    new = np.full(mesh.n_edges, -1)
+    new[split_edges] = mesh.n_vertices + np.arange(len(split_edges))
     fine = fine._with_members(_groups(mesh, split_edges, new, fine, parents))
+    ends = mesh.edges[split_edges]
     means = _rows(mesh.n_vertices, ends, np.full(ends.shape, 0.5))
-    return FinerMesh(mesh, fine, parents, np.where(found < 0, -1, owners[found]), split_edges, means)
+    inside = np.full(len(split_edges), -1)
+    of_edges = _edge_parents(mesh, split_edges, new, fine)
+    return FinerMesh(mesh, fine, parents, of_edges, split_edges, inside, means)
+
+
+def _bisected_six(mesh: QuadraticTriangleMesh, marked: np.ndarray, project: Project | None) -> FinerMesh:
+    """Return the mesh of six-node elements with marked ones divided; midside nodes of divided edges become corners."""
+    split_edges = bisected_edges(mesh.corners, marked)
+    faces, parents = divided_faces(mesh.corners, split_edges)
+    corners = np.concatenate([mesh.corner_vertices, mesh.edge_nodes[split_edges]])[faces]
+    within = (mesh.elements[parents][:, None, :] == corners[:, :, None]).argmax(
+        axis=2
+    )  # 3 to 5: midside nodes
+    sides = [(0, 1), (1, 2), (2, 0)]
+    ends = np.concatenate([corners[:, side] for side in sides])
+    keys, first, which = np.unique(np.sort(ends, axis=1), axis=0, return_index=True, return_inverse=True)
+    local = np.concatenate([within[:, side] for side in sides])[first]
+    owners = np.tile(parents, 3)[first]
+    whole = row_numbers(mesh.edges, keys)
+    middle = mesh.edge_nodes[split_edges]
+    halves = np.stack([mesh.edges[split_edges, 0], middle, middle, mesh.edges[split_edges, 1]], axis=1)
+    half = row_numbers(halves.reshape(-1, 2), keys)
+    is_new = whole < 0
+    nodes = np.where(is_new, mesh.n_vertices - 1 + np.cumsum(is_new), mesh.edge_nodes[whole])
+    weights = weights_between(local[is_new])
+    interpolation = _rows(mesh.n_vertices, mesh.elements[owners[is_new]], weights)
+    placed = interpolation @ mesh.rest_positions
+    if project is not None:
+        placed[mesh.n_vertices :] = projected("project(points)", "n", project, placed[mesh.n_vertices :])
+    elements = np.concatenate([corners, nodes[which.reshape(3, -1).T]], axis=1)
+    fine = QuadraticTriangleMesh._without_warning(placed, elements)
+    new = np.full(mesh.n_edges, -1)
+    new[split_edges] = middle
+    fine = fine._with_members(_groups(mesh, split_edges, new, fine, parents))
+    on_edge = np.where(half < 0, -1, split_edges[half // 2])[is_new]
+    inside = np.where(on_edge < 0, owners[is_new], -1)
+    of_edges = _edge_parents(mesh, split_edges, new, fine)
+    return FinerMesh(mesh, fine, parents, of_edges, on_edge, inside, interpolation)
+
+
+def _edge_parents(mesh: Sheet, split_edges: np.ndarray, new: np.ndarray, fine: Sheet) -> np.ndarray:
+    """Return the coarse edge that each edge of the finer mesh lies on, -1 inside elements; `new`: the middle of edges."""
+    ends, between = mesh.edges[split_edges], new[split_edges]
+    halves = np.stack([ends[:, 0], between, between, ends[:, 1]], axis=1).reshape(-1, 2)
+    owners = np.concatenate([np.arange(mesh.n_edges), np.repeat(split_edges, 2)])
+    found = row_numbers(np.concatenate([mesh.edges, halves]), fine.edges)
+    return np.where(found < 0, -1, owners[found])
 
 
 def surface_middles(
@@ -151,21 +199,18 @@ def _rows(n_vertices: int, columns: np.ndarray, weights: np.ndarray) -> Any:
 
 
 def _groups(
-    mesh: TriangleMesh, split_edges: np.ndarray, new: np.ndarray, fine: TriangleMesh, parents: np.ndarray
+    mesh: Sheet, split_edges: np.ndarray, new: np.ndarray, fine: Sheet, parents: np.ndarray
 ) -> dict[str, Any]:
     """Return the groups of the bisected mesh: halves of edges and parts of faces take the place of these."""
     found = {}
     for name, group in mesh._groups.items():
-        edges = row_numbers(mesh.edges, group.edges)
-        middle = np.full(mesh.n_edges, -1)
-        middle[split_edges] = new
-        cut = middle[edges] >= 0
-        ends, between = group.edges[cut], middle[edges[cut]]
-        halves = np.stack([ends[:, 0], between, between, ends[:, 1]], axis=1).reshape(-1, 2)
-        _, parts = children(parents, row_numbers(mesh.faces, group.faces))
-        found[name] = group._replace(
-            edges=np.concatenate([group.edges[~cut], halves]), faces=fine.faces[parts]
-        )
+        between = new[row_numbers(mesh.edges, group.edges)]
+        cut = between >= 0
+        ends = group.edges[cut]
+        halves = np.stack([ends[:, 0], between[cut], between[cut], ends[:, 1]], axis=1).reshape(-1, 2)
+        _, parts = children(parents, row_numbers(mesh.elements[:, :3], group.faces))
+        faces = fine.elements[parts, :3].astype(np.int64)
+        found[name] = group._replace(edges=np.concatenate([group.edges[~cut], halves]), faces=faces)
     if found:
         mesh._warn_of_new_vertices()
     return found

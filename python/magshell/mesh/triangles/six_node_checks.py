@@ -164,7 +164,12 @@ _PARAMETERS = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.5, 0.
 
 def inner_weights() -> np.ndarray:
     """Return the shape functions at the three nodes that `divided` puts inside an element, (3, 6)."""
-    return shapes(np.array([0.5 * (_PARAMETERS[a] + _PARAMETERS[b]) for a, b in _INNER]))[0]
+    return weights_between(np.array(_INNER))
+
+
+def weights_between(pairs: np.ndarray) -> np.ndarray:
+    """Return the shape functions halfway between two nodes of an element each, (k, 6); pairs: (k, 2), 0 to 5."""
+    return shapes(0.5 * (_PARAMETERS[pairs[:, 0]] + _PARAMETERS[pairs[:, 1]]))[0]
 
 
 def divided(mesh: QuadraticTriangleMesh) -> tuple[np.ndarray, np.ndarray]:

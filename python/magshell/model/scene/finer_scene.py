@@ -98,8 +98,7 @@ def held_vertices(finer: FinerMesh, vertices: np.ndarray) -> np.ndarray:
         of_edges &= ~inside | (of_elements[sides[:, 0]] == of_elements[sides[:, 1]])
     new = np.where(finer.new_edges >= 0, of_edges[finer.new_edges], False)
     if mesh.order == 2:
-        inner = np.flatnonzero(finer.new_edges < 0)
-        new[inner] = np.repeat(of_elements, len(inner) // mesh.n_elements)
+        new |= (finer.new_elements >= 0) & of_elements[finer.new_elements]
     return np.flatnonzero(np.concatenate([held, new]))
 
 

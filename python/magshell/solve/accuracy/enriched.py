@@ -121,26 +121,45 @@ def _linear(
     return FinerSolution(scene, finer, places, inputs, rest, controls, 1, response, adjoint)
 
 
-def _nonlinear(
-    result: Equilibrium, scene: Scene, inputs: Inputs, finer: tuple[FinerMesh, ...]
-) -> FinerSolution:
-    model = scene._model
-    parts = zip(_by_body(result.scene, np.asarray(detached(result.positions))), finer, strict=True)
+def equilibrium_on(result: Equilibrium, scene: Scene, finer: tuple[FinerMesh, ...]) -> Equilibrium:
+    """Return the equilibrium of a scene on finer meshes near that on the coarse ones. Raises NotConverged."""
+    inputs = inputs_of(scene, load_parameters(result))
+    start = _prolonged(result, scene, inputs, finer)
+    solution, _ = _found(result, scene, inputs, start, store_factor=False)
+    _refuse_another(result, scene, start, solution)
+    return solution.equilibrium
+
+
+def _prolonged(result: Equilibrium, scene: Scene, inputs: Inputs, finer: tuple[FinerMesh, ...]) -> np.ndarray:
+    """Return all unknowns of a scene on finer meshes, deformed as the coarse ones, and in place where they are held."""
+    parts = zip(_by_body(result.scene, result.positions), finer, strict=True)
     placed = np.concatenate([positions_on(each, x) for x, each in parts])
     with inputs.in_core():
-        start = model.state(placed, np.zeros(scene._bodies.n_rotations))
-        start = start + model.driven_increment(start, inputs.controls)
-    solution, factorizations = _found(result, scene, inputs, start)
-    found = solution.found
-    places = model.positions(found.state)
-    moved = np.abs(places - model.positions(start)).max()
-    largest = np.abs(np.asarray(detached(result.displacements))).max()
+        start = scene._model.state(placed, np.zeros(scene._bodies.n_rotations))
+        return start + scene._model.driven_increment(start, inputs.controls)
+
+
+def _refuse_another(result: Equilibrium, scene: Scene, start: np.ndarray, solution: Solution) -> None:
+    """Raise NotConverged if an equilibrium is far from where its search began."""
+    places, before = scene._model.positions(solution.found.state), scene._model.positions(start)
+    moved, largest = np.abs(places - before).max(), np.abs(np.asarray(detached(result.displacements))).max()
     if moved > _NEAR * largest:
         raise NotConverged(
             f"the finer mesh finds an equilibrium that is {moved:.3g} m away from this one, whose largest displacement is "
             f"{largest:.3g} m: the mesh is too coarse for an estimate, or the equilibrium is near others. Refine the mesh",
             solution.equilibrium,
         )
+
+
+def _nonlinear(
+    result: Equilibrium, scene: Scene, inputs: Inputs, finer: tuple[FinerMesh, ...]
+) -> FinerSolution:
+    model = scene._model
+    start = _prolonged(result, scene, inputs, finer)
+    solution, factorizations = _found(result, scene, inputs, start)
+    _refuse_another(result, scene, start, solution)
+    found = solution.found
+    places = model.positions(found.state)
 
     def adjoint(by_positions: np.ndarray) -> np.ndarray:
         still = np.zeros(model.size)
@@ -159,11 +178,13 @@ def _nonlinear(
     )
 
 
-def _found(result: Equilibrium, scene: Scene, inputs: Inputs, start: np.ndarray) -> tuple[Solution, int]:
+def _found(
+    result: Equilibrium, scene: Scene, inputs: Inputs, start: np.ndarray, store_factor: bool = True
+) -> tuple[Solution, int]:
     """Return the equilibrium near `start`, or else that from the rest shape, and the factorizations of both searches."""
     search = Search(MixedNewton(), require_stable=result.stable)
     options = search.options()
-    options.keep_factor = True
+    options.keep_factor = store_factor
     options.max_relaxation_steps = 0
     options.max_factorizations = _MOST_FROM_COARSE
     try:
@@ -173,7 +194,7 @@ def _found(result: Equilibrium, scene: Scene, inputs: Inputs, start: np.ndarray)
         spent = failed.last_good.factorizations
         if not result.stable:
             raise
-    from_rest = find(scene, load_parameters(result), None, search, store_factor=True)
+    from_rest = find(scene, load_parameters(result), None, search, store_factor=store_factor)
     return from_rest, spent + from_rest.equilibrium.factorizations
 
 

@@ -118,7 +118,7 @@ def error_estimate(
     0.04
     """
     began = time.perf_counter()
-    _check_result(result)
+    check_result(result)
     flag("by_face", by_face)
     of = Output(output, result.scene)
     solution, slope, scale = _solved(result, of, project)
@@ -176,7 +176,7 @@ def _solved(
     return solution, slope, scale
 
 
-def _check_result(result: Any) -> None:
+def check_result(result: Any) -> None:
     """Raise ValueError for a result whose discretization error cannot be estimated."""
     if not isinstance(result, Equilibrium | LinearResponse):
         raise ValueError(
