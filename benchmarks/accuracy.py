@@ -8,7 +8,7 @@ from typing import Any
 
 import magshell as ms
 
-from . import compare_ngsolve, solid_accuracy
+from . import compare_ngsolve, estimates, solid_accuracy
 from .cases import CASES, SOLID_CASES, Case, Comparison, Outcome
 from .cases.hemisphere import large_deflection
 from .cases.magnetic_strip import field_across
@@ -83,6 +83,7 @@ def _against_references(options: argparse.Namespace) -> dict[str, Any]:
     results["solids"] = solid_accuracy.measure(of_solids, coarse)
     if options.only is None:
         results["single solves"] = _single_solves()
+        results["estimates"] = estimates.measure(options.quick)
         meshes = COARSE_MESHES if options.quick else MESHES
         studies = {
             (name, bending): converge(name, bending, meshes) for name in STUDIES for bending in BENDINGS

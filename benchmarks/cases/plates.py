@@ -116,6 +116,11 @@ def _quarter(mesh: ms.TriangleMesh, bending: str, name: str, allowed: float | No
     return _middle_deflections(mesh, _rim(mesh), _symmetry(), 4, bending, SQUARE, name, allowed)
 
 
+def quarter_response(mesh: Any, bending: str, support: str, load: str) -> ms.LinearResponse:
+    """Return one of the four responses of the unit square, from a quarter of it."""
+    return _response(mesh, _rim(mesh), _symmetry(), 4, bending, support, load)
+
+
 def _rim(mesh) -> np.ndarray:
     return mesh.edges_where(lambda midpoints: midpoints[:, :2].max(axis=1) > 0.5 - 1e-9)
 

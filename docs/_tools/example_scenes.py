@@ -375,6 +375,27 @@ def shell_against_volume() -> dict[str, Any]:
     )
 
 
+def pinched_cylinder() -> dict[str, Any]:
+    import pinched_cylinder as example
+
+    only = {"cylinder": ((6, 6), (8, 8), (16, 16)), "hemisphere": None}
+    result = example.main(**only)["cases"]["pinched cylinder"]["found"].result
+    mesh, moved = result.scene.mesh, result.displacements
+    sizes = np.log(np.repeat(mesh.element_areas, 4))
+    shade = (sizes - sizes.min()) / np.ptp(sizes)
+    states = [
+        mesh.rest_positions + 60.0 * share / np.abs(moved).max() * moved
+        for share in np.linspace(0.0, 1.0, 14)
+    ]
+    return shown(
+        states,
+        [(mesh.faces, between("#c8553d", "#c9d6e8", shade))],
+        (28, 60),
+        held=6,
+        back=True,
+    )
+
+
 def _robot(
     robot: Any,
     steps: int,
@@ -465,6 +486,7 @@ _COMPUTED: dict[str, tuple[str, Callable[[], dict[str, Any]]]] = {
     "folding": ("A strip coils up", folding),
     "identify": ("A sheet of uneven stiffness in three fields", identify),
     "shell_against_volume": ("A plate of tetrahedra is twisted", shell_against_volume),
+    "pinched_cylinder": ("A pinched cylinder on small elements", pinched_cylinder),
 }
 SCENES = {
     name: Scene(words, compute, film) for name, (words, compute) in _COMPUTED.items()

@@ -32,6 +32,7 @@ SMALL = {
     "pneumatic_finger": "",
     "snap_design": "cells=(24, 4)",
     "shell_against_volume": "cells=(32, 4), layers=(2, 6), angles=(1.0, 3.14159)",
+    "pinched_cylinder": "((6, 6), (8, 8), (16, 16)), ((8, 8), (8, 8), (16, 16))",
 }
 _SCRIPT = """
 import sys; sys.path.insert(0, {examples!r})

@@ -1,0 +1,1 @@
+"""The parts of examples/pinched_cylinder.py."""
