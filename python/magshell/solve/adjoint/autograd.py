@@ -1,4 +1,4 @@
-"""Result arrays as tensors of torch's graph. The only module that uses torch.autograd; it holds no physics."""
+"""Result arrays as tensors of torch's graph. It holds no physics; energy_autograd.py is for energies."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from ...errors import NoGradient
 
 if TYPE_CHECKING:
     from .dynamic import MotionAdjoint
-    from .energy import EnergyAdjoint
     from .static import Adjoint
 
 
@@ -89,7 +88,7 @@ class _Products:
 
     def transposed(self, by_outputs: Sequence[torch.Tensor]) -> list[torch.Tensor]:
         """Return the gradients by the wanted leaves."""
-        found = self._adjoint.gradients([_numbers(each) for each in by_outputs], self._wanted)
+        found = self._adjoint.gradients([numbers_of(each) for each in by_outputs], self._wanted)
         like = zip(found, self._leaves, strict=True)
         return [
             torch.from_numpy(np.array(each)).to(dtype=dtype, device=device)
@@ -99,7 +98,7 @@ class _Products:
 
     def tangent(self, along: Sequence[torch.Tensor]) -> list[torch.Tensor]:
         """Return the tangents of the results."""
-        found = self._adjoint.tangents([_numbers(each) for each in along])
+        found = self._adjoint.tangents([numbers_of(each) for each in along])
         return [
             torch.from_numpy(each).to(dtype=dtype) for each, dtype in zip(found, self._outputs, strict=True)
         ]
@@ -119,7 +118,7 @@ class _Products:
         """Return the change of the gradients by all leaves along changes of all leaves. Raises NoGradient without one."""
         if not hasattr(self._adjoint, "curvature"):
             raise NoGradient(_SECOND)
-        found = self._adjoint.curvature(*([_numbers(each) for each in of] for of in (by_outputs, along)))
+        found = self._adjoint.curvature(*([numbers_of(each) for each in of] for of in (by_outputs, along)))
         like = zip(found, self._leaves, strict=True)
         return [torch.from_numpy(each).to(dtype=dtype, device=device) for each, (_, dtype, device) in like]
 
@@ -303,98 +302,6 @@ _SECOND = (
 )
 
 
-class _Energies(torch.autograd.Function):
-    """The energies of a scene at given positions, (n,) J, of the leaves: positions, edge rotations and values."""
-
-    @staticmethod
-    def forward(
-        ctx: Any, adjoint: EnergyAdjoint, energies: np.ndarray, dtype: torch.dtype, *leaves: torch.Tensor
-    ) -> torch.Tensor:
-        ctx.adjoint, ctx.leaves, ctx.dtype = adjoint, leaves, dtype
-        return torch.from_numpy(energies).to(dtype=dtype)
-
-    @staticmethod
-    def backward(ctx: Any, by_energies: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
-        found = ctx.adjoint.gradients(_numbers(by_energies), ctx.needs_input_grad[3:])
-        by_leaves = _like_leaves(found, ctx.leaves)
-        if torch.is_grad_enabled():  # create_graph=True
-            slopes = _Slopes.apply(ctx.adjoint, ctx.dtype, by_energies[0], *ctx.leaves)
-            by_unknowns = dict(zip(("positions", "edge_rotations"), slopes, strict=True))
-            given = [each for each in by_leaves if each is not None]
-            marked = iter(_NoFurther.apply(_BY_VALUES, len(given), *given, *ctx.leaves, by_energies))
-            by_leaves = [None if each is None else next(marked) for each in by_leaves]
-            for k, leaf in enumerate(ctx.adjoint.inputs.leaves):
-                if by_leaves[k] is not None and leaf.owner is None and leaf.name in by_unknowns:
-                    by_leaves[k] = by_unknowns[leaf.name].to(ctx.leaves[k])
-        return None, None, None, *by_leaves
-
-
-class _Slopes(torch.autograd.Function):
-    """A weight times the gradient of the sum of all energies by positions and by edge rotations, of the leaves."""
-
-    @staticmethod
-    def forward(
-        ctx: Any, adjoint: EnergyAdjoint, dtype: torch.dtype, weight: torch.Tensor, *leaves: torch.Tensor
-    ) -> tuple[torch.Tensor, ...]:
-        ctx.adjoint, ctx.weight, ctx.leaves = adjoint, weight, leaves
-        return tuple(torch.from_numpy(float(weight) * each).to(dtype=dtype) for each in adjoint.by_unknowns)
-
-    @staticmethod
-    def backward(ctx: Any, *motion: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
-        arrays = [_numbers(each) for each in motion]
-        by_weight, found = ctx.adjoint.mixed(float(ctx.weight), *arrays, ctx.needs_input_grad[3:])
-        by_inputs = [torch.tensor(by_weight).to(ctx.weight), *_like_leaves(found, ctx.leaves)]
-        if torch.is_grad_enabled():
-            given = [each for each in by_inputs if each is not None]
-            others = (ctx.weight, *ctx.leaves, *motion)
-            marked = iter(_NoFurther.apply(_THIRD, len(given), *given, *others))
-            by_inputs = [None if each is None else next(marked) for each in by_inputs]
-        return None, None, *by_inputs
-
-
-_THIRD = (
-    "no third derivatives of energies: there are gradients and Hessians. Take differences of the second ones."
-)
-_BY_VALUES = (
-    "no second derivatives of energies that begin with a gradient by values: there is none by a value twice. Those of "
-    "a position and a value: differentiate by the positions first (ms.forces), then by the value."
-)
-
-
-class _NoFurther(torch.autograd.Function):
-    """Gradients connected to the tensors that they depend on, so that their derivatives raise NoGradient, with a reason."""
-
-    @staticmethod
-    def forward(ctx: Any, reason: str, count: int, *given: torch.Tensor) -> tuple[torch.Tensor, ...]:
-        ctx.reason = reason
-        return tuple(each.clone() for each in given[:count])
-
-    @staticmethod
-    def backward(ctx: Any, *_: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
-        raise NoGradient(ctx.reason)
-
-
-def _like_leaves(found, leaves) -> list[torch.Tensor | None]:
-    return [
-        None if values is None else torch.from_numpy(np.array(values)).to(leaf)
-        for values, leaf in zip(found, leaves, strict=True)
-    ]
-
-
-def energies_of(
-    adjoint: EnergyAdjoint, energies: np.ndarray, dtype: torch.dtype, leaves: list[Any]
-) -> torch.Tensor:
-    """Return energies (n,) as a tensor that is connected to the leaves by their derivatives."""
-    return _Energies.apply(adjoint, energies, dtype, *leaves)
-
-
-def slopes_of(
-    adjoint: EnergyAdjoint, dtype: torch.dtype, leaves: list[Any]
-) -> tuple[torch.Tensor, torch.Tensor]:
-    """Return the gradient of the sum by positions and by edge rotations, as tensors connected to the leaves."""
-    return _Slopes.apply(adjoint, dtype, torch.ones((), dtype=torch.float64), *leaves)
-
-
 class _Mapped(torch.autograd.Function):
     """Results of a solve inside torch.func.vmap: the members of the map become one batch of solves.
 
@@ -445,7 +352,7 @@ class _MappedTransposed(torch.autograd.Function):
         info: Any, in_dims: tuple[Any, ...], solves: Any, count: int, *given: torch.Tensor
     ) -> tuple[Any, Any]:
         given = _in_front(info.batch_size, in_dims[2:], given)
-        found = solves.gradients([_numbers(each) for each in given[:count]])
+        found = solves.gradients([numbers_of(each) for each in given[:count]])
         parts = zip(found, given[count:], strict=True)
         by_tensors = tuple(torch.from_numpy(np.array(each)).to(like) for each, like in parts)
         return by_tensors, (0,) * len(by_tensors)
@@ -531,10 +438,10 @@ def chained(
     if not given:
         return [None for _ in tensors]
     found = products([leaf for leaf, _ in given], tensors, [each for _, each in given])
-    return [None if each is None else _numbers(each) for each in found]
+    return [None if each is None else numbers_of(each) for each in found]
 
 
-def _numbers(by_output) -> np.ndarray:
+def numbers_of(by_output) -> np.ndarray:
     if why := why_not(by_output):
         raise NoGradient(f"no gradient here: the one by a result {why}")
     return by_output.detach().cpu().double().numpy()

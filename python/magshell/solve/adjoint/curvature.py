@@ -64,7 +64,7 @@ def curvature(
         multiplier = _core.push_forward(model, found, weights, nothing)
 
     def at(step: float, multiplier: np.ndarray, weights: np.ndarray) -> list[np.ndarray]:
-        there = _moved(inputs, [step * each for each in along])
+        there = moved_inputs(inputs, [step * each for each in along])
         with there.in_core():
             residual = Residual(there, found.state + step * motion, found.turns, there.controls)
             slopes = residual.slopes(multiplier)
@@ -74,7 +74,7 @@ def curvature(
 
     parts = at(0.0, multiplier, weights)
     rates = directional_derivative(
-        lambda step: _rows(at(step, multiplier, weights)),
+        lambda step: rows_of(at(step, multiplier, weights)),
         _steps(inputs, motion, along),
         ROUNDING,
         _sizes(inputs),
@@ -92,7 +92,7 @@ def curvature(
     ]
 
 
-def _rows(parts: list[np.ndarray]) -> np.ndarray:
+def rows_of(parts: list[np.ndarray]) -> np.ndarray:
     """Return vectors of different lengths as rows of one array, filled up with zeros."""
     rows = np.zeros((len(parts), max(part.size for part in parts)))
     for row, part in zip(rows, parts, strict=True):
@@ -100,7 +100,7 @@ def _rows(parts: list[np.ndarray]) -> np.ndarray:
     return rows
 
 
-def _moved(inputs: Inputs, changes: list[np.ndarray]) -> Inputs:
+def moved_inputs(inputs: Inputs, changes: list[np.ndarray]) -> Inputs:
     """Return the inputs after changes of all leaves. Raises ValueError beyond the range of a value."""
     scene, replaced = inputs.scene, {owner: dict(named) for owner, named in inputs.values.replaced.items()}
     magnetization, controls = inputs.magnetization, inputs.controls

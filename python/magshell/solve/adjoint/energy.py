@@ -81,6 +81,11 @@ class EnergyAdjoint:
         self._function, self._base = function, base
         self._model = inputs.scene._model
 
+    def with_inputs(self, inputs: Inputs, leaves: list[Leaf]) -> EnergyAdjoint:
+        """Return the energies at the same state with other values. leaves: by which there are derivatives."""
+        inputs.leaves = leaves
+        return EnergyAdjoint(self._function, inputs, self._base)
+
     def state(self, controls: np.ndarray) -> np.ndarray:
         """Return all unknowns. Positions do not determine the directions that clamps hold: the clamps prescribe these."""
         scene, state = self.inputs.scene, self._base.copy()

@@ -61,7 +61,7 @@ def energies(
     At the positions of an equilibrium these are its `energies`. The directions that clamps prescribe are used; other
     prescribed displacements are not. Tensors get energies that are tensors: see ms.energy. The gradient by positions
     is that of the sum of all energies; the one of a single energy, with others left out, raises NoGradient. Those by values
-    may be of single energies.
+    may be of single energies. Energies of one body have none: ValueError.
 
     Raises ValueError on bad input, and where there is no energy: bodies in contact intersect or are nearer than
     they may be, or elements are inside out whose material does not bear it.
@@ -84,7 +84,7 @@ def energies(
         found = at.adjoint.by_name() if number is None else _of_body(scene, number, at.adjoint.of_terms())
     if not leaves:
         return found
-    from ..adjoint.autograd import energies_of
+    from ..adjoint.energy_autograd import energies_of
 
     tensors = energies_of(at.adjoint, np.array([*found.values()]), at.dtype, at.adjoint.inputs.tensors)
     return dict(zip(found, tensors.unbind(), strict=True))
@@ -120,8 +120,9 @@ def energy(
     With tensors it is a tensor, differentiable by positions, edge rotations and everything else above. First derivatives by
     positions and edge rotations are exact. Those by values are differences of eighth order, checked against sixth, one value
     of the core after another (8 energies each): cheap for a number, slow for one number a face of a large mesh.
-    Second derivatives by positions (Hessian-vector products) are exact; so are those by positions and values, where
-    the gradient by positions is taken first. Those by value and value raise NoGradient; so do third derivatives.
+    Second derivatives by positions (Hessian-vector products) are exact. Those by positions and values are exact, too, where
+    the gradient by positions is taken first. Those that begin with a gradient by values are differences along one
+    direction, right to some 1e-9, at the cost of eight to sixteen such gradients. Third derivatives raise NoGradient.
 
     Raises ValueError as ms.energies does, and NoGradient where an energy is not smooth in a value.
 
@@ -139,7 +140,7 @@ def energy(
         found = at.adjoint.by_name()
     if not inputs.leaves:
         return sum(found.values())
-    from ..adjoint.autograd import energies_of
+    from ..adjoint.energy_autograd import energies_of
 
     return energies_of(at.adjoint, np.array([*found.values()]), at.dtype, inputs.tensors).sum()
 
@@ -191,7 +192,7 @@ def forces(
     inputs = at.adjoint.inputs
     if not inputs.leaves:
         return Forces(*(like(-each, *inputs.given) for each in at.adjoint.by_unknowns))
-    from ..adjoint.autograd import slopes_of
+    from ..adjoint.energy_autograd import slopes_of
 
     return Forces(*(-each for each in slopes_of(at.adjoint, at.dtype, inputs.tensors)))
 

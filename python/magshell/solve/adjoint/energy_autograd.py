@@ -1,0 +1,135 @@
+"""Energies at given positions as tensors of torch's graph, with their derivatives. It holds no physics."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+
+from ...errors import NoGradient
+from .autograd import numbers_of
+from .energy import POSITIONAL
+from .energy_by_values import is_positional, rates_along_values
+
+if TYPE_CHECKING:
+    from .energy import EnergyAdjoint
+
+
+class _Energies(torch.autograd.Function):
+    """The energies of a scene at given positions, (n,) J, of the leaves: positions, edge rotations and values."""
+
+    @staticmethod
+    def forward(
+        ctx: Any, adjoint: EnergyAdjoint, energies: np.ndarray, dtype: torch.dtype, *leaves: torch.Tensor
+    ) -> torch.Tensor:
+        ctx.adjoint, ctx.leaves, ctx.dtype = adjoint, leaves, dtype
+        return torch.from_numpy(energies).to(dtype=dtype)
+
+    @staticmethod
+    def backward(ctx: Any, by_energies: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
+        found = ctx.adjoint.gradients(numbers_of(by_energies), ctx.needs_input_grad[3:])
+        by_leaves = _like_leaves(found, ctx.leaves)
+        if torch.is_grad_enabled():  # create_graph=True
+            positional = [is_positional(leaf) for leaf in ctx.adjoint.inputs.leaves]
+            asked = [each is not None for each in by_leaves]
+            if any(is_asked and at for is_asked, at in zip(asked, positional, strict=True)):
+                slopes = _Slopes.apply(ctx.adjoint, ctx.dtype, by_energies[0], *ctx.leaves)
+                for k, leaf in enumerate(ctx.adjoint.inputs.leaves):
+                    if asked[k] and positional[k]:
+                        by_leaves[k] = slopes[POSITIONAL.index(leaf.name)].to(ctx.leaves[k])
+            chosen = [k for k, at in enumerate(positional) if asked[k] and not at]
+            if chosen:
+                given = [by_leaves[k] for k in chosen]
+                connected = _SlopesByValues.apply(ctx.adjoint, chosen, by_energies, *given, *ctx.leaves)
+                for k, each in zip(chosen, connected, strict=True):
+                    by_leaves[k] = each
+        return None, None, None, *by_leaves
+
+
+class _SlopesByValues(torch.autograd.Function):
+    """Gradients of weighted energies by some of the leaves that are values, which were computed, connected to all leaves."""
+
+    @staticmethod
+    def forward(
+        ctx: Any, adjoint: EnergyAdjoint, chosen: list[int], weights: torch.Tensor, *tensors: torch.Tensor
+    ) -> tuple[torch.Tensor, ...]:
+        ctx.adjoint, ctx.chosen, ctx.weights, ctx.leaves = adjoint, chosen, weights, tensors[len(chosen) :]
+        return tuple(each.clone() for each in tensors[: len(chosen)])
+
+    @staticmethod
+    def backward(ctx: Any, *motion: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
+        along: list[np.ndarray | None] = [None] * len(ctx.leaves)
+        for k, each in zip(ctx.chosen, motion, strict=True):
+            along[k] = numbers_of(each)
+        wanted = ctx.needs_input_grad[3 + len(ctx.chosen) :]
+        by_weights, found = rates_along_values(ctx.adjoint, numbers_of(ctx.weights), along, wanted)
+        by_inputs = [torch.from_numpy(by_weights).to(ctx.weights), *_like_leaves(found, ctx.leaves)]
+        if torch.is_grad_enabled():
+            given = [each for each in by_inputs if each is not None]
+            marked = iter(_NoFurther.apply(_THIRD, len(given), *given, ctx.weights, *ctx.leaves, *motion))
+            by_inputs = [None if each is None else next(marked) for each in by_inputs]
+        by_weights, *by_leaves = by_inputs
+        return None, None, by_weights, *(None for _ in ctx.chosen), *by_leaves
+
+
+class _Slopes(torch.autograd.Function):
+    """A weight times the gradient of the sum of all energies by positions and by edge rotations, of the leaves."""
+
+    @staticmethod
+    def forward(
+        ctx: Any, adjoint: EnergyAdjoint, dtype: torch.dtype, weight: torch.Tensor, *leaves: torch.Tensor
+    ) -> tuple[torch.Tensor, ...]:
+        ctx.adjoint, ctx.weight, ctx.leaves = adjoint, weight, leaves
+        return tuple(torch.from_numpy(float(weight) * each).to(dtype=dtype) for each in adjoint.by_unknowns)
+
+    @staticmethod
+    def backward(ctx: Any, *motion: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
+        arrays = [numbers_of(each) for each in motion]
+        by_weight, found = ctx.adjoint.mixed(float(ctx.weight), *arrays, ctx.needs_input_grad[3:])
+        by_inputs = [torch.tensor(by_weight).to(ctx.weight), *_like_leaves(found, ctx.leaves)]
+        if torch.is_grad_enabled():
+            given = [each for each in by_inputs if each is not None]
+            others = (ctx.weight, *ctx.leaves, *motion)
+            marked = iter(_NoFurther.apply(_THIRD, len(given), *given, *others))
+            by_inputs = [None if each is None else next(marked) for each in by_inputs]
+        return None, None, *by_inputs
+
+
+_THIRD = (
+    "no third derivatives of energies: there are gradients and Hessians. Take differences of the second ones."
+)
+
+
+class _NoFurther(torch.autograd.Function):
+    """Gradients connected to the tensors that they depend on, so that their derivatives raise NoGradient, with a reason."""
+
+    @staticmethod
+    def forward(ctx: Any, reason: str, count: int, *given: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        ctx.reason = reason
+        return tuple(each.clone() for each in given[:count])
+
+    @staticmethod
+    def backward(ctx: Any, *_: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
+        raise NoGradient(ctx.reason)
+
+
+def _like_leaves(found, leaves) -> list[torch.Tensor | None]:
+    return [
+        None if values is None else torch.from_numpy(np.array(values)).to(leaf)
+        for values, leaf in zip(found, leaves, strict=True)
+    ]
+
+
+def energies_of(
+    adjoint: EnergyAdjoint, energies: np.ndarray, dtype: torch.dtype, leaves: list[Any]
+) -> torch.Tensor:
+    """Return energies (n,) as a tensor that is connected to the leaves by their derivatives."""
+    return _Energies.apply(adjoint, energies, dtype, *leaves)
+
+
+def slopes_of(
+    adjoint: EnergyAdjoint, dtype: torch.dtype, leaves: list[Any]
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """Return the gradient of the sum by positions and by edge rotations, as tensors connected to the leaves."""
+    return _Slopes.apply(adjoint, dtype, torch.ones((), dtype=torch.float64), *leaves)
