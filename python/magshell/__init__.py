@@ -54,6 +54,7 @@ from .model.bodies.ties import Tie
 from .model.contact import obstacles
 from .model.contact.body_contact import BodyContact, SelfContact
 from .model.contact.contact import Contact
+from .model.elastomers import Elastomer, elastomer
 from .model.fields.adapters import CustomField, MagpylibField
 from .model.fields.field import AppliedField, Dipoles, SampledField, UniformField, residual_to_remanent
 from .model.fields.magnets import CuboidMagnet, CylinderMagnet
@@ -175,6 +176,7 @@ __all__ = [
     "Dipoles",
     "EdgeCouple",
     "EdgeLoad",
+    "Elastomer",
     "Equilibrium",
     "EquilibriumBatch",
     "EquilibriumJumped",
@@ -275,6 +277,7 @@ __all__ = [
     "bias_forces",
     "control",
     "coordinate_slices",
+    "elastomer",
     "energies",
     "energy",
     "envs",

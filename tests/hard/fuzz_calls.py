@@ -186,6 +186,15 @@ def _fields(s: Sample) -> Iterator[Call]:
         yield Call(f"{name}.flux_density", each.flux_density, {"points": points})
         yield Call(f"{name}.gradient", each.gradient, {"points": points})
     yield Call("SampledField.contains", s.grid.contains, {"points": points})
+    yield Call("elastomer", ms.elastomer, {"name": "Ecoflex 00-30"})
+    rubber = {
+        "young_modulus": 1e5,
+        "young_modulus_range": (9e4, 2e5),
+        "poisson_ratio": 0.5,
+        "mass_density": 1e3,
+    }
+    texts = {"name": "ink", "source": "own", "note": "tension", "remanent_magnetization": 1e4}
+    yield Call("Elastomer", ms.Elastomer, {**texts, **rubber})
     yield Call("residual_to_remanent", ms.residual_to_remanent, {"residual_flux_density": np.ones((2, 3))})
 
 

@@ -231,6 +231,9 @@ def _options(given: Arrays) -> dict[str, object]:
         "ink": ms.PrintableSet(
             5e4, given([[1.0, 0, 0], [0, 1.0, 0]]), levels=given([0.0, 1.0]), frames=given([np.eye(3)] * 4)
         ),
+        "elastomer": ms.Elastomer(
+            "ink", 1e5, (9e4, 2e5), "own", "tension", mass_density=2e3, remanent_magnetization=1e4
+        ),
         "view": ms.View(30, -60, frame=given([[0.0, 0, 0], [0.1, 0.02, 0.01]])),
         "style": ms.Style(),
         "probe": ms.Probe("tip", given.numbers(0, 1, 2)),
