@@ -11,6 +11,7 @@
 #include "bindings/strains.h"
 #include "magshell/core/errors.h"
 #include "magshell/solve/linear_response.h"
+#include "magshell/terms/magnetic/applied_field_term.h"
 #include "magshell/terms/magnetic/own_field_term.h"
 
 namespace magshell::bindings {
@@ -110,14 +111,17 @@ py::tuple largest_at(const Model& model, const VectorXd& q, const VectorXd& thic
     return to_tuple(largest_of(strains_at(model, q, thickness)));
 }
 
+Rows3 rows_of(const std::vector<Vec3>& vectors) {
+    Rows3 rows(static_cast<Eigen::Index>(vectors.size()), 3);
+    for (std::size_t k = 0; k < vectors.size(); ++k) rows.row(k) = vectors[k].transpose();
+    return rows;
+}
+
 Rows3 own_flux_density(const Model& model, const VectorXd& q, const Rows3& at) {
     std::vector<Vec3> points(at.rows());
     for (Eigen::Index k = 0; k < at.rows(); ++k) points[k] = at.row(k).transpose();
-    Rows3 flux = Rows3::Zero(at.rows(), 3);
-    if (!model.terms().own_field) return flux;
-    const std::vector<Vec3> found = model.terms().own_field->field().flux_density(q.data(), points);
-    for (Eigen::Index k = 0; k < at.rows(); ++k) flux.row(k) = found[k].transpose();
-    return flux;
+    if (!model.terms().own_field) return Rows3::Zero(at.rows(), 3);
+    return rows_of(model.terms().own_field->field().flux_density(q.data(), points));
 }
 
 }  // namespace
@@ -318,6 +322,20 @@ void register_model(py::module_& module) {
             },
             py::arg("name"), py::arg("q"), py::arg("controls"), py::call_guard<py::gil_scoped_release>(),
             "The gradient of the terms of one name, of all unknowns (n,) [N].")
+        .def(
+            "magnetic_moments",
+            [](const Model& model, const std::string& name, const VectorXd& q,
+               const LoadParameters& load_parameters) {
+                std::vector<Vec3> points, moments;
+                for (const std::unique_ptr<Term>& term : model.terms().energies)
+                    if (const AppliedFieldTerm* in_field = dynamic_cast<const AppliedFieldTerm*>(term.get());
+                        in_field && (name.empty() || term->name() == name))
+                        in_field->add_moments(q.data(), load_parameters, points, moments);
+                return std::pair(rows_of(points), rows_of(moments));
+            },
+            py::arg("name"), py::arg("q"), py::arg("controls"),
+            "Points [m] and magnetic moments [A m2] of the terms of one name, or of all of them, in the "
+            "applied field, (n, 3) each.")
         .def(
             "own_flux_density",
             [](const Model& model, const VectorXd& q, const Array& points) {

@@ -85,6 +85,7 @@ std::vector<ShellInput> sheets_of(const py::list& given) {
         sheet.directors = each["directors"].cast<bool>();
         sheet.magnetic = each["magnetic"].cast<bool>();
         sheet.magnetization_law = magnetization_law_of(each);
+        sheet.susceptible = each["susceptible"].cast<bool>();
         sheet.directed_edges = directed_edges(each["directed_edges"].cast<IndexArray>());
     }
     return sheets;

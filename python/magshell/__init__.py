@@ -37,6 +37,7 @@ from .errors import (
     NotConverged,
     ObjectiveFailed,
     StepErrorWarning,
+    SusceptibilityWarning,
     UnitWarning,
 )
 from .mesh import generate as meshes
@@ -257,6 +258,7 @@ __all__ = [
     "StudyRow",
     "Style",
     "SurfaceTension",
+    "SusceptibilityWarning",
     "SymmetryPlane",
     "Tendon",
     "TetMesh",

@@ -491,6 +491,18 @@ class Model:
         """
         What hessian(), called last, leaves out: columns u (n, k) and stiffnesses s (k,), the sum of s u u^T. Of cavities, cells and tendons, which couple all of their nodes.
         """
+    def magnetic_moments(
+        self,
+        name: str,
+        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    ) -> tuple[
+        typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"],
+        typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"],
+    ]:
+        """
+        Points [m] and magnetic moments [A m2] of the terms of one name, or of all of them, in the applied field, (n, 3) each.
+        """
     def own_energies(
         self, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> list[float]:

@@ -127,6 +127,14 @@ class FieldSamplingWarning(UserWarning):
     """
 
 
+class SusceptibilityWarning(UserWarning):
+    """A warning about a susceptible shell that is too strongly magnetized for its law, which neglects its own field.
+
+    It is raised once per scene, where the susceptibility times the thickness is more than a tenth of the extent: about that
+    part of the magnetization along the shell is wrong.
+    """
+
+
 class NoGradient(RuntimeError):
     """An error for a gradient that does not exist.
 

@@ -51,6 +51,7 @@ NOT_CALLED = {
     "LargeStrainWarning": "a warning",
     "StepErrorWarning": "a warning",
     "FieldSamplingWarning": "a warning",
+    "SusceptibilityWarning": "a warning",
     "MeshGroupWarning": "a warning",
     "MeshQualityWarning": "a warning",
     "UnitWarning": "a warning",

@@ -40,6 +40,7 @@ from gradient_kinds_skeletons import (
     turning_screw,
 )
 from gradient_kinds_steps import step_makers
+from gradient_kinds_susceptibility import susceptible_shells
 from gradient_scenes import Kind
 from gradient_world import (
     BEGIN,
@@ -371,6 +372,8 @@ MAKERS = {
     "custom energies in motion": custom_energies_in_motion,
     "bodies whose magnetization rotates at rest": lambda: rotating_magnetization(False),
     "bodies whose magnetization rotates in motion": lambda: rotating_magnetization(True),
+    "susceptible shells at rest": lambda: susceptible_shells(False),
+    "susceptible shells in motion": lambda: susceptible_shells(True),
     **LINEAR_MAKERS,
 }
 

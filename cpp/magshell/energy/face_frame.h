@@ -7,6 +7,7 @@
 #pragma once
 
 #include "magshell/core/vector3.h"
+#include "magshell/energy/symmetric3.h"
 
 namespace magshell {
 
@@ -22,6 +23,16 @@ struct FaceFrame {
 
     /// Returns P = (b - n (n . b)) / |N|.
     SimdVec3 tangential(const SimdVec3& b) const { return inverse_area2 * (b - dot(normal, b) * normal); }
+
+    /// Computes the transposed derivatives of the unit normal by the three nodes, N_k^T.
+    void normal_by_nodes(SimdMat3 transposed[3]) const {
+        SimdMat3 p = -outer(normal, normal);
+        add_to_diagonal(p, SimdDouble(1.0));
+        p = inverse_area2 * p;
+        transposed[1] = multiply(cross_matrix(a2), p);
+        transposed[2] = -multiply(cross_matrix(a1), p);
+        transposed[0] = -(transposed[1] + transposed[2]);
+    }
 
     /// Returns the rate of the unit normal for given nodal velocities.
     SimdVec3 normal_rate(const SimdVec3 rate[3]) const {
@@ -39,6 +50,21 @@ struct FaceFrame {
         const SimdMat3 kc1 = multiply(k, c1);
         h11 = -multiply(c2, multiply(k, c2)), h22 = -multiply(c1, kc1);
         h12 = multiply(c2, kc1) - scale * cross_matrix(tangential(b));
+    }
+
+    /// Computes the lower blocks of the nodes from those of the edge vectors.
+    static void node_blocks(const SimdMat3& h11, const SimdMat3& h12, const SimdMat3& h22, SimdMat3 h[6]) {
+        for (int row = 0; row < 3; ++row)
+            for (int column = 0; column < 3; ++column) {
+                const int k = 3 * row + column, transposed = 3 * column + row;
+                const SimdDouble b11 = h11.at[k], b12 = h12.at[k], b21 = h12.at[transposed], b22 = h22.at[k];
+                h[lower_index(1, 1)].at[k] = b11;
+                h[lower_index(2, 1)].at[k] = b21;
+                h[lower_index(2, 2)].at[k] = b22;
+                h[lower_index(1, 0)].at[k] = -(b11 + b12);
+                h[lower_index(2, 0)].at[k] = -(b21 + b22);
+                h[lower_index(0, 0)].at[k] = b11 + b12 + b21 + b22;
+            }
     }
 };
 

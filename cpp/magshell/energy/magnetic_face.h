@@ -68,21 +68,6 @@ struct MagneticFace : FaceFrame {
         node_blocks(h11, h12, h22, h);
     }
 
-    /// Computes the lower blocks of the nodes from those of the edge vectors.
-    static void node_blocks(const SimdMat3& h11, const SimdMat3& h12, const SimdMat3& h22, SimdMat3 h[6]) {
-        for (int row = 0; row < 3; ++row)
-            for (int column = 0; column < 3; ++column) {
-                const int k = 3 * row + column, transposed = 3 * column + row;
-                const SimdDouble b11 = h11.at[k], b12 = h12.at[k], b21 = h12.at[transposed], b22 = h22.at[k];
-                h[lower_index(1, 1)].at[k] = b11;
-                h[lower_index(2, 1)].at[k] = b21;
-                h[lower_index(2, 2)].at[k] = b22;
-                h[lower_index(1, 0)].at[k] = -(b11 + b12);
-                h[lower_index(2, 0)].at[k] = -(b21 + b22);
-                h[lower_index(0, 0)].at[k] = b11 + b12 + b21 + b22;
-            }
-    }
-
     /// Adds the part due to the variation of the field in space: d2(M . B(x_b)) with one or two derivatives by x_b.
     template <class Element>
     void add_hessian_by_position(const Element& e, const FieldAtPoint& field, SimdMat3 h[6]) const {

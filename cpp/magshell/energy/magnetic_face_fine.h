@@ -53,12 +53,7 @@ void hessian(const Law& face, const typename Law::Element& e, const FieldOverFac
     Law::node_blocks(h11, h12, h22, of_normal);
 
     SimdMat3 normal[3];  // N_k^T
-    SimdMat3 p = -outer(face.normal, face.normal);
-    add_to_diagonal(p, SimdDouble(1.0));
-    p = face.inverse_area2 * p;
-    normal[1] = multiply(cross_matrix(face.a2), p);
-    normal[2] = -multiply(cross_matrix(face.a1), p);
-    normal[0] = -(normal[1] + normal[2]);
+    face.normal_by_nodes(normal);
 
     SimdMat3 mixed[4][3];  // D_ak
     for (int a = 0; a < 4; ++a) face.by_node(e, field.gradient[a], mixed[a]);

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "magshell/terms/joint/damper_term.h"
+#include "magshell/terms/magnetic/applied_field_term.h"
 
 namespace magshell {
 namespace {
@@ -100,17 +101,22 @@ VectorXd ModelParameters::rate_by_varying(const LoadParameters& at, const LoadPa
 
 VectorXd ModelParameters::gradient_rate(const VectorXd& q, const LoadParameters& at,
                                         const LoadParameters& rate) {
-    // The difference removes the part that does not depend on the load parameters, such as that of target volumes.
+    // The difference removes the part that does not depend on the load parameters, such as that of target volumes. A central one is
+    // exact where the gradient is quadratic.
     const LoadParameters none = LoadParameters::Zero(rate.size());
-    Residual change, constant, dropped;
-    for (Residual* each : {&change, &constant, &dropped}) each->reset(bodies_.nodes().n_dofs());
+    Residual change, constant, above, below, dropped;
+    for (Residual* each : {&change, &constant, &above, &below, &dropped})
+        each->reset(bodies_.nodes().n_dofs());
     for (const std::unique_ptr<Term>& term : terms_.energies) {
         if (!term->depends_on_loads()) continue;
-        term->evaluate(q.data(), rate, change);
-        term->evaluate(q.data(), none, constant);
+        const AppliedFieldTerm* in_field = dynamic_cast<const AppliedFieldTerm*>(term.get());
+        const bool quadratic = in_field && in_field->is_quadratic_in_loads();
+        term->evaluate(q.data(), quadratic ? at + rate : rate, quadratic ? above : change);
+        term->evaluate(q.data(), quadratic ? at - rate : none, quadratic ? below : constant);
         term->evaluate(q.data(), at, dropped);  // restores the state of the term
     }
     change.gradient -= constant.gradient;
+    change.gradient += 0.5 * (above.gradient - below.gradient);
     if (varying_.empty()) return change.gradient;
     return change.gradient + rate_by_varying(at, rate, [&](const LoadParameters& there) {
                Residual gradient;

@@ -40,6 +40,7 @@ struct ShellInput {
     bool directors = true;  // true: midedge elements; false: hinge elements
     bool magnetic = false;
     MagnetizationLaw magnetization_law = MagnetizationLaw::stretches;
+    bool susceptible = false;                  // whether it has a magnetic susceptibility
     std::vector<DirectedEdge> directed_edges;  // directions are rows of SceneInput::directions
 };
 

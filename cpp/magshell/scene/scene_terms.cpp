@@ -18,6 +18,7 @@
 #include "magshell/terms/load/load_term.h"
 #include "magshell/terms/load/pressure_term.h"
 #include "magshell/terms/load/water_term.h"
+#include "magshell/terms/magnetic/induced_term.h"
 #include "magshell/terms/magnetic/magnetic_solid_term.h"
 #include "magshell/terms/magnetic/magnetic_term.h"
 #include "magshell/terms/magnetic/moment_term.h"
@@ -213,6 +214,12 @@ void Builder::add_magnetic_terms(const SceneInput& input) {
     };
     for (std::size_t k = 0; k < shells; ++k)
         if (input.shells[k].magnetic) add(k, input.shells[k].magnetization_law);
+    for (std::size_t k = 0; k < shells; ++k) {
+        const auto& [surface, body] = bodies_.faces()[k];
+        if (input.shells[k].susceptible)
+            out_.energies.push_back(
+                make_induced_term(*surface, body, *out_.loops[k], out_.field_sources, registry_));
+    }
     for (std::size_t k = 0; k < input.skins.size(); ++k)
         add(shells + solids + k, input.skins[k].magnetization_law);
     for (std::size_t k = 0; k < input.six_node_shells.size(); ++k) {

@@ -25,6 +25,14 @@ std::span<const FacePoint> FaceSampling::points(Index face) const {
     return face_points::barycenter;
 }
 
+void FaceSampling::add_moments(const std::vector<double>& volumes, const std::vector<Vec3>& magnetizations,
+                               std::vector<Vec3>& moments) const {
+    std::size_t n = 0;
+    for (Index f = 0; f < n_faces_; ++f)
+        for (const FacePoint& point : points(f))
+            moments.push_back((volumes[f] * point.weight) * magnetizations[n++]);
+}
+
 std::vector<FieldOverFace> FaceSampling::moments(const FieldSamples& samples, int order,
                                                  const Vec3& everywhere,
                                                  const std::vector<double>& thicknesses) const {

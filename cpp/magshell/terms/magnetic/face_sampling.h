@@ -12,6 +12,12 @@
 
 namespace magshell {
 
+/// Returns a point of a face from its corners and its thickness times its normal [m], or the point's velocity from theirs.
+inline Vec3 position_of(const FacePoint& point, const Vec3 corners[3], const Vec3& across) {
+    return point.at[0] * corners[0] + point.at[1] * corners[1] + point.at[2] * corners[2] +
+           point.height * across;
+}
+
 class FaceSampling {
   public:
     explicit FaceSampling(const FaceLoop& loop) : loop_(loop) {}
@@ -34,6 +40,10 @@ class FaceSampling {
                                        const std::vector<double>& thicknesses) const;
     /// Returns the place of a SIMD vector in moments().
     Index at(Index group) const { return groups_[group]; }
+
+    /// Adds the magnetic moment of each point [A m2] from the volumes of the faces [m3] and the magnetizations at the points [A/m].
+    void add_moments(const std::vector<double>& volumes, const std::vector<Vec3>& magnetizations,
+                     std::vector<Vec3>& moments) const;
 
     std::size_t bytes() const { return bytes_of(first_) + bytes_of(groups_); }
 

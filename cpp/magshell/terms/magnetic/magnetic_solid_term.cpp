@@ -5,6 +5,7 @@
 #include "magshell/energy/magnetic_solid.h"
 #include "magshell/energy/magnetic_solid_rotating.h"
 #include "magshell/strain/tetrahedron.h"
+#include "magshell/terms/magnetic/applied_field_term.h"
 #include "magshell/terms/magnetic/field_groups.h"
 #include "magshell/terms/magnetic/total_applied_field.h"
 
@@ -12,7 +13,7 @@ namespace magshell {
 namespace {
 
 template <class Element, template <int> class Law>
-class MagneticSolidTerm final : public Term {
+class MagneticSolidTerm final : public AppliedFieldTerm {
     static constexpr int N = Element::nodes, points = Element::points;
     using Nodes = std::array<Index, N>;
     using Point = Law<N>;
@@ -144,6 +145,18 @@ class MagneticSolidTerm final : public Term {
             out.values.segment<3>(magnetization_.at(t)) += by_magnetization;
         }
         field_.add_vjp(places, probe, samples, load_parameters, out);
+    }
+
+    void add_moments(const double* q, const LoadParameters&, std::vector<Vec3>& places,
+                     std::vector<Vec3>& moments) const override {
+        std::vector<Vec3> at, magnetizations;
+        at_points(q, at, magnetizations);
+        places.insert(places.end(), at.begin(), at.end());
+        for (Index t = 0; t < solid_.n_elements(); ++t) {
+            const RestElement<Element> rest = rest_of(t);
+            for (int p = 0; p < points; ++p)
+                moments.push_back(rest.volume[p] * magnetizations[t * points + p]);
+        }
     }
 
     std::size_t bytes() const override { return loop_.bytes() + bytes_of(elements_) + bytes_of(fields_); }

@@ -8,6 +8,7 @@
 #include "magshell/energy/magnetic_face_fine.h"
 #include "magshell/energy/magnetic_rotating.h"
 #include "magshell/mesh/half_edges.h"
+#include "magshell/terms/magnetic/applied_field_term.h"
 #include "magshell/terms/magnetic/face_sampling.h"
 #include "magshell/terms/magnetic/field_groups.h"
 #include "magshell/terms/magnetic/total_applied_field.h"
@@ -18,7 +19,7 @@ namespace {
 // In a uniform field nothing is sampled. If the magnetization is linear in the positions too, the force does not
 // depend on the deformation, and there is no Hessian to add.
 template <class Law>
-class MagneticTerm final : public Term {
+class MagneticTerm final : public AppliedFieldTerm {
   public:
     MagneticTerm(const Surface& surface, Index body, const FaceLoop& loop, const FieldSources& sources,
                  Registry& registry);
@@ -35,6 +36,8 @@ class MagneticTerm final : public Term {
              Gradient& out) override;
     double field_sampling_error(const double* q, const LoadParameters& load_parameters,
                                 double extent) override;
+    void add_moments(const double* q, const LoadParameters& load_parameters, std::vector<Vec3>& points,
+                     std::vector<Vec3>& moments) const override;
     std::size_t bytes() const override;
 
   private:
@@ -141,8 +144,7 @@ void MagneticTerm<Law>::find_points(const double* q, std::vector<Vec3>& points,
             const Vec3 corners[3] = {lane_of(x[0], lane), lane_of(x[1], lane), lane_of(x[2], lane)},
                        across = thicknesses_[f] * lane_of(face.normal, lane);
             for (const FacePoint& point : sampling_.points(f)) {
-                points[n] = point.at[0] * corners[0] + point.at[1] * corners[1] + point.at[2] * corners[2] +
-                            point.height * across;
+                points[n] = position_of(point, corners, across);
                 magnetizations[n++] = lane_of(m, lane);
             }
         }
@@ -390,6 +392,19 @@ double MagneticTerm<Law>::field_sampling_error(const double* q, const LoadParame
     const double total = std::max({(force + error).norm(), cancelling * forces, couples / extent});
     if (!(total > 0.0)) return total == 0.0 ? 0.0 : unknown;
     return error.norm() / total;
+}
+
+template <class Law>
+void MagneticTerm<Law>::add_moments(const double* q, const LoadParameters&, std::vector<Vec3>& points,
+                                    std::vector<Vec3>& moments) const {
+    std::vector<Vec3> at, magnetizations;
+    find_points(q, at, magnetizations);
+    points.insert(points.end(), at.begin(), at.end());
+    std::vector<double> volumes(surface_.n_faces());
+    for (Index group = 0; group < loop_.groups(); ++group)
+        for (int lane = 0; lane < loop_.lanes_in(group); ++lane)
+            volumes[loop_.face(group, lane)] = elements_[group].volume[lane];
+    sampling_.add_moments(volumes, magnetizations, moments);
 }
 
 template <class Law>

@@ -47,13 +47,18 @@ Vec3 MomentTerm::sum(const std::array<double, 4>& weights, const Each& of) {
     return weights[0] * of[0] + weights[1] * of[1] + weights[2] * of[2] + weights[3] * of[3];
 }
 
-FieldSamples MomentTerm::sample(const double* q, const LoadParameters& load_parameters, int order,
-                                std::vector<Vec3>& points, std::vector<Vec3>& moments) const {
+void MomentTerm::add_moments(const double* q, const LoadParameters&, std::vector<Vec3>& points,
+                             std::vector<Vec3>& moments) const {
     for (const ElementBlock& element_block : element_blocks_) {
         const Each x = at_corners(element_block, q);
         points.push_back(sum(element_block.b, x));
         moments.push_back(sum(element_block.alpha, x));
     }
+}
+
+FieldSamples MomentTerm::sample(const double* q, const LoadParameters& load_parameters, int order,
+                                std::vector<Vec3>& points, std::vector<Vec3>& moments) const {
+    add_moments(q, load_parameters, points, moments);
     FieldSamples samples = field_.sample(points, moments, order, load_parameters);
     for (Vec3& flux : samples.flux) flux += field_.uniform(load_parameters);
     return samples;

@@ -12,12 +12,12 @@
 #include <vector>
 
 #include "magshell/body/nodes.h"
+#include "magshell/terms/magnetic/applied_field_term.h"
 #include "magshell/terms/magnetic/total_applied_field.h"
-#include "magshell/terms/term.h"
 
 namespace magshell {
 
-class MomentTerm final : public Term {
+class MomentTerm final : public AppliedFieldTerm {
   public:
     struct Magnet {
         std::string owner;
@@ -36,6 +36,8 @@ class MomentTerm final : public Term {
                          SystemMatrix& out) const override;
     void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
              Gradient& out) override;
+    void add_moments(const double* q, const LoadParameters& load_parameters, std::vector<Vec3>& points,
+                     std::vector<Vec3>& moments) const override;
     std::size_t bytes() const override { return element_blocks_.size() * sizeof(ElementBlock); }
 
   private:
@@ -51,8 +53,8 @@ class MomentTerm final : public Term {
 
     static Each at_corners(const ElementBlock& element_block, const double* from);
     static Vec3 sum(const std::array<double, 4>& weights, const Each& of);
-    /// Returns the total field at the magnets, the uniform part included in `flux`, and computes the magnets'
-    /// points and moments at q.
+    /// Returns the total field at the magnets, the uniform part included in `flux`, and adds the magnets' points
+    /// and moments at q.
     FieldSamples sample(const double* q, const LoadParameters& load_parameters, int order,
                         std::vector<Vec3>& points, std::vector<Vec3>& moments) const;
 

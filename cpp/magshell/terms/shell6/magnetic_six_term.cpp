@@ -6,6 +6,7 @@
 #include "magshell/energy/magnetic.h"
 #include "magshell/energy/magnetic_rotating.h"
 #include "magshell/energy/magnetic_six.h"
+#include "magshell/terms/magnetic/applied_field_term.h"
 #include "magshell/terms/magnetic/field_groups.h"
 #include "magshell/terms/magnetic/total_applied_field.h"
 
@@ -13,7 +14,7 @@ namespace magshell {
 namespace {
 
 template <class Law>
-class MagneticSixTerm final : public Term {
+class MagneticSixTerm final : public AppliedFieldTerm {
   public:
     MagneticSixTerm(const SixNodeShell& sheet, Index body, const ColoredLoop& element_blocks,
                     const SystemMatrix& matrix, const FieldSources& sources, Registry& registry);
@@ -28,6 +29,8 @@ class MagneticSixTerm final : public Term {
                   bool, SystemMatrix& out) const override;
     void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
              Gradient& out) override;
+    void add_moments(const double* q, const LoadParameters& load_parameters, std::vector<Vec3>& places,
+                     std::vector<Vec3>& moments) const override;
     std::size_t bytes() const override;
 
   private:
@@ -249,6 +252,22 @@ void MagneticSixTerm<Law>::vjp(const double* q, const LoadParameters& load_param
         }
     });
     field_.add_vjp(places, probe, samples, load_parameters, out);
+}
+
+template <class Law>
+void MagneticSixTerm<Law>::add_moments(const double* q, const LoadParameters&, std::vector<Vec3>& places,
+                                       std::vector<Vec3>& moments) const {
+    std::vector<Vec3> at, magnetizations;
+    find_points(q, at, magnetizations);
+    places.insert(places.end(), at.begin(), at.end());
+    const std::size_t first = moments.size();
+    moments.resize(first + at.size());
+    for (Index group = 0; group < loop_.groups(); ++group)
+        for (int lane = 0; lane < loop_.lanes_in(group); ++lane)
+            for (int p = 0; p < points; ++p) {
+                const Index n = loop_.element(group, lane) * points + p;
+                moments[first + n] = elements_[group].at[p].volume[lane] * magnetizations[n];
+            }
 }
 
 template <class Law>

@@ -24,7 +24,7 @@ import numpy as np
 from ... import _core
 from ..._runtime.warning_stacklevel import callers_level
 from ...errors import FieldSamplingWarning
-from ..shells.deformed_magnetization import deformed_magnetization
+from ..shells.deformed_magnetization import deformed_magnetization, frames_of
 from ..solids.solid import Solid
 from .magnetization import magnetized_bodies
 
@@ -79,8 +79,9 @@ def _finer() -> _Rule:
 class _Faces(NamedTuple):
     """The magnetized three-node faces of one body in a state.
 
-    body: the Shell or Skin. label: of its values in the core. corners: (n, 3, 3) m. moments: (n, 3) A m2. thickness: (n,)
-    m. fine: (n,), which of them sample finely.
+    body: the Shell or Skin. label: of its values in the core. corners: (n, 3, 3) m. moments: (n, 3) A m2, the remanent ones.
+    thickness: (n,) m. fine: (n,), which of them sample finely. response: (n, 3, 3) A m2/T, the moments that a flux density
+    induces; zero without a susceptibility.
     """
 
     body: Any
@@ -89,6 +90,11 @@ class _Faces(NamedTuple):
     moments: np.ndarray
     thickness: np.ndarray
     fine: np.ndarray
+    response: np.ndarray
+
+    def moments_in(self, flux: np.ndarray) -> np.ndarray:
+        """Return the moments in flux densities (n, n_points, 3) T, of the same shape, A m2."""
+        return self.moments[:, None] + np.einsum("fij,fqj->fqi", self.response, flux)
 
     def points(self, rule: _Rule) -> np.ndarray:
         """Return the points of a rule, (n, n_points, 3) m."""
@@ -98,7 +104,7 @@ class _Faces(NamedTuple):
         return np.einsum("qk,fkd->fqd", rule.at, self.corners) + rule.heights[:, None] * across[:, None]
 
     def part(self, which: Any) -> _Faces:
-        arrays = (self.corners, self.moments, self.thickness, self.fine)
+        arrays = (self.corners, self.moments, self.thickness, self.fine, self.response)
         return _Faces(self.body, self.label, *(each[which] for each in arrays))
 
 
@@ -177,11 +183,12 @@ def sampling_errors(
     ]
     if not fields or field_factor == 0.0 or not np.isfinite(positions).all():
         return
-    sources = fields, [float(field_factor)] * len(fields)
+    uniform = np.zeros(3) if flux_density is None else np.asarray(flux_density, dtype=np.float64)
+    sources = _Sources(fields, [float(field_factor)] * len(fields), uniform)
     extent = values.scene._bodies.extent
     fine, finer = _fine(), _finer()
     for faces in _magnetized_faces(values, positions):
-        if not faces.moments.any():
+        if not (faces.moments.any() or faces.response.any()):
             continue
         taken, mean, flux = (np.empty_like(faces.moments) for _ in range(3))
         for part, taking, reference in (
@@ -192,7 +199,7 @@ def sampling_errors(
                 some = faces.part(chunk)
                 flux[chunk], taken[chunk] = _mean_forces(sources, some, taking)
                 mean[chunk] = _mean_forces(sources, some, reference)[1]
-        couples = np.cross(faces.moments, flux if flux_density is None else flux + flux_density)
+        couples = np.cross(faces.moments_in(flux[:, None])[:, 0], flux)
         off = taken - mean
         known = np.isfinite(off).all(axis=1)
         total = max(
@@ -207,19 +214,23 @@ def sampling_errors(
             yield SamplingError(faces.body, faces.label, error, off_by, faces.fine)
 
 
-def _mean_forces(sources, faces: _Faces, rule: _Rule | None) -> tuple[np.ndarray, np.ndarray]:
+class _Sources(NamedTuple):
+    """The fields of the core that vary in space, their factors, and the uniform flux density (3,) T."""
+
+    fields: list[Any]
+    factors: list[float]
+    uniform: np.ndarray
+
+
+def _mean_forces(sources: _Sources, faces: _Faces, rule: _Rule | None) -> tuple[np.ndarray, np.ndarray]:
     """Return the mean flux density B [T] and force [N] of faces by a rule; without one, at their barycenters."""
-    if rule is None:
-        return _forces(sources, faces.corners.mean(axis=1), faces.moments)
-    points = faces.points(rule)
-    flux, forces = _forces(sources, points.reshape(-1, 3), np.repeat(faces.moments, points.shape[1], axis=0))
-    return tuple(np.einsum("q,fqd->fd", rule.weights, each.reshape(points.shape)) for each in (flux, forces))
-
-
-def _forces(sources, points, moments) -> tuple[np.ndarray, np.ndarray]:
-    """Return the flux density B [T] at points (n, 3) and the forces [N] on magnetic moments [A m2] there."""
-    flux, gradient, _ = _core.sample_fields(*sources, points, np.zeros_like(points), 1)
-    return flux, np.einsum("nij,ni->nj", gradient, moments)
+    points = faces.corners.mean(axis=1)[:, None] if rule is None else faces.points(rule)
+    weights = np.ones(1) if rule is None else rule.weights
+    places = points.reshape(-1, 3)
+    flux, gradient, _ = _core.sample_fields(sources.fields, sources.factors, places, np.zeros_like(places), 1)
+    flux = flux.reshape(points.shape) + sources.uniform
+    forces = np.einsum("fqij,fqi->fqj", gradient.reshape(*points.shape, 3), faces.moments_in(flux))
+    return np.einsum("q,fqd->fd", weights, flux), np.einsum("q,fqd->fd", weights, forces)
 
 
 def _magnetized_faces(values, positions) -> Iterator[_Faces]:
@@ -239,7 +250,21 @@ def _magnetized_faces(values, positions) -> Iterator[_Faces]:
         turned = deformed_magnetization(rest, corners, magnetization, now.magnetization_law == "rotates")
         thickness = np.broadcast_to(now.thickness, (len(faces),))
         fine = scene._value_layout.of(values.numbers, label, KEY) != 0.0
-        yield _Faces(now, label, corners, (_areas(rest) * thickness)[:, None] * turned, thickness, fine)
+        volumes = _areas(rest) * thickness
+        chi = None if isinstance(body, Solid) else now.susceptibility
+        induced = 0.0 if chi is None else _response(corners, chi)
+        response = np.broadcast_to(induced * volumes[:, None, None], (len(faces), 3, 3))
+        yield _Faces(now, label, corners, volumes[:, None] * turned, thickness, fine, response)
+
+
+def _response(corners: np.ndarray, susceptibility: np.ndarray) -> np.ndarray:
+    """Return how the magnetization of thin faces follows the flux density, dM/dB (n, 3, 3) A/(m T)."""
+    normals = frames_of(corners)[:, :, 2]
+    along = susceptibility / _core.vacuum_permeability
+    across = susceptibility**2 / ((1.0 + susceptibility) * _core.vacuum_permeability)
+    return along[:, None, None] * np.eye(3) - across[:, None, None] * np.einsum(
+        "fi,fj->fij", normals, normals
+    )
 
 
 def _areas(corners: np.ndarray) -> np.ndarray:

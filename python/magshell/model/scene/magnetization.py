@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._input.tensors import is_tensor, require_torch
+from ..shells.shell import Shell
 from ..solids.solid import Solid
 
 if TYPE_CHECKING:
@@ -31,7 +32,8 @@ def check_given_once(scene: Scene, given: Any, replaced: dict[object, dict[Any, 
     if given is not None and replacing:
         raise ValueError("remanent_magnetization was given twice: as an argument and in values")
     for k, each, _ in magnetized_bodies(scene):
-        if given is None and _NAME not in replaced.get(each, {}) and each.remanent_magnetization is None:
+        own = each.remanent_magnetization is not None or _is_susceptible(each)
+        if given is None and _NAME not in replaced.get(each, {}) and not own:
             whose = f" of body {k}" if len(scene.bodies) > 1 else ""
             skin = "" if each is scene.bodies[k] else ", of its skin,"
             raise ValueError(f"the scene has a field, so remanent_magnetization{whose}{skin} [A/m] is needed")
@@ -101,6 +103,7 @@ def of_all_bodies(scene: Scene, replaced: dict[object, dict[Any, Any]]) -> Any:
         (replaced.get(body, {}).get(_NAME, body.remanent_magnetization), faces)
         for _, body, faces in magnetized_bodies(scene)
     ]
+    parts = [(np.zeros(3) if given is None else given, faces) for given, faces in parts]
     n_rows = scene._bodies.n_magnetized
     if not any(is_tensor(given) for given, _ in parts):
         rows = np.zeros((n_rows, 3))
@@ -113,6 +116,11 @@ def of_all_bodies(scene: Scene, replaced: dict[object, dict[Any, Any]]) -> Any:
         tensor = given if is_tensor(given) else torch.tensor(np.array(given, dtype=float))
         rows = rows.index_put((torch.from_numpy(faces),), tensor.to(rows).expand(len(faces), 3))
     return rows
+
+
+def _is_susceptible(body: Any) -> bool:
+    """Return whether a shell is magnetized by a field, so that it needs no remanent magnetization."""
+    return isinstance(body, Shell) and body.susceptibility is not None
 
 
 def magnetized_bodies(scene: Scene) -> Iterator[tuple[int, Any, np.ndarray]]:

@@ -93,6 +93,11 @@ def _require_flat_shell(number: int, body: Shell | Solid) -> None:
                 'charges would change with the stretch. Take magnetization_law="stretches", or name the other shells in '
                 "ms.OwnField(bodies=...)"
             )
+        if body.susceptibility is not None:
+            raise ValueError(
+                f"own_field does not support body {number}, which has a susceptibility: the magnetization that a field "
+                "induces in it makes no field here. Name the other shells in ms.OwnField(bodies=...)"
+            )
         return
     kind = "a Solid" if isinstance(body, Solid) else "a Shell of six-node faces"
     raise ValueError(

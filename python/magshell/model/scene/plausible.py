@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._runtime.warning_stacklevel import callers_level
-from ...errors import UnitWarning
+from ...errors import SusceptibilityWarning, UnitWarning
 from ..shells.shell import Shell
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ MOST_OF_EDGE = 100.0  # [-] thickness over the median edge
 YOUNG_MODULUS = (0.1, 1e13)  # Pa: the softest gels have 10, diamond 1.2e12
 MASS_DENSITY = (1e-7, 1e6)  # kg/m3: aerogel has 1, osmium 2.3e4; 1e-6 stands for zero under a RigidBody
 MOST_MAGNETIZATION = 1e8  # A/m: iron saturates at 1.7e6
+MOST_DEMAGNETIZATION = 0.1  # [-] susceptibility times thickness over extent: about the error of the magnetization
 MOST_FLUX_DENSITY = 30.0  # T: what moves soft robots has 0.1, the strongest magnets of hospitals 12
 
 
@@ -37,6 +38,7 @@ def warn_of_units(scene: Scene, values: Values) -> None:
         whose = f" of body {k}" if len(values.sheets) > 1 else ""
         if isinstance(body, Shell):
             _warn_of_thickness(scene, body, whose)
+            _warn_of_susceptibility(scene, body, whose)
         _warn_of_range(
             scene, "young_modulus", "Pa", _held(body, "young_modulus"), YOUNG_MODULUS, "kPa? MPa?", whose
         )
@@ -70,6 +72,22 @@ def _warn_of_thickness(scene: Scene, shell: Shell, whose: str) -> None:
             "thickness",
             f"thickness [m]{whose} is {thickest:g}, {thickest / edge:.3g} times the usual edge of the mesh, {edge:.3g} m",
             "mm? A mesh this fine is for a Solid",
+        )
+
+
+def _warn_of_susceptibility(scene: Scene, shell: Shell, whose: str) -> None:
+    kind = "susceptibility"
+    if shell.susceptibility is None or kind in scene._warned_of_units:
+        return
+    most = float((shell.susceptibility * shell.thickness).max()) / shell.mesh.size
+    if most > MOST_DEMAGNETIZATION:
+        scene._warned_of_units.add(kind)
+        warnings.warn(
+            f"susceptibility [1]{whose} times the thickness is {most:.2g} of the extent of the sheet: its magnetization is "
+            f"wrong by about as much, because the field that it makes in the sheet itself is neglected along the sheet "
+            "(docs/theory.md). A smaller susceptibility, a thinner or a larger sheet is what the model is for",
+            SusceptibilityWarning,
+            stacklevel=callers_level(),
         )
 
 

@@ -45,6 +45,8 @@ def without_rest_gradient(scene: Scene, bodies: Any) -> list[str]:
         found += [name for name in ("growth", "rest_curvature") if getattr(body, name) is not None]
         if scene.is_magnetic and body.magnetization_law != "stretches":
             found.append("a magnetization that rotates")
+        if body.susceptibility is not None:
+            found.append("a susceptibility")
         if scene._model.recut_faces and any(
             np.ptp(getattr(body, name)) > 0.0 for name in ("thickness", "young_modulus", "poisson_ratio")
         ):

@@ -381,6 +381,11 @@ class Scene(PlotMixin):
         return self.water is not None or has_friction
 
     @property
+    def has_susceptible_shells(self) -> bool:
+        """Return whether a shell has a susceptibility, so that forces are quadratic in the applied field."""
+        return any(sheet.susceptibility is not None for sheet in self._bodies.sheets)
+
+    @property
     def n_dofs(self) -> int:
         """The number of free degrees of freedom: position components and edge rotations."""
         return self._model.free_size
@@ -428,7 +433,8 @@ def _refuse_support(parts, held: np.ndarray) -> None:
 
 
 def _refuse_idle_magnetization(scene: Scene) -> None:
-    """Raise ValueError for a skin or a magnetized solid that has no effect because the scene has no field.
+    """Raise ValueError for a skin, a magnetized solid or a susceptible shell that has no effect because the scene has no
+    field.
 
     Without a field a skin still adds mass if it has a mass density.
     """
@@ -436,6 +442,10 @@ def _refuse_idle_magnetization(scene: Scene) -> None:
         return
     for k, body in enumerate(scene.bodies):
         if not isinstance(body, Solid):
+            if body.susceptibility is not None:
+                raise ValueError(
+                    f"body {k} has a susceptibility, but the scene has no applied field: Scene(..., field=...)"
+                )
             continue
         idle = body.skin is not None and (
             body.skin.mass_density is None or body.skin.remanent_magnetization is not None

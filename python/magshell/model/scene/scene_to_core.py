@@ -126,6 +126,7 @@ def _sheets(scene, directed_edges: np.ndarray) -> list[dict[Any, Any]]:
             "directors": shell.bending == "midedge",
             "magnetic": bool(scene.fields),
             "magnetization_rotates": shell.magnetization_law == "rotates",
+            "susceptible": shell.susceptibility is not None,
             "directed_edges": directed[k],
         }
         for k, (shell, span) in enumerate(zip(scene.bodies, scene._bodies.spans, strict=True))

@@ -141,6 +141,10 @@ class Shell(Owner):
         "rotates", R M of the polar decomposition F = R U: it turns with the face and keeps its magnitude, as experiments
         with sheets that are stretched show (docs/theory.md). Both are the same where a sheet bends without stretching. An
         OwnField needs "stretches".
+    susceptibility: chi of a film that an applied field magnetizes, M = chi H, above -1: as soft iron, or as an elastomer
+        filled with superparamagnetic grains, far from saturation. It is magnetized by chi B/mu0 along its plane and by
+        chi/(1 + chi) B/mu0 across it, as a thin plate is (docs/theory.md), in addition to its remanent_magnetization, which
+        need not be given then. For meshes of three-node faces. None: none, and no solve can change it.
     growth: the factor by which lengths in the faces have grown, so that they are free of stress: a positive number, or a
         symmetric tensor in world axes at rest, (3, 3) or one per face (n_f, 3, 3), of which the part in the face acts:
         np.eye(3) + 0.1 np.outer(d, d) grows by a tenth along d. A sheet that is stretched by s before it is fixed to others
@@ -181,11 +185,13 @@ class Shell(Owner):
         "mass_density",
         "curvature_scale",
         "remanent_magnetization",
+        "susceptibility",
         "growth",
         "rest_curvature",
         "rest_positions",
     )
     _in_time = ("growth", "rest_curvature")
+    _optional = ("susceptibility", *_in_time)  # without a value at construction no solve can give them one
 
     @grouped()
     def __init__(
@@ -200,6 +206,7 @@ class Shell(Owner):
         bending: str | None = None,
         remanent_magnetization: Numbers | None = None,
         magnetization_law: str = "stretches",
+        susceptibility: Numbers | None = None,
         growth: Numbers | None = None,
         rest_curvature: Numbers | None = None,
     ):
@@ -241,11 +248,14 @@ class Shell(Owner):
         )
 
         self.magnetization_law: str = checked_magnetization_law(magnetization_law)
+        self.susceptibility: np.ndarray | None = (
+            None if susceptibility is None else _susceptibility(susceptibility, mesh)
+        )
         self.growth, self.rest_curvature = (
             None if given is None else self._growth.checked(name, given)
             for name, given in (("growth", growth), ("rest_curvature", rest_curvature))
         )
-        absent = [name for name in type(self)._in_time if getattr(self, name) is None]
+        absent = [name for name in self._optional if getattr(self, name) is None]
         self._replaceable = tuple(name for name in self._replaceable if name not in absent)
         self._in_time = tuple(name for name in type(self)._in_time if name not in absent)
 
@@ -273,14 +283,17 @@ class Shell(Owner):
             numbers[label, name] = getattr(self, name)
         if self.remanent_magnetization is not None:  # else a solve gives it
             numbers[label, "remanent_magnetization"] = self.remanent_magnetization
+        if self.susceptibility is not None:
+            numbers[label, "susceptibility"] = self.susceptibility
 
     def _gradients(self, label: str, values: Values, gradient: Gradient) -> dict[str, np.ndarray]:
         """Return the gradients by its values, including those through the vertex masses and through the thickness in
         contacts.
         """
         found = {name: gradient.value(label, name) for name in self._stiffnesses}
-        if gradient.has(label, "remanent_magnetization"):
-            found["remanent_magnetization"] = gradient.value(label, "remanent_magnetization")
+        for name in ("remanent_magnetization", "susceptibility"):
+            if gradient.has(label, name):
+                found[name] = gradient.value(label, name)
         for contact, of_contact, sheets in values.contacts:
             if any(self is sheet for sheet in sheets):
                 found["thickness"] = found["thickness"] + contact._by_thickness(of_contact, sheets, gradient)
@@ -474,6 +487,17 @@ def _property(name: str, unit: str, value, rows: tuple[str, int]) -> np.ndarray:
 def _positive(name: str, unit: str, value, rows: tuple[str, int]) -> np.ndarray:
     array = _property(name, unit, value, rows)
     _refuse(f"{name} [{unit}]", "positive", array, array <= 0)
+    return array
+
+
+def _susceptibility(value, mesh: TriangleMesh | QuadraticTriangleMesh) -> np.ndarray:
+    if mesh.order == 2:
+        raise ValueError(
+            "susceptibility [1] is for meshes of three-node faces, and this one has six-node elements: take "
+            "mesh.first_order()"
+        )
+    array = _property("susceptibility", "1", value, ("n_f", mesh.n_elements))
+    _refuse("susceptibility [1]", "above -1", array, array <= -1)
     return array
 
 

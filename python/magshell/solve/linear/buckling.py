@@ -84,6 +84,9 @@ def linear_buckling(
     limit of small displacements before buckling: columns, plates loaded in their plane, closed shells. A shallow arch, which
     softens before it buckles, needs ms.follow_path. The stiffness of a field is included.
 
+    Forces on a susceptible shell are quadratic in the field: in a scene with one the factors multiply the field, u and dK
+    are by the square of the factor, and nothing but the field on such shells may load the scene.
+
     {keywords}
     values: as in ms.equilibrium.
 
@@ -100,10 +103,11 @@ def linear_buckling(
     and bodies in contact, since a contact bears in one direction only, so that a mode and its opposite have different
     factors. ms.follow_path follows opening and closing contacts.
 
-    Factors are differentiable, by perturbation of first order: by values and load parameters that are tensors, and by the
-    inputs of an equilibrium that was found with tensors, with the change of the equilibrium. A gradient costs two
-    factorizations and some hundreds of evaluations of the stiffness for each factor asked for. Factors that equal the next
-    one to 1e-6 have none, nor those of loads with which supports move: NoGradient says so. Modes are arrays.
+    Factors are differentiable but for those of susceptible shells, by perturbation of first order: by values and load
+    parameters that are tensors, and by the inputs of an equilibrium that was found with tensors, with the change of the
+    equilibrium. A gradient costs two factorizations and some hundreds of evaluations of the stiffness for each factor asked
+    for. Factors that equal the next one to 1e-6 have none, nor those of loads with which supports move: NoGradient says so.
+    Modes are arrays.
 
     Raises ValueError on bad input, about an equilibrium that is not stable or with its own load parameters; in a scene with
     contact of bodies, where the supports leave the sheet a motion without stiffness, where the load parameters do nothing,
@@ -132,6 +136,12 @@ def linear_buckling(
         raise ValueError(
             f"linear buckling multiplies the controls, and {acting[0]!r:.80} acts whatever they are: ms.follow_path has it"
         )
+    quadratic = scene.has_susceptible_shells
+    if quadratic and equilibrium is not None:
+        raise ValueError(
+            "the stiffness of a susceptible shell is quadratic in the field, and linear buckling about an equilibrium takes "
+            "it to be linear: ms.follow_path(..., start=) finds where it buckles"
+        )
     began = time.perf_counter()
     model = scene._model
     if modes >= model.free_size:
@@ -143,10 +153,14 @@ def linear_buckling(
         stiffness.factorize()
         response = stiffness.response(inputs)
         displacement = float(np.abs(model.points(response)).max())
-        change = _stiffness_change(scene, stiffness, response, displacement, inputs)
+        if quadratic:
+            _refuse_odd_loads(scene, stiffness, inputs)
+        change = _stiffness_change(scene, stiffness, response, displacement, inputs, quadratic)
     leaves = _leaves(inputs, equilibrium)
     asked = modes + bool(leaves and modes + 1 < model.free_size)  # whether the last one is simple
     factors, vectors = _lowest(stiffness, change, asked, _LARGEST_DISPLACEMENT * _size(scene), displacement)
+    if quadratic:
+        factors = np.sqrt(factors)
     shapes, edge_rotations = mode_shapes(model, vectors[:, :modes])
     return Buckling(
         scene=scene,
@@ -188,6 +202,9 @@ def _differentiable(
     with inputs.in_core():
         rate = model.prescribed_rate(at[2])
     further = layout.of(inputs.controls - at[2], "scene", "support_factor")
+    refusal = ""
+    if inputs.scene.has_susceptible_shells:
+        refusal = "no gradient of buckling factors with a susceptibility"
     moves = rate.any() and (further.any() or any(leaf.name == "support_factor" for leaf, _ in leaves))
     adjoint = BucklingAdjoint(
         Residual(inputs if about is None else about, *at),
@@ -198,7 +215,7 @@ def _differentiable(
         leaves,
         complete=len(factors) == modes,
         at_rest=equilibrium is None,
-        refusal="no gradient of buckling factors: supports move with the loads" if moves else "",
+        refusal="no gradient of buckling factors: supports move with the loads" if moves else refusal,
     )
     return solved(adjoint, (kept.copy(),), dtype_like(*given), adjoint.tensors)[0]
 
@@ -210,21 +227,51 @@ def _size(scene: Scene) -> float:
     return float(np.ptp(scene._model.points(scene._model.rest_state()), axis=0).max())
 
 
+def _refuse_odd_loads(scene: Scene, stiffness: Stiffness, inputs: Inputs) -> None:
+    """Raise ValueError unless forces and stiffness at rest are the same for reversed load parameters: those of a field on
+    susceptible shells are, to the last bit, and others are not.
+    """
+    model, state, controls = scene._model, stiffness.state, inputs.controls
+    moved = model.prescribed_rate(stiffness.controls).any()
+    same_forces = np.array_equal(model.gradient(state, controls), model.gradient(state, -controls))
+    if (
+        moved
+        or not same_forces
+        or not np.array_equal(*(model.hessian(state, c)[3] for c in (controls, -controls)))
+    ):
+        raise ValueError(
+            "the forces on a susceptible shell are quadratic in the field, and something else loads the scene (a remanent "
+            "magnetization, a load, a support that moves), which is linear: one factor cannot multiply both. ms.follow_path "
+            "finds where it buckles"
+        )
+
+
 def _stiffness_change(
-    scene: Scene, stiffness: Stiffness, response: np.ndarray, displacement: float, inputs: Inputs
+    scene: Scene,
+    stiffness: Stiffness,
+    response: np.ndarray,
+    displacement: float,
+    inputs: Inputs,
+    quadratic: bool,
 ) -> np.ndarray:
-    """Return the nonzeros of dK, in the pattern of K, for load parameters that go from those of K to those of the inputs."""
+    """Return the nonzeros of dK, in the pattern of K, for load parameters that go from those of K to those of the inputs.
+
+    quadratic: forces and stiffness are proportional to the square of the load parameters; dK is by that square.
+    """
     # Where nothing moves before buckling, K is linear in the controls and any step is exact.
     edges = scene.mesh.edge_lengths
     length = float(edges.mean()) if len(edges) else _size(scene)
     moves = displacement > _ROUND_OFF * length
     step = _PRE_LOAD * length / displacement if moves else 1.0
 
-    def values(t: float) -> np.ndarray:
-        controls = (1.0 - t) * stiffness.controls + t * inputs.controls
+    def values(t: float, of_controls: float) -> np.ndarray:
+        controls = (1.0 - of_controls) * stiffness.controls + of_controls * inputs.controls
         return scene._model.hessian(stiffness.state + t * response, controls)[3]
 
-    change = (values(step) - values(-step)) / (2.0 * step)
+    if quadratic:
+        change = (values(step, 0.0) - values(-step, 0.0)) / (2.0 * step) + values(0.0, 1.0) - values(0.0, 0.0)
+    else:
+        change = (values(step, step) - values(-step, -step)) / (2.0 * step)
     if not change.any():
         raise ValueError("the controls neither load the scene nor change its stiffness: nothing buckles")
     largest = np.abs(change).max()

@@ -26,6 +26,8 @@ from .solve_log import SolveLog, SolveStep
 
 if TYPE_CHECKING:
     from ..._input.kinds import Computed, Numbers
+    from ...model.fields.field import AppliedField
+    from ...model.rigid.rigid import RigidBody
     from ...model.shells.shell import Shell
     from ...model.solids.solid import Solid
 
@@ -162,12 +164,14 @@ class Equilibrium(SaveMixin, OfOneBody):
             held = self.scene._model.held_forces(self._state, self._angle_branches, self._controls)
         return reaction_in(self.scene, support, self._state, held.reshape(-1, 3))
 
-    def magnetic_force(self, body: Shell | Solid) -> np.ndarray:
-        """Return the magnetic force on a shell or solid, (3,) N, as ms.field_of(result).magnetic_force does."""
+    def magnetic_force(self, body: Shell | Solid | RigidBody | AppliedField) -> np.ndarray:
+        """Return the magnetic force on a body or on a magnet, (3,) N, as ms.field_of(result).magnetic_force does."""
         return MagneticState(self).magnetic_force(body)
 
-    def magnetic_torque(self, body: Shell | Solid, center: Numbers | None = None) -> np.ndarray:
-        """Return the torque of these forces about `center` (3,) m, by default the mean position of the body, (3,) N m."""
+    def magnetic_torque(
+        self, body: Shell | Solid | RigidBody | AppliedField, center: Numbers | None = None
+    ) -> np.ndarray:
+        """Return the torque of these forces about `center` (3,) m, by default that of the body, (3,) N m."""
         return MagneticState(self).magnetic_torque(body, center)
 
     def self_intersections(self) -> np.ndarray:

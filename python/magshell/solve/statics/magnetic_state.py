@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ... import _core
 from ..._input.quantity import quantity
 from ..._input.tensors import detached
 from ..._runtime.frozen import Frozen
@@ -14,11 +16,14 @@ from ...model.results.result_lookup import OfOneBody
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
+    from ...model.fields.field import AppliedField
+    from ...model.rigid.rigid import RigidBody
     from ...model.shells.shell import Shell
     from ...model.solids.solid import Solid
     from .equilibrium import Equilibrium
 
-_TERMS = ("magnetic", "moments", "own field")
+_APPLIED = ("magnetic", "induced magnetization", "moments")
+_TERMS = (*_APPLIED, "own field")
 
 
 def field_of(equilibrium: Equilibrium) -> MagneticState:
@@ -64,7 +69,7 @@ class MagneticState(Frozen):
 
     def own_flux_density(self, points: Numbers) -> np.ndarray:
         """Return the flux density of the magnetized shells at points (n, 3) m outside of them, (n, 3) T; zero without an
-        OwnField.
+        OwnField. The magnetization that a field induces in susceptible shells makes none here.
         """
         at, result = _points(points), self.equilibrium
         with result._values.in_core():
@@ -73,18 +78,32 @@ class MagneticState(Frozen):
     def applied_flux_density(self, points: Numbers) -> np.ndarray:
         """Return the flux density of the applied fields at points (n, 3) m, (n, 3) T; NaN where a field has no value."""
         at, result = _points(points), self.equilibrium
-        layout = result.scene._control_layout
-        factor = float(layout.of(result._controls, "scene", "field_factor")[0])
-        total = np.tile(layout.of(result._controls, "scene", "applied_flux_density")[0], (len(at), 1))
+        total = np.tile(self._uniform, (len(at), 1))
         for source in result.scene.fields:
             if not isinstance(source, UniformField):
-                total = total + factor * result._values.current(source).flux_density(at)
+                total = total + self._field_factor * result._values.current(source).flux_density(at)
         return total
 
-    def magnetic_force(self, body: Shell | Solid) -> np.ndarray:
-        """Return the magnetic force of the applied field and of the other bodies on a body, (3,) N.
+    @property
+    def _uniform(self) -> np.ndarray:
+        """The uniform applied flux density, (3,) T."""
+        result = self.equilibrium
+        return result.scene._control_layout.of(result._controls, "scene", "applied_flux_density")[0]
 
-        Raises ValueError for a body that is not among the scene's shells and solids.
+    @property
+    def _field_factor(self) -> float:
+        result = self.equilibrium
+        return float(result.scene._control_layout.of(result._controls, "scene", "field_factor")[0])
+
+    def magnetic_force(self, body: Shell | Solid | RigidBody | AppliedField) -> np.ndarray:
+        """Return the magnetic force on a body or on a magnet of the scene, (3,) N.
+
+        body: a Shell or Solid, on which the applied field and the other bodies of an OwnField act; a RigidBody or Link with
+            a magnetic_moment, on which the applied field acts; or a field of the scene that has sources, such as a
+            CuboidMagnet, a PlacedField or Dipoles: the force of all bodies on these, opposite to theirs on the bodies.
+            Magnets do not act on each other here.
+
+        Raises ValueError for what is not in the scene, for a RigidBody without a moment, and for a UniformField.
 
         >>> import magshell as ms
         >>> meshes = [
@@ -98,43 +117,103 @@ class MagneticState(Frozen):
         >>> bool(upper[2] < 0), bool(abs(upper + lower).max() < 1e-12 * abs(upper[2]))
         (True, True)
         """
-        return self._forces(body)[0].sum(axis=0)
+        return self._actions(body).forces.sum(axis=0)
 
-    def magnetic_torque(self, body: Shell | Solid, center: Numbers | None = None) -> np.ndarray:
+    def magnetic_torque(
+        self, body: Shell | Solid | RigidBody | AppliedField, center: Numbers | None = None
+    ) -> np.ndarray:
         """Return the torque of these forces about a point, (3,) N m.
 
-        center: (3,) m; None: the mean of the current positions of the body's vertices.
+        center: (3,) m; None: the mean of the current positions of the body's vertices, the center of a RigidBody's moment,
+            or the `center` of a field that has one.
         """
-        forces, positions = self._forces(body)
-        about = positions.mean(axis=0) if center is None else quantity("center", "m", center, (3,))
-        return np.cross(positions - about, forces).sum(axis=0)
+        on = self._actions(body)
+        about = on.center if center is None else quantity("center", "m", center, (3,))
+        if about is None:
+            raise ValueError(f"center is needed: {body!r:.60} has none of its own")
+        return (np.cross(on.points - about, on.forces) + on.couples).sum(axis=0)
 
     @property
     def energies(self) -> dict[str, float]:
-        """The magnetic energies, J: "applied" in the applied fields, "own" of each shell in its own field, "mutual" of the
-        shells in the fields of each other.
+        """The magnetic energies, J: "applied" in the applied fields, that of susceptible shells too, "own" of each shell in
+        its own field, "mutual" of the shells in the fields of each other.
         """
         result = self.equilibrium
         with result._values.in_core():
             own = float(sum(result.scene._model.own_energies(result._state)))
-        applied = sum(result.energies.get(name, 0.0) for name in _TERMS[:2])
+        applied = sum(result.energies.get(name, 0.0) for name in _APPLIED)
         return {"applied": applied, "own": own, "mutual": result.energies.get("own field", 0.0) - own}
 
-    def _forces(self, body) -> tuple[np.ndarray, np.ndarray]:
-        """Return the magnetic forces on the vertices of a body and their positions, (n_v, 3) each."""
+    def _actions(self, body: Any) -> _Actions:
+        scene = self.equilibrium.scene
+        if any(body is each for each in scene.bodies):
+            return self._on_body(body)
+        for k, part in enumerate(part for part in scene.rigid_parts if part.magnetic_moment is not None):
+            if part is body and scene.fields:
+                return self._on_moment(k)
+        if any(body is each for each in scene.fields) and not isinstance(body, UniformField):
+            return self._on_source(body)
+        raise ValueError(
+            "body must be a Shell or Solid of the scene, a RigidBody of it with a magnetic_moment in a field, or one of its "
+            f"fields with sources, got {body!r:.60}"
+        )
+
+    def _on_body(self, body: Shell | Solid) -> _Actions:
         result = self.equilibrium
         model, bodies = result.scene._model, result.scene._bodies
-        if not any(body is each for each in result.scene.bodies):
-            raise ValueError("body must be one of the shells and solids of the scene")
         rows = bodies.spans[bodies.number(body)].vertices
         with result._values.in_core():
             gradient = sum(model.term_gradient(name, result._state, result._controls) for name in _TERMS)
             of_vertices = model.positions(gradient)
-        return -of_vertices[rows], np.asarray(detached(result.positions))[rows]
+        positions = np.asarray(detached(result.positions))[rows]
+        return _Actions(positions, -of_vertices[rows], np.zeros(3), positions.mean(axis=0))
+
+    def _on_moment(self, number: int) -> _Actions:
+        """Return the force and couple on the moment of a rigid part, by its number among those with a moment."""
+        points, moments = (rows[number : number + 1] for rows in self._moments("moments"))
+        fields = [field for field in self.equilibrium.scene.fields if not isinstance(field, UniformField)]
+        forces, couples = self._on_moments(fields, points, moments)
+        return _Actions(points, forces, couples + np.cross(moments, self._uniform), points[0])
+
+    def _on_source(self, field: AppliedField) -> _Actions:
+        """Return the forces and couples of all bodies on the sources of a field: minus those of the field on them."""
+        points, moments = self._moments("")
+        forces, couples = self._on_moments([field], points, moments)
+        return _Actions(
+            points, -forces, -couples, getattr(self.equilibrium._values.current(field), "center", None)
+        )
+
+    def _on_moments(
+        self, fields: Iterable[AppliedField], points: np.ndarray, moments: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the forces (n, 3) N and couples (n, 3) N m of fields on magnetic moments at points."""
+        current = [self.equilibrium._values.current(field)._core for field in fields]
+        factors = [self._field_factor] * len(current)
+        flux, gradient, _ = _core.sample_fields(current, factors, points, np.zeros_like(points), 1)
+        return np.einsum("nij,ni->nj", gradient, moments), np.cross(moments, flux)
+
+    def _moments(self, term: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return the points (n, 3) m and magnetic moments (n, 3) A m2 that the applied field acts on; term: of the core, ""
+        for all.
+        """
+        result = self.equilibrium
+        with result._values.in_core():
+            return result.scene._model.magnetic_moments(term, result._state, result._controls)
 
     def __repr__(self) -> str:
         energies = ", ".join(f"{name} {value:.4g}" for name, value in self.energies.items())
         return f"MagneticState: energies {energies} J"
+
+
+class _Actions(NamedTuple):
+    """Forces (n, 3) N and couples (n, 3) N m, the latter one each or (3,), at points (n, 3) m, and the point (3,) m that
+    torques are about by default, or None.
+    """
+
+    points: np.ndarray
+    forces: np.ndarray
+    couples: np.ndarray
+    center: np.ndarray | None
 
 
 def _points(points: Numbers) -> np.ndarray:
