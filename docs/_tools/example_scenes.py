@@ -356,6 +356,21 @@ def identify() -> dict[str, Any]:
     )
 
 
+def relaxation_fit() -> dict[str, Any]:
+    from relaxation_fit import PULLED, Test
+
+    test = Test((8, 2, 2), np.array([1.0]))
+    pull = test.move(3e5, 0.1, 20.0).positions[test.ends <= PULLED]
+    return shown(
+        pull,
+        [(test.bar.mesh.faces, SOLID)],
+        (20, -62),
+        outlined=False,
+        held=8,
+        back=True,
+    )
+
+
 def shell_against_volume() -> dict[str, Any]:
     from _shell_against_volume.deformations import twisted
     from _shell_against_volume.energies import Plate
@@ -485,6 +500,7 @@ _COMPUTED: dict[str, tuple[str, Callable[[], dict[str, Any]]]] = {
     "pendulum_in_jelly": ("Two bones in jelly swing", pendulum_in_jelly),
     "folding": ("A strip coils up", folding),
     "identify": ("A sheet of uneven stiffness in three fields", identify),
+    "relaxation_fit": ("A bar of silicone is pulled and held", relaxation_fit),
     "shell_against_volume": ("A plate of tetrahedra is twisted", shell_against_volume),
     "pinched_cylinder": ("A pinched cylinder on small elements", pinched_cylinder),
 }
