@@ -278,3 +278,49 @@ def test_symmetry_planes_keep_the_new_vertices_of_their_edges():
     assert fitted.error == pytest.approx(exact.error, rel=0.1)
     with pytest.raises(ValueError, match="does not lie in SymmetryPlane"):
         ms.error_estimate(response, lambda bent: bent.displacements[corner, 0], project=lambda x: x + 1e-3)
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_results_with_tensors_have_the_estimate_of_those_with_arrays(dtype):
+    mesh = ms.meshes.rectangle(0.1, 0.02, cells=(8, 2))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
+    tip = height_at(mesh.vertices_at(x=0.1))
+    given = torch.tensor([3e4, 0.0, 0.0], dtype=dtype, requires_grad=True)
+    found, expected = (
+        ms.error_estimate(
+            ms.equilibrium(scene, remanent_magnetization=each, applied_flux_density=(0, 0, 2e-3)), tip
+        )
+        for each in (given, (3e4, 0, 0))
+    )
+    assert found.error == pytest.approx(expected.error, rel=1e-4)
+    assert np.allclose(found.by_face, expected.by_face, rtol=1e-2, atol=1e-3 * abs(expected.error))
+
+
+def test_rest_positions_of_a_solve_go_over_to_the_finer_mesh():
+    mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+    load = ms.EdgeLoad(mesh.edges_at(x=0.1), (0, 0, 0.01))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0)
+    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[load])
+    shorter = mesh.rest_positions * (0.5, 1.0, 1.0)
+    response = ms.linear_response(scene, values={sheet: {"rest_positions": shorter}})
+    found = ms.error_estimate(response, height_at(mesh.vertices_at(x=0.1)))
+    assert found.corrected == pytest.approx(0.005, rel=1e-3)  # p L^3 / (3 E I)
+
+
+def above_a_magnet(cells, order):
+    """Return a strip that a magnet below its end pulls down, and its tip."""
+    mesh = ms.meshes.rectangle(0.04, 0.01, cells, order=order)
+    sheet = ms.Shell(mesh, thickness=5e-4, young_modulus=1e7, remanent_magnetization=(0, 0, 2e4))
+    magnet = ms.CuboidMagnet(
+        (0.01, 0.01, 0.01), remanent_magnetization=(0, 0, 2e4), center=(0.04, 0.005, -0.015)
+    )
+    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=magnet)
+    return ms.equilibrium(scene), [mesh.nearest_vertex((0.04, 0.005, 0.0))]
+
+
+def test_estimate_of_a_strip_over_a_magnet_matches_a_finer_mesh():
+    rest, tip = above_a_magnet((8, 2), 1)
+    found = ms.error_estimate(rest, height_at(tip))
+    finest, same = above_a_magnet((32, 8), 2)
+    assert LEAST < effectivity(found, finest.positions[same, 2].mean()) < MOST

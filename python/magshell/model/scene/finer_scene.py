@@ -33,6 +33,7 @@ def refuse_what_stays(scene: Scene) -> None:
         "actuators": scene.actuators,
         "contacts": scene.contacts,
         "an OwnField": scene.own_field,
+        "water": scene.water,
         **{f"a {type(load).__name__}": [load] for load in scene.loads if type(load) not in _LOADS},
     }
     found = [name for name, some in has.items() if some]
@@ -74,7 +75,7 @@ def finer_scene(scene: Scene, values: Values, finer: Finer) -> Scene:
         loads=loads,
         field=[values.current(each) for each in scene.fields] or None,
         gravity=values.gravity,
-        allow_rigid_motions=True,
+        allow_rigid_motions=scene._allow_rigid_motions,
     )
     _check_planes(scene, supports, finer)
     return made

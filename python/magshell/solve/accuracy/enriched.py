@@ -92,6 +92,14 @@ def finer_solution(result: Equilibrium | LinearResponse, finer: tuple[FinerMesh,
     return solved(result, made, inputs, finer)
 
 
+def positions_of(result: Equilibrium | LinearResponse) -> np.ndarray:
+    """Return the positions of a result in double precision, whatever tensors it has, (n_v, 3) m."""
+    if isinstance(result, Equilibrium):
+        return np.asarray(result.scene._model.positions(result._state))
+    moved = np.asarray(detached(result.displacements), dtype=np.float64)
+    return result.scene.mesh.rest_positions + moved
+
+
 def load_parameters(result: Equilibrium | LinearResponse) -> dict[str, Any]:
     """Return the load parameters of a result as keywords of a solve."""
     layout, controls = result.scene._control_layout, result._controls
@@ -132,7 +140,7 @@ def equilibrium_on(result: Equilibrium, scene: Scene, finer: tuple[FinerMesh, ..
 
 def _prolonged(result: Equilibrium, scene: Scene, inputs: Inputs, finer: tuple[FinerMesh, ...]) -> np.ndarray:
     """Return all unknowns of a scene on finer meshes, deformed as the coarse ones, and in place where they are held."""
-    parts = zip(_by_body(result.scene, result.positions), finer, strict=True)
+    parts = zip(_by_body(result.scene, positions_of(result)), finer, strict=True)
     placed = np.concatenate([positions_on(each, x) for x, each in parts])
     with inputs.in_core():
         start = scene._model.state(placed, np.zeros(scene._bodies.n_rotations))
@@ -142,7 +150,10 @@ def _prolonged(result: Equilibrium, scene: Scene, inputs: Inputs, finer: tuple[F
 def _refuse_another(result: Equilibrium, scene: Scene, start: np.ndarray, solution: Solution) -> None:
     """Raise NotConverged if an equilibrium is far from where its search began."""
     places, before = scene._model.positions(solution.found.state), scene._model.positions(start)
-    moved, largest = np.abs(places - before).max(), np.abs(np.asarray(detached(result.displacements))).max()
+    moved, largest = (
+        np.abs(places - before).max(),
+        np.abs(positions_of(result) - result.scene.mesh.rest_positions).max(),
+    )
     if moved > _NEAR * largest:
         raise NotConverged(
             f"the finer mesh finds an equilibrium that is {moved:.3g} m away from this one, whose largest displacement is "
@@ -207,5 +218,5 @@ def _refuse_unsymmetric(one: float, other: float) -> None:
         )
 
 
-def _by_body(scene: Scene, rows: Any) -> list[np.ndarray]:
-    return [np.asarray(detached(rows))[span.vertices] for span in scene._bodies.spans]
+def _by_body(scene: Scene, rows: np.ndarray) -> list[np.ndarray]:
+    return [rows[span.vertices] for span in scene._bodies.spans]

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._input.scalars import flag
-from ..._input.tensors import detached
 from ..._runtime.frozen import immutable
 from ..._runtime.solver_entry_point import solve_entry
 from ...mesh.finer import FinerMesh, divided, second_order
@@ -20,7 +19,7 @@ from ...model.supports.supports import SymmetryPlane
 from ..linear.response import LinearResponse
 from ..statics.equilibrium import Equilibrium
 from .contributions import contributions, scaled_to
-from .enriched import FinerSolution, finer_solution
+from .enriched import FinerSolution, finer_solution, positions_of
 from .output_value import Output
 
 if TYPE_CHECKING:
@@ -122,7 +121,7 @@ def error_estimate(
     flag("by_face", by_face)
     of = Output(output, result.scene)
     solution, slope, scale = _solved(result, of, project)
-    positions = np.asarray(detached(result.positions))
+    positions = positions_of(result)
     value = of.value(positions)
     error = scale * (of.value(solution.positions) - value)
     parts, more = None, 0
@@ -163,7 +162,7 @@ def _solved(
     result: Equilibrium | LinearResponse, output: Output, project: Any
 ) -> tuple[FinerSolution, np.ndarray, float]:
     """Return the solution on the finer mesh, the derivative of the output, and the factor of the difference of outputs."""
-    positions = np.asarray(detached(result.positions))
+    positions = positions_of(result)
     slope = output.gradient(positions)
     kinds = {isinstance(body.mesh, QuadraticTriangleMesh) for body in result.scene.bodies}
     if len(kinds) > 1:

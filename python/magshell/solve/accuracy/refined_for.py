@@ -10,7 +10,6 @@ import numpy as np
 
 from ..._input.arrays import count
 from ..._input.scalars import positive
-from ..._input.tensors import detached
 from ..._runtime.frozen import immutable
 from ..._runtime.solver_entry_point import solve_entry
 from ...errors import NotConverged
@@ -18,7 +17,7 @@ from ...mesh.finer import bisected
 from ...model.scene.finer_scene import finer_scene, refuse_what_stays
 from ..linear.response import LinearResponse, linear_response
 from ..statics.equilibrium import Equilibrium
-from .enriched import equilibrium_on, load_parameters
+from .enriched import equilibrium_on, load_parameters, positions_of
 from .error_estimate import ErrorEstimate, check_result, error_estimate, planes_of
 from .output_value import Output, PositionsOfResult
 
@@ -178,7 +177,8 @@ def _on_first(output: Callable[[Any], Any], first: Scene) -> Callable[[Any], Any
 
 def _refuse_round_off(tolerance: float, output: Output, result: Equilibrium | LinearResponse) -> None:
     """Raise ValueError if a tolerance is below what solves and round-off determine of the output."""
-    positions, moved = (np.asarray(detached(each)) for each in (result.positions, result.displacements))
+    positions = positions_of(result)
+    moved = positions - result.scene.mesh.rest_positions
     slope = output.gradient(positions)
     of_solver, of_rounding = (float(np.abs(slope * each).sum()) for each in (moved, positions))
     least = _LEAST_TOLERANCE * of_solver + _ROUND_OFF * of_rounding
