@@ -25,6 +25,8 @@ SMALL = {
     "hexagram": "edges_per_side=6, n_vertices=280, iterations=25",
     "muscle_strip": "cells=(12, 2, 2), steps=40, time_step=2e-2",
     "folding": "cells=(21, 20), angles=(4, 5)",
+    "snapping_flaps": "step=0.5e-3",
+    "self_folding": "",
     "tendon_arm": "",
     "pendulum_in_jelly": "cells=6",
     "bistable_beam": "cells=(24, 4), meshes=((12, 2), (24, 4), (48, 8))",

@@ -1,0 +1,1 @@
+"""Parts of the examples snapping_flaps and self_folding."""
