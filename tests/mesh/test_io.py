@@ -225,7 +225,9 @@ def test_missing_files_and_unknown_endings(tmp_path):
         ValueError, match=r"cannot read 'sheet.step': the ending must be one of .obj, .ply, .inp, .stl"
     ):
         ms.read_mesh(tmp_path / "sheet.step")
-    with pytest.raises(ValueError, match=r"cannot write 'sheet.obj': the ending must be .vtu or .ply"):
+    with pytest.raises(
+        ValueError, match=r"cannot write 'sheet.obj': the ending must be one of .vtu, .msh, .ply"
+    ):
         ms.write_mesh(tmp_path / "sheet.obj", MESH)
 
 

@@ -97,6 +97,93 @@ def test_groups_are_written_to_vtu_and_read_back(tmp_path, mesh):
     assert list(ms.read_fields(tmp_path / "mesh.vtu").vertex) == ["u"]
 
 
+@pytest.mark.parametrize(
+    "mesh", [SHEET, ms.QuadraticTriangleMesh.from_triangles(SHEET), BLOCK, BLOCK.second_order()], ids=str
+)
+def test_groups_are_written_to_msh_and_read_back(tmp_path, mesh):
+    pytest.importorskip("meshio")
+    again = mesh.faces_in("FIXED" if isinstance(mesh, ms.TetMesh) else "LOADED")
+    named = mesh.with_groups({"a name with spaces": again, "TIPS": {"vertices": [0, 14]}})
+    named = named.with_groups({"BORDER": mesh.edges_at(y=0.0)})
+    ms.write_mesh(tmp_path / "mesh.msh", named)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        back = ms.read_mesh(tmp_path / "mesh.msh")
+    assert type(back) is type(mesh)
+    assert np.array_equal(back.rest_positions, mesh.rest_positions)
+    for name in named.groups:
+        for select in ("vertices_in", "edges_in", "faces_in"):
+            if name not in back.groups:  # a group of all volumes of a kind is a part
+                assert isinstance(mesh, ms.TetMesh) and list(named.groups[name]) == ["tetrahedra"]
+                continue
+            found, wanted = (getattr(each, select) for each in (back, named))
+            try:
+                expected = wanted(name)
+            except ValueError:
+                continue  # it has no members of this kind
+            assert np.array_equal(middles(back, select, found(name)), middles(named, select, expected))
+    if isinstance(mesh, ms.TetMesh):
+        assert np.array_equal(
+            sorted(back.tetrahedra[back.tetrahedra_in("HEAD")].tolist()),
+            sorted(named.tetrahedra[named.tetrahedra_in("HEAD")].tolist()),
+        )
+
+
+def middles(mesh, select, chosen):
+    """Return the middles of selected vertices, edges or faces, in an order that does not depend on their numbers."""
+    rows = {
+        "vertices_in": np.arange(mesh.n_vertices)[:, None],
+        "edges_in": mesh.edges,
+        "faces_in": mesh.faces,
+    }
+    found = mesh.rest_positions[rows[select][chosen]].mean(axis=1).round(12)
+    return found[np.lexsort(found.T)]
+
+
+def test_msh_is_read_by_gmsh_with_its_groups(tmp_path):
+    gmsh = pytest.importorskip("gmsh", exc_type=ImportError)
+    ms.write_mesh(tmp_path / "block.msh", BLOCK.second_order())
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.open(str(tmp_path / "block.msh"))
+        groups = {gmsh.model.getPhysicalName(*each): each for each in gmsh.model.getPhysicalGroups()}
+        nodes = {name: gmsh.model.mesh.getNodesForPhysicalGroup(*each)[1] for name, each in groups.items()}
+        quality = gmsh.model.mesh.getElementQualities(gmsh.model.mesh.getElementsByType(11)[0], "minDetJac")
+    finally:
+        gmsh.finalize()
+    dimensions = {name: dimension for name, (dimension, _) in groups.items()}
+    assert dimensions == {"RIM": 1, "FIXED": 2, "HEAD": 3, "": 3}  # the last one is of all other volumes
+    assert np.allclose(nodes["FIXED"].reshape(-1, 3)[:, 0], 0.0)
+    assert len(quality) == BLOCK.n_tetrahedra
+    assert quality.min() > 0.0  # the nodes are in gmsh's order
+
+
+def test_msh_refuses_what_it_cannot_hold(tmp_path):
+    with pytest.raises(ValueError, match="fields are not written to MSH"):
+        ms.write_mesh(tmp_path / "sheet.msh", SHEET, vertex_fields={"u": SHEET.rest_positions})
+    with pytest.raises(ValueError, match="no names with quotes"):
+        ms.write_mesh(tmp_path / "sheet.msh", SHEET.with_groups({'a "b"': SHEET.edges_at(x=0.0)}))
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_extruded_groups_gain_a_dimension(order):
+    solid = ms.meshes.extruded(SHEET, 0.01, layers=3, order=order)
+    assert np.array_equal(solid.faces_in("FIXED"), solid.faces_at(x=0.0))
+    assert np.array_equal(solid.tetrahedra_in("LOADED"), solid.tetrahedra_where(lambda p: p[:, 0] > 0.03))
+    x, y, _ = SHEET.rest_positions[14]
+    assert np.array_equal(solid.edges_in("TIP"), solid.edges_at(x=x, y=y))
+    assert len(solid.edges_in("TIP")) == 3
+
+
+def test_groups_of_a_surface_are_kept_where_it_is_filled():
+    pytest.importorskip("gmsh", exc_type=ImportError)
+    filled = ms.meshes.tetrahedralize(BLOCK.surface)
+    assert np.array_equal(filled.faces_in("FIXED"), filled.faces_at(x=0.0))
+    assert np.array_equal(filled.edges_in("RIM"), filled.edges_at(x=0.04, y=0.0))
+
+
 def test_ply_says_that_it_holds_no_groups_of_edges(tmp_path):
     with pytest.warns(ms.MeshGroupWarning, match="groups of edges: 'FIXED' are not in 'sheet.ply'"):
         ms.write_mesh(tmp_path / "sheet.ply", SHEET)

@@ -47,6 +47,7 @@ def write_checkpoint(path):
 
 WRITERS = {
     "mesh.vtu": write_vtu,
+    "mesh.msh": lambda path: ms.write_mesh(path, MESH),
     "mesh.ply": lambda path: ms.write_mesh(path, MESH),
     "page.html": lambda path: ms.write_page(MESH, path),
     "plot.png": lambda path: ms.plot(MESH, width=400, style=ms.Style(backend="matplotlib")).save(path),

@@ -19,7 +19,7 @@ def tetrahedralize(surface: TriangleMesh, size: float | None = None, order: int 
 
     Args:
         surface: a closed mesh of one or several pieces that do not cross; a piece inside another bounds a chamber. Its
-            normals point all outwards or all inwards. Its vertex v is vertex v of the result.
+            normals point all outwards or all inwards. Its vertex v is vertex v of the result, and its groups are kept.
         size: the target length of edges inside, m; by default it grows from the edges of the surface.
         order: 1 for four nodes; 2 for ten, with straight edges.
 
@@ -60,7 +60,7 @@ def tetrahedralize(surface: TriangleMesh, size: float | None = None, order: int 
     outwards = surface if _enclosed(surface) > 0 else surface.flipped()
     tetrahedra = _within(oriented(points, tetrahedra), outwards)
     used = np.union1d(np.arange(surface.n_vertices), tetrahedra)
-    mesh = TetMesh(points[used], np.searchsorted(used, tetrahedra))
+    mesh = TetMesh(points[used], np.searchsorted(used, tetrahedra))._with_members(surface._groups)
     return mesh.second_order() if order == 2 else mesh
 
 

@@ -25,6 +25,7 @@ _SAFE = "-_.+:/()[]"  # characters that every format can have in the name of a f
 _PHYSICAL = "gmsh:physical"
 _PHYSICAL_NAME = re.compile(rb'^\s*(\d+)\s+(\d+)\s+"(.*)"\s*$', re.MULTILINE)
 DIMENSIONS = {"vertex": 0, "line": 1, "line3": 1, "triangle": 2, "triangle6": 2, "tetra": 3, "tetra10": 3}
+NO_GROUP = "(no group)"  # the physical group of what belongs to none: meshio reads a file with groups only if all have one
 _UNNAMED = ("point", "curve", "surface")  # what gmsh calls entities of 0, 1 and 2 dimensions
 
 
@@ -93,6 +94,8 @@ def groups_of_meshio(content: Any, data: bytes, kind: str) -> Named:
             named.add(name, members_of_cells(*blocks[block], int(first[block]), rows))
 
     for dimension, tag, name in _physical_groups(content, data):
+        if name == NO_GROUP:
+            continue
         sets = content.cell_sets.get(name) if _known_to_meshio(content, name, dimension, tag) else None
         for k, (of, _) in enumerate(blocks):
             if DIMENSIONS.get(of) != dimension:

@@ -27,6 +27,7 @@ from ..triangles.triangle_mesh import TriangleMesh, checked_mesh
 from .file_counts import check_counts
 from .group_cells import side_group_fields, vertex_group_fields, with_group_cells
 from .inp import read_inp
+from .msh import check_names, write_msh
 from .named_groups import (
     Named,
     check_no_group_field,
@@ -50,7 +51,7 @@ _READABLE = (".obj", ".ply", ".inp", *_MESHIO_MODULES)
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "inch": 0.0254}  # m
 # [m] Sizes of a mesh beyond these limits are taken as a wrong unit of the file; test_sizes_of_a_wrong_unit_are_warned_of.
 _PLAUSIBLE_SIZES = (1e-5, 10.0)
-_WRITERS = (".vtu", ".ply")
+_WRITERS = (".vtu", ".msh", ".ply")
 _LOWER_CELLS = ("vertex", "line", "line3")  # gmsh writes them in addition to the surface
 _TRIANGLES = ("triangle", "triangle6")
 
@@ -140,15 +141,16 @@ def write_mesh(
     face_fields: Mapping[str, Numbers] | None = None,
     tetrahedron_fields: Mapping[str, Numbers] | None = None,
 ) -> None:
-    """Write a mesh and fields on it to a VTU file (needs the extra `io`) or, for three-node triangles, a binary PLY file.
+    """Write a mesh to a VTU file (needs the extra `io`), gmsh's MSH or, for three-node triangles, a binary PLY file.
 
     Args:
-        path: the file, which ends in .vtu or .ply.
+        path: the file, which ends in .vtu, .msh (format 4.1, in text, without fields) or .ply.
         mesh: the mesh to write. The parts of tetrahedra are written as the cell field `part`, without their names. Fields on
             the faces of a solid are written with the mesh's `surface`. The curved elements of a QuadraticTriangleMesh are
             written, and `face_fields` belong to them; fields on its flat faces are written with its `surface` as well.
             Named groups are written as fields of zeros and ones, `group:` and the name; a VTU file gets cells for edges
-            and for faces of a solid in groups, where other fields are NaN or -1. PLY has no groups of edges.
+            and for faces of a solid in groups, where other fields are NaN or -1. PLY has no groups of edges. An MSH file
+            has physical groups with these names, and with those of the parts.
         positions: (n_v, 3), m, the positions to write instead of the rest positions.
         vertex_fields: name -> (n_v,) or (n_v, k).
         face_fields: name -> (n_f,) or (n_f, k).
@@ -169,7 +171,9 @@ def write_mesh(
     ending = path.suffix.lower()
     if ending not in _WRITERS:
         other = "; write_surface writes .stl and .obj" if ending in (".stl", ".obj") else ""
-        raise ValueError(f"cannot write {path.name!r}: the ending must be {' or '.join(_WRITERS)}{other}")
+        raise ValueError(
+            f"cannot write {path.name!r}: the ending must be one of {', '.join(_WRITERS)}{other}"
+        )
     solid, six = isinstance(mesh, TetMesh), isinstance(mesh, QuadraticTriangleMesh)
     if not (solid or six or isinstance(mesh, TriangleMesh)) and hasattr(mesh, "surface"):
         raise ValueError(
@@ -182,6 +186,12 @@ def write_mesh(
     if positions is not None:
         points = quantity("positions", "m", detached(positions), (mesh.n_vertices, 3))
     _refuse_misplaced(solid, ending, face_fields, tetrahedron_fields)
+    if ending == ".msh":
+        if vertex_fields or face_fields or tetrahedron_fields:
+            raise ValueError("fields are not written to MSH: write .vtu")
+        check_names(mesh)
+        write_msh(path, mesh, points)
+        return
     on_vertices = _checked_fields("vertex", vertex_fields, mesh.n_vertices) | vertex_group_fields(mesh)
     if solid:
         on_cells = _checked_fields("tetrahedron", tetrahedron_fields, mesh.n_tetrahedra)
