@@ -26,7 +26,9 @@ class PositionsOfResult:
     """
 
     def __init__(self, scene: Scene, positions: Any, rest: Any):
-        self.scene, self.positions, self._rest = scene, positions, rest
+        self.scene: Scene = scene
+        self.positions: Any = positions
+        self._rest = rest
 
     @property
     def displacements(self) -> Any:
