@@ -117,6 +117,7 @@ def _scenes(s: Sample) -> Iterator[Call]:
         "mass_density": 1e3,
         "curvature_scale": np.full(n_e, 1.0),
         "bending": "midedge",
+        "susceptibility": np.full(n_f, 0.5),
     }
     yield Call("Shell", ms.Shell, material)
     moved = {"displacement": (0, 0, 1e-3), "rotation": (0.1, 0, 0), "center": (0, 0, 0)}

@@ -169,6 +169,20 @@ def test_path_through_the_critical_field_ends_at_the_equilibrium():
     np.testing.assert_allclose(last.positions, direct.positions, atol=1e-6 * LENGTH)
 
 
+def test_path_in_a_normal_field_branches_where_the_closed_form_says():
+    """Check the first branch of a path, and its derivative: the critical field is proportional to ACROSS^(-1/2)."""
+    torch = pytest.importorskip("torch")
+    shell = film(cells=(12, 2))
+    chi = torch.tensor(CHI, dtype=torch.float64, requires_grad=True)
+    values = {shell: {"susceptibility": chi}}
+    path = ms.follow_path(cantilever(shell), applied_flux_density=(0, 0, 1.5 * CRITICAL), values=values)
+    first = path.critical[0].parameter
+    assert 1.5 * first.item() == pytest.approx(1.0, rel=3e-3)
+    first.backward()
+    by_chi = -0.5 * first.item() * (1 - 1 / (1 + CHI) ** 2) / ACROSS
+    assert chi.grad.item() == pytest.approx(by_chi, rel=1e-9)
+
+
 def test_linear_response_about_an_equilibrium_is_the_rate_of_the_path():
     scene = cantilever(film(cells=(8, 2)))
     flux_density = 0.6 * CRITICAL * np.array([0.5, 0.0, 1.0])
