@@ -228,6 +228,14 @@ def test_directional_derivative_is_that_of_a_power(power, exact):
     assert found[0, 0] == pytest.approx(exact, rel=1e-11)
 
 
+@pytest.mark.parametrize("power, evaluations", [(1, 4), (2, 4), (3, 6), (4, 6), (5, 8)])
+def test_directional_derivative_of_a_low_power_takes_few_evaluations(power, evaluations):
+    calls = []
+    found = directional_derivative(lambda t: calls.append(t) or np.array([[(1.0 + t) ** power]]), [1 / 64])
+    assert found.item() == pytest.approx(power, rel=1e-12)
+    assert len(calls) == evaluations
+
+
 def test_directional_derivative_is_none_at_a_kink():
     assert directional_derivative(lambda t: np.array([[abs(t) ** 1.5 * (t > 0)]]), [0.1, 0.01, 1e-3]) is None
 

@@ -36,6 +36,11 @@ def directional_derivative(
             linear = stencil.slope(4)
             if stencil.difference(linear, stencil.slope(1)) <= _AGREE:
                 return linear
+            # Slopes of a cubic at m steps are a + b m^2, as those of forces by the thickness of a sheet.
+            growth = (linear - stencil.slope(1)) / 15
+            cubic = stencil.slope(1) - growth
+            if stencil.difference(cubic + 4 * growth, stencil.slope(2)) <= _AGREE:
+                return cubic
             eighth, sixth = stencil.weighted(EIGHTH), stencil.weighted(SIXTH)
         except ValueError:  # beyond the range of the value
             continue
