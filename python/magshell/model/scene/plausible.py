@@ -28,7 +28,9 @@ MOST_OF_EDGE = 100.0  # [-] thickness over the median edge
 YOUNG_MODULUS = (0.1, 1e13)  # Pa: the softest gels have 10, diamond 1.2e12
 MASS_DENSITY = (1e-7, 1e6)  # kg/m3: aerogel has 1, osmium 2.3e4; 1e-6 stands for zero under a RigidBody
 MOST_MAGNETIZATION = 1e8  # A/m: iron saturates at 1.7e6
-MOST_DEMAGNETIZATION = 0.1  # [-] susceptibility times thickness over extent: about the error of the magnetization
+MOST_DEMAGNETIZATION = (
+    0.1  # [-] susceptibility times thickness over extent: about the error of the magnetization
+)
 MOST_FLUX_DENSITY = 30.0  # T: what moves soft robots has 0.1, the strongest magnets of hospitals 12
 
 

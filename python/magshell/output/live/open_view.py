@@ -146,8 +146,10 @@ class _Coloring:
 def _checked(style: Style | None, view: Any, title: str, host: str, port: int, browser: bool) -> Style:
     style = style_of(style)
     flag("browser", browser)
-    if style.contacts:
-        raise ValueError("a live view does not show contacts: leave them out of its style; ms.plot does")
+    if style.contacts or style.ticks:
+        raise ValueError(
+            "a live view does not show contacts and ticks: leave them out of its style; ms.plot does"
+        )
     if isinstance(view, View) and view.frame is not None:
         raise ValueError("a live view shows all of it, and its reader zooms: leave the frame out of its view")
     for name, text in (("title", title), ("host", host)):

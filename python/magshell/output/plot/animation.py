@@ -33,6 +33,7 @@ from .playback import (
 )
 from .style import Color, Style, colored, style_of
 from .surfaces import on_surfaces, scalar_on_surfaces
+from .ticks import check_ticks
 from .view import View, view_of
 
 if TYPE_CHECKING:
@@ -117,7 +118,10 @@ def animate(
     states = on_surfaces(states)
     check_contacts(style, states)
     options = Options.of(style)
-    scenery = Scenery(states, scalar, view_of(states, view), unit, options)
+    seen = view_of(states, view)
+    if style.ticks:
+        check_ticks(seen)
+    scenery = Scenery(states, scalar, seen, unit, options)
     shown = moments(states, fps, speed)
 
     def drawing(moment: Moment) -> Drawing:

@@ -22,6 +22,7 @@ from .picture import Picture, paint
 from .playback import evenly_spaced
 from .style import Color, Style, colored, style_of
 from .surfaces import on_surfaces, scalar_on_surfaces
+from .ticks import check_ticks
 from .view import View, view_of
 
 if TYPE_CHECKING:
@@ -111,6 +112,8 @@ def plot(
     volumes, drawn = drawn, on_surfaces(drawn)
     seen = view_of(drawn, view)
     plane = checked_cut(cut, volumes, seen)
+    if style.ticks:
+        check_ticks(seen)
     sections = () if plane is None else tuple(section(state, plane) for state in volumes)
     groups = [drawn] if overlay or fade else [[state] for state in drawn]
     check_contacts(style, drawn)

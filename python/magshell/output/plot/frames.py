@@ -55,6 +55,7 @@ class Scenery:
         self.strongest: float = glyphs.largest(states)
         some = evenly_spaced(states, SAMPLES) if options.contacts else []
         self._strongest_contact = strongest_contact(some)
+        self._middle = np.concatenate([state.positions for state in states]).mean(axis=0)  # floors stay there
         self._points, self._full_length = self._surroundings(states)
         low, high = self._bounds(states)
         self._prepare_uniform_field(states, low, high)
@@ -66,12 +67,13 @@ class Scenery:
         if self.scalar is not None and values is not None:
             shades = colors.scale_colors(self.scalar.scale, values, self.scalar.limits)
         panel = Panel(title, sheet_solids(state, shades, self.view, self.size, self.options))
-        panel.solids += obstacle_solids([state], self.size)
+        panel.solids += obstacle_solids([state], self.size, self._middle, self.view.axes[2])
         panel.solids += self._magnetization(state)
         if self._strongest_contact:
             panel.solids.append(contact_solid(state, self._strongest_contact, self.size))
         self._add_fields(panel, state)
-        return Drawing([panel], self.view, self.unit, self.scalar, self._legend(), self._hold)
+        ticks = self.options.ticks
+        return Drawing([panel], self.view, self.unit, self.scalar, self._legend(), self._hold, ticks)
 
     def _legend(self) -> list[tuple[str, str]]:
         shown = [magnetization_key(self.strongest)] if self.options.arrows and self.strongest else []
@@ -97,7 +99,8 @@ class Scenery:
         ]
         points += [states[0].mesh.rest_positions] if self.options.rest else []
         points += [self._points] if len(self._points) else []
-        around = [each.positions for each in obstacle_solids(evenly_spaced(states, SAMPLES), self.size)]
+        some, eye = evenly_spaced(states, SAMPLES), self.view.axes[2]
+        around = [each.positions for each in obstacle_solids(some, self.size, self._middle, eye)]
         return box_of(*([self.view.project(each) for each in some] for some in (points, around)))
 
     def _prepare_uniform_field(self, states: list[State], low: np.ndarray, high: np.ndarray) -> None:

@@ -52,7 +52,7 @@ class Drawing:
     """A complete picture for layout and painting.
 
     arrows: the keys of arrows in the legend, (text, colour) each. hold: points (n, 3) m that the window must contain, in
-    addition to the solids.
+    addition to the solids. ticks: whether the window has ticks with coordinates.
     """
 
     panels: list[Panel]
@@ -61,6 +61,7 @@ class Drawing:
     scalar: Scalar | None
     arrows: list[tuple[str, str]]
     hold: np.ndarray | None = None
+    ticks: bool = False
 
     @property
     def window(self) -> np.ndarray:
@@ -92,12 +93,15 @@ class Options:
     cut: Cut | None = None
     sections: tuple[Section, ...] = ()  # one per state, if there is a cut
     contacts: bool = False  # contact forces as arrows
+    ticks: bool = False  # coordinates along the edges of the window
 
     @classmethod
     def of(cls, style: Style) -> Options:
         """Make the options from a caller's style."""
         count = arrow_count(style.arrows)
-        return cls(count, style.show_field, style.rest, style.mesh_lines, contacts=style.contacts)
+        return cls(
+            count, style.show_field, style.rest, style.mesh_lines, contacts=style.contacts, ticks=style.ticks
+        )
 
 
 def draw(
@@ -126,7 +130,7 @@ def draw(
                 solids += _section_solids(state, first + index, scalar, view, size, options)
                 solids = [each for each in solids if len(each.faces)]
             panel.solids += _pale(solids, paleness)
-        panel.solids += obstacle_solids(group, size)
+        panel.solids += obstacle_solids(group, size, eye=view.axes[2])
         if len(group) > 1:
             labels = _series_labels(group, titles, view)
             panel.labels += _apart(labels, view, 0.1 * size) if options.fade else labels
@@ -143,7 +147,7 @@ def draw(
     if options.field:
         _uniform_fields(panels, groups, view, size, options)
         legend += _sources(panels, groups, size)
-    return Drawing(panels, view, unit, scalar, legend)
+    return Drawing(panels, view, unit, scalar, legend, ticks=options.ticks)
 
 
 def size_of(states: list[State]) -> float:

@@ -19,6 +19,7 @@ from .legend import TEXT
 from .limits import check_pixels
 from .panels import Drawing, Label, Panel
 from .texts import Ruler
+from .ticks import write_ticks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -172,6 +173,8 @@ def paint_panel(
         vtk.paint(axes, panel, drawing.view, window, screen)
     else:
         polygons.paint(axes, panel, drawing.view)
+    if drawing.ticks:
+        write_ticks(axes, drawing, window)
     box = axes.get_window_extent()
     size = np.array([box.width, box.height]) / axes.figure.dpi
     if panel.title:

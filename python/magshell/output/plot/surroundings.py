@@ -6,22 +6,27 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...model.contact.obstacles import Obstacle, Plane
 from ..results.state import State
 from . import colors
-from .solids import Solid, sheet
+from .solids import Solid, ribbons, sheet
 
 OPACITY = 0.35
 REACH = 1.6  # [-] side of the square that represents a plane, over the size of the drawing
 LARGE = 2.0  # [-] size of an obstacle over that of the bodies, above which it is shown in part only
+EDGE_ON = 0.02  # [-] cosine of the angle between the normal of a plane and the eye, below which it is drawn as a line
+GROUND = 0.0045  # [-] width of the line of a plane over the size of the drawing
+HATCH = 0.03  # [-] distance of the strokes below it, likewise
 ROOM = 0.15  # [-] distance from the bodies up to which such an obstacle is shown, over their size
 
 
-def obstacle_solids(states: list[State], size: float, middle: np.ndarray | None = None) -> list[Solid]:
+def obstacle_solids(
+    states: list[State], size: float, middle: np.ndarray | None = None, eye: np.ndarray | None = None
+) -> list[Solid]:
     """Return the obstacles and magnets of states in one panel; those that do not move appear once.
 
     size: of the drawing, m. middle: (3,) m, the point around which the square of a plane lies; by default the mean position
-        of
-    each state.
+    of each state. eye: (3,), the direction of the eye; a plane seen edge-on is a hatched line then.
     """
     shown = {}
     for state in states:
@@ -30,6 +35,9 @@ def obstacle_solids(states: list[State], size: float, middle: np.ndarray | None 
             key = (id(obstacle), None if obstacle.motion is None else time)
             if key not in shown:
                 near = state.positions.mean(axis=0) if middle is None else middle
+                if eye is not None and (line := _ground_line(obstacle, time, near, size, eye)) is not None:
+                    shown[key] = line
+                    continue
                 vertices, faces = obstacle.surface(time, extent=REACH * size, around=near)
                 surface = sheet(vertices, faces, colors.rgb(colors.OBSTACLE))
                 shown[key] = replace(surface, opacity=OPACITY, around=True)
@@ -39,6 +47,33 @@ def obstacle_solids(states: list[State], size: float, middle: np.ndarray | None 
             surface = sheet(points, faces, colors.rgb(colors.MAGNET))
             shown.setdefault(key, replace(surface, around=True, smooth=False))  # blocks have sharp edges
     return list(shown.values())
+
+
+def _ground_line(
+    obstacle: Obstacle, time: float, near: np.ndarray, size: float, eye: np.ndarray
+) -> Solid | None:
+    """Return a plane that is seen edge-on as a line with strokes on its solid side; None for others."""
+    if not isinstance(obstacle, Plane):
+        return None
+    normal = obstacle.normals(near[None], time)[0]
+    if abs(normal @ eye) > EDGE_ON:
+        return None
+    along = np.cross(eye, normal)
+    along /= np.linalg.norm(along)
+    foot = near - obstacle.signed_distance(near[None], time)[0] * normal
+    half, step = 0.5 * REACH * size, HATCH * size
+    starts = foot + np.arange(-half + step, half, step)[:, None] * along
+    strokes = np.stack([starts, starts - 0.7 * step * (normal + along)], axis=1)
+    line = np.stack([foot - half * along, foot + half * along])[None]
+    thick = ribbons(line, eye, GROUND * size, colors.OBSTACLE, 0.0)
+    thin = ribbons(strokes, eye, 0.5 * GROUND * size, colors.OBSTACLE, 0.0)
+    return replace(
+        thick,
+        positions=np.concatenate([thick.positions, thin.positions]),
+        faces=np.concatenate([thick.faces, thin.faces + len(thick.positions)]),
+        colors=np.concatenate([thick.colors, thin.colors]),
+        around=True,
+    )
 
 
 def box_of(bodies: list[np.ndarray], around: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
