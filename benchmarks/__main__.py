@@ -51,6 +51,9 @@ PARTS = {
         "dynamics", "dynamics", "integrators: error, time, energy; gradients and memory of motions"
     ),
     "scaling": Part("scaling", "scaling", "time and memory from 2,000 to 500,000 faces, one and two threads"),
+    "topology": Part(
+        "topology", "topology", "an iteration of a topology, its mesh independence, void in large rotations"
+    ),
     "experiments": Part(
         "experiments",
         "experiments",

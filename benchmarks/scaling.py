@@ -153,7 +153,7 @@ def costs(faces: int, threads: int, bending: str, rounds: int) -> dict[str, Any]
 
     whole = clocked(solve, rounds=rounds)
     peak = peak_memory()
-    algebra, nonzeros = _linear_algebra(scene, found, rounds)
+    algebra, nonzeros = linear_algebra(scene, found, rounds)
     operations, metis = _orderings(scene, found)
     times = {
         "iteration": Clocked(*(seconds / found.factorizations for seconds in whole)),
@@ -191,7 +191,7 @@ def _gradient(scene: ms.Scene, inputs: dict[str, Any], found: ms.Equilibrium, ro
         return clocked(lambda: _core.pull_back(scene._model, kept, by_positions, by_rotations), rounds=rounds)
 
 
-def _linear_algebra(scene: ms.Scene, found: ms.Equilibrium, rounds: int) -> tuple[dict[str, Clocked], int]:
+def linear_algebra(scene: ms.Scene, found: ms.Equilibrium, rounds: int) -> tuple[dict[str, Clocked], int]:
     """Measure each step of an iteration separately, at the equilibrium; also returns the number of entries of L."""
     model, state, controls = scene._model, found._state, found._controls
     n, starts, rows, values = model.hessian(state, controls)

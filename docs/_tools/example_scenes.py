@@ -110,6 +110,28 @@ def snap_design() -> dict[str, Any]:
     return shown(states, [(beam.mesh.faces, SHEET)], (14, -70), held=4, back=True)
 
 
+def topology() -> dict[str, Any]:
+    import topology as example
+    import torch
+
+    arm = example.Arm((48, 24))
+    design = example.search(arm, iterations=12)
+    tensors = [torch.tensor(design[name]) for name in ("densities", "magnetization")]
+    states = [design["positions"][1]]  # without the field
+    with torch.no_grad():
+        for strength in np.linspace(0.0, 1.0, 20)[1:]:
+            arm.heights(
+                tensors[0],
+                strength * tensors[1],
+                torch.tensor(design["angle"]),
+                example.SHARPNESSES[-1],
+            )
+            states.append(np.asarray(arm.equilibria[0].positions))
+    size = np.linalg.norm(design["magnetization"][design["faces"]], axis=1)
+    colors = between("#3d4f9f", "#f2c14e", size / size.max())
+    return shown(states, [(design["mesh"].faces, colors)], (24, -60), held=6, back=True)
+
+
 def banner() -> dict[str, Any]:
     import banner
 
@@ -523,6 +545,7 @@ _COMPUTED: dict[str, tuple[str, Callable[[], dict[str, Any]]]] = {
     "bending_twisting": ("A strip follows a field that turns", bending_twisting),
     "bistable_in_time": ("The snap of the beam in slow motion", bistable_in_time),
     "snap_design": ("A beam snaps there and back at given fields", snap_design),
+    "topology": ("An arm of found topology lifts a load", topology),
     "reptile": ("A sheet with eight legs crawls", reptile),
     "beating_heart": ("A hollow heart beats", beating_heart),
     "muscle_strip": ("A strip with two muscles swims", muscle_strip),

@@ -33,6 +33,7 @@ SMALL = {
     "bending_twisting": "cells=(16, 2), bending_time=10.0, turning_time=5.0, undamped_time=0.3",
     "pneumatic_finger": "",
     "snap_design": "cells=(24, 4)",
+    "topology": "cells=(24, 12), iterations=8",
     "shell_against_volume": "cells=(32, 4), layers=(2, 6), angles=(1.0, 3.14159)",
     "pinched_cylinder": "((6, 6), (8, 8), (16, 16)), ((8, 8), (8, 8), (16, 16))",
 }

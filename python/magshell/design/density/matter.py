@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy
 
+from ..._input.arrays import number
 from ..._input.quantity import quantity
 from ..._input.tensors import detached, real_tensor, require_torch
 from ..._runtime.frozen import Frozen
@@ -142,7 +143,8 @@ class Matter(Frozen):
             raise ValueError(
                 f"values must have shape (n, ...), n = {len(self.faces)}, got {tuple(given.shape)}"
             )
-        whole = torch.full((self.original.n_faces, *given.shape[1:]), fill, dtype=given.dtype)
+        rest = number("fill", detached(fill))
+        whole = torch.full((self.original.n_faces, *given.shape[1:]), rest, dtype=given.dtype)
         whole = whole.index_copy(0, torch.tensor(self.faces), given)
         return whole if given is values else whole.numpy()
 
