@@ -324,3 +324,18 @@ def test_estimate_of_a_strip_over_a_magnet_matches_a_finer_mesh():
     found = ms.error_estimate(rest, height_at(tip))
     finest, same = above_a_magnet((32, 8), 2)
     assert LEAST < effectivity(found, finest.positions[same, 2].mean()) < MOST
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"project": "fit"}, "project must be a function"),
+        ({"project": lambda x: x[:1]}, "project"),
+        ({"project": lambda x: x * np.nan}, "project"),
+        ({"by_face": 1}, "by_face must be True or False"),
+    ],
+)
+def test_options_of_the_wrong_kind_are_refused(options, words):
+    rest, tip = cantilever()
+    with pytest.raises(ValueError, match=words):
+        ms.error_estimate(rest, height_at(tip), **options)

@@ -9,7 +9,6 @@ import scipy
 
 from ... import _core
 from ..adjoint.factorized import Factorized
-from ..linear.stiffness import symmetric
 
 if TYPE_CHECKING:
     from .enriched import FinerSolution
@@ -63,16 +62,19 @@ def scaled_to(parts: list[np.ndarray], total: float) -> list[np.ndarray]:
 def _relaxed(solution: FinerSolution, at_coarse: np.ndarray) -> np.ndarray:
     """Return a motion of all unknowns: as given at coarse vertices, (n, 3) m, and without forces on all others."""
     model = solution.scene._model
-    pattern = model.hessian(solution.state_of_stiffness, solution.controls)
-    matrix = symmetric(*pattern)
+    size, starts, rows, entries = model.hessian(solution.state_of_stiffness, solution.controls)
+    lower = scipy.sparse.csc_array((entries, rows, starts), shape=(size, size))
     motion = model.reduce(model.full_vector(solution.from_coarse(at_coarse)))
     marks = np.random.default_rng(0).uniform(1.0, 2.0, at_coarse.shape)
-    held = model.reduce(model.full_vector(solution.from_coarse(marks))) != 0.0
-    free = np.flatnonzero(~held)
-    inner = scipy.sparse.csc_array(scipy.sparse.tril(matrix[free][:, free]))
-    inner.sort_indices()
-    factor = Factorized(len(free), inner.indptr, inner.indices, inner.data, model.free_points[free])
-    motion[free] = factor.solve(-(matrix[free] @ motion))
+    free = model.reduce(model.full_vector(solution.from_coarse(marks))) == 0.0
+    pulled = lower @ motion + lower.T @ motion - lower.diagonal() * motion
+    columns = np.repeat(np.arange(size), np.diff(starts))
+    inner = free[rows] & free[columns]
+    numbers = np.cumsum(free) - 1
+    counts = np.bincount(numbers[columns[inner]], minlength=free.sum())
+    starts = np.concatenate([[0], np.cumsum(counts)])
+    factor = Factorized(len(counts), starts, numbers[rows[inner]], entries[inner], model.free_points[free])
+    motion[free] = factor.solve(-pulled[free])
     return model.expand(motion)
 
 
