@@ -108,7 +108,7 @@ def _in_scenes(s: Sample) -> Iterator[Call]:
         clamp = ms.Clamp(s.mesh.edges_at(x=0.0))
         return ms.Scene(s.shell, supports=clamp, own_field=ms.OwnField(**a))
 
-    yield Call("OwnField", with_own_field, {"bodies": s.shell, "max_points": 100})
+    yield Call("OwnField", with_own_field, {"bodies": s.shell, "accuracy": 1e-6, "max_points": 100})
     table = (np.linspace(0.0, np.pi / 2, 4), np.arange(4.0))
     flow = {
         "fluid_density": 1e3,

@@ -11,12 +11,19 @@ SHIFT = (4e-3, 3e-3, 0.012)  # [m] of the upper sheet: no edge lies above anothe
 
 
 def own_field(moves: bool) -> Kind:
-    """Build two sheets above each other: obliquely magnetized at rest, in a uniform field too, or tangentially in motion."""
+    """Build two sheets above each other, of both laws: oblique at rest, in a uniform field too, or tangential in motion."""
     rng = np.random.default_rng(11)
     meshes = [MESH, MESH.transformed(translation=SHIFT)]
     sheets = [
-        ms.Shell(each, thickness=thickness, young_modulus=3e6, poisson_ratio=0.3, mass_density=1e3)
-        for each, thickness in zip(meshes, (1e-3, 1.2e-3), strict=True)
+        ms.Shell(
+            each,
+            thickness=thickness,
+            young_modulus=3e6,
+            poisson_ratio=0.3,
+            mass_density=1e3,
+            magnetization_law=law,
+        )
+        for each, thickness, law in zip(meshes, (1e-3, 1.2e-3), ("stretches", "rotates"), strict=True)
     ]
     supports = [
         ms.Clamp(mesh.edges_at(x=mesh.rest_positions[:, 0].min()), body=sheet)

@@ -62,6 +62,13 @@ OwnField::OwnField(Faces faces) {
             face.conormals[i] = along.cross(face.normal);
             face.size = std::max(face.size, along.norm());
         }
+        face.rotates = faces.rotates[f];
+        face.basis = {(x[1] - x[0]).normalized(), face.normal.cross((x[1] - x[0]).normalized())};
+        const double first[2] = {(x[1] - x[0]).dot(face.basis[0]), 0.0};
+        const double second[2] = {(x[2] - x[0]).dot(face.basis[0]), (x[2] - x[0]).dot(face.basis[1])};
+        face.inverse = {1.0 / first[0], -second[0] / (first[0] * second[1]), 0.0, 1.0 / second[1]};
+        for (int i = 0; i < 3; ++i)
+            for (int c = 0; c < 2; ++c) face.in_plane[i][c] = face.conormals[i].dot(face.basis[c]);
     }
     for (const HalfEdge& half : sorted_half_edges(corners, static_cast<Index>(nodes_.size()))) {
         const std::array<Index, 2> ends{half.low, half.high};
@@ -93,6 +100,7 @@ void OwnField::set(const std::vector<Vec3>& magnetization, const std::vector<dou
     rest_currents_.assign(n_faces, 0.0);
     side_charges_.assign(n_faces, 0.0);
     edge_charges_.assign(n_edges, 0.0);
+    has_charge_.assign(n_edges, false);
     edge_thickness_.assign(n_edges, 0.0);
     std::vector<double> largest(n_edges, 0.0);
     for (Index f = 0; f < n_faces; ++f) {
@@ -104,6 +112,9 @@ void OwnField::set(const std::vector<Vec3>& magnetization, const std::vector<dou
             side_charges_[f] = face.area * along;
         }
         for (int i = 0; i < 3; ++i) {
+            const double tangential = (m - along * face.normal).norm();
+            if (face.rotates && tangential > round_off * m.norm()) has_charge_[face.edges[i]] = true;
+            if (face.rotates) continue;
             edge_charges_[face.edges[i]] += thickness[f] * m.dot(face.conormals[i]);
             largest[face.edges[i]] =
                 std::max(largest[face.edges[i]], thickness[f] * m.norm() * face.conormals[i].norm());
@@ -114,13 +125,13 @@ void OwnField::set(const std::vector<Vec3>& magnetization, const std::vector<dou
         const std::array<Index, 2>& at = edges_[e].faces;
         edge_thickness_[e] = at[1] < 0 ? thickness[at[0]] : 0.5 * (thickness[at[0]] + thickness[at[1]]);
         if (std::abs(edge_charges_[e]) <= round_off * largest[e]) edge_charges_[e] = 0.0;
-        has_charges_ |= edge_charges_[e] != 0.0;
+        if (edge_charges_[e] != 0.0) has_charge_[e] = true;
+        has_charges_ |= has_charge_[e];
     }
     active_faces_ = partition_numbers(n_faces, face_order_, [&](Index f) { return side_charges_[f] != 0.0; });
     active_edges_ = partition_numbers(n_edges, edge_order_, [&](Index e) {
         const std::array<Index, 2>& at = edges_[e].faces;
-        return edge_charges_[e] != 0.0 || side_charges_[at[0]] != 0.0 ||
-               (at[1] >= 0 && side_charges_[at[1]] != 0.0);
+        return has_charge_[e] || side_charges_[at[0]] != 0.0 || (at[1] >= 0 && side_charges_[at[1]] != 0.0);
     });
 }
 
@@ -146,19 +157,21 @@ OwnField OwnField::of_sources() const {
     part.faces_ = selected(faces_, faces);
     for (Face& face : part.faces_) {
         for (Index& node : face.nodes) node = node_numbers[node];
-        face.edges.fill(-1);
+        for (Index& edge : face.edges) edge = edge_numbers[edge];
     }
     for (Index k = 0; k < active_edges_; ++k) part.edge_order_.push_back(edge_numbers[edge_order_[k]]);
     for (Index k = 0; k < active_faces_; ++k) part.face_order_.push_back(face_numbers[face_order_[k]]);
     part.active_edges_ = active_edges_;
     part.active_faces_ = active_faces_;
     part.edge_charges_ = selected(edge_charges_, edges);
+    part.has_charge_ = selected(has_charge_, edges);
     part.edge_thickness_ = selected(edge_thickness_, edges);
     part.thickness_ = selected(thickness_, faces);
     part.rest_currents_ = selected(rest_currents_, faces);
     part.magnetization_ = selected(magnetization_, faces);
     part.side_charges_ = selected(side_charges_, faces);
     part.has_charges_ = has_charges_;
+    part.accuracy_ = accuracy_;
     return part;
 }
 

@@ -3,6 +3,7 @@
 // With a magnetization M~ that is constant on each face and carried along by the deformation (F M~), the sources lie on the edges:
 //
 //   tangential  charge Q_e = sum over faces f at e of h_f l~_e (M~_f . nu~_fe),  nu~ the outward conormal at rest; a constant of the motion
+//               a face whose magnetization rotates without stretching, R M~, has U^-1 M~ instead of M~ (energy/unstretched_vector.h)
 //   normal      current I_e = I_left - I_right along e,  I_f = h_f (M~_f . n~_f) A~_f / A_f; and charges +-A~_f (M~_f . n~_f) on the two
 //               sides of f, which only charges Q_e feel
 //
@@ -19,6 +20,7 @@
 
 #include <array>
 #include <cstddef>
+#include <memory>
 #include <vector>
 
 #include "magshell/core/dual.h"
@@ -28,20 +30,25 @@ namespace magshell {
 
 class OwnField {
   public:
-    /// The faces of all sheets: their nodes and their corners at rest [m].
+    /// The faces of all sheets: their nodes, their corners at rest [m], and whether their tangential magnetization rotates without stretching.
     struct Faces {
         std::vector<std::array<Index, 3>> nodes;
         std::vector<std::array<Vec3, 3>> rest;
+        std::vector<bool> rotates;
     };
     /// The gradient by the values of each face.
     struct FaceGradient {
         std::vector<Vec3> magnetization;  // [J m/A]
         std::vector<double> thickness;    // [J/m]
     };
-    /// Pairs that are near: for each target edge its source edges, and the pairs (edge, face) with charged sides.
+    /// Trees of the source points, and the pairs of boxes whose sums they replace.
+    struct Trees;
+    /// Pairs that are near: for each target edge its source edges, and the pairs (edge, face) with charged sides. Trees if the sums are
+    /// not direct.
     struct Neighbours {
         std::vector<std::vector<Index>> edges;
         std::vector<std::array<Index, 2>> sides;
+        std::shared_ptr<const Trees> trees;
     };
 
     /// Throws InvalidInput if more than two faces meet at an edge.
@@ -49,6 +56,11 @@ class OwnField {
 
     /// Sets the remanent magnetization [A/m] and the thickness [m] of each face.
     void set(const std::vector<Vec3>& magnetization, const std::vector<double>& thickness);
+    /// Sets the accuracy of sums over more than most_direct points; 0: they are direct.
+    void set_accuracy(double accuracy) { accuracy_ = accuracy; }
+    double accuracy() const { return accuracy_; }
+    static constexpr Index most_direct =
+        16000;  // trees take less time beyond; see benchmarks/own_field_costs.py
     /// Returns the number of source points: four per edge with a source, six per face with a normal magnetization if there are charges.
     Index n_points() const { return 4 * active_edges_ + (has_charges_ ? 6 * active_faces_ : 0); }
 
@@ -86,7 +98,11 @@ class OwnField {
         Vec3 normal;                    // at rest
         std::array<Vec3, 3>
             conormals;  // at rest, outward, times the length of the edge opposite each corner [m]
-        std::array<Index, 3> edges;  // opposite each corner; not in of_sources()
+        std::array<Index, 3> edges;  // opposite each corner; -1: left out
+        bool rotates = false;
+        std::array<Vec3, 2> basis;                        // of the plane at rest
+        std::array<double, 4> inverse;                    // of the edges at rest in the basis; by rows
+        std::array<std::array<double, 2>, 3> in_plane{};  // the conormals in the basis
     };
     template <class T>
     struct EdgeAdjoint {
@@ -126,8 +142,14 @@ class OwnField {
     Index target_faces(Targets at) const {
         return at == Targets::all ? static_cast<Index>(faces_.size()) : active_faces_;
     }
+    /// Returns h M~ in the basis of the plane [A].
+    std::array<double, 2> tangential(std::size_t f) const {
+        const Vec3 m = thickness_[f] * magnetization_[f];
+        return {m.dot(faces_[f].basis[0]), m.dot(faces_[f].basis[1])};
+    }
     bool has_sides(Targets at) const { return at == Targets::all || (has_charges_ && active_faces_ > 0); }
     Neighbours neighbours(const double* q, Targets targets) const;
+    std::shared_ptr<const Trees> trees(const std::vector<Triple<double>>& x, Targets targets) const;
     template <class T>
     std::vector<Triple<T>> positions(const double* q, const double* rate) const;
     template <class T>
@@ -149,13 +171,15 @@ class OwnField {
     std::vector<Index> edge_order_, face_order_;  // those with a source first
     Index active_edges_ = 0;                      // number of edges with a source
     Index active_faces_ = 0;                      // number of faces with a normal magnetization
-    std::vector<double> edge_charges_;            // Q_e [A m]
+    std::vector<double> edge_charges_;            // Q_e [A m] of faces whose magnetization stretches
+    std::vector<bool> has_charge_;                // of edges
     std::vector<double> edge_thickness_;          // [m]
     std::vector<double> thickness_;               // of faces [m]
     std::vector<double> rest_currents_;           // h_f (M~_f . n~_f) [A]
     std::vector<Vec3> magnetization_;
     std::vector<double> side_charges_;  // A~_f (M~_f . n~_f) [A m]
     bool has_charges_ = false;
+    double accuracy_ = 0.0;  // [-]
 };
 
 }  // namespace magshell

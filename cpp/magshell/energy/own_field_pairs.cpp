@@ -9,8 +9,6 @@ namespace magshell {
 namespace {
 
 constexpr std::size_t width = SimdDouble::width;
-constexpr double far_away =
-    1e30;  // [m] place of sources without strength, so that their distance is not zero
 
 SimdDouble load(const std::vector<double>& numbers, std::size_t first) {
     SimdDouble out;
@@ -70,17 +68,15 @@ void SourceArrays::resize(std::size_t count, bool has_currents, bool has_rates) 
     const std::size_t padded = (count + width - 1) / width * width;
     for (int k = 0; k < components; ++k) {
         values_[k].assign(k < 4 || has_currents ? padded : 0, k < 3 ? far_away : 0.0);
-        rates_[k].assign(has_rates && k != 3 && (k < 4 || has_currents) ? padded : 0, 0.0);
+        rates_[k].assign(has_rates && (k < 4 || has_currents) ? padded : 0, 0.0);
     }
 }
 
 template <class T>
 void SourceArrays::set(std::size_t k, const SourcePoint<T>& point) {
-    const T* numbers[components] = {&point.at.x,      &point.at.y,      &point.at.z,     nullptr,
+    const T* numbers[components] = {&point.at.x,      &point.at.y,      &point.at.z,     &point.charge,
                                     &point.current.x, &point.current.y, &point.current.z};
-    values_[3][k] = point.charge;
-    for (int c = 0; c < components; ++c) {
-        if (c == 3 || (c > 3 && !has_currents_)) continue;
+    for (int c = 0; c < (has_currents_ ? components : 4); ++c) {
         values_[c][k] = value_of(*numbers[c]);
         if (!rates_[c].empty()) rates_[c][k] = rate_of(*numbers[c]);
     }
@@ -105,7 +101,7 @@ void SourceArrays::add(const SourcePoint<double>& point, std::size_t first, std:
     each_vector(first, last, skip, skip_end, [&](std::size_t k, bool partial, const SimdDouble& mask) {
         SimdVec3 d = at - load(values_, k);
         if (partial) d = moved(d, mask);
-        SimdDouble inverse = SimdDouble(1.0) / sqrt(squared_norm(d));
+        SimdDouble inverse = inverse_root(squared_norm(d));
         if (partial) inverse *= mask;
         const SimdDouble q = load(values_[3], k);
         charges += q * inverse;
@@ -129,7 +125,7 @@ void SourceArrays::add(const SourcePoint<Dual>& point, std::size_t first, std::s
     const SimdVec3 at = broadcast(values_of(point.at)), at_rate = broadcast(rates_of(point.at)),
                    current = broadcast(values_of(point.current)),
                    current_rate = broadcast(rates_of(point.current));
-    const SimdDouble charge(point.charge), zero(0.0), three(3.0);
+    const SimdDouble charge(point.charge.value), charge_rate(point.charge.rate), zero(0.0), three(3.0);
     const SimdVec3 none{zero, zero, zero};
     SimdDouble charges = zero, charges_rate = zero;
     SimdVec3 currents = none, currents_rate = none, pull = none, pull_rate = none;
@@ -137,13 +133,13 @@ void SourceArrays::add(const SourcePoint<Dual>& point, std::size_t first, std::s
         SimdVec3 d = at - load(values_, k);
         if (partial) d = moved(d, mask);
         const SimdVec3 d_rate = at_rate - load(rates_, k);
-        SimdDouble inverse = SimdDouble(1.0) / sqrt(squared_norm(d));
+        SimdDouble inverse = inverse_root(squared_norm(d));
         if (partial) inverse *= mask;
         const SimdDouble growth = dot(d, d_rate) * inverse * inverse;  // r' / r
-        const SimdDouble q = load(values_[3], k);
+        const SimdDouble q = load(values_[3], k), q_rate = load(rates_[3], k);
         charges += q * inverse;
-        charges_rate -= q * growth * inverse;
-        SimdDouble strength = charge * q, strength_rate = zero;
+        charges_rate += (q_rate - q * growth) * inverse;
+        SimdDouble strength = charge * q, strength_rate = charge_rate * q + charge * q_rate;
         if constexpr (has_currents) {
             const SimdVec3 c = load(values_ + 4, k), c_rate = load(rates_ + 4, k);
             currents += inverse * c;

@@ -115,6 +115,7 @@ struct ClosureInput {
 struct OwnFieldInput {
     std::vector<Index> shells;
     Index max_points = 0;
+    double accuracy = 0.0;  // [-] of sums over many points; 0: they are direct
 };
 
 /// The whole scene. Nodes of supports count the vertices first, then directions.

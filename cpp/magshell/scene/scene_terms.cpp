@@ -240,10 +240,12 @@ void Builder::add_magnetic_terms(const SceneInput& input) {
 }
 
 void Builder::add_own_field(const SceneInput& input) {
-    std::vector<const Surface*> surfaces;
-    for (const Index shell : input.own_field.shells) surfaces.push_back(bodies_.faces()[shell].surface);
-    std::unique_ptr<OwnFieldTerm> term = std::make_unique<OwnFieldTerm>(
-        std::move(surfaces), input.own_field.max_points, bodies_.nodes().n_dofs(), registry_);
+    std::vector<OwnFieldTerm::Sheet> sheets;
+    for (const Index shell : input.own_field.shells)
+        sheets.push_back({bodies_.faces()[shell].surface, input.shells[shell].magnetization_law});
+    std::unique_ptr<OwnFieldTerm> term =
+        std::make_unique<OwnFieldTerm>(std::move(sheets), input.own_field.max_points,
+                                       input.own_field.accuracy, bodies_.nodes().n_dofs(), registry_);
     out_.own_field = term.get();
     out_.operators.push_back(term.get());
     out_.energies.push_back(std::move(term));

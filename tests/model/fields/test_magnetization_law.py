@@ -95,12 +95,6 @@ def test_unknown_laws_are_refused(law):
             build({"magnetization_law": law})
 
 
-def test_an_own_field_refuses_a_magnetization_that_rotates():
-    strip = three_node_strip({"magnetization_law": "rotates"})
-    with pytest.raises(ValueError, match="own_field does not support body 0, whose magnetization_law"):
-        ms.Scene(strip, supports=[ms.Clamp(strip.mesh.edges_at(x=0.0))], own_field=ms.OwnField())
-
-
 @pytest.mark.parametrize("law", ["stretches", "rotates"])
 def test_the_drawn_magnetization_follows_the_law(law):
     """Check a strip that is stretched by a half and turned about y: F M_r is half longer than R M_r."""

@@ -15,10 +15,10 @@ POLARIZATION = 0.0754  # [T]
 MANY = ms.OwnField(max_points=10**5)
 
 
-def pair_of_plates(cells, offset):
+def pair_of_plates(cells, offset, **law):
     mesh = ms.meshes.rectangle(SIZE, SIZE, cells=(cells, cells))
     meshes = [mesh, mesh.transformed(translation=tuple(offset))]
-    plates = [ms.Shell(each, thickness=THICKNESS, young_modulus=1e6) for each in meshes]
+    plates = [ms.Shell(each, thickness=THICKNESS, young_modulus=1e6, **law) for each in meshes]
     return ms.Scene(plates, own_field=MANY, allow_rigid_motions=True)
 
 
@@ -67,10 +67,10 @@ def test_force_between_plates_equals_the_closed_form(axis, direction, gap, force
     assert abs(found[along] / exact[along] - 1) < bound
 
 
-def random_pair(cells=3, components=(1, 1, 1), seed=0):
+def random_pair(cells=3, components=(1, 1, 1), seed=0, **law):
     """Return two crumpled plates above each other, their inputs, and the state."""
     rng = np.random.default_rng(seed)
-    scene = pair_of_plates(cells, (1e-3, 5e-4, 1.1e-3))
+    scene = pair_of_plates(cells, (1e-3, 5e-4, 1.1e-3), **law)
     magnetization = 6e4 * rng.normal(size=(scene.mesh.n_faces, 3)) * np.array(components)
     positions = scene.mesh.rest_positions + 2e-4 * rng.normal(size=scene.mesh.rest_positions.shape)
     inputs = Inputs(scene, magnetization, None)
@@ -82,9 +82,13 @@ def random_pair(cells=3, components=(1, 1, 1), seed=0):
 KINDS = {"tangential": (1, 1, 0), "normal": (0, 0, 1), "oblique": (1, 1, 1)}
 
 
+LAWS = ["stretches", "rotates"]
+
+
+@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("components", KINDS.values(), ids=KINDS)
-def test_force_and_torque_of_a_closed_system_vanish(components):
-    scene, inputs, state = random_pair(components=components)
+def test_force_and_torque_of_a_closed_system_vanish(components, law):
+    scene, inputs, state = random_pair(components=components, magnetization_law=law)
     with inputs.in_core():
         gradient = scene._model.positions(scene._model.term_gradient("own field", state, inputs.controls))
         positions = scene._model.positions(state)
@@ -93,9 +97,10 @@ def test_force_and_torque_of_a_closed_system_vanish(components):
     assert np.linalg.norm(np.cross(positions, gradient).sum(axis=0)) < 1e-14 * total * SIZE
 
 
+@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("components", KINDS.values(), ids=KINDS)
-def test_gradient_and_hessian_product_agree_with_differences(components):
-    scene, inputs, state = random_pair(components=components)
+def test_gradient_and_hessian_product_agree_with_differences(components, law):
+    scene, inputs, state = random_pair(components=components, magnetization_law=law)
     model, controls = scene._model, inputs.controls
     rng = np.random.default_rng(1)
     direction = np.zeros_like(state)
@@ -119,10 +124,11 @@ def test_gradient_and_hessian_product_agree_with_differences(components):
     assert np.abs(change - product).max() < 1e-7 * np.abs(product).max()
 
 
+@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("magnetization", [(4e4, 0, 0), (0, 0, 4e4), (3e4, 0, 2e4)])
-def test_derivatives_by_the_magnetization_of_every_face_agree_with_differences(magnetization):
+def test_derivatives_by_the_magnetization_of_every_face_agree_with_differences(magnetization, law):
     # With uniform magnetization most edges have no source, but their derivatives do not vanish.
-    scene, _, state = random_pair()
+    scene, _, state = random_pair(magnetization_law=law)
     rng = np.random.default_rng(2)
     base = np.tile(np.array(magnetization), (scene.mesh.n_faces, 1))
     change, adjoint = 1e4 * rng.normal(size=base.shape), rng.normal(size=len(state))
@@ -193,6 +199,37 @@ def test_bent_tangential_strip_is_softened_by_its_end_charges():
 def test_bent_normal_strip_is_stiffened_by_its_border_currents(width, cells, stiffness):
     found = magnetic_bending_stiffness(20e-3, width, cells, (0, 0, 6e4))
     assert abs(found / stiffness - 1) < 0.03
+
+
+def test_stretched_plates_with_a_rotating_magnetization_have_the_charges_of_their_moment():
+    """Check plates magnetized along x and stretched by 1.3 along x: those that rotate keep their moment, M V at rest."""
+    stretch, gap = 1.3, 1e-3
+    offset = np.array([0.0, 0.0, THICKNESS + gap])
+    now = [stretch * SIZE, SIZE, THICKNESS]
+    for law, polarization in (("stretches", POLARIZATION), ("rotates", POLARIZATION / stretch)):
+        scene = pair_of_plates(32, offset, magnetization_law=law)
+        inputs = Inputs(scene, (POLARIZATION / VACUUM_PERMEABILITY, 0, 0), None)
+        positions = scene.mesh.rest_positions * [stretch, 1.0, 1.0]
+        with inputs.in_core():
+            state = scene._model.state(positions, np.zeros(scene._bodies.n_rotations))
+            forces = -scene._model.positions(scene._model.term_gradient("own field", state, inputs.controls))
+        found = forces[scene.bodies[0].mesh.n_vertices :].sum(axis=0)
+        exact = cuboid_force(now, now, offset, 0, polarization)
+        assert abs(found[2] / exact[2] - 1) < 3e-4
+
+
+def test_bent_sheet_has_the_same_own_field_under_both_laws():
+    """Check a strip on an arc of equal chords, which does not stretch."""
+    mesh, positions = bent_strip(20e-3, 4e-3, (20, 4), 40.0)
+    found = []
+    for law in LAWS:
+        shell = ms.Shell(mesh, thickness=THICKNESS, young_modulus=1e6, magnetization_law=law)
+        scene = ms.Scene(shell, own_field=MANY, allow_rigid_motions=True)
+        inputs = Inputs(scene, (5e4, 0, 3e4), None)
+        with inputs.in_core():
+            state = scene._model.state(positions, np.zeros(scene._bodies.n_rotations))
+            found.append(scene._model.energies(state, inputs.controls)["own field"])
+    assert found[1] == pytest.approx(found[0], rel=1e-9)
 
 
 def test_own_field_has_the_same_bits_for_every_number_of_threads():

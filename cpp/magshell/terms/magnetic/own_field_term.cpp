@@ -28,27 +28,30 @@ class OwnFieldHessian final : public HessianOperator {
     double factor_;
 };
 
-OwnField::Faces faces_of(const std::vector<const Surface*>& surfaces) {
+OwnField::Faces faces_of(const std::vector<OwnFieldTerm::Sheet>& sheets) {
     OwnField::Faces faces;
-    for (const Surface* surface : surfaces)
-        for (Index f = 0; f < surface->n_faces(); ++f) {
-            faces.nodes.push_back(surface->corners[f]);
-            faces.rest.push_back(surface->rest_corners(f));
+    for (const OwnFieldTerm::Sheet& sheet : sheets)
+        for (Index f = 0; f < sheet.surface->n_faces(); ++f) {
+            faces.nodes.push_back(sheet.surface->corners[f]);
+            faces.rest.push_back(sheet.surface->rest_corners(f));
+            faces.rotates.push_back(sheet.law == MagnetizationLaw::rotates);
         }
     return faces;
 }
 
 }  // namespace
 
-OwnFieldTerm::OwnFieldTerm(std::vector<const Surface*> surfaces, Index max_points, Index n_dofs,
+OwnFieldTerm::OwnFieldTerm(std::vector<Sheet> sheets, Index max_points, double accuracy, Index n_dofs,
                            Registry& registry)
-    : surfaces_(std::move(surfaces)),
+    : sheets_(std::move(sheets)),
       max_points_(max_points),
       n_dofs_(n_dofs),
       factor_(registry.load_parameters.add("scene", "own_field_factor", "1", 1, 1)),
-      field_(faces_of(surfaces_)),
+      field_(faces_of(sheets_)),
       sources_(std::make_shared<const OwnField>(field_)) {
-    for (const Surface* surface : surfaces_) {
+    field_.set_accuracy(accuracy);
+    for (const Sheet& sheet : sheets_) {
+        const Surface* const surface = sheet.surface;
         magnetization_.push_back(registry.values.add(surface->owner, "remanent_magnetization", "A/m",
                                                      surface->n_faces(), 3, &surface->faces));
         thickness_.push_back(
@@ -58,13 +61,13 @@ OwnFieldTerm::OwnFieldTerm(std::vector<const Surface*> surfaces, Index max_point
 
 bool OwnFieldTerm::set_values(const Values& values) {
     bool changed = false;
-    for (std::size_t k = 0; k < surfaces_.size(); ++k)
+    for (std::size_t k = 0; k < sheets_.size(); ++k)
         changed |= values.changed(magnetization_[k], thickness_[k]);
     if (!changed) return false;
     magnetizations_.clear();
     thicknesses_.clear();
-    for (std::size_t k = 0; k < surfaces_.size(); ++k)
-        for (Index f = 0; f < surfaces_[k]->n_faces(); ++f) {
+    for (std::size_t k = 0; k < sheets_.size(); ++k)
+        for (Index f = 0; f < sheets_[k].surface->n_faces(); ++f) {
             magnetizations_.push_back(values.vector(magnetization_[k], f));
             thicknesses_.push_back(values.number(thickness_[k], f));
         }
@@ -72,8 +75,7 @@ bool OwnFieldTerm::set_values(const Values& values) {
     if (field_.n_points() > max_points_)
         throw InvalidInput("the own field has " + std::to_string(field_.n_points()) +
                            " source points, more than max_points = " + std::to_string(max_points_) +
-                           " of the OwnField: each product with its Hessian takes time in proportion to the "
-                           "square of that number. Use a "
+                           " of the OwnField. Use a "
                            "coarser mesh, fewer bodies, a uniform tangential magnetization (whose sources "
                            "lie on the border only), or "
                            "ms.OwnField(max_points=...)");
@@ -107,9 +109,10 @@ std::shared_ptr<const HessianOperator> OwnFieldTerm::hessian_operator(
 std::vector<double> OwnFieldTerm::own_energies(const double* q) const {
     std::vector<double> energies;
     std::ptrdiff_t first = 0;
-    for (const Surface* surface : surfaces_) {
-        OwnField alone(faces_of({surface}));
-        const std::ptrdiff_t last = first + surface->n_faces();
+    for (const Sheet& sheet : sheets_) {
+        OwnField alone(faces_of({sheet}));
+        alone.set_accuracy(field_.accuracy());
+        const std::ptrdiff_t last = first + sheet.surface->n_faces();
         alone.set({magnetizations_.begin() + first, magnetizations_.begin() + last},
                   {thicknesses_.begin() + first, thicknesses_.begin() + last});
         std::vector<Vec3> by_position;
@@ -124,8 +127,8 @@ void OwnFieldTerm::vjp(const double* q, const LoadParameters& load_parameters, c
     const double factor = load_parameters[factor_.first];
     const OwnField::FaceGradient by = field_.vjp(q, lambda);
     std::size_t face = 0;
-    for (std::size_t k = 0; k < surfaces_.size(); ++k)
-        for (Index f = 0; f < surfaces_[k]->n_faces(); ++f, ++face) {
+    for (std::size_t k = 0; k < sheets_.size(); ++k)
+        for (Index f = 0; f < sheets_[k].surface->n_faces(); ++f, ++face) {
             out.values.segment<3>(magnetization_[k].at(f)) += factor * by.magnetization[face];
             out.values[thickness_[k].at(f)] += factor * by.thickness[face];
         }

@@ -3,6 +3,7 @@
 
 #include "magshell/body/nodes.h"
 #include "magshell/body/surface.h"
+#include "magshell/energy/magnetization_law.h"
 #include "magshell/energy/own_field.h"
 #include "magshell/terms/operator_term.h"
 
@@ -10,8 +11,15 @@ namespace magshell {
 
 class OwnFieldTerm final : public OperatorTerm {
   public:
-    /// max_points: number of source points beyond which set_values() throws InvalidInput. The surfaces must outlive the term.
-    OwnFieldTerm(std::vector<const Surface*> surfaces, Index max_points, Index n_dofs, Registry& registry);
+    struct Sheet {
+        const Surface* surface;
+        MagnetizationLaw law;
+    };
+
+    /// max_points: number of source points beyond which set_values() throws InvalidInput. accuracy: of the sums over many points, 0 if all
+    /// are direct. The surfaces must outlive the term.
+    OwnFieldTerm(std::vector<Sheet> sheets, Index max_points, double accuracy, Index n_dofs,
+                 Registry& registry);
 
     std::string_view name() const override { return "own field"; }
     bool set_values(const Values& values) override;
@@ -30,7 +38,7 @@ class OwnFieldTerm final : public OperatorTerm {
     std::vector<double> own_energies(const double* q) const;
 
   private:
-    const std::vector<const Surface*> surfaces_;
+    const std::vector<Sheet> sheets_;
     const Index max_points_, n_dofs_;
     std::vector<ParameterSlice> magnetization_, thickness_;  // of each surface
     ParameterSlice factor_;

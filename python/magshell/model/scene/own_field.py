@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from ..._input.arrays import count
+from ..._input.arrays import count, number
 from ..._input.checked_list import checked_list
 from ..._runtime.frozen import Frozen
 from ...mesh.triangles.triangle_mesh import TriangleMesh
@@ -15,7 +15,8 @@ from ..solids.solid import Solid
 if TYPE_CHECKING:
     from .scene import Scene
 
-_MOST_POINTS = 8000
+_MOST_POINTS = 1_000_000
+_TIGHTEST, _LOOSEST = 1e-9, 1e-2  # accuracies that the trees of the core keep
 
 
 class OwnField(Frozen):
@@ -24,13 +25,15 @@ class OwnField(Frozen):
     Without it a scene has the model of the papers: magnetized bodies feel the applied field only. With it shells attract
     and repel each other and themselves. The sources lie on the edges of the mesh, two by two points on each edge with a
     source and four by four where edges are near (docs/theory.md). A uniform tangential magnetization has sources on the
-    border of a shell only; a normal one has sources on all edges. The time of an evaluation grows with the square of the
-    number of points.
+    border of a shell only; a normal one, or a tangential one that rotates without stretching (magnetization_law="rotates"),
+    has sources on all edges. Up to 16,000 points all pairs are summed; beyond, distant points are summed by boxes of a tree.
 
     The rest shape is that of the shell without its magnetization, so that a solve loads it with the own field too.
 
     bodies: the Shells of three-node faces whose field acts, on all of them; None: all bodies of the scene, which must be
         such shells. Shells that are tied to each other may have it if no edge has more than two faces.
+    accuracy: error of the sums over more than 16,000 points, over the size of the forces, from 1e-9 to 1e-2; None: all sums
+        are over all pairs, in a time that grows with the square of the number of points.
     max_points: the largest number of points with a source; a solve with more raises ValueError.
 
     >>> import magshell as ms
@@ -43,12 +46,23 @@ class OwnField(Frozen):
     True
     """
 
-    def __init__(self, bodies: Shell | Iterable[Shell] | None = None, *, max_points: int = _MOST_POINTS):
+    def __init__(
+        self,
+        bodies: Shell | Iterable[Shell] | None = None,
+        *,
+        accuracy: float | None = 1e-6,
+        max_points: int = _MOST_POINTS,
+    ):
         self.bodies: tuple[Shell, ...] | None = (
             None if bodies is None else checked_list("bodies", bodies, (Shell,))
         )
         if self.bodies == ():
             raise ValueError("bodies is empty: name the shells whose own field acts, or leave it out for all")
+        self.accuracy: float | None = None if accuracy is None else number("accuracy", accuracy)
+        if self.accuracy is not None and not _TIGHTEST <= self.accuracy <= _LOOSEST:
+            raise ValueError(
+                f"accuracy must be in [{_TIGHTEST:g}, {_LOOSEST:g}], or None for sums over all pairs, got {accuracy!r}"
+            )
         self.max_points: int = count("max_points", max_points)
 
     def __repr__(self) -> str:
@@ -60,7 +74,7 @@ def own_field_inputs(scene: Scene) -> dict[str, object]:
     """Return the input of the core. Raises ValueError if the own field of a body is not supported."""
     given = scene.own_field
     if given is None:
-        return {"own_field_shells": [], "own_field_max_points": 0}
+        return {"own_field_shells": [], "own_field_max_points": 0, "own_field_accuracy": 0.0}
     chosen = scene.bodies if given.bodies is None else given.bodies
     if given.bodies is None:
         for k, body in enumerate(scene.bodies):
@@ -82,17 +96,15 @@ def own_field_inputs(scene: Scene) -> dict[str, object]:
         )
     if len(set(numbers)) < len(numbers):
         raise ValueError("own_field names a Shell twice")
-    return {"own_field_shells": sorted(numbers), "own_field_max_points": given.max_points}
+    return {
+        "own_field_shells": sorted(numbers),
+        "own_field_max_points": given.max_points,
+        "own_field_accuracy": given.accuracy or 0.0,
+    }
 
 
 def _require_flat_shell(number: int, body: Shell | Solid) -> None:
     if isinstance(body, Shell) and isinstance(body.mesh, TriangleMesh):
-        if body.magnetization_law != "stretches":
-            raise ValueError(
-                f'own_field does not support body {number}, whose magnetization_law is "{body.magnetization_law}": its '
-                'charges would change with the stretch. Take magnetization_law="stretches", or name the other shells in '
-                "ms.OwnField(bodies=...)"
-            )
         if body.susceptibility is not None:
             raise ValueError(
                 f"own_field does not support body {number}, which has a susceptibility: the magnetization that a field "

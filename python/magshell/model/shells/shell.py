@@ -139,8 +139,7 @@ class Shell(Owner):
     remanent_magnetization: (3,) or (n_f, 3) A/m, in a scene with a field, unless a solve gives another.
     magnetization_law: "stretches", the default, F M of the papers: the magnetization of a face stretches with it; or
         "rotates", R M of the polar decomposition F = R U: it turns with the face and keeps its magnitude, as experiments
-        with sheets that are stretched show (docs/theory.md). Both are the same where a sheet bends without stretching. An
-        OwnField needs "stretches".
+        with sheets that are stretched show (docs/theory.md). Both are the same where a sheet bends without stretching.
     susceptibility: chi of a film that an applied field magnetizes, M = chi H, above -1: as soft iron, or as an elastomer
         filled with superparamagnetic grains, far from saturation. It is magnetized by chi B/mu0 along its plane and by
         chi/(1 + chi) B/mu0 across it, as a thin plate is (docs/theory.md), in addition to its remanent_magnetization, which

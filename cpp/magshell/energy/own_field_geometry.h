@@ -1,0 +1,263 @@
+// The deformed sheets of an OwnField and their source points (energy/own_field.h), for the files that add up over them.
+#pragma once
+
+#include <algorithm>
+#include <numbers>
+
+#include "magshell/core/parallel.h"
+#include "magshell/energy/own_field.h"
+#include "magshell/energy/own_field_pairs.h"
+#include "magshell/energy/source_tree.h"
+#include "magshell/energy/unstretched_vector.h"
+#include "magshell/field/dipoles.h"
+
+namespace magshell {
+namespace own_field {
+
+inline constexpr double strength = vacuum_permeability / (4.0 * std::numbers::pi);  // mu_0/(4 pi)
+inline constexpr int block = 16;  // targets that a thread takes at once
+
+struct GaussRule {
+    int count;
+    const double *points, *weights;  // on [0, 1]
+};
+inline constexpr double points_2[] = {0.21132486540518712, 0.78867513459481288}, weights_2[] = {0.5, 0.5},
+                        points_4[] = {0.069431844202973712, 0.33000947820757187, 0.66999052179242813,
+                                      0.93056815579702629},
+                        weights_4[] = {0.17392742256872693, 0.32607257743127307, 0.32607257743127307,
+                                       0.17392742256872693};
+inline constexpr GaussRule coarse{2, points_2, weights_2}, fine{4, points_4, weights_4};
+
+// Barycentric coordinates of the three points of a face, of equal weights; exact for quadratic functions.
+inline constexpr double face_points[3][3] = {
+    {2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0}, {1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0}, {1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0}};
+
+// Distances of midpoints over the length of the longer edge, or the size of the face, up to which a pair is near, and from which on it
+// is far [-]; see test_force_between_plates_equals_the_closed_form.
+struct Blend {
+    double near, far;
+};
+inline constexpr Blend of_edges{1.5, 2.0}, of_sides{2.5, 3.5};
+
+// The weight of the near value and its derivatives by t: 1 below near, 0 above far, with continuous second derivatives.
+struct BlendWeight {
+    double value, slope, curvature;
+};
+inline BlendWeight blend(const Blend& range, double t) {
+    if (t <= range.near) return {1.0, 0.0, 0.0};
+    if (t >= range.far) return {0.0, 0.0, 0.0};
+    const double width = range.far - range.near, s = (range.far - t) / width;
+    return {s * s * s * (10.0 - 15.0 * s + 6.0 * s * s), -30.0 * s * s * (1.0 - s) * (1.0 - s) / width,
+            60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / (width * width)};
+}
+
+// Converts the weight and its slope to the type of t: a double, or a dual number.
+inline void lift(const BlendWeight& weight, double, double& value, double& slope) {
+    value = weight.value;
+    slope = weight.slope;
+}
+inline void lift(const BlendWeight& weight, const Dual& t, Dual& value, Dual& slope) {
+    value = {weight.value, weight.slope * t.rate};
+    slope = {weight.slope, weight.curvature * t.rate};
+}
+
+// Runs body(first, last) over ranges of targets on all threads.
+template <class Body>
+void in_blocks(Index count, const Body& body) {
+    parallel_for((count + block - 1) / block,
+                 [&](int part) { body(part * block, std::min<Index>(count, (part + 1) * block)); });
+}
+
+}  // namespace own_field
+
+/// The deformed sheets: what the sources depend on.
+template <class T>
+struct OwnField::Geometry {
+    const OwnField& field;
+    const std::vector<Triple<T>>& x;
+    std::vector<Triple<T>> normals, edge_normals;            // of faces, of edges
+    std::vector<T> areas, currents, edge_currents, charges;  // charges of edges
+
+    Geometry(const OwnField& f, const std::vector<Triple<T>>& positions) : field(f), x(positions) {
+        normals.resize(f.faces_.size());
+        areas.resize(f.faces_.size());
+        currents.resize(f.faces_.size());
+        edge_normals.resize(f.edges_.size());
+        edge_currents.resize(f.edges_.size());
+        charges.assign(f.edge_charges_.begin(), f.edge_charges_.end());
+        for (std::size_t k = 0; k < f.faces_.size(); ++k) {
+            const Face& face = f.faces_[k];
+            const Triple<T>& origin = x[face.nodes[0]];
+            const Triple<T> across = cross(x[face.nodes[1]] - origin, x[face.nodes[2]] - origin);
+            const T length = norm(across);
+            normals[k] = (T(1.0) / length) * across;
+            areas[k] = T(0.5) * length;
+            currents[k] = T(f.rest_currents_[k] * face.area) / areas[k];
+            if (!face.rotates) continue;
+            const std::array<T, 2> m = unstretched(face)(lifted(f.tangential(k)));
+            for (int i = 0; i < 3; ++i)
+                if (face.edges[i] >= 0)
+                    charges[face.edges[i]] += T(face.in_plane[i][0]) * m[0] + T(face.in_plane[i][1]) * m[1];
+        }
+        for (std::size_t k = 0; k < f.edges_.size(); ++k) {
+            const Edge& edge = f.edges_[k];
+            edge_normals[k] = normals[edge.faces[0]];
+            edge_currents[k] = T(edge.turns[0]) * currents[edge.faces[0]];
+            if (edge.faces[1] < 0) continue;
+            const Triple<T> sum = edge_normals[k] + T(edge.normals[1]) * normals[edge.faces[1]];
+            edge_normals[k] = (T(1.0) / norm(sum)) * sum;
+            edge_currents[k] += T(edge.turns[1]) * currents[edge.faces[1]];
+        }
+    }
+
+    static std::array<T, 2> lifted(const std::array<double, 2>& m) { return {T(m[0]), T(m[1])}; }
+    UnstretchedVector<T> unstretched(const Face& face) const {
+        const Triple<T>& origin = x[face.nodes[0]];
+        return {{x[face.nodes[1]] - origin, x[face.nodes[2]] - origin}, face.inverse};
+    }
+    // Returns sum l~_e nu~_e dE/dQ_e over the edges of a face, in the basis of its plane.
+    std::array<T, 2> by_charges(const Face& face, const std::vector<EdgeAdjoint<T>>& edges) const {
+        std::array<T, 2> sum{};
+        for (int i = 0; i < 3; ++i)
+            if (face.edges[i] >= 0)
+                for (int c = 0; c < 2; ++c) sum[c] += T(face.in_plane[i][c]) * edges[face.edges[i]].charge;
+        return sum;
+    }
+    Triple<T> along(const Edge& edge) const { return x[edge.nodes[1]] - x[edge.nodes[0]]; }
+    Triple<T> middle(const Edge& edge) const { return T(0.5) * (x[edge.nodes[0]] + x[edge.nodes[1]]); }
+    Triple<T> center(const Face& face) const {
+        return T(1.0 / 3.0) * (x[face.nodes[0]] + x[face.nodes[1]] + x[face.nodes[2]]);
+    }
+
+    // Calls body(point, s, zeta, weight) for the Gauss points of an edge; zeta over the thickness.
+    template <class Body>
+    void each_point(Index e, const own_field::GaussRule& rule, const Body& body) const {
+        const Edge& edge = field.edges_[e];
+        const Triple<T> line = along(edge);
+        for (int i = 0; i < rule.count; ++i)
+            for (int j = 0; j < rule.count; ++j) {
+                const double s = rule.points[i], zeta = rule.points[j] - 0.5,
+                             weight = rule.weights[i] * rule.weights[j];
+                SourcePoint<T> point;
+                point.at =
+                    x[edge.nodes[0]] + T(s) * line + T(zeta * field.edge_thickness_[e]) * edge_normals[e];
+                point.charge = T(weight) * charges[e];
+                point.current = (T(weight) * edge_currents[e]) * line;
+                body(point, s, zeta, weight);
+            }
+    }
+
+    // Calls body(point, barycentric, zeta, weight) for the points of the charged sides of a face.
+    template <class Body>
+    void each_side_point(Index f, const Body& body) const {
+        const Face& face = field.faces_[f];
+        for (const double side : {0.5, -0.5})
+            for (const double* weights : own_field::face_points) {
+                SourcePoint<T> point;
+                point.at = T(side * field.thickness_[f]) * normals[f];
+                for (int k = 0; k < 3; ++k) point.at += T(weights[k]) * x[face.nodes[k]];
+                const double weight = side * 2.0 / 3.0;
+                point.charge = T(weight * field.side_charges_[f]);
+                body(point, weights, side, weight);
+            }
+    }
+
+    // Adds the derivatives of the sums at a Gauss point of an edge by the values of that edge.
+    void add(Index e, const SourceSums<T>& sums, double s, double zeta, double weight,
+             EdgeAdjoint<T>& out) const {
+        const Triple<T> pull = T(-own_field::strength) * sums.pull;
+        const Triple<T> by_element = T(-own_field::strength * weight) * sums.currents;
+        out.a += T(1.0 - s) * pull - edge_currents[e] * by_element;
+        out.b += T(s) * pull + edge_currents[e] * by_element;
+        out.normal += T(zeta * field.edge_thickness_[e]) * pull;
+        out.thickness += T(zeta) * dot(edge_normals[e], pull);
+        out.charge += T(own_field::strength * weight) * sums.charges;
+        out.current += dot(by_element, along(field.edges_[e]));
+    }
+
+    // Does the same at a point of a charged side.
+    void add(Index f, const SourceSums<T>& sums, const double* weights, double zeta, double weight,
+             FaceAdjoint<T>& out) const {
+        const Triple<T> pull = T(-own_field::strength) * sums.pull;
+        for (int k = 0; k < 3; ++k) out.corners[k] += T(weights[k]) * pull;
+        out.normal += T(zeta * field.thickness_[f]) * pull;
+        out.thickness += T(zeta) * dot(normals[f], pull);
+        out.charge += T(own_field::strength * weight) * sums.charges;
+    }
+};
+
+template <class T>
+OwnField::EdgeAdjoint<T>& OwnField::EdgeAdjoint<T>::operator+=(const EdgeAdjoint& other) {
+    a += other.a, b += other.b, normal += other.normal;
+    charge += other.charge, current += other.current, thickness += other.thickness;
+    return *this;
+}
+
+template <class T>
+OwnField::EdgeAdjoint<T>& OwnField::EdgeAdjoint<T>::operator-=(const EdgeAdjoint& other) {
+    a -= other.a, b -= other.b, normal -= other.normal;
+    charge -= other.charge, current -= other.current, thickness -= other.thickness;
+    return *this;
+}
+
+template <class T>
+void OwnField::EdgeAdjoint<T>::scale(const T& factor) {
+    a = factor * a, b = factor * b, normal = factor * normal;
+    charge = factor * charge, current = factor * current, thickness = factor * thickness;
+}
+
+template <class T>
+OwnField::FaceAdjoint<T>& OwnField::FaceAdjoint<T>::operator+=(const FaceAdjoint& other) {
+    for (int k = 0; k < 3; ++k) corners[k] += other.corners[k];
+    normal += other.normal;
+    current += other.current, charge += other.charge, thickness += other.thickness;
+    return *this;
+}
+
+template <class T>
+void OwnField::FaceAdjoint<T>::scale(const T& factor) {
+    for (Triple<T>& corner : corners) corner = factor * corner;
+    normal = factor * normal;
+    current = factor * current, charge = factor * charge, thickness = factor * thickness;
+}
+
+/// Trees over the coarse points of the target edges and over the charged sides of the target faces, in the order of `edge_order_` and
+/// `face_order_`. Edges and faces without a source among them have no strength.
+struct OwnField::Trees {
+    SourceTree edges, faces;
+    BoxPairs edge_pairs{}, side_pairs_of_edges{}, side_pairs_of_faces{};
+    std::vector<std::size_t> edge_positions{}, face_positions{};  // in the order of the tree
+
+    template <class T>
+    std::vector<SourcePoint<T>> edge_points(const Geometry<T>& at) const {
+        std::vector<SourcePoint<T>> points;
+        for (const Index k : edges.order())
+            at.each_point(
+                at.field.edge_order_[k], own_field::coarse,
+                [&](const SourcePoint<T>& point, double, double, double) { points.push_back(point); });
+        return points;
+    }
+    template <class T>
+    std::vector<SourcePoint<T>> side_points(const Geometry<T>& at) const {
+        std::vector<SourcePoint<T>> points;
+        for (const Index k : faces.order())
+            at.each_side_point(at.field.face_order_[k], [&](const SourcePoint<T>& point, const double*,
+                                                            double, double) { points.push_back(point); });
+        return points;
+    }
+    template <class T>
+    std::vector<SourceSums<T>> edge_sums(const Geometry<T>& at) const {
+        const std::vector<SourcePoint<T>> points = edge_points(at);
+        return tree_sums(edges, points, edges, points, edge_pairs, at.field.active_faces_ > 0, true);
+    }
+    template <class T>
+    std::vector<SourceSums<T>> side_sums_at_edges(const Geometry<T>& at) const {
+        return tree_sums(edges, edge_points(at), faces, side_points(at), side_pairs_of_edges, false, false);
+    }
+    template <class T>
+    std::vector<SourceSums<T>> edge_sums_at_sides(const Geometry<T>& at) const {
+        return tree_sums(faces, side_points(at), edges, edge_points(at), side_pairs_of_faces, false, false);
+    }
+};
+
+}  // namespace magshell

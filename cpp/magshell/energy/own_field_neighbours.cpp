@@ -1,0 +1,124 @@
+#include <algorithm>
+
+#include "magshell/energy/own_field_geometry.h"
+#include "magshell/mesh/box_tree.h"
+
+namespace magshell {
+
+using namespace own_field;
+
+namespace {
+
+// Balls around edges or faces, which are near each other if one of them has the other's center in it.
+struct Balls {
+    std::vector<Vec3> centers;
+    std::vector<double> radii;
+
+    void add(const Vec3& center, double radius) {
+        centers.push_back(center);
+        radii.push_back(radius);
+    }
+    Bounds box(std::size_t k) const {
+        const Vec3 reach = Vec3::Constant(radii[k]);
+        return {centers[k] - reach, centers[k] + reach};
+    }
+};
+
+// Returns for each ball the others that are near it, in ascending order; `wanted` says which of the balls are asked.
+template <class Wanted>
+std::vector<std::vector<Index>> near_balls(const Balls& of, const Balls& others, const Wanted& wanted) {
+    std::vector<Bounds> boxes;
+    for (std::size_t k = 0; k < others.centers.size(); ++k) boxes.push_back(others.box(k));
+    const BoxTree tree(boxes, others.centers);
+    std::vector<std::vector<Index>> near(of.centers.size());
+    in_blocks(static_cast<Index>(near.size()), [&](Index first, Index last) {
+        std::vector<Index> open;
+        for (Index k = first; k < last; ++k) {
+            if (!wanted(k)) continue;
+            const Bounds box = of.box(k);
+            open.assign(1, 0);
+            while (!open.empty()) {
+                const Index number = open.back();
+                open.pop_back();
+                const BoxTree::Node& node = tree.nodes()[number];
+                if (!node.bounds.meets(box, 0.0)) continue;
+                if (node.right >= 0) {
+                    open.push_back(number + 1);
+                    open.push_back(node.right);
+                    continue;
+                }
+                for (Index i = node.first; i < node.first + node.count; ++i) {
+                    const Index j = tree.items()[i];
+                    const double reach = std::max(of.radii[k], others.radii[j]);
+                    if ((of.centers[k] - others.centers[j]).squaredNorm() < reach * reach)
+                        near[k].push_back(j);
+                }
+            }
+            std::sort(near[k].begin(), near[k].end());
+        }
+    });
+    return near;
+}
+
+std::vector<std::size_t> positions_in(const SourceTree& tree) {
+    std::vector<std::size_t> positions(tree.order().size());
+    for (std::size_t k = 0; k < positions.size(); ++k) positions[tree.order()[k]] = k;
+    return positions;
+}
+
+}  // namespace
+
+OwnField::Neighbours OwnField::neighbours(const double* q, Targets targets) const {
+    const std::vector<Triple<double>> x = positions<double>(q, nullptr);
+    const auto middle = [&](const auto& nodes) {
+        Vec3 sum = Vec3::Zero();
+        for (const Index node : nodes) sum += values_of(x[node]);
+        return Vec3(sum / static_cast<double>(nodes.size()));
+    };
+    Neighbours near;
+    Balls sources, all, side_edges, side_faces;
+    for (Index k = 0; k < target_edges(targets); ++k) {
+        const Edge& edge = edges_[edge_order_[k]];
+        const Vec3 center = middle(edge.nodes);
+        all.add(center, of_edges.far * edge.length);
+        if (k < active_edges_) sources.add(center, of_edges.far * edge.length);
+        side_edges.add(center, of_sides.far * edge.length);
+    }
+    near.edges = near_balls(all, sources, [](Index) { return true; });
+    for (Index k = 0; k < active_edges_; ++k) std::erase(near.edges[k], k);
+    if (n_points() > most_direct && accuracy_ > 0.0) near.trees = trees(x, targets);
+    if (!has_sides(targets)) return near;
+    for (Index k = 0; k < target_faces(targets); ++k) {
+        const Face& face = faces_[face_order_[k]];
+        side_faces.add(middle(face.nodes), of_sides.far * face.size);
+    }
+    const auto wanted = [&](Index k) { return targets == Targets::all || has_charge_[edge_order_[k]]; };
+    const std::vector<std::vector<Index>> near_faces = near_balls(side_edges, side_faces, wanted);
+    for (Index k = 0; k < target_edges(targets); ++k)
+        for (const Index j : near_faces[k]) near.sides.push_back({k, j});
+    return near;
+}
+
+std::shared_ptr<const OwnField::Trees> OwnField::trees(const std::vector<Triple<double>>& x,
+                                                       Targets targets) const {
+    const Geometry<double> at(*this, x);
+    std::vector<Vec3> edge_points, side_points;
+    for (Index k = 0; k < target_edges(targets); ++k)
+        at.each_point(edge_order_[k], coarse, [&](const SourcePoint<double>& point, double, double, double) {
+            edge_points.push_back(values_of(point.at));
+        });
+    if (has_sides(targets))
+        for (Index k = 0; k < target_faces(targets); ++k)
+            at.each_side_point(face_order_[k], [&](const SourcePoint<double>& point, const double*, double,
+                                                   double) { side_points.push_back(values_of(point.at)); });
+    Trees trees{.edges = SourceTree(edge_points, 4, accuracy_),
+                .faces = SourceTree(side_points, 6, accuracy_)};
+    BoxPairs mirrored;
+    pair_boxes(trees.edges, trees.edges, trees.edge_pairs, mirrored);
+    pair_boxes(trees.edges, trees.faces, trees.side_pairs_of_edges, trees.side_pairs_of_faces);
+    trees.edge_positions = positions_in(trees.edges);
+    trees.face_positions = positions_in(trees.faces);
+    return std::make_shared<const Trees>(std::move(trees));
+}
+
+}  // namespace magshell

@@ -1,0 +1,96 @@
+"""The own field of more points than are summed pair by pair: accuracy, derivatives, threads, bad input."""
+
+import numpy as np
+import pytest
+
+import magshell as ms
+from magshell import _core
+from magshell.model.scene.solve_inputs import Inputs
+
+CELLS, SIZE, THICKNESS = 40, 0.04, 5e-4  # sides and thickness in m
+KINDS = {"tangential": (1, 1, 0), "normal": (0, 0, 1), "oblique": (1, 1, 1)}
+
+
+def curled_sheet(components, accuracy, law="stretches"):
+    """Return a sheet on an arc with another magnetization in each face, its inputs and state: 19,520 points or more."""
+    rng = np.random.default_rng(3)
+    mesh = ms.meshes.rectangle(SIZE, SIZE, cells=(CELLS, CELLS))
+    sheet = ms.Shell(mesh, thickness=THICKNESS, young_modulus=1e6, magnetization_law=law)
+    scene = ms.Scene(sheet, own_field=ms.OwnField(accuracy=accuracy), allow_rigid_motions=True)
+    x, y, _ = mesh.rest_positions.T
+    radius = 0.02
+    arc = np.stack([radius * np.sin(x / radius), y, radius * (1 - np.cos(x / radius))], axis=1)
+    positions = arc + 2e-5 * rng.normal(size=arc.shape)
+    magnetization = 6e4 * rng.normal(size=(mesh.n_faces, 3)) * np.array(components)
+    inputs = Inputs(scene, magnetization, None)
+    with inputs.in_core():
+        state = scene._model.state(positions, np.zeros(scene._bodies.n_rotations))
+    direction = np.zeros_like(state)
+    direction[: 3 * mesh.n_vertices] = rng.normal(size=3 * mesh.n_vertices)
+    return scene._model, inputs, state, direction
+
+
+def gradient_of(model, inputs, state):
+    with inputs.in_core():
+        return model.term_gradient("own field", state, inputs.controls)
+
+
+def product_of(model, inputs, state, direction):
+    with inputs.in_core():
+        whole = model.hessian_product(state, inputs.controls, direction)
+        return whole - model.hessian_product(state, 0 * inputs.controls, direction)
+
+
+@pytest.mark.parametrize("components", KINDS.values(), ids=KINDS)
+def test_tree_sums_agree_with_direct_ones(components):
+    exact, inputs, state, direction = curled_sheet(components, None)
+    gradient, product = (
+        gradient_of(exact, inputs, state),
+        product_of(exact, inputs, state, direction),
+    )
+    for accuracy in (1e-3, 1e-6):
+        model, inputs, state, direction = curled_sheet(components, accuracy)
+        error = np.linalg.norm(gradient_of(model, inputs, state) - gradient) / np.linalg.norm(gradient)
+        assert error < 2 * accuracy
+        error = np.linalg.norm(product_of(model, inputs, state, direction) - product) / np.linalg.norm(
+            product
+        )
+        assert error < 2 * accuracy
+
+
+@pytest.mark.parametrize("law", ["stretches", "rotates"])
+def test_hessian_product_by_tree_agrees_with_differences(law):
+    model, inputs, state, direction = curled_sheet((1, 1, 1), 1e-6, law)
+    step = 1e-8
+    change = gradient_of(model, inputs, state + step * direction) - gradient_of(
+        model, inputs, state - step * direction
+    )
+    product = product_of(model, inputs, state, direction)
+    assert np.linalg.norm(change / (2 * step) - product) < 1e-5 * np.linalg.norm(product)
+
+
+def test_tree_sums_have_the_same_bits_for_every_number_of_threads():
+    model, inputs, state, _ = curled_sheet((1, 0, 1), 1e-4)
+    before, found = _core.num_threads(), []
+    try:
+        for threads in (1, 2, 3):
+            _core.set_num_threads(threads)
+            found.append(gradient_of(model, inputs, state))
+    finally:
+        _core.set_num_threads(before)
+    assert all(np.array_equal(found[0], each) for each in found[1:])
+
+
+def test_derivatives_by_magnetization_with_trees_equal_those_with_direct_sums():
+    found = []
+    for accuracy in (None, 1e-6):
+        model, inputs, state, direction = curled_sheet((1, 1, 0), accuracy)
+        with inputs.in_core():
+            found.append(_core.vjp(model, state, inputs.controls, direction)[0])
+    assert np.linalg.norm(found[1] - found[0]) < 2e-6 * np.linalg.norm(found[0])
+
+
+@pytest.mark.parametrize("accuracy", [0.0, -1e-6, 1e-12, 0.1, float("nan"), "fine", (1e-6, 1e-6)])
+def test_accuracy_that_a_tree_cannot_hold_is_refused(accuracy):
+    with pytest.raises(ValueError, match="accuracy"):
+        ms.OwnField(accuracy=accuracy)
