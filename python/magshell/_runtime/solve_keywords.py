@@ -44,9 +44,9 @@ _FACTORS = "multiply the loads, gravity, the field sources, and the prescribed m
 _FACTORS_IN_TIME = "as in ms.equilibrium; numbers, or in time as above."
 _SHELL = "replace the shell's own values in this solve."
 _MAXWELL = (
-    "Maxwell branches beside the elastic stiffness: their moduli over the elastic one, and their relaxation times, s; "
-    "numbers of one branch, or (n,) of a Prony series of n. The elastic stiffness is that of slow loading and of statics, "
-    "without the branches. They begin relaxed."
+    "Maxwell branches beside the elastic stiffness of all bodies: their moduli over the elastic one, and their relaxation "
+    "times, s; numbers of one branch, or (n,) of a Prony series of n. The elastic stiffness is that of slow loading and of "
+    "statics, without the branches. They begin relaxed."
 )
 
 

@@ -124,6 +124,24 @@ def test_creep_and_recovery_have_their_closed_form(body):
     np.testing.assert_allclose(found, exact, rtol=0, atol=1e-3)
 
 
+def test_adaptive_steps_follow_creep_to_their_tolerance():
+    body = three_nodes()
+    left, right = ends(body)
+    scene = ms.Scene(
+        body, supports=[ms.Pin(left)], loads=[ms.PointLoad(right, (1e-3, 0, 0))], **free_of(body)
+    )
+    times = np.linspace(0.0, DURATION, 17)
+    factor = np.interp(times, [0.0, 0.1, 0.8, 0.9], [0.0, 1.0, 1.0, 0.0])
+    slow = ms.equilibrium(scene, progress=False).displacements[right, 0].mean()
+    errors = []
+    for tolerance in (1e-2, 1e-4):
+        steps = ms.Adaptive(0.1, tolerance=tolerance * slow)
+        move = motion(scene, 16, time_step=steps, load_factor=factor, damping=1e-9)
+        found = move.displacements[:, right, 0].mean(axis=1) / slow
+        errors.append(np.abs(found - creep(factor, 0.1)).max())
+    assert errors[0] < 1e-2 and errors[1] < 1e-3
+
+
 def free_of(body):
     """Return the argument of a scene that allows a pinned edge to turn, where an edge does not hold a sheet."""
     return {"allow_rigid_motions": True} if isinstance(body, ms.Shell) else {}
@@ -195,6 +213,21 @@ def test_members_of_a_batch_have_their_own_branches():
     for k, own in enumerate(moduli):
         single = waving(maxwell_modulus=own, maxwell_time=times)
         np.testing.assert_array_equal(batch.positions[k], single.positions)
+
+
+def test_gradients_of_a_batch_are_those_of_its_members():
+    torch = pytest.importorskip("torch")
+    moduli = torch.tensor([(0.5, 0.2), (0.1, 0.0)], dtype=torch.float64, requires_grad=True)
+    times = torch.tensor([(1e-2, 1e-3)], dtype=torch.float64, requires_grad=True)
+    together = waving(maxwell_modulus=moduli, maxwell_time=times, batch=2)
+    together.positions[:, -1, :, 2].sum().backward()
+    by_times = torch.zeros(2, dtype=torch.float64)
+    for k in range(2):
+        own, shared = (each.detach().clone().requires_grad_(True) for each in (moduli[k], times[0]))
+        waving(maxwell_modulus=own, maxwell_time=shared).positions[-1, :, 2].sum().backward()
+        np.testing.assert_allclose(moduli.grad[k], own.grad, rtol=1e-12)
+        by_times += shared.grad
+    np.testing.assert_allclose(times.grad[0], by_times, rtol=1e-12)
 
 
 def test_batch_asks_whether_numbers_are_branches_or_members():

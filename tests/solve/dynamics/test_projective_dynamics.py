@@ -101,7 +101,15 @@ def test_rigid_bodies_equal_those_of_newton():
     assert_same(*both(scene))
 
 
-@pytest.mark.parametrize("law", [{"stiffness_damping": 5e-3}, {"maxwell_modulus": 1.0, "maxwell_time": 1e-2}])
+@pytest.mark.parametrize(
+    "law",
+    [
+        {"stiffness_damping": 5e-3},
+        {"maxwell_modulus": 1.0, "maxwell_time": 1e-2},
+        {"maxwell_modulus": (1.0, 0.5), "maxwell_time": (1e-2, 1e-3)},
+    ],
+    ids=["damping", "branch", "branches"],
+)
 def test_viscosity_and_damping(law):
     solid = bar(MATERIALS["Corotated"])
     scene = ms.Scene(solid, supports=[clamped(solid)], gravity=(0, 2.0, -9.81))
