@@ -339,3 +339,13 @@ def test_options_of_the_wrong_kind_are_refused(options, words):
     rest, tip = cantilever()
     with pytest.raises(ValueError, match=words):
         ms.error_estimate(rest, height_at(tip), **options)
+
+
+def test_estimates_of_loose_solves_are_corrected_by_the_adjoint(monkeypatch):
+    given = [cantilever((20, 2)), magnetized((20, 2), "midedge", beta=20.0), cantilever((10, 2), "midedge2")]
+    loose = [ms.error_estimate(rest, height_at(tip), by_face=False) for rest, tip in given]
+    monkeypatch.setattr("magshell.solve.accuracy.enriched._LOOSE", 1e-11)
+    exact = [ms.error_estimate(rest, height_at(tip), by_face=False) for rest, tip in given]
+    for one, other in zip(loose, exact, strict=True):
+        assert one.error == pytest.approx(other.error, rel=0.02)
+    assert sum(each.factorizations for each in loose) < sum(each.factorizations for each in exact)

@@ -127,10 +127,14 @@ def error_estimate(
     solution, slope, scale = _solved(result, of, project)
     positions = positions_of(result)
     value = of.value(positions)
-    error = scale * (of.value(solution.positions) - value)
+    adjoint = solution.adjoint(slope) if by_face or solution.residual is not None else None
+    change = of.value(solution.positions) - value
+    if solution.residual is not None:
+        change -= float(adjoint @ solution.residual)  # what the loose solve leaves, to first order
+    error = scale * change
     parts, more = None, 0
     if by_face:
-        parts = contributions(solution, solution.adjoint(slope), positions)
+        parts = contributions(solution, adjoint, positions)
         parts = np.concatenate(scaled_to(parts, error))
         more = 1 + isinstance(result, LinearResponse)  # those of the inner unknowns, and of the adjoint
     return ErrorEstimate(
