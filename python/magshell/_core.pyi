@@ -1102,6 +1102,15 @@ def drag_gradients(
     For each face the gradient of multiplier . f by what describes the water; f is the force on the face, multipliers are (n, 3).
     """
 
+def element_energies(
+    model: Model,
+    q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+) -> list[typing.Any]:
+    """
+    [(name, whether of a solid, number of the sheet or solid, J of each element)] of the terms that are sums over elements, in the order of term_energies. Angles have no turns.
+    """
+
 def factor_backends() -> list[str]: ...
 def factor_orderings() -> list[str]: ...
 def fibre_states(

@@ -227,7 +227,7 @@ def _solves(s: Sample) -> Iterator[Call]:
         "values": {s.clamp: {"displacement": (0, 0, 2e-4)}, s.dipoles: {"moments": [(0, 0, 0.2)]}},
     }
     places = {"positions": s.positions, "edge_rotations": np.zeros(n_e), "body": None}
-    yield Call("energies", ms.energies, {**magnetic, **replaced, **places})
+    yield Call("energies", ms.energies, {**magnetic, **replaced, **places, "by": "face"})
     there = {name: value for name, value in places.items() if name != "body"}
     yield Call("energy", ms.energy, {**magnetic, **replaced, **there})
     yield Call("forces", ms.forces, {**magnetic, **replaced, **there})

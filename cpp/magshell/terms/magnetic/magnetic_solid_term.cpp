@@ -5,6 +5,7 @@
 #include "magshell/energy/magnetic_solid.h"
 #include "magshell/energy/magnetic_solid_rotating.h"
 #include "magshell/strain/tetrahedron.h"
+#include "magshell/terms/element_energies.h"
 #include "magshell/terms/magnetic/applied_field_term.h"
 #include "magshell/terms/magnetic/field_groups.h"
 #include "magshell/terms/magnetic/total_applied_field.h"
@@ -13,7 +14,7 @@ namespace magshell {
 namespace {
 
 template <class Element, template <int> class Law>
-class MagneticSolidTerm final : public AppliedFieldTerm {
+class MagneticSolidTerm final : public AppliedFieldTerm, public ElementEnergies {
     static constexpr int N = Element::nodes, points = Element::points;
     using Nodes = std::array<Index, N>;
     using Point = Law<N>;
@@ -53,17 +54,11 @@ class MagneticSolidTerm final : public AppliedFieldTerm {
     }
 
     double energy(const double* q, const LoadParameters& load_parameters) const override {
-        const std::vector<Fields> fields = sample(q, load_parameters, 0);
-        const SimdVec3 everywhere = broadcast(field_.uniform(load_parameters));
-        return loop_.sum([&](Index group) {
-            SimdVec3 x[N];
-            loop_.gather(group, q, x);
-            SimdDouble total(0.0);
-            for (int p = 0; p < points; ++p)
-                total += elements_[group].at[p].deformed(x).energy(fields.empty() ? everywhere
-                                                                                  : fields[group].at[p].flux);
-            return total;
-        });
+        return loop_.sum(energy_of_group(q, load_parameters));
+    }
+    std::vector<double> element_energies(const double* q,
+                                         const LoadParameters& load_parameters) const override {
+        return of_elements(loop_, solid_.elements.user, energy_of_group(q, load_parameters));
     }
 
     void evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) override {
@@ -162,6 +157,19 @@ class MagneticSolidTerm final : public AppliedFieldTerm {
     std::size_t bytes() const override { return loop_.bytes() + bytes_of(elements_) + bytes_of(fields_); }
 
   private:
+    // Returns a function of a SIMD vector that computes the energies [J] of its elements.
+    auto energy_of_group(const double* q, const LoadParameters& load_parameters) const {
+        return [this, q, fields = sample(q, load_parameters, 0),
+                everywhere = broadcast(field_.uniform(load_parameters))](Index group) {
+            SimdVec3 x[N];
+            loop_.gather(group, q, x);
+            SimdDouble total(0.0);
+            for (int p = 0; p < points; ++p)
+                total += elements_[group].at[p].deformed(x).energy(fields.empty() ? everywhere
+                                                                                  : fields[group].at[p].flux);
+            return total;
+        };
+    }
     RestElement<Element> rest_of(Index element) const {
         Vec3 x[N];
         for (int k = 0; k < N; ++k) x[k] = solid_.rest(element, k);

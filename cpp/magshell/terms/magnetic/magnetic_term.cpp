@@ -8,6 +8,7 @@
 #include "magshell/energy/magnetic_face_fine.h"
 #include "magshell/energy/magnetic_rotating.h"
 #include "magshell/mesh/half_edges.h"
+#include "magshell/terms/element_energies.h"
 #include "magshell/terms/magnetic/applied_field_term.h"
 #include "magshell/terms/magnetic/face_sampling.h"
 #include "magshell/terms/magnetic/field_groups.h"
@@ -19,7 +20,7 @@ namespace {
 // In a uniform field nothing is sampled. If the magnetization is linear in the positions too, the force does not
 // depend on the deformation, and there is no Hessian to add.
 template <class Law>
-class MagneticTerm final : public AppliedFieldTerm {
+class MagneticTerm final : public AppliedFieldTerm, public ElementEnergies {
   public:
     MagneticTerm(const Surface& surface, Index body, const FaceLoop& loop, const FieldSources& sources,
                  Registry& registry);
@@ -27,7 +28,13 @@ class MagneticTerm final : public AppliedFieldTerm {
     std::string_view name() const override { return Magnetic::name; }
     Index body() const override { return body_; }
     bool set_values(const Values& values) override;
-    double energy(const double* q, const LoadParameters& load_parameters) const override;
+    double energy(const double* q, const LoadParameters& load_parameters) const override {
+        return loop_.sum(energy_of_group(q, load_parameters));
+    }
+    std::vector<double> element_energies(const double* q,
+                                         const LoadParameters& load_parameters) const override {
+        return of_elements(loop_, surface_.faces.user, energy_of_group(q, load_parameters));
+    }
     void evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) override;
     void prepare_assembly(const double* q, const LoadParameters& load_parameters) override;
     void assemble(const ElementBlock& element_block, const double* q, const LoadParameters& load_parameters,
@@ -55,6 +62,18 @@ class MagneticTerm final : public AppliedFieldTerm {
     void find_points(const double* q, std::vector<Vec3>& points, std::vector<Vec3>& magnetizations) const;
     // Returns the applied field on all faces. Order as in AppliedField::add_samples.
     Fields sample(const double* q, const LoadParameters& load_parameters, int order) const;
+    // Returns a function of a SIMD vector that computes the energies [J] of its faces.
+    auto energy_of_group(const double* q, const LoadParameters& load_parameters) const {
+        return [this, q, fields = sample(q, load_parameters, 0),
+                everywhere = broadcast(field_.uniform(load_parameters))](Index group) {
+            SimdVec3 x[3];
+            loop_.gather(group, q, x);
+            const SimdVec3& flux = !fields.vary()                 ? everywhere
+                                   : sampling_.any_fine_in(group) ? fields.over_face[sampling_.at(group)].flux
+                                                                  : fields.at_barycenter[group].flux;
+            return Law(x, elements_[group]).energy(elements_[group], flux);
+        };
+    }
     Mat3 rest_frame(Index face) const {
         const std::array<Vec3, 3>& x = surface_.rest_corners(face);
         return Law::rest_frame(x[1] - x[0], x[2] - x[0]);
@@ -167,20 +186,6 @@ auto MagneticTerm<Law>::sample(const double* q, const LoadParameters& load_param
                       order, everywhere);
     if (sampling_.any_fine()) fields.over_face = sampling_.moments(samples, order, everywhere, thicknesses_);
     return fields;
-}
-
-template <class Law>
-double MagneticTerm<Law>::energy(const double* q, const LoadParameters& load_parameters) const {
-    const Fields fields = sample(q, load_parameters, 0);
-    const SimdVec3 everywhere = broadcast(field_.uniform(load_parameters));
-    return loop_.sum([&](Index group) {
-        SimdVec3 x[3];
-        loop_.gather(group, q, x);
-        const SimdVec3& flux = !fields.vary()                 ? everywhere
-                               : sampling_.any_fine_in(group) ? fields.over_face[sampling_.at(group)].flux
-                                                              : fields.at_barycenter[group].flux;
-        return Law(x, elements_[group]).energy(elements_[group], flux);
-    });
 }
 
 template <class Law>

@@ -6,6 +6,7 @@
 #include "magshell/energy/magnetic.h"
 #include "magshell/energy/magnetic_rotating.h"
 #include "magshell/energy/magnetic_six.h"
+#include "magshell/terms/element_energies.h"
 #include "magshell/terms/magnetic/applied_field_term.h"
 #include "magshell/terms/magnetic/field_groups.h"
 #include "magshell/terms/magnetic/total_applied_field.h"
@@ -14,7 +15,7 @@ namespace magshell {
 namespace {
 
 template <class Law>
-class MagneticSixTerm final : public AppliedFieldTerm {
+class MagneticSixTerm final : public AppliedFieldTerm, public ElementEnergies {
   public:
     MagneticSixTerm(const SixNodeShell& sheet, Index body, const ColoredLoop& element_blocks,
                     const SystemMatrix& matrix, const FieldSources& sources, Registry& registry);
@@ -22,7 +23,13 @@ class MagneticSixTerm final : public AppliedFieldTerm {
     std::string_view name() const override { return Magnetic::name; }
     Index body() const override { return body_; }
     bool set_values(const Values& values) override;
-    double energy(const double* q, const LoadParameters& load_parameters) const override;
+    double energy(const double* q, const LoadParameters& load_parameters) const override {
+        return loop_.sum(energy_of_group(q, load_parameters));
+    }
+    std::vector<double> element_energies(const double* q,
+                                         const LoadParameters& load_parameters) const override {
+        return of_elements(loop_, sheet_.faces.user, energy_of_group(q, load_parameters));
+    }
     void evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) override;
     void prepare_assembly(const double* q, const LoadParameters& load_parameters) override;
     void assemble(const ElementBlock& element_block, const double* q, const LoadParameters& load_parameters,
@@ -48,6 +55,21 @@ class MagneticSixTerm final : public AppliedFieldTerm {
     // Returns the applied field at all points in SIMD vectors; empty in a uniform field. Order as in
     // AppliedField::add_samples.
     std::vector<Fields> sample(const double* q, const LoadParameters& load_parameters, int order) const;
+    // Returns a function of a SIMD vector that computes the energies [J] of its faces.
+    auto energy_of_group(const double* q, const LoadParameters& load_parameters) const {
+        return [this, q, fields = sample(q, load_parameters, 0),
+                everywhere = broadcast(field_.uniform(load_parameters))](Index group) {
+            SimdVec3 x[6];
+            loop_.gather(group, q, x);
+            SimdDouble total(0.0);
+            for (int p = 0; p < points; ++p) {
+                const typename Law::Element& e = elements_[group].at[p];
+                total +=
+                    Point(x, p, e).frame().energy(e, fields.empty() ? everywhere : fields[group].at[p].flux);
+            }
+            return total;
+        };
+    }
 
     const SixNodeShell& sheet_;
     const Index body_;
@@ -141,22 +163,6 @@ auto MagneticSixTerm<Law>::sample(const double* q, const LoadParameters& load_pa
     find_points(q, places, moments);
     return in_groups<points>(loop_, field_.sample(places, moments, order, load_parameters), order,
                              field_.uniform(load_parameters));
-}
-
-template <class Law>
-double MagneticSixTerm<Law>::energy(const double* q, const LoadParameters& load_parameters) const {
-    const std::vector<Fields> fields = sample(q, load_parameters, 0);
-    const SimdVec3 everywhere = broadcast(field_.uniform(load_parameters));
-    return loop_.sum([&](Index group) {
-        SimdVec3 x[6];
-        loop_.gather(group, q, x);
-        SimdDouble total(0.0);
-        for (int p = 0; p < points; ++p) {
-            const typename Law::Element& e = elements_[group].at[p];
-            total += Point(x, p, e).frame().energy(e, fields.empty() ? everywhere : fields[group].at[p].flux);
-        }
-        return total;
-    });
 }
 
 template <class Law>

@@ -14,13 +14,14 @@
 #include "magshell/energy/st_venant_kirchhoff.h"
 #include "magshell/strain/cubic_root.h"
 #include "magshell/strain/tetrahedron.h"
+#include "magshell/terms/element_energies.h"
 #include "magshell/terms/solid/solid_moduli.h"
 #include "magshell/terms/solid/solid_term.h"
 
 namespace magshell {
 
 template <class Element, class Material, class Moduli, bool mean>
-class Tetrahedra : public SolidTerm {
+class Tetrahedra : public SolidTerm, public ElementEnergies {
   public:
     Tetrahedra(const SolidTermInput& input,
                const std::vector<std::array<Index, Element::nodes>>& element_nodes)
@@ -62,16 +63,10 @@ class Tetrahedra : public SolidTerm {
     }
 
     double energy(const double* q, const LoadParameters&) const override {
-        return loop_.sum([&](Index group) {
-            const State state(*this, group, q);
-            SimdDouble total = mean ? rest_[group].total() * state.volumetric[0].energy : SimdDouble(0.0);
-            for (int p = 0; p < points; ++p) {
-                SimdDouble density = state.at[p].energy(constants_[group].at);
-                if constexpr (!mean) density += state.volumetric[p].energy;
-                total += rest_[group].volume[p] * density;
-            }
-            return total;
-        });
+        return loop_.sum(energy_of_group(q));
+    }
+    std::vector<double> element_energies(const double* q, const LoadParameters&) const override {
+        return of_elements(loop_, solid_.elements.user, energy_of_group(q));
     }
 
     /// Adds w sum_p V_p g_k . g_l. The weight w is the material's own, or the P-wave modulus of the reference
@@ -201,6 +196,20 @@ class Tetrahedra : public SolidTerm {
 
   protected:
     static constexpr int N = Element::nodes, points = Element::points, n_constants = Material::constants;
+
+    /// Returns a function of a SIMD vector that computes the energies [J] of its elements.
+    auto energy_of_group(const double* q) const {
+        return [this, q](Index group) {
+            const State state(*this, group, q);
+            SimdDouble total = mean ? rest_[group].total() * state.volumetric[0].energy : SimdDouble(0.0);
+            for (int p = 0; p < points; ++p) {
+                SimdDouble density = state.at[p].energy(constants_[group].at);
+                if constexpr (!mean) density += state.volumetric[p].energy;
+                total += rest_[group].volume[p] * density;
+            }
+            return total;
+        };
+    }
 
     struct Rest {
         SimdVec3 gradients[points][3];

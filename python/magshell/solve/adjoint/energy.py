@@ -13,7 +13,7 @@ from ... import _core
 from ...errors import NoGradient
 from ...model.scene.solve_inputs import Inputs
 from ...model.scene.values import Gradient
-from .differences import EIGHTH, SIXTH
+from .differences import EIGHTH, SIXTH, directional_derivative
 from .leaf_gradient import by_leaf
 
 if TYPE_CHECKING:
@@ -115,6 +115,26 @@ class EnergyAdjoint:
         self._model.term_energies(state, [], controls)  # sets the turns of angles to those at rest
         return self._model.gradient(state, controls)
 
+    @property
+    def count(self) -> int:
+        """The number of the energies of `by_name`."""
+        with self.inputs.in_core():
+            return len(self.by_name())
+
+    def weighted(self, weights: np.ndarray, state: np.ndarray, controls: np.ndarray) -> np.ndarray:
+        """Return the gradient of the weighted sum of `by_name` by all unknowns of the core, which must hold the values."""
+        names = self._names(state, controls)
+        if np.ptp(weights) == 0.0:
+            return weights[0] * self._model.gradient(state, controls)
+        each = zip(weights, names, strict=True)
+        return sum(
+            weight * self._model.term_gradient(name, state, controls) for weight, name in each if weight
+        )
+
+    def _names(self, state: np.ndarray, controls: np.ndarray) -> list[str]:
+        """Return the names of `by_name`, and set the turns of angles to those at rest."""
+        return [*dict.fromkeys(name for name, _ in self._model.term_energies(state, [], controls))]
+
     @cached_property
     def gradient(self) -> np.ndarray:
         """The gradient of the sum by all unknowns of the core."""
@@ -140,12 +160,13 @@ class EnergyAdjoint:
         """Compute the gradients of the weighted sum of `by_name` by the wanted leaves. Raises NoGradient if there is
         none.
         """
-        found = []
+        found, of_unknowns = [], None
         for leaf, is_wanted in zip(self.inputs.leaves, wanted, strict=True):
             if not is_wanted:
                 found.append(None)
             elif leaf.name in POSITIONAL and leaf.owner is None:
-                found.append(self.weight_of_all(weights) * self.by_unknowns[POSITIONAL.index(leaf.name)])
+                of_unknowns = self.slopes(weights) if of_unknowns is None else of_unknowns
+                found.append(of_unknowns[POSITIONAL.index(leaf.name)])
             else:
                 found.append(
                     self._differences(leaf, lambda c: weights * np.array([*self.by_name(c).values()]))
@@ -157,32 +178,77 @@ class EnergyAdjoint:
         """The gradient of the sum by positions (n_v, 3) and by edge rotations (n_e,)."""
         return self.unknowns.split(self.gradient)
 
-    def weight_of_all(self, weights: np.ndarray) -> float:
-        """Return the one weight of all energies. Raises NoGradient if they differ."""
-        if np.ptp(weights) > 0.0:
-            raise NoGradient("no gradient by positions of single energies: take that of their sum, ms.energy")
-        return float(weights[0])
+    def slopes(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the gradient of the weighted sum by positions (n_v, 3) and by edge rotations (n_e,)."""
+        if np.ptp(weights) == 0.0:
+            return tuple(weights[0] * each for each in self.by_unknowns)
+        controls, unknowns = self.inputs.controls, self.unknowns
+        with self.inputs.in_core():
+            return unknowns.split(self.weighted(weights, self.state(controls), controls))
 
     def mixed(
-        self, weight: float, by_positions: np.ndarray, by_rotations: np.ndarray, wanted: Sequence[bool]
-    ) -> tuple[float, list[np.ndarray | None]]:
-        """Compute m . g, with the gradient g and a motion m in two arrays as `by_unknowns`, and weight (m . g) by leaves."""
+        self,
+        weights: np.ndarray,
+        by_positions: np.ndarray,
+        by_rotations: np.ndarray,
+        by_weights: bool,
+        wanted: Sequence[bool],
+    ) -> tuple[np.ndarray | None, list[np.ndarray | None]]:
+        """Compute derivatives of m . g, with the gradient g of the weighted sum and a motion m in two arrays as `slopes`.
+
+        Returns those by the weights (n,), None unless they are asked for, and by the wanted leaves.
+        """
         motion = self.unknowns.joined(by_positions, by_rotations)
-        moved = self.unknowns.split(weight * (self.hessian @ motion)) if any(wanted) else ()
-        found, of_values = [], None
+        is_sum = np.ptp(weights) == 0.0
+        found, of_values, moved = [], None, None
         for leaf, is_wanted in zip(self.inputs.leaves, wanted, strict=True):
             if not is_wanted:
                 found.append(None)
             elif leaf.name in POSITIONAL and leaf.owner is None:
+                if moved is None:
+                    product = weights[0] * (self.hessian @ motion) if is_sum else self._bent(weights, motion)
+                    moved = self.unknowns.split(product)
                 found.append(moved[POSITIONAL.index(leaf.name)])
-            elif self._follows(leaf):
+            elif self._follows(leaf) or not is_sum:
                 found.append(
-                    self._differences(leaf, lambda c: np.array([weight * (motion @ self._gradient(c))]))
+                    self._differences(
+                        leaf, lambda c: np.array([motion @ self.weighted(weights, self.state(c), c)])
+                    )
                 )
             else:
-                of_values = self._by_values(weight * motion) if of_values is None else of_values
+                of_values = self._by_values(weights[0] * motion) if of_values is None else of_values
                 found.append(by_leaf(self.inputs, leaf, of_values))
-        return float(motion @ self.gradient), found
+        return self._works(motion) if by_weights else None, found
+
+    def _works(self, motion: np.ndarray) -> np.ndarray:
+        """Return the products of a motion with the gradients of single energies, (n,)."""
+        state, controls = self.state(self.inputs.controls), self.inputs.controls
+        with self.inputs.in_core():
+            names = self._names(state, controls)
+            return np.array([motion @ self._model.term_gradient(name, state, controls) for name in names])
+
+    def _bent(self, weights: np.ndarray, motion: np.ndarray) -> np.ndarray:
+        """Return the rate of the gradient of the weighted sum along a motion. Raises NoGradient where it is not smooth."""
+        state, controls = self.state(self.inputs.controls), self.inputs.controls
+        length = self._relative_size(motion)
+        if length == 0.0:
+            return np.zeros_like(motion)
+        with self.inputs.in_core():
+            rate = directional_derivative(
+                lambda step: self.weighted(weights, state + step * motion, controls)[None],
+                [_STEP * shorter / length for shorter in _SHORTER],
+            )
+        if rate is None:
+            raise NoGradient(
+                "no second derivatives of single energies here: they are not smooth in the positions"
+            )
+        return rate[0]
+
+    def _relative_size(self, motion: np.ndarray) -> float:
+        """Return the largest motion of a vertex over the shortest edge, or the largest rotation in rad, if that is more."""
+        vertices, edges = 3 * self.inputs.scene._bodies.n_points, self.inputs.scene.mesh.edge_lengths
+        moved = np.abs(motion[:vertices]).max(initial=0.0) / edges.min(initial=np.inf)
+        return float(max(moved, np.abs(motion[vertices:]).max(initial=0.0)))
 
     def _follows(self, leaf: Leaf) -> bool:
         """Return whether directions of clamps can change with a leaf, or load parameters, which `vjp` leaves out."""

@@ -34,7 +34,7 @@ class _Energies(torch.autograd.Function):
             positional = [is_positional(leaf) for leaf in ctx.adjoint.inputs.leaves]
             asked = [each is not None for each in by_leaves]
             if any(is_asked and at for is_asked, at in zip(asked, positional, strict=True)):
-                slopes = _Slopes.apply(ctx.adjoint, ctx.dtype, by_energies[0], *ctx.leaves)
+                slopes = _Slopes.apply(ctx.adjoint, ctx.dtype, by_energies, *ctx.leaves)
                 for k, leaf in enumerate(ctx.adjoint.inputs.leaves):
                     if asked[k] and positional[k]:
                         by_leaves[k] = slopes[POSITIONAL.index(leaf.name)].to(ctx.leaves[k])
@@ -74,23 +74,24 @@ class _SlopesByValues(torch.autograd.Function):
 
 
 class _Slopes(torch.autograd.Function):
-    """A weight times the gradient of the sum of all energies by positions and by edge rotations, of the leaves."""
+    """The gradient of the weighted sum of all energies by positions and by edge rotations, of the weights and leaves."""
 
     @staticmethod
     def forward(
-        ctx: Any, adjoint: EnergyAdjoint, dtype: torch.dtype, weight: torch.Tensor, *leaves: torch.Tensor
+        ctx: Any, adjoint: EnergyAdjoint, dtype: torch.dtype, weights: torch.Tensor, *leaves: torch.Tensor
     ) -> tuple[torch.Tensor, ...]:
-        ctx.adjoint, ctx.weight, ctx.leaves = adjoint, weight, leaves
-        return tuple(torch.from_numpy(float(weight) * each).to(dtype=dtype) for each in adjoint.by_unknowns)
+        ctx.adjoint, ctx.weights, ctx.leaves = adjoint, weights, leaves
+        return tuple(torch.from_numpy(each).to(dtype=dtype) for each in adjoint.slopes(numbers_of(weights)))
 
     @staticmethod
     def backward(ctx: Any, *motion: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
         arrays = [numbers_of(each) for each in motion]
-        by_weight, found = ctx.adjoint.mixed(float(ctx.weight), *arrays, ctx.needs_input_grad[3:])
-        by_inputs = [torch.tensor(by_weight).to(ctx.weight), *_like_leaves(found, ctx.leaves)]
+        is_asked, *wanted = ctx.needs_input_grad[2:]
+        by_weights, found = ctx.adjoint.mixed(numbers_of(ctx.weights), *arrays, is_asked, wanted)
+        by_inputs = _like_leaves([by_weights, *found], [ctx.weights, *ctx.leaves])
         if torch.is_grad_enabled():
             given = [each for each in by_inputs if each is not None]
-            others = (ctx.weight, *ctx.leaves, *motion)
+            others = (ctx.weights, *ctx.leaves, *motion)
             marked = iter(_NoFurther.apply(_THIRD, len(given), *given, *others))
             by_inputs = [None if each is None else next(marked) for each in by_inputs]
         return None, None, *by_inputs
@@ -132,4 +133,5 @@ def slopes_of(
     adjoint: EnergyAdjoint, dtype: torch.dtype, leaves: list[Any]
 ) -> tuple[torch.Tensor, torch.Tensor]:
     """Return the gradient of the sum by positions and by edge rotations, as tensors connected to the leaves."""
-    return _Slopes.apply(adjoint, dtype, torch.ones((), dtype=torch.float64), *leaves)
+    weights = torch.ones(adjoint.count, dtype=torch.float64)
+    return _Slopes.apply(adjoint, dtype, weights, *leaves)

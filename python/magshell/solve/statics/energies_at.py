@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import scipy
 
+from ... import _core
 from ..._input.quantity import quantity
 from ..._input.scalars import flag
 from ..._input.tensors import dtype_like, like
 from ..._runtime.solve_keywords import given_to
 from ..._runtime.solver_entry_point import solve_entry
+from ...errors import NoGradient
 from ...model.bodies.bodies import checked_body
 from ...model.scene.fine_faces import with_fine_faces
 from ...model.scene.scene import Scene
@@ -35,6 +37,7 @@ def energies(
     *,
     edge_rotations: Numbers | None = None,
     body: Shell | Solid | None = None,
+    by: str | None = None,
     remanent_magnetization: Numbers | None = None,
     applied_flux_density: Numbers | None = None,
     load_factor: Any = 1.0,
@@ -54,14 +57,17 @@ def energies(
     positions: (n_v, 3) m. edge_rotations: (n_e,) rad, as a result has them, of sheets with bending="midedge"; by default
         none, which leaves the normals across edges half-way between those of their faces.
     body: of the scene: its elastic energies alone, "membrane" and "bending" of a Shell, "solid" of a Solid.
+    by: "face" or "tetrahedron": the energies of every element of the body, {name: (n,) J}, elastic and magnetic ones; of a
+        sheet with six-node faces, of these. Their sums are the energies of the body. Others, such as those of loads and
+        contact, do not belong to elements and are left out. A scene of one Shell or Solid needs no `body`.
 
     {keywords}
     values: as in ms.equilibrium.
 
     At the positions of an equilibrium these are its `energies`. The directions that clamps prescribe are used; other
-    prescribed displacements are not. Tensors get energies that are tensors: see ms.energy. The gradient by positions
-    is that of the sum of all energies; the one of a single energy, with others left out, raises NoGradient. Those by values
-    may be of single energies. Energies of one body have none: ValueError.
+    prescribed displacements are not. Tensors get energies that are tensors: see ms.energy. Single
+    energies have the same derivatives as their sum; their second ones by positions are differences of gradients. Energies
+    of one body have none: ValueError; those of elements have none: NoGradient.
 
     Raises ValueError on bad input, and where there is no energy: bodies in contact intersect or are nearer than
     they may be, or elements are inside out whose material does not bear it.
@@ -76,8 +82,13 @@ def energies(
     """
     arguments = given_to("energies", locals())
     number = None if checked_body(body) is None else _number(scene, body)
+    chosen = None if by is None else _element_kind(scene, by, body)
     at = _point("energies", scene, positions, edge_rotations, arguments)
     leaves = at.adjoint.inputs.leaves
+    if chosen is not None:
+        if leaves:
+            raise NoGradient(f"energies by {by} have no gradients: give tensors detached")
+        return _of_elements(at.adjoint, *chosen)
     if number is not None and leaves:
         raise ValueError("energies of one body have no gradients: give tensors detached, or no body")
     with at.adjoint.inputs.in_core():
@@ -334,6 +345,42 @@ def _point(function: str, scene: Scene, positions, edge_rotations, arguments: di
         if reason := model.refusal(adjoint.state(inputs.controls)):
             raise ValueError(f"there is no energy at these positions: {reason}")
     return _Point(adjoint, dtype_like(*inputs.given) if inputs.leaves else None)
+
+
+_KINDS = {"face": Shell, "tetrahedron": Solid}
+
+
+def _element_kind(scene: Scene, by: str, body: Shell | Solid | None) -> tuple[bool, int]:
+    """Return whether elements are those of a solid, and the number of their body among the sheets or solids of a scene.
+
+    Raises ValueError for another `by`, and if there is no such body, or none is chosen of several.
+    """
+    if not isinstance(by, str) or by not in _KINDS:
+        raise ValueError(f'by must be "face" or "tetrahedron", got {by!r:.60}')
+    if not isinstance(scene, Scene):
+        raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
+    bodies, kind = scene._bodies, _KINDS[by]
+    if body is None:
+        found = [each for each in (*bodies.sheets, *bodies.solids) if isinstance(each, kind)]
+        if len(found) != 1:
+            raise ValueError(f"the scene has {len(found)} bodies with energies by {by}: choose one by body=")
+        (body,) = found
+    elif not isinstance(body, kind):
+        raise ValueError(f"a {type(body).__name__} has no energies by {by}")
+    among = bodies.sheets if kind is Shell else bodies.solids
+    return kind is Solid, next(k for k, each in enumerate(among) if each is body)
+
+
+def _of_elements(adjoint: EnergyAdjoint, of_solid: bool, number: int) -> dict[str, np.ndarray]:
+    """Return the energies of the elements of a body, {name: (n,) J}."""
+    inputs, found = adjoint.inputs, {}
+    model = inputs.scene._model
+    with inputs.in_core():
+        of_terms = _core.element_energies(model, adjoint.state(inputs.controls), inputs.controls)
+    for name, solid, whose, elements in of_terms:
+        if solid == of_solid and whose == number:
+            found[name] = found.get(name, 0.0) + elements
+    return found
 
 
 def _of_body(scene, number: int, of_terms: list[tuple[str, float]]) -> dict[str, float]:
