@@ -77,7 +77,7 @@ def _meshes_and_pictures(s: Sample) -> Iterator[Call]:
         "names": {0: "low"},
     }
     yield Call("Color", lambda **a: ms.plot(s.mesh, color=ms.Color(**a), style=painted), color, cost=30)
-    shown = ("show_field", "rest", "mesh_lines", "ticks")
+    shown = ("show_field", "rest", "mesh_lines", "ticks", "thickness")
     style = {"arrows": 3, **dict.fromkeys(shown, True), "contacts": False, "backend": "matplotlib"}
     yield Call("Style", ms.Style, style)
     yield Call(

@@ -146,9 +146,9 @@ class _Coloring:
 def _checked(style: Style | None, view: Any, title: str, host: str, port: int, browser: bool) -> Style:
     style = style_of(style)
     flag("browser", browser)
-    if style.contacts or style.ticks:
+    if style.contacts or style.ticks or style.thickness:
         raise ValueError(
-            "a live view does not show contacts and ticks: leave them out of its style; ms.plot does"
+            "a live view does not show contacts, ticks and thickness: leave them out of its style; ms.plot does"
         )
     if isinstance(view, View) and view.frame is not None:
         raise ValueError("a live view shows all of it, and its reader zooms: leave the frame out of its view")

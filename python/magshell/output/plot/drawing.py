@@ -123,7 +123,9 @@ def plot(
 
 
 def check_contacts(style: Style, states: list[State]) -> None:
-    """Raise ValueError if the style shows contact forces and no state has contacts."""
+    """Raise ValueError if the style shows contact forces or the thickness, and no state has them."""
+    if style.thickness and not any(s.thickness is not None and s.thickness().any() for s in states):
+        raise ValueError("thickness is drawn of shells: give a Shell, or a Scene or a result with one")
     if style.contacts and not any(state.loads for state in states):
         raise ValueError("contacts are drawn of a result of a scene with contacts: there is none")
 

@@ -85,9 +85,9 @@ def write_page(
         raise ValueError(f"a page is saved as .html, got {path.name!r}")
     style = style_of(style)
     count = arrow_count(style.arrows)
-    if style.contacts or style.ticks:
+    if style.contacts or style.ticks or style.thickness:
         raise ValueError(
-            "a page does not show contacts and ticks: leave them out of its style; ms.plot and ms.animate do"
+            "a page does not show contacts, ticks and thickness: leave them out of its style; ms.plot and ms.animate do"
         )
     if isinstance(view, View) and view.frame is not None:
         raise ValueError("a page shows all of it, and its reader zooms: leave the frame out of its view")

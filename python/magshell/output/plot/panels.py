@@ -17,6 +17,7 @@ from .limits import arrow_count
 from .solids import Solid, arrows, ribbons, sheet
 from .style import Style
 from .surroundings import box_of, obstacle_solids
+from .thick import thick_skins
 from .view import View
 
 # [-] Cosine of the angle between the normals of two faces in the reference configuration; an edge with a larger angle is
@@ -94,14 +95,14 @@ class Options:
     sections: tuple[Section, ...] = ()  # one per state, if there is a cut
     contacts: bool = False  # contact forces as arrows
     ticks: bool = False  # coordinates along the edges of the window
+    thickness: bool = False  # shells as closed surfaces
 
     @classmethod
     def of(cls, style: Style) -> Options:
         """Make the options from a caller's style."""
         count = arrow_count(style.arrows)
-        return cls(
-            count, style.show_field, style.rest, style.mesh_lines, contacts=style.contacts, ticks=style.ticks
-        )
+        more = {name: getattr(style, name) for name in ("contacts", "ticks", "thickness")}
+        return cls(count, style.show_field, style.rest, style.mesh_lines, **more)
 
 
 def draw(
@@ -195,16 +196,21 @@ def sheet_solids(state: State, shades: np.ndarray, view: View, size: float, opti
     """Return the solids of a state's bodies, with links, tendons, rigid bodies and lines. shades: colours of the bodies."""
     mesh, eye = state.mesh, view.axes[2]
     step = float(mesh.edge_lengths.mean())
-    skin = sheet(state.positions, mesh.faces, shades)
+    skins, border = [sheet(state.positions, mesh.faces, shades)], None
+    if options.thickness and state.thickness is not None:
+        skins, border = thick_skins(state, shades)
     links = [sheet(*each, rgb(colors.LINK)) for each in state.links]
     inside = [*links, *(sheet(*each, rgb(colors.TENDON)) for each in state.tendons)]
     shapes = [sheet(*each, rgb(colors.LINK)) for each in state.shapes]
-    solids = [*inside, *shapes, replace(skin, opacity=FLESH) if inside else skin]
+    skins = [replace(skin, opacity=FLESH) for skin in skins] if inside else skins
+    solids = [*inside, *shapes, *skins]
     if options.mesh_lines:
         edges = mesh.edges[_seen(state, np.arange(mesh.n_edges), eye)]
         solids.append(ribbons(state.positions[edges], eye, 0.5 * LINE * size, colors.OUTLINE, 0.6 * step))
     lines = _outline(mesh)
-    if len(shown := mesh.edges[_seen(state, lines, eye)]):
+    if border is not None:
+        solids.append(ribbons(border, eye, LINE * size, colors.OUTLINE, 0.2 * step))
+    elif len(shown := mesh.edges[_seen(state, lines, eye)]):
         solids.append(ribbons(state.positions[shown], eye, LINE * size, colors.OUTLINE, 0.8 * step))
     if options.rest and state.displacements.any():
         lines = mesh.edges[lines] if len(lines) else mesh.edges

@@ -28,6 +28,7 @@ class Style:
     rest: show the rest shape as a faint outline. mesh_lines: show the edges of the mesh.
     contacts: show the forces of all contacts, friction included, as arrows at the vertices, in front of everything else.
     ticks: show coordinates along the edges of a picture or movie that is seen along an axis: view="front", "side" or "top".
+    thickness: draw shells with their thickness, so that a sheet seen edge-on is not a line.
     backend: "pyvista" or "matplotlib"; by default that of the environment variable MAGSHELL_PLOT, else pyvista if it can
         render off-screen, else matplotlib. A page is painted by the browser that shows it.
 
@@ -44,11 +45,12 @@ class Style:
     mesh_lines: bool = False
     contacts: bool = False
     ticks: bool = False
+    thickness: bool = False
     backend: str | None = None
 
     def __post_init__(self) -> None:
         arrow_count(self.arrows)
-        for name in ("show_field", "rest", "mesh_lines", "contacts", "ticks"):
+        for name in ("show_field", "rest", "mesh_lines", "contacts", "ticks", "thickness"):
             flag(name, getattr(self, name))
         if self.backend is not None and self.backend not in BACKENDS:
             raise ValueError(f"backend must be 'pyvista' or 'matplotlib', got {self.backend!r:.60}")

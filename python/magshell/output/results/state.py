@@ -61,6 +61,7 @@ class State:
     loads: () -> ContactLoads of a result of a scene with contacts, or None.
     forces: () -> {name: (n_v, 3) N} of a result, the forces of its supports and loads on the vertices, or None.
     rotates: whether the magnetization of each face only rotates with it, (n_f,), or of all faces.
+    thickness: () -> (n_f,) m, of the faces of shells, 0 on those of solids; None of a mesh.
     """
 
     mesh: TriangleMesh | QuadraticTriangleMesh | TetMesh | JoinedMesh
@@ -81,6 +82,7 @@ class State:
     forces: Callable[[], dict[str, np.ndarray]] | None = None
     shapes: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
     rotates: np.ndarray | bool = False
+    thickness: Callable[[], np.ndarray] | None = None
 
     @property
     def contact_pressures(self) -> np.ndarray | None:
@@ -161,13 +163,14 @@ def states_of(
     if isinstance(what, TriangleMesh | QuadraticTriangleMesh | TetMesh):
         return _states(what, given)
     if isinstance(what, Shell | Solid):
-        return _states(what.mesh, _magnetized(given, [what]))
+        return _with_thickness(_states(what.mesh, _magnetized(given, [what])), lambda k: [what])
     if isinstance(what, Scene):
         links, shapes = link_surfaces_at_rest(what), shapes_at_rest(what)
         if (links or shapes) and not what.bodies:
             return _states(mesh_of([*links, *shapes]), _with_own(given, what), [what.fields])
         states = _states(what.mesh, _with_own(given, what), [what.fields])
         tendons = tuple(tendons_at_rest(what))
+        states = _with_thickness(states, lambda k: what.bodies)
         return [replace(state, links=tuple(links), shapes=tuple(shapes), tendons=tendons) for state in states]
     is_result = isinstance(getattr(what, "scene", None), Scene) and hasattr(what, "positions")
     if is_result and not isinstance(what, EquilibriumSet):
@@ -184,6 +187,8 @@ def states_of(
             states = [replace(state, obstacles=each) for state, each in pairs]
         states = _with_tendons(what, _with_links(what, states, positions), positions)
         states = _with_elements(what, states, positions)
+        if what.scene.bodies and hasattr(what, "_values_at"):
+            states = _with_thickness(states, lambda k: what._values_at(k).sheets)
         own_times = isinstance(what, Trajectory) and len(states) == len(what)
         return timed(states, what.times) if own_times else states
     if isinstance(what, Iterable) and not isinstance(what, str | bytes | np.ndarray):
@@ -213,6 +218,19 @@ def _with_tendons(result, states: list[State], positions) -> list[State]:
     if not tendons:
         return states
     return [replace(state, tendons=tuple(each)) for state, each in zip(states, tendons, strict=True)]
+
+
+def _with_thickness(states: list[State], bodies_of: Callable[[int], Any]) -> list[State]:
+    """Add the thickness of faces to states. bodies_of: returns the bodies with their values in state k."""
+    return [
+        replace(state, thickness=lambda k=k: thickness_of(bodies_of(k))) for k, state in enumerate(states)
+    ]
+
+
+def thickness_of(bodies: Iterable[Shell | Solid]) -> np.ndarray:
+    """Return the thickness of the faces of bodies, one after another, (n_f,) m; 0 on the faces of solids."""
+    each = [np.zeros(b.mesh.n_faces) if isinstance(b, Solid) else b._face_thickness for b in bodies]
+    return np.concatenate([np.zeros(0), *each])
 
 
 def _skeletons_alone(result) -> tuple[TriangleMesh, np.ndarray]:

@@ -18,7 +18,7 @@ from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ...model.scene.scene import Scene
 from ...model.shells.shell import Shell
 from ...model.solids.solid import Solid
-from .state import State, states_of
+from .state import State, states_of, thickness_of
 
 if TYPE_CHECKING:
     from ..._input.kinds import FilePath, Numbers, Shown
@@ -123,11 +123,4 @@ def _thickness(what, state: State, given, index: int) -> np.ndarray | None:
         bodies = what._values_at(index).sheets
     else:
         raise ValueError('thickness="own" needs a result, a Scene or a Shell: give a number, m')
-    return np.concatenate([np.zeros(0), *map(_of_faces, bodies)])
-
-
-def _of_faces(body: Shell | Solid) -> np.ndarray:
-    """Return the thickness of a shell's faces, (n_f,) m; zeros for a solid, whose values are not used."""
-    if isinstance(body, Solid):
-        return np.zeros(body.mesh.n_faces)
-    return body._face_thickness
+    return thickness_of(bodies)
