@@ -13,6 +13,7 @@ below mean the same in every problem.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -48,14 +49,14 @@ class Subproblem:
         point = _Point.start(self)
         barrier = 1.0
         while barrier > _LAST_BARRIER:
+            residual = point.residual(barrier)
             for _ in range(_NEWTON_LIMIT):
-                residual = point.residual(self, barrier)
                 if np.abs(residual).max() < 0.9 * barrier:
                     break
-                moved = point.newton(self, barrier, np.linalg.norm(residual))
+                moved = point.newton(barrier, np.linalg.norm(residual))
                 if moved is None:  # the residual is round-off
                     break
-                point = moved
+                point, residual = moved
             barrier *= 0.1
         return point.t
 
@@ -65,6 +66,7 @@ class _Point:
     """An iterate: primal t, y, slack s of the constraints, and the multipliers of constraints, of t's bounds and of
     y's."""
 
+    of: Subproblem
     t: np.ndarray
     y: np.ndarray
     slack: np.ndarray
@@ -79,28 +81,32 @@ class _Point:
         t = 0.5 * (sub.lower + sub.upper)
         at_bound = np.maximum(1.0, 2.0 / (sub.upper - sub.lower))
         ones = np.ones(m)
-        return _Point(t, ones, ones, ones, at_bound, at_bound, np.full(m, max(1.0, 0.5 * sub.penalty)))
+        return _Point(sub, t, ones, ones, ones, at_bound, at_bound, np.full(m, max(1.0, 0.5 * sub.penalty)))
 
     def parts(self) -> tuple[np.ndarray, ...]:
         return self.t, self.y, self.slack, self.multiplier, self.at_lower, self.at_upper, self.at_zero
 
-    def slopes(self, sub: Subproblem) -> np.ndarray:
-        """Return the derivatives of objective and constraints, (1 + m, n)."""
+    @cached_property
+    def slopes(self) -> np.ndarray:
+        """The derivatives of objective and constraints, (1 + m, n)."""
+        sub = self.of
         return sub.p / (sub.asymptote - self.t) ** 2 - sub.q / (sub.asymptote + self.t) ** 2
 
-    def excess(self, sub: Subproblem) -> np.ndarray:
-        """Return the constraints minus y and b, (m,)."""
+    @cached_property
+    def excess(self) -> np.ndarray:
+        """The constraints minus y and b, (m,)."""
+        sub = self.of
         values = sub.p[1:] @ (1 / (sub.asymptote - self.t)) + sub.q[1:] @ (1 / (sub.asymptote + self.t))
         return values - self.y - sub.limits
 
-    def residual(self, sub: Subproblem, barrier: float) -> np.ndarray:
+    def residual(self, barrier: float) -> np.ndarray:
         """Return the residual of the perturbed optimality conditions."""
-        slopes = self.slopes(sub)
+        sub, slopes = self.of, self.slopes
         return np.concatenate(
             [
                 slopes[0] + self.multiplier @ slopes[1:] - self.at_lower + self.at_upper,
                 sub.penalty + self.y - self.multiplier - self.at_zero,
-                self.excess(sub) + self.slack,
+                self.excess + self.slack,
                 self.at_lower * (self.t - sub.lower) - barrier,
                 self.at_upper * (sub.upper - self.t) - barrier,
                 self.at_zero * self.y - barrier,
@@ -108,35 +114,39 @@ class _Point:
             ]
         )
 
-    def newton(self, sub: Subproblem, barrier: float, norm: float) -> _Point | None:
-        """Take one damped Newton step; returns None if no step reduces the residual."""
-        direction = self._direction(sub, barrier)
+    def newton(self, barrier: float, norm: float) -> tuple[_Point, np.ndarray] | None:
+        """Take one damped Newton step; returns the point and its residual, or None if no step reduces the residual."""
+        sub = self.of
+        direction = self._direction(barrier)
         rates = [-step / value for step, value in zip(direction[1:], self.parts()[1:], strict=True)]
         rates += [-direction[0] / (self.t - sub.lower), direction[0] / (sub.upper - self.t)]
         length = 1.0 / max(1.0, *(1.01 * rate.max() for rate in rates))
         for _ in range(50):
-            moved = _Point(
-                *(value + length * step for value, step in zip(self.parts(), direction, strict=True))
-            )
+            parts = zip(self.parts(), direction, strict=True)
+            moved = _Point(sub, *(value + length * step for value, step in parts))
             inside = (moved.t > sub.lower).all() and (moved.t < sub.upper).all()
-            if inside and np.linalg.norm(moved.residual(sub, barrier)) < norm:
-                return moved
+            if inside:
+                residual = moved.residual(barrier)
+                if np.linalg.norm(residual) < norm:
+                    return moved, residual
             length *= 0.5
         return None
 
-    def _direction(self, sub: Subproblem, barrier: float) -> tuple[np.ndarray, ...]:
+    def _direction(self, barrier: float) -> tuple[np.ndarray, ...]:
         """Return the Newton step, from a system of the m multipliers after elimination of all else."""
+        sub = self.of
         above, below = self.t - sub.lower, sub.upper - self.t
-        slopes = self.slopes(sub)
+        slopes = self.slopes
         jacobian = slopes[1:]
         weights = np.concatenate([[1.0], self.multiplier])
-        curvature = 2 * (weights @ sub.p) / (sub.asymptote - self.t) ** 3
-        curvature += 2 * (weights @ sub.q) / (sub.asymptote + self.t) ** 3
+        to_upper, to_lower = sub.asymptote - self.t, sub.asymptote + self.t
+        curvature = 2 * (weights @ sub.p) / (to_upper * to_upper * to_upper)
+        curvature += 2 * (weights @ sub.q) / (to_lower * to_lower * to_lower)
         diagonal_t = curvature + self.at_lower / above + self.at_upper / below
         diagonal_y = 1.0 + self.at_zero / self.y
         force_t = slopes[0] + self.multiplier @ jacobian - barrier / above + barrier / below
         force_y = sub.penalty + self.y - self.multiplier - barrier / self.y
-        force_multiplier = self.excess(sub) + barrier / self.multiplier
+        force_multiplier = self.excess + barrier / self.multiplier
 
         matrix = (jacobian / diagonal_t) @ jacobian.T
         matrix += np.diag(1 / diagonal_y + self.slack / self.multiplier)
