@@ -441,7 +441,8 @@ def chained(
     return [None if each is None else numbers_of(each) for each in found]
 
 
-def numbers_of(by_output) -> np.ndarray:
+def numbers_of(by_output: torch.Tensor) -> np.ndarray:
+    """Return a derivative by a result as an array. Raises NoGradient inside transforms that cannot be served."""
     if why := why_not(by_output):
         raise NoGradient(f"no gradient here: the one by a result {why}")
     return by_output.detach().cpu().double().numpy()
