@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -102,7 +103,7 @@ class Elastomer:
             object.__setattr__(self, name, value)
 
     @property
-    def elasticity(self) -> dict[str, float]:
+    def elasticity(self) -> dict[str, Any]:
         """The arguments young_modulus and poisson_ratio of ms.Shell; solids need a ratio below 0.5."""
         return {"young_modulus": self.young_modulus, "poisson_ratio": self.poisson_ratio}
 
