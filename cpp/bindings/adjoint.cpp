@@ -7,20 +7,18 @@ namespace magshell::bindings {
 namespace {
 
 py::tuple pull_back_to_inputs(Model& model, const StaticsResult& equilibrium, const Array& by_positions,
-                              const Array& by_edge_rotations, const VectorXd& by_driving,
-                              const std::vector<VectorXd>& curvature_scales) {
+                              const Array& by_edge_rotations, const VectorXd& by_driving, bool by_rest) {
     const Rows3 positions = to_rows3(by_positions);
     const VectorXd rotations = to_vector(by_edge_rotations);
     Gradient gradient;
-    RestGradient rest{curvature_scales, {}, {}};
+    RestGradient rest{by_rest, {}, {}};
     {
         const py::gil_scoped_release unlocked;
         const std::lock_guard lock(model.in_use());
         gradient = equilibrium_vjp(model, equilibrium, model.bodies().gradient_by_state(positions, rotations),
                                    by_driving, rest);
     }
-    if (!rest.asked())
-        return py::make_tuple(values_to_user(model, gradient.values), gradient.load_parameters);
+    if (!rest.asked) return py::make_tuple(values_to_user(model, gradient.values), gradient.load_parameters);
     return py::make_tuple(values_to_user(model, gradient.values), gradient.load_parameters,
                           at_nodes(model, rest.by_nodes), at_nodes(model, rest.by_prescribed));
 }
@@ -43,12 +41,16 @@ py::tuple by_parameters_at(Model& model, const VectorXd& q, const LoadParameters
     return by_parameters(model, gradient);
 }
 
-// Returns lambda . dg/dk at a state, in equilibrium or not, for all parameters and load parameters k.
+// Returns lambda . dg/dk at a state, in equilibrium or not, for all parameters and load parameters k, and lambda . dg/dX of all nodes.
 py::tuple residual_vjp(Model& model, const VectorXd& q, const LoadParameters& load_parameters,
-                       const VectorXd& lambda) {
-    return by_parameters_at(model, q, load_parameters, [&](Gradient& gradient) {
+                       const VectorXd& lambda, bool by_rest) {
+    RestGradient rest{by_rest, {}, {}};
+    const py::tuple found = by_parameters_at(model, q, load_parameters, [&](Gradient& gradient) {
         model.parameters().vjp(q, load_parameters, lambda, gradient);
+        if (by_rest) rest.clear(model);
+        rest.add(model, q, load_parameters, lambda);
     });
+    return py::make_tuple(found[0], found[1], rest.by_nodes);
 }
 
 // Returns dF/dq_h . dq_h/dk for all parameters and load parameters k, with the prescribed dofs q_h.
@@ -65,18 +67,33 @@ py::tuple prescribed_vjp(Model& model, const VectorXd& q, const LoadParameters& 
 
 void register_adjoint(py::module_& module) {
     module.def(
+        "without_rest_gradient",
+        [](const Model& model) {
+            py::list names;
+            for (const std::string_view name : without_rest_gradient(model))
+                names.append(py::str(name.data(), name.size()));
+            return names;
+        },
+        py::arg("model"), "The names of the energies and forces that have no derivative by rest positions.");
+    module.def(
         "pull_back", &pull_back_to_inputs, py::arg("model"), py::arg("equilibrium"), py::arg("by_positions"),
-        py::arg("by_edge_rotations"), py::arg("by_driving") = VectorXd(),
-        py::arg("curvature_scales") = std::vector<VectorXd>(),
+        py::arg("by_edge_rotations"), py::arg("by_driving") = VectorXd(), py::arg("by_rest") = false,
         "The gradients by everything a solve takes, of a function of positions (n_v, 3), edge rotations "
-        "(n_e,) and what motors do (m,) with these gradients; with the curvature scales of all three-node "
-        "shells also those by rest "
-        "positions and directions, of the elastic energies and by what supports prescribe there. The model "
+        "(n_e,) and what motors do (m,) with these gradients; by_rest: also those by rest positions and "
+        "directions, through the shape of bodies at rest and through what supports prescribe there. The "
+        "model "
         "must hold the values of that solve.");
     module.def(
         "vjp", &residual_vjp, py::arg("model"), py::arg("q"), py::arg("controls"), py::arg("adjoint"),
+        py::arg("by_rest") = false,
         "adjoint . dg/dk at a state q, g the gradient of the energy: (n,) by every value and (m,) by the "
-        "controls. What supports prescribe stays.");
+        "controls; by_rest: also by the rest shape, three numbers per node, else none. What supports "
+        "prescribe "
+        "stays.");
+    module.def(
+        "at_nodes", &at_nodes, py::arg("model"), py::arg("vector"),
+        "The rows of all vertices (n_v, 3) and directions (n_d, 3) of three numbers per node, or of all "
+        "unknowns.");
     module.def(
         "prescribed_vjp", &prescribed_vjp, py::arg("model"), py::arg("q"), py::arg("controls"),
         py::arg("by_state"),

@@ -229,10 +229,10 @@ MotionResult run(Model& model, const MotionInput& input, bool gradients, std::si
 
 py::dict back(Model& model, const MotionInput& input, const MotionResult& motion, const Array& by_positions,
               const Array& by_edge_rotations, const Array& by_velocities, const Knots& by_driving,
-              const std::vector<VectorXd>& curvature_scales, const py::object& progress) {
+              bool by_rest, const py::object& progress) {
     const Watch watch(progress);
     GradientsByStates by;
-    by.curvature_scales = curvature_scales;
+    by.wants_rest = by_rest;
     const VectorXd no_rotations = VectorXd::Zero(model.bodies().n_edges());
     const py::ssize_t n_v = model.nodes().n_user_vertices(), n_e = model.bodies().n_edges();
     for (py::ssize_t k = 0; k < static_cast<py::ssize_t>(motion.recorded.size()); ++k) {
@@ -254,7 +254,7 @@ py::dict back(Model& model, const MotionInput& input, const MotionResult& motion
     py::dict result;
     result["values"] = values_to_user(model, gradient.values);
     result["controls"] = rows_of(gradient.load_parameters);
-    if (gradient.rest.asked())
+    if (gradient.rest.asked)
         result["rest"] = py::make_tuple(at_nodes(model, gradient.rest.by_nodes),
                                         at_nodes(model, gradient.rest.by_prescribed));
     result["positions"] = model.bodies().gradient_by_vectors(gradient.positions);
@@ -351,8 +351,7 @@ void register_dynamics(py::module_& module) {
                py::arg("keep"), py::arg("progress") = py::none());
     module.def("pull_back_motion", &back, py::arg("model"), py::arg("input"), py::arg("motion"),
                py::arg("by_positions"), py::arg("by_edge_rotations"), py::arg("by_velocities"),
-               py::arg("by_driving") = Knots(), py::arg("curvature_scales") = std::vector<VectorXd>(),
-               py::arg("progress") = py::none());
+               py::arg("by_driving") = Knots(), py::arg("by_rest") = false, py::arg("progress") = py::none());
 }
 
 }  // namespace magshell::bindings

@@ -1073,6 +1073,13 @@ def analyze(
     Orders and analyses the lower triangle of a symmetric pattern, given by columns: sorted rows, diagonal present. points (n, 3): where the unknowns are, which makes for better orderings.
     """
 
+def at_nodes(
+    model: Model, vector: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
+) -> tuple[typing.Any, ...]:
+    """
+    The rows of all vertices (n_v, 3) and directions (n_d, 3) of three numbers per node, or of all unknowns.
+    """
+
 def build_info() -> list[tuple[str, str]]: ...
 def distances(
     obstacle: Obstacle, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
@@ -1292,12 +1299,10 @@ def pull_back(
     by_positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     by_edge_rotations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     by_driving: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ...,
-    curvature_scales: collections.abc.Sequence[
-        typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
-    ] = [],
+    by_rest: bool = False,
 ) -> tuple[typing.Any, ...]:
     """
-    The gradients by everything a solve takes, of a function of positions (n_v, 3), edge rotations (n_e,) and what motors do (m,) with these gradients; with the curvature scales of all three-node shells also those by rest positions and directions, of the elastic energies and by what supports prescribe there. The model must hold the values of that solve.
+    The gradients by everything a solve takes, of a function of positions (n_v, 3), edge rotations (n_e,) and what motors do (m,) with these gradients; by_rest: also those by rest positions and directions, through the shape of bodies at rest and through what supports prescribe there. The model must hold the values of that solve.
     """
 
 def pull_back_motion(
@@ -1308,9 +1313,7 @@ def pull_back_motion(
     by_edge_rotations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     by_velocities: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     by_driving: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"] = ...,
-    curvature_scales: collections.abc.Sequence[
-        typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
-    ] = [],
+    by_rest: bool = False,
     progress: typing.Any = None,
 ) -> dict[str, typing.Any]: ...
 def push_forward(
@@ -1383,9 +1386,15 @@ def vjp(
     q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     adjoint: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    by_rest: bool = False,
 ) -> tuple[typing.Any, ...]:
     """
-    adjoint . dg/dk at a state q, g the gradient of the energy: (n,) by every value and (m,) by the controls. What supports prescribe stays.
+    adjoint . dg/dk at a state q, g the gradient of the energy: (n,) by every value and (m,) by the controls; by_rest: also by the rest shape, three numbers per node, else none. What supports prescribe stays.
+    """
+
+def without_rest_gradient(model: Model) -> list[typing.Any]:
+    """
+    The names of the energies and forces that have no derivative by rest positions.
     """
 
 __version__: str = "0.1.0"

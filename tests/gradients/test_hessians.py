@@ -35,7 +35,9 @@ PRECISION = {
 
 def inputs_of(name):
     together = kind(name).together
-    return {key: value for key, value in together.items() if not is_geometry(key)}
+    return {
+        key: value for key, value in together.items() if not is_geometry(key) and key[1] != "rest_positions"
+    }
 
 
 def directions(name, given, rng):

@@ -11,6 +11,7 @@ torch = pytest.importorskip("torch")
 
 EXACT = {"solver": ms.MixedNewton(tolerance=1e-13), "progress": False}
 FACTORS = {"load_factor": 0.9, "gravity_factor": 0.8, "field_factor": 1.1, "support_factor": 0.7}
+MAXWELL = {"maxwell_modulus": 0.5, "maxwell_time": 3e-3}
 MOVED = MESH.rest_positions + 1e-3 * np.random.default_rng(2).standard_normal((N_V, 3))
 WEIGHTS = torch.from_numpy(np.random.default_rng(3).standard_normal((N_V, 3)))
 
@@ -241,31 +242,31 @@ def test_gradient_of_a_motion_from_an_equilibrium_near_a_magnet_agrees_with_diff
     assert found == pytest.approx((by * direction).sum(), rel=1e-6)
 
 
-def test_terms_of_a_motion_without_a_derivative_by_rest_positions_are_named():
-    scene = ms.Scene(shell(), supports=[ms.Clamp(MESH.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+def test_supports_that_rotate_in_a_motion_have_no_derivative_by_rest_positions():
+    clamp = ms.Clamp(MESH.edges_at(x=0.0), rotation=(0, 0.1, 0))
+    scene = ms.Scene(shell(), supports=[clamp], gravity=(0, 0, -9.81))
     given = torch.tensor(MOVED, requires_grad=True)
-    values, steps = {scene.bodies[0]: {"rest_positions": given}}, {"steps": 1, "time_step": 1e-3}
-    with pytest.raises(ms.NoGradient, match="stiffness_damping yet"):
-        ms.simulate(scene, values=values, stiffness_damping=1e-3, **steps)
-    turned = ms.Scene(
-        shell(), supports=[ms.Clamp(MESH.edges_at(x=0.0), rotation=(0, 0.1, 0))], gravity=(0, 0, -9.81)
-    )
     with pytest.raises(ms.NoGradient, match="supports that rotate yet"):
-        ms.simulate(turned, values={turned.bodies[0]: {"rest_positions": given}}, **steps)
+        ms.simulate(scene, values={scene.bodies[0]: {"rest_positions": given}}, steps=1, time_step=1e-3)
 
 
-def test_friction_needs_a_sticking_speed_of_its_own_for_a_gradient_by_rest_positions():
-    plane = ms.obstacles.Plane((0, 0, 1), center=(0, 0, -0.01))
-    given = torch.tensor(MOVED, requires_grad=True)
-    for speed in (None, 1e-3):
-        rough = ms.Contact(plane, contact_stiffness=50.0, friction_coefficient=0.4, sticking_speed=speed)
-        scene = ms.Scene(shell(), contacts=[rough], gravity=(0, 0, -9.81), allow_rigid_motions=True)
-        move = {"values": {scene.bodies[0]: {"rest_positions": given}}, "steps": 1, "time_step": 1e-3}
-        if speed is None:
-            with pytest.raises(ms.NoGradient, match="friction without a sticking_speed of its own yet"):
-                ms.simulate(scene, **move)
-        else:
-            assert ms.simulate(scene, **move).positions.requires_grad
+@pytest.mark.parametrize("viscosity", [{"stiffness_damping": 1e-3}, MAXWELL], ids=["Kelvin-Voigt", "Maxwell"])
+def test_gradient_by_rest_positions_of_a_viscous_motion_agrees_with_differences(viscosity):
+    clamp = ms.Clamp(MESH.edges_at(x=0.0), displacement=(0.0, 0.0, 1e-3))
+    scene = ms.Scene(shell(), supports=[clamp], gravity=(1.0, 0.5, -9.81))
+
+    def loss(x):
+        values = {scene.bodies[0]: {"rest_positions": x}}
+        move = ms.simulate(scene, values=values, steps=3, time_step=2e-3, **viscosity, **EXACT)
+        return 1e3 * (WEIGHTS * tensor(move.displacements)[-1]).sum()
+
+    x = torch.tensor(MOVED, requires_grad=True)
+    loss(x).backward()
+    by = x.grad.numpy()
+    direction = by / np.linalg.norm(by)
+    at = [float(loss(MOVED + k * 1e-5 * direction)) for k in (-2, -1, 1, 2)]
+    found = (at[0] - 8.0 * at[1] + 8.0 * at[2] - at[3]) / (12.0 * 1e-5)
+    assert found == pytest.approx((by * direction).sum(), rel=1e-6)
 
 
 def stretched(length):
@@ -337,9 +338,48 @@ def test_rest_positions_of_another_shape_or_kind_are_refused():
                 batch=2,
                 values={sheet: {"rest_positions": np.stack([MOVED, MOVED])}},
             )
-    with pytest.raises(ms.NoGradient, match=r"only ms.equilibrium and ms.simulate have one"):
+    with pytest.raises(ms.NoGradient, match=r"only ms.equilibrium, ms.WarmStart and ms.simulate have one"):
         given = torch.tensor(MOVED, requires_grad=True)
         ms.linear_response(scene, **DEFAULTS, values={sheet: {"rest_positions": given}})
+
+
+def test_a_motion_goes_on_from_a_state_at_the_same_rest_positions_only():
+    scene = ms.Scene(shell(), supports=[ms.Clamp(MESH.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    steps = {"steps": 2, "time_step": 1e-3, **EXACT}
+    values = {scene.bodies[0]: {"rest_positions": MOVED}}
+    first = ms.simulate(scene, values=values, **steps)
+    on = ms.simulate(scene, values=values, start=first.end, **steps)
+    both = ms.simulate(scene, values=values, **{**steps, "steps": 4})
+    assert on.positions[-1] == pytest.approx(both.positions[-1], rel=0, abs=1e-12)
+    values = {scene.bodies[0]: {"rest_positions": MOVED * (1.01, 1.0, 1.0)}}
+    with pytest.raises(ValueError, match="start is the state of a motion at other rest_positions"):
+        ms.simulate(scene, values=values, start=first.end, **steps)
+
+
+def test_a_path_follows_a_sheet_with_other_rest_positions():
+    scene = everything()
+    values = {scene.bodies[0]: {"rest_positions": MOVED}}
+    path = ms.follow_path(scene, values=values, max_step=0.2, progress=False, **DEFAULTS)
+    end = solved(scene, MOVED, **DEFAULTS)
+    assert path.positions[-1] == pytest.approx(end.positions, rel=0, abs=1e-8)
+    with pytest.raises(ValueError, match="a path keeps those of its start"):
+        ms.follow_path(scene, start=end, progress=False, **DEFAULTS)
+    given = {scene.bodies[0]: {"rest_positions": torch.tensor(MOVED, requires_grad=True)}}
+    with pytest.raises(ms.NoGradient, match="no gradient by rest_positions here"):
+        ms.follow_path(scene, values=given, progress=False, **DEFAULTS)
+
+
+def test_the_lowest_frequency_of_a_cantilever_falls_with_the_square_of_its_length():
+    mesh = ms.meshes.rectangle(0.1, 0.01, cells=(20, 2))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e7, poisson_ratio=0.0, mass_density=1e3)
+    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))])
+    x = torch.tensor(mesh.rest_positions, requires_grad=True)
+    rest = ms.equilibrium(scene, values={sheet: {"rest_positions": x}})
+    slowest = ms.vibration_modes(rest.scene, rest, count=1).frequencies[0]
+    (by,) = torch.autograd.grad(slowest, x)
+    powers = (by * x.detach()).sum(dim=0) / slowest.detach()
+    assert powers[:2].numpy() == pytest.approx([-2.0, 0.0], abs=5e-3)
+    assert float(powers.sum()) == pytest.approx(-2.0, rel=1e-7)  # at a given thickness
 
 
 def test_terms_without_a_derivative_by_rest_positions_are_named_before_the_solve():
@@ -366,8 +406,16 @@ def test_terms_without_a_derivative_by_rest_positions_are_named_before_the_solve
         "a sheet under pressure at rest",
         "two sheets at rest",
         "onto a Plane",
+        "onto a Plane, rubbing",
         "onto a Sphere, its law given",
         "through water",
+        "through water onto a Plane",
+        "a solid at rest",
+        "a magnetized solid at rest",
+        "a magnetized solid in motion, in water",
+        "a solid under pressure at rest",
+        "a six-node sheet at rest",
+        "a six-node sheet in motion",
     ],
 )
 def test_kinds_of_scene_with_rest_positions_are_compared_with_differences(name):

@@ -41,8 +41,8 @@ class Kind:
     solve: (scene, start=None, **keywords) to what has positions; function: the one of magshell behind it. controls: by
     keyword, the inputs that belong to no object. fixed: other keywords. step: of differences, over the size of a
     value; reach: that size, where it is not the value's own. in_time: steps of the motion over which everything
-    varies_in_time somewhere that can, or 0. of_linear: whether it gives numbers of the stiffness, which have no gradient by
-    rest positions yet.
+    varies_in_time somewhere that can, or 0. of_linear: whether it is a solve of linear theory or a path that takes no rest
+    positions.
     """
 
     scene: ms.Scene
@@ -83,17 +83,11 @@ class Kind:
         """Return whether the solve takes this value, and has a gradient by it."""
         if name != "rest_positions":
             return True
-        if self.of_linear:
-            return False
-        if self.function is ms.simulate:
-            turning = any(
-                isinstance(each, ms.Pin | ms.Clamp) and each._move.rotation is not None
-                for each in self.scene.supports
-            )
-            viscous = {"stiffness_damping", "maxwell_modulus"} & {*self.controls, *self.fixed}
-            if turning or viscous:
-                return False
-        return rest_positions_follow(self.scene, owner)
+        turning = self.function is ms.simulate and any(
+            isinstance(each, ms.Pin | ms.Clamp) and each._move.rotation is not None
+            for each in self.scene.supports
+        )
+        return not (self.of_linear or turning) and rest_positions_follow(self.scene, owner)
 
     def varies_in_time(self, owner, name: str) -> bool:
         """Return whether this value is another at each end of a step."""
@@ -208,7 +202,8 @@ def _names_of(kind: type) -> tuple[str, ...]:
         each for each in vars(ms).values() if isinstance(each, type) and issubclass(each, SolidMaterial)
     ]
     return tuple(
-        {name for each in materials for name in each._ranges} | {"mass_density", "remanent_magnetization"}
+        {name for each in materials for name in each._ranges}
+        | {"mass_density", "remanent_magnetization", "rest_positions"}
     )
 
 
@@ -261,4 +256,6 @@ def _values_of(scene: ms.Scene, owner, moving: bool) -> dict[str, object]:
             absent = {"mass_density"} if weightless else set()
             if owner.remanent_magnetization is None:  # the solve says it
                 absent.add("remanent_magnetization")
+        if isinstance(owner, ms.Shell | ms.Solid) and not rest_positions_follow(scene, owner):
+            absent.add("rest_positions")
     return {name: values[name] for name in names if name not in absent}

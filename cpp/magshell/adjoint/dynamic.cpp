@@ -32,9 +32,9 @@ class Backward {
         g_.positions = g_.velocities = g_.mass = g_.damping = VectorXd::Zero(model_.size());
         g_.time_steps.assign(input.time_steps.size(), 0.0);
         g_.load_parameters.assign(input.load_parameters.size(), model_.parameters().zero_load_parameters());
-        g_.rest.curvature_scales = by.curvature_scales;
-        if (g_.rest.asked()) g_.rest.clear(model_);
         g_.viscosity.branches.assign(input.viscosity.branches.size(), {0.0, 0.0});
+        g_.rest.asked = by.wants_rest;
+        if (by.wants_rest) g_.rest.clear(model_);
     }
 
     MotionGradient run() {
@@ -52,6 +52,7 @@ class Backward {
         back_to_start();
         model_.dof_map().project_state_vjp(motion_.start.q, motion_.start.v, g_.positions, g_.velocities,
                                            scene_);
+        if (g_.rest.asked) g_.rest.add_directions_at_start(model_, g_.positions);
         g_.values = std::move(scene_.values);
         g_.factorizations = newton_.factorizations();
         return std::move(g_);
@@ -205,6 +206,7 @@ class Backward {
             g_.positions += model_.elastic().forces(strains.by_d_begin, model_.size());
             scene_.load_parameters.setZero();
             model_.elastic().strains_vjp(strains.by_d_begin, scene_);
+            g_.rest.add_strains(model_.elastic(), strains.by_d_begin);
             model_.parameters().time_varying().move_gradient(scene_);
             add_by_load_parameters(step, substep.begin, scene_.load_parameters);
             by_strains_ = std::move(strains.by_begin);
@@ -301,7 +303,7 @@ class Backward {
         if (by_c.size() > 0)
             by_contact = back_through_contact(stage.q, stage.contact, algebra.tableau().contact_factor(i),
                                               by_c, load_parameters, by_x, by_free);
-        viscous.strains.before_solve(i, by_x, scene_);
+        g_.rest.add_strains(model_.elastic(), viscous.strains.before_solve(i, by_x, scene_));
         viscous.joints.before_solve(i, by_x, scene_);
         const VectorXd lambda =
             solve(stage.q, stage.factor.get(), load_parameters, proximal, -(by_x + by_free));
@@ -392,18 +394,18 @@ class Backward {
             by_motor_forces.size() > 0 ? VectorXd(lambda + dof_map.motor_motion(by_motor_forces)) : lambda;
         scene_.load_parameters.setZero();
         model_.parameters().vjp(q, load_parameters, all, scene_);
-        if (g_.rest.asked()) g_.rest.add(model_, q, all);
+        g_.rest.add(model_, q, load_parameters, all);
         KinematicsGradient by_forces;
         if (model_.capabilities().has_velocity_forces)
             by_forces = model_.parameters().forces_vjp(model_.kinematics(), load_parameters, all, scene_);
         if (by_contact.size() > 0)
             model_.contacts().vjp(q, model_.kinematics(), load_parameters, by_contact, by_forces, scene_);
-        if (dof_map.has_values() || g_.rest.asked()) {
+        if (dof_map.has_values() || g_.rest.asked) {
             // Assembles again, because the factorization has rotated the blocks of rotated nodes.
             model_.assemble(q, load_parameters, false);
             model_.assemble_forces(load_parameters);
             const VectorXd reaction = product(lambda, *proximal.weights) + by_q;
-            if (g_.rest.asked()) g_.rest.add_prescribed(dof_map, reaction);
+            g_.rest.add_prescribed(dof_map, reaction);
             if (dof_map.has_values())
                 dof_map.vjp(reaction, lambda, newton_.gradient(q, proximal), load_parameters, scene_,
                             by_motor_forces);
@@ -433,6 +435,7 @@ class Backward {
             g_.positions += model_.elastic().forces(by_strains, model_.size());
             scene_.load_parameters.setZero();
             model_.elastic().strains_vjp(by_strains, scene_);
+            g_.rest.add_strains(model_.elastic(), by_strains);
             model_.parameters().time_varying().move_gradient(scene_);
             g_.load_parameters[0] += scene_.load_parameters;
         }
@@ -445,7 +448,7 @@ class Backward {
         g_.positions += reaction;
         scene_.load_parameters.setZero();
         model_.parameters().vjp(q, load_parameters, lambda, scene_);
-        if (g_.rest.asked()) g_.rest.add(model_, q, lambda);
+        g_.rest.add(model_, q, load_parameters, lambda);
         model_.parameters().time_varying().move_gradient(scene_);
         g_.load_parameters[0] += scene_.load_parameters;
     }

@@ -24,7 +24,7 @@ struct MotionGradient {
     std::vector<double> time_steps;  // one number a step
     Viscosity viscosity;
     VectorXd values;                              // of the scene
-    RestGradient rest;                            // if asked for; without viscosity
+    RestGradient rest;                            // if asked for
     std::vector<LoadParameters> load_parameters;  // as MotionInput::load_parameters
     int factorizations = 0;                       // that the adjoint took, including those of repeated steps
 };
@@ -34,7 +34,7 @@ struct GradientsByStates {
     std::vector<VectorXd> q, v;  // by the dofs and by the velocities
     std::vector<VectorXd>
         motor_forces;  // by the motor forces, in the order of DofMap::motor_forces; empty if the loss does not depend on them
-    std::vector<VectorXd> curvature_scales;  // as in RestGradient
+    bool wants_rest = false;  // whether the gradient by rest positions is asked for
 };
 
 /// Returns the gradients by all inputs from those by the recorded states. Throws InvalidInput if the motion was not stored for its

@@ -1,29 +1,36 @@
-// RestGradient: the gradient of a loss by rest positions, as far as the core computes it: through the elastic energies of three-node shells, and
-// through what supports prescribe. The caller adds what follows from the other gradients.
+// RestGradient: the gradient of a loss by rest positions, as far as the core computes it: through the shape of bodies at rest, and through what
+// supports prescribe. The caller adds what follows from the other gradients.
 #pragma once
 
-#include "magshell/scene/shells_rest_gradient.h"
+#include "magshell/scene/rest_gradient.h"
 
 namespace magshell {
 
 struct RestGradient {
-    std::vector<VectorXd> curvature_scales;  // as in scene/shells_rest_gradient.h; empty: not asked for
-    VectorXd by_nodes;                       // three numbers per node
-    VectorXd by_prescribed;                  // of all dofs: by the prescribed positions
-
-    bool asked() const { return !curvature_scales.empty(); }
+    bool asked = false;
+    VectorXd by_nodes;       // three numbers per node
+    VectorXd by_prescribed;  // of all dofs: by the prescribed positions
 
     void clear(const Model& model) {
         by_nodes = VectorXd::Zero(3 * model.nodes().n_nodes());
         by_prescribed = VectorXd::Zero(model.size());
     }
-    /// Adds lambda . dg/dX at the last evaluated state q.
-    void add(Model& model, const VectorXd& q, const VectorXd& lambda) {
-        by_nodes += shells_rest_vjp(model, q, lambda, curvature_scales);
+    /// Adds lambda . dg/dX at the last evaluated state q; ModelParameters::vjp() had the same arguments.
+    void add(Model& model, const VectorXd& q, const LoadParameters& load_parameters, const VectorXd& lambda) {
+        if (asked) add_rest_vjp(model, q, load_parameters, lambda, by_nodes);
+    }
+    /// Adds that of the strains times stresses at the last evaluated state.
+    void add_strains(const ViscousTerms& terms, const StrainSet& stresses) {
+        if (asked && !stresses.empty()) add_rest_strains_vjp(terms, stresses, by_nodes);
+    }
+    /// Adds that of the directions at the start of a motion, which are those at rest where supports do not rotate. by_q: of all dofs.
+    void add_directions_at_start(const Model& model, const VectorXd& by_q) {
+        const Index first = model.nodes().n_coordinates(), count = by_nodes.size() - first;
+        by_nodes.tail(count) += by_q.segment(first, count);
     }
     /// Adds the part of a gradient by all dofs that is by prescribed ones.
     void add_prescribed(const DofMap& dof_map, const VectorXd& by_q) {
-        by_prescribed += by_q - dof_map.expand(dof_map.vector(by_q));
+        if (asked) by_prescribed += by_q - dof_map.expand(dof_map.vector(by_q));
     }
 };
 

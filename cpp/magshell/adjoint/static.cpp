@@ -16,7 +16,7 @@ Gradient equilibrium_vjp(Model& model, const StaticsResult& equilibrium, const V
 
     model.set_angle_branches(equilibrium.angle_branches);
     model.evaluate(q, load_parameters);
-    if (model.capabilities().has_unsymmetric_tangent || dof_map.has_values() || rest.asked())
+    if (model.capabilities().has_unsymmetric_tangent || dof_map.has_values() || rest.asked)
         model.assemble(q, load_parameters, false);
     const auto add_product = [&](const VectorXd& motion, VectorXd& forces) {
         VectorXd product(q.size());
@@ -37,10 +37,10 @@ Gradient equilibrium_vjp(Model& model, const StaticsResult& equilibrium, const V
     const VectorXd lambda = dof_map.expand(reduced);
     Gradient gradient(model.parameters().registry());
     model.parameters().vjp(q, load_parameters, lambda + motors, gradient);
-    if (dof_map.has_values() || rest.asked()) add_product(lambda, by_q);
-    if (rest.asked()) {
+    if (dof_map.has_values() || rest.asked) add_product(lambda, by_q);
+    if (rest.asked) {
         rest.clear(model);
-        rest.add(model, q, lambda);
+        rest.add(model, q, load_parameters, lambda);
         rest.add_prescribed(dof_map, by_q);
     }
     if (dof_map.has_values()) {

@@ -41,8 +41,8 @@ void ViscousAdjoint::set_history(int i) const {
     if (!idle()) terms_.set_history(law_.scale(step_.stage_time()), &stages_[i].shift);
 }
 
-void ViscousAdjoint::before_solve(int i, VectorXd& by_q, Gradient& scene) {
-    if (idle()) return;
+StrainSet ViscousAdjoint::before_solve(int i, VectorXd& by_q, Gradient& scene) {
+    if (idle()) return {};
     const ViscousStage& stage = stages_[i];
     const StrainRates& rates = this->rates(first_ + i);
     const StrainSet& by_d_rate = by_d_rate_[first_ + i];
@@ -63,6 +63,7 @@ void ViscousAdjoint::before_solve(int i, VectorXd& by_q, Gradient& scene) {
     }
     by_q += terms_.forces(by_d, unknowns_);
     terms_.strains_vjp(by_d, scene);
+    return by_d;
 }
 
 void ViscousAdjoint::after_solve(int i, const VectorXd& lambda) {

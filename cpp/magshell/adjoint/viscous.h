@@ -21,8 +21,9 @@ class ViscousAdjoint {
 
     /// Sets the strain history of stage i in the terms.
     void set_history(int i) const;
-    /// Adds to by_q, and to the parameters of `scene`, the gradients by the strains of the evaluated stage i through later rates.
-    void before_solve(int i, VectorXd& by_q, Gradient& scene);
+    /// Adds to by_q, and to the parameters of `scene`, the gradients by the strains of the evaluated stage i through later rates, and returns
+    /// the gradient by these strains; it is empty without viscosity.
+    StrainSet before_solve(int i, VectorXd& by_q, Gradient& scene);
     /// Adds the contribution of lambda at the evaluated stage i to the gradients by the history and by the law.
     void after_solve(int i, const VectorXd& lambda);
     /// Adds the same for a nearby state with the history of stage i; it must be called before after_solve(i).

@@ -13,20 +13,28 @@
 
 namespace magshell {
 
-/// The gradients g_k of the shape functions, the unit normal n~ and the area A~ [m2] of a face at rest.
+/// The gradients g_k of the shape functions, the edges, the unit normal n~ and the area A~ [m2] of a face at rest.
 struct RestShape {
     std::array<Vec3, 3> gradients;
+    std::array<Vec3, 2> edges;  // from corner 0 [m]
     Vec3 normal;
     double area;
 
     explicit RestShape(const std::array<Vec3, 3>& x) {
-        const Vec3 across = (x[1] - x[0]).cross(x[2] - x[0]);
+        edges = {x[1] - x[0], x[2] - x[0]};
+        const Vec3 across = edges[0].cross(edges[1]);
         const double twice = across.norm();
         normal = across / twice;
         area = 0.5 * twice;
         for (int k = 0; k < 3; ++k) gradients[k] = normal.cross(x[(k + 2) % 3] - x[(k + 1) % 3]) / twice;
     }
 
+    /// Returns (a~_1, a~_2, n~), with the edges from corner 0.
+    Mat3 frame() const {
+        Mat3 columns;
+        columns << edges[0], edges[1], normal;
+        return columns;
+    }
     /// Returns dA~/dX_k.
     Vec3 area_by_corner(int k) const { return area * gradients[k]; }
 };
@@ -36,6 +44,21 @@ template <class Corners>
 void add_by_rest_corners(const RestShape& face, const Mat3& by_deformation, const Corners& corners,
                          VectorXd& out) {
     for (int k = 0; k < 3; ++k) out.segment<3>(3 * corners[k]) += by_deformation * face.gradients[k];
+}
+
+/// Returns the gradient by the edge vectors a~_1, a~_2 at rest of a power that is proportional to the area and linear in the coordinates
+/// c = R^-1 M~ of a magnetization M~, R = (a~_1, a~_2, n~), from its gradient by M~. As M~ = R c stays, by_c . dc = - by_M~ . dR c, and the
+/// motion of a corner tilts n~: dn~ = - sum_k g_k (n~ . dX_k).
+inline std::array<Vec3, 2> magnetic_by_rest_edges(const RestShape& face, const Vec3& coordinates,
+                                                  const Vec3& by_magnetization) {
+    const double power = by_magnetization.dot(face.frame() * coordinates);
+    std::array<Vec3, 2> by;
+    for (int k = 0; k < 2; ++k) {
+        const Vec3& slope = face.gradients[k + 1];
+        by[k] = power * slope - coordinates[k] * by_magnetization +
+                coordinates[2] * by_magnetization.dot(slope) * face.normal;
+    }
+    return by;
 }
 
 }  // namespace magshell

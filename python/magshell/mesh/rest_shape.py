@@ -14,6 +14,12 @@ from typing import Any
 import numpy as np
 
 from .._input.quantity import quantity
+from .face_shapes import sides
+from .tetrahedra.jacobian import by_shape_integrals, jacobians, not_positive, straight_volumes
+from .tetrahedra.tet_mesh import TetMesh
+from .topology import EDGES, FLAT
+from .triangles import six_node_checks
+from .triangles.six_node_mesh import QuadraticTriangleMesh
 from .triangles.triangle_mesh import TriangleMesh
 
 # Cosine [-] of the angle between the normals of neighbouring faces below which they lie folded onto each other, and the
@@ -22,14 +28,17 @@ _FOLDED, _FLATTEST = -0.99, 1e-4
 _NAMED = 5  # faces in a message
 
 
-def moved_mesh(mesh: TriangleMesh, rest_positions: Any) -> TriangleMesh:
-    """Return a mesh with the same faces at other rest positions (n_v, 3) m.
+def moved_mesh(
+    mesh: TriangleMesh | QuadraticTriangleMesh, rest_positions: Any
+) -> TriangleMesh | QuadraticTriangleMesh:
+    """Return a mesh with the same elements at other rest positions (n_v, 3) m.
 
     Raises ValueError for another shape, for faces without area, and for neighbours that lie folded onto each other, as
-    where a vertex has crossed the opposite edge; the message names the faces.
+    where a vertex has crossed the opposite edge; the message names the faces. Of six-node elements they are the flat ones.
     """
     x = quantity("rest_positions", "m", rest_positions, (mesh.n_vertices, 3))
-    corners = x[mesh.faces]
+    flat_mesh = mesh.surface if isinstance(mesh, QuadraticTriangleMesh) else mesh
+    corners = x[flat_mesh.faces]
     edges = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)  # opposite each corner
     across = np.cross(edges[:, 0], edges[:, 1])
     doubled = np.linalg.norm(across, axis=1)
@@ -39,11 +48,9 @@ def moved_mesh(mesh: TriangleMesh, rest_positions: Any) -> TriangleMesh:
         raise ValueError(
             f"rest_positions [m] leave {_called(flat)} without area: the smallest has {0.5 * doubled[flat].min():.3g} m2"
         )
-    inner = mesh.edge_faces[mesh.interior_edges]
-    cosines = [
-        np.einsum("ij,ij->i", normals[inner[:, 0]], normals[inner[:, 1]])
-        for normals in (across / doubled[:, None], mesh.face_normals)
-    ]
+    inner = flat_mesh.edge_faces[flat_mesh.interior_edges]
+    normals, before = across / doubled[:, None], flat_mesh.face_normals
+    cosines = [np.einsum("ij,ij->i", n[inner[:, 0]], n[inner[:, 1]]) for n in (normals, before)]
     folded = np.unique(inner[(cosines[0] < _FOLDED) & (cosines[1] >= _FOLDED)])
     if folded.size:
         raise ValueError(
@@ -53,9 +60,34 @@ def moved_mesh(mesh: TriangleMesh, rest_positions: Any) -> TriangleMesh:
     return mesh._with_rest_positions(x)
 
 
-def _called(faces: np.ndarray) -> str:
-    more = f" and {len(faces) - _NAMED} more" if len(faces) > _NAMED else ""
-    return f"face{'s' * (len(faces) > 1)} {', '.join(map(str, faces[:_NAMED]))}{more}"
+def moved_solid_mesh(mesh: TetMesh, rest_positions: Any) -> TetMesh:
+    """Return a mesh with the same tetrahedra at other rest positions (n_v, 3) m.
+
+    Raises ValueError for another shape, and for flat and inverted tetrahedra, which the message names, and what else a
+    TetMesh refuses.
+    """
+    x = quantity("rest_positions", "m", rest_positions, (mesh.n_vertices, 3))
+    nodes = x[mesh.tetrahedra]
+    volumes = straight_volumes(nodes[:, :4])
+    ends = nodes[:, :4][:, EDGES]
+    longest = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).max(axis=1)
+    bad = volumes <= _FLATTEST * longest**3
+    if mesh.order == 2:
+        coefficients = jacobians(nodes)
+        bad |= coefficients.min(axis=1) <= 0.0
+        bad[bad] &= not_positive(coefficients[bad], _FLATTEST * longest[bad] ** 3)
+    if bad.any():
+        found = np.flatnonzero(bad)
+        raise ValueError(
+            f"rest_positions [m] leave {_called(found, 'tetrahedron', 'tetrahedra')} flat or inside out: the least "
+            f"volume is {volumes[found].min():.3g} m3"
+        )
+    return mesh._with_rest_positions(x)
+
+
+def _called(numbers: np.ndarray, one: str = "face", several: str = "faces") -> str:
+    more = f" and {len(numbers) - _NAMED} more" if len(numbers) > _NAMED else ""
+    return f"{several if len(numbers) > 1 else one} {', '.join(map(str, numbers[:_NAMED]))}{more}"
 
 
 def shape_gradients(mesh: TriangleMesh, faces: np.ndarray) -> np.ndarray:
@@ -73,29 +105,6 @@ def by_areas(mesh: TriangleMesh, faces: np.ndarray, gradient: np.ndarray) -> np.
     return _summed(mesh, mesh.faces[faces], of_areas * shape_gradients(mesh, faces))
 
 
-def by_magnetizations(mesh: TriangleMesh, magnetization: np.ndarray, gradient: np.ndarray) -> np.ndarray:
-    """Return the gradient by the rest positions, (n_v, 3), of magnetic forces, from that by magnetizations, (n_f, 3).
-
-    magnetization: (n_f, 3) A/m. A magnetization M = R c stretches with its face, whose edges and normal at rest are the
-    columns a_1, a_2, n of R. The forces are proportional to A and linear in c, so that for the gradient b by M
-
-        b . dM = A b . M dA - b . dR c
-    """
-    every = np.arange(mesh.n_faces)
-    corners = mesh.rest_positions[mesh.faces]
-    frames = np.stack(
-        [corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], mesh.face_normals], axis=2
-    )
-    coordinates = np.linalg.solve(frames, magnetization[..., None])[..., 0]
-    slopes = shape_gradients(mesh, every)
-    rows = (gradient * magnetization).sum(axis=1)[:, None, None] * slopes
-    tilts = coordinates[:, 2, None] * np.einsum("fki,fi->fk", slopes, gradient)
-    rows = rows + tilts[..., None] * mesh.face_normals[:, None]
-    by_edges = -coordinates[:, :2, None] * gradient[:, None]
-    rows = rows + np.concatenate([-by_edges.sum(axis=1, keepdims=True), by_edges], axis=1)
-    return _summed(mesh, mesh.faces, rows)
-
-
 def by_edge_vectors(mesh: TriangleMesh, edges: np.ndarray, gradient: np.ndarray) -> np.ndarray:
     """Return the gradient by the rest positions, (n_v, 3), from those by the vectors along some edges, (k, 3)."""
     return _summed(mesh, mesh.edges[edges], np.stack([-gradient, gradient], axis=1))
@@ -103,10 +112,60 @@ def by_edge_vectors(mesh: TriangleMesh, edges: np.ndarray, gradient: np.ndarray)
 
 def by_lengths(mesh: TriangleMesh, edges: np.ndarray, gradient: np.ndarray) -> np.ndarray:
     """Return the gradient by the rest positions, (n_v, 3), from that by the lengths of some edges (k,)."""
+    if isinstance(mesh, QuadraticTriangleMesh):
+        return by_nodal_lengths(mesh, edges, np.repeat(gradient[:, None], 3, axis=1))
     ends = mesh.rest_positions[mesh.edges[edges]]
     along = ends[:, 1] - ends[:, 0]
     unit = along / np.linalg.norm(along, axis=1, keepdims=True)
     return by_edge_vectors(mesh, edges, gradient[:, None] * unit)
+
+
+def by_nodal_areas(mesh: Any, faces: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+    """Return the gradient by the rest positions, (n_v, 3), from that by `nodal_areas(mesh, faces)`, (k, 3) or (k, 6)."""
+    nodes, parts = sides(mesh)
+    if parts == 1:
+        return by_areas(mesh, faces, gradient.mean(axis=1))
+    nodes = nodes[faces // parts]
+    rows = np.empty((*nodes.shape, 3))
+    for part, corners in enumerate(FLAT):
+        here = faces % parts == part
+        rows[here] = six_node_checks.by_shape_integrals(
+            mesh.rest_positions[nodes[here]], gradient[here], corners
+        )
+    return _summed(mesh, nodes, rows)
+
+
+def by_nodal_element_areas(mesh: QuadraticTriangleMesh, gradient: np.ndarray) -> np.ndarray:
+    """Return the gradient by the rest positions, (n_v, 3), from that by the areas of the elements' nodes, (n, 6)."""
+    nodes = mesh.elements
+    return _summed(mesh, nodes, six_node_checks.by_shape_integrals(mesh.rest_positions[nodes], gradient))
+
+
+def by_nodal_lengths(mesh: Any, edges: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+    """Return the gradient by the rest positions, (n_v, 3), from that by `nodal_lengths(mesh, edges)`, (k, 2) or (k, 3)."""
+    if not isinstance(mesh, QuadraticTriangleMesh):
+        return by_lengths(mesh, edges, gradient.mean(axis=1))
+    nodes = mesh.nodes_of_edges[edges]
+    return _summed(mesh, nodes, six_node_checks.by_edge_integrals(mesh.rest_positions[nodes], gradient))
+
+
+def by_width(mesh: Any, gradient: float) -> np.ndarray:
+    """Return the gradient by the rest positions, (n_v, 3), from that by twice the distance of the farthest vertex from the
+    middle of the surface, `width_of`."""
+    x, corners = mesh.rest_positions, mesh.rest_positions[mesh.faces].mean(axis=1)
+    shares = mesh.face_areas / mesh.face_areas.sum()
+    middle = shares @ corners
+    away = x - middle
+    farthest = int(np.argmax(np.linalg.norm(away, axis=1)))
+    by_vertex = 2.0 * gradient * away[farthest] / np.linalg.norm(away[farthest])
+    found = by_areas(
+        mesh, np.arange(len(mesh.faces)), (corners - middle) @ -by_vertex / mesh.face_areas.sum()
+    )
+    np.add.at(
+        found, mesh.faces, np.broadcast_to(-by_vertex / 3.0, (*mesh.faces.shape, 3)) * shares[:, None, None]
+    )
+    found[farthest] += by_vertex
+    return found
 
 
 def by_continuations(mesh: TriangleMesh, edges: np.ndarray, gradient: np.ndarray) -> np.ndarray:
@@ -114,6 +173,10 @@ def by_continuations(mesh: TriangleMesh, edges: np.ndarray, gradient: np.ndarray
 
     These are t x n, with the unit vector t along the edge as its first face runs it, and the normal n of that face.
     """
+    if isinstance(mesh, QuadraticTriangleMesh):
+        found = np.zeros((mesh.n_vertices, 3))
+        found[mesh._corner_vertices] = by_continuations(mesh.corners, edges, gradient)
+        return found
     first = mesh.edge_faces[edges, 0] >= 0
     faces = np.where(first, mesh.edge_faces[edges, 0], mesh.edge_faces[edges, 1])
     ends = mesh.rest_positions[mesh.edges[edges]]
@@ -127,7 +190,22 @@ def by_continuations(mesh: TriangleMesh, edges: np.ndarray, gradient: np.ndarray
     return found + _summed(mesh, mesh.faces[faces], -slopes[..., None] * normal[:, None])
 
 
-def _summed(mesh: TriangleMesh, vertices: np.ndarray, rows: np.ndarray) -> np.ndarray:
+def by_nodal_volumes(mesh: TetMesh, gradient: np.ndarray) -> np.ndarray:
+    """Return the gradient by the rest positions, (n_v, 3), from that by integrals of the shape functions of all tetrahedra.
+
+    gradient: (n_t, 4) or (n_t, 10).
+    """
+    nodes = mesh.rest_positions[mesh.tetrahedra]
+    if mesh.order == 2:
+        return _summed(mesh, mesh.tetrahedra, by_shape_integrals(nodes, gradient))
+    edges = nodes[:, 1:] - nodes[:, :1]
+    across = np.stack([np.cross(edges[:, (k + 1) % 3], edges[:, (k + 2) % 3]) for k in range(3)], axis=1)
+    by_volume = gradient.mean(axis=1)[:, None, None] / 6.0 * across
+    rows = np.concatenate([-by_volume.sum(axis=1, keepdims=True), by_volume], axis=1)
+    return _summed(mesh, mesh.tetrahedra, rows)
+
+
+def _summed(mesh: TriangleMesh | TetMesh, vertices: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Sum rows (k, m, 3) on vertices (k, m) to those on all vertices, (n_v, 3)."""
     total = np.zeros((mesh.n_vertices, 3))
     np.add.at(total, vertices, rows)

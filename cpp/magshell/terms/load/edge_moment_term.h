@@ -10,6 +10,8 @@
 // divided between the two Gauss points of the edge.
 #pragma once
 
+#include <algorithm>
+
 #include "magshell/assembly/lanes.h"
 #include "magshell/body/nodes.h"
 #include "magshell/terms/term.h"
@@ -42,6 +44,11 @@ class EdgeMomentTerm final : public Term {
                    Index rows, Registry& registry);
 
     std::string_view name() const override { return "couple"; }
+    /// Returns true on quadratic triangles, where the fractions of the Gauss points depend on the lengths at rest.
+    bool reads_rest_lengths() const {
+        return std::any_of(couples_.begin(), couples_.end(),
+                           [](const EdgeMoment& couple) { return couple.point >= 0; });
+    }
     bool set_values(const Values& values) override;
     double energy(const double* q, const LoadParameters& load_parameters) const override;
     void evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) override;

@@ -9,12 +9,13 @@
 #include "magshell/terms/magnetic/applied_field_term.h"
 #include "magshell/terms/magnetic/field_groups.h"
 #include "magshell/terms/magnetic/total_applied_field.h"
+#include "magshell/terms/rest_shape_term.h"
 
 namespace magshell {
 namespace {
 
 template <class Element, template <int> class Law>
-class MagneticSolidTerm final : public AppliedFieldTerm, public ElementEnergies {
+class MagneticSolidTerm final : public AppliedFieldTerm, public ElementEnergies, public RestShapeTerm {
     static constexpr int N = Element::nodes, points = Element::points;
     using Nodes = std::array<Index, N>;
     using Point = Law<N>;
@@ -39,6 +40,7 @@ class MagneticSolidTerm final : public AppliedFieldTerm, public ElementEnergies 
 
     std::string_view name() const override { return Magnetic::name; }
     Index body() const override { return body_; }
+    bool has_rest_gradient() const override { return Point::is_linear; }
 
     bool set_values(const Values& values) override {
         if (!values.changed(magnetization_)) return false;
@@ -117,10 +119,11 @@ class MagneticSolidTerm final : public AppliedFieldTerm, public ElementEnergies 
         const FieldSamples samples = field_.at_factor_one(places, magnetizations);
         FieldProbe probe;  // - V_p (M', M, v)
         probe.direction = rates.velocities;
+        by_magnetization_.resize(places.size());
         for (Index t = 0; t < solid_.n_elements(); ++t) {
             const RestElement<Element> rest = rest_of(t);
             const Eigen::Matrix<double, 3, N> x = nodes_of(t, q), along = nodes_of(t, lambda);
-            Vec3 by_magnetization = Vec3::Zero();
+            Vec3 by_magnetization = Vec3::Zero(), before = by_magnetization;
             for (int p = 0; p < points; ++p) {
                 const Index n = t * points + p;
                 const Vec3 flux = everywhere + factor * samples.flux[n],
@@ -134,6 +137,8 @@ class MagneticSolidTerm final : public AppliedFieldTerm, public ElementEnergies 
                     by_magnetization -= rest.volume[p] * (rates.rotations[n].transpose() *
                                                           (flux.cross(rates.spins[n]) + flux_rate));
                 }
+                by_magnetization_[n] = by_magnetization - before;
+                before = by_magnetization;
                 probe.flux.push_back(-rest.volume[p] * rates.magnetizations[n]);
                 probe.moment.push_back(-rest.volume[p] * magnetizations[n]);
             }
@@ -152,6 +157,19 @@ class MagneticSolidTerm final : public AppliedFieldTerm, public ElementEnergies 
             for (int p = 0; p < points; ++p)
                 moments.push_back(rest.volume[p] * magnetizations[t * points + p]);
         }
+    }
+
+    void add_rest_vjp(const double*, const LoadParameters&, const double*, VectorXd& out) override {
+        if constexpr (Point::is_linear)
+            for (Index t = 0; t < solid_.n_elements(); ++t) {
+                const RestElement<Element> rest = rest_of(t);
+                const std::span<const Index> nodes = solid_.nodes_of(t);
+                for (int p = 0; p < points; ++p) {
+                    const Eigen::Matrix<double, N, 3> g = gradients(rest, p);
+                    const Mat3 by = by_deformation(t, p);
+                    for (int k = 0; k < N; ++k) out.segment<3>(3 * nodes[k]) += by * g.row(k).transpose();
+                }
+            }
     }
 
     std::size_t bytes() const override { return loop_.bytes() + bytes_of(elements_) + bytes_of(fields_); }
@@ -179,6 +197,17 @@ class MagneticSolidTerm final : public AppliedFieldTerm, public ElementEnergies 
     // Returns the gradients g_k of a point's shape functions, one per row.
     static Eigen::Matrix<double, N, 3> gradients(const RestElement<Element>& rest, int p) {
         return Element::shape_derivatives(p) * rest.gradients[p];
+    }
+
+    // Returns the derivative by a homogeneous deformation I + H of the rest shape at a point of b . M~_r V_p with b V_p = by_magnetization_.
+    // It turns F into F (I - H) and V_p into V_p (1 + tr H), so that b . M~_r becomes b . (I - H) M~_r.
+    Mat3 by_deformation(Index t, int p) const {
+        const Vec3& by = by_magnetization_[t * points + p];
+        const auto& alpha = elements_[t / SimdDouble::width].at[p].alpha;
+        Vec3 magnetization = Vec3::Zero();
+        for (int k = 0; k < N; ++k)
+            magnetization += alpha[k][t % SimdDouble::width] * (solid_.rest(t, k) - solid_.rest(t, 0));
+        return by.dot(magnetization) * Mat3::Identity() - by * magnetization.transpose();
     }
 
     Eigen::Matrix<double, 3, N> nodes_of(Index element, const double* from) const {
@@ -261,7 +290,8 @@ class MagneticSolidTerm final : public AppliedFieldTerm, public ElementEnergies 
     ParameterSlice magnetization_;
     std::array<double, N> shapes_[points];
     std::vector<Points> elements_;
-    std::vector<Fields> fields_;  // sampled for the current assembly; empty in a uniform field
+    std::vector<Vec3> by_magnetization_;  // gradient by that of each point, from the last vjp()
+    std::vector<Fields> fields_;          // sampled for the current assembly; empty in a uniform field
 };
 
 template <template <int> class Law>

@@ -7,12 +7,14 @@
 #include "magshell/energy/magnetic.h"
 #include "magshell/energy/magnetic_face_fine.h"
 #include "magshell/energy/magnetic_rotating.h"
+#include "magshell/energy/rest_corners.h"
 #include "magshell/mesh/half_edges.h"
 #include "magshell/terms/element_energies.h"
 #include "magshell/terms/magnetic/applied_field_term.h"
 #include "magshell/terms/magnetic/face_sampling.h"
 #include "magshell/terms/magnetic/field_groups.h"
 #include "magshell/terms/magnetic/total_applied_field.h"
+#include "magshell/terms/rest_shape_term.h"
 
 namespace magshell {
 namespace {
@@ -20,12 +22,14 @@ namespace {
 // In a uniform field nothing is sampled. If the magnetization is linear in the positions too, the force does not
 // depend on the deformation, and there is no Hessian to add.
 template <class Law>
-class MagneticTerm final : public AppliedFieldTerm, public ElementEnergies {
+class MagneticTerm final : public AppliedFieldTerm, public ElementEnergies, public RestShapeTerm {
   public:
     MagneticTerm(const Surface& surface, Index body, const FaceLoop& loop, const FieldSources& sources,
                  Registry& registry);
 
     std::string_view name() const override { return Magnetic::name; }
+    bool has_rest_gradient() const override { return std::is_same_v<Law, Magnetic>; }
+    void add_rest_vjp(const double*, const LoadParameters&, const double*, VectorXd& out) override;
     Index body() const override { return body_; }
     bool set_values(const Values& values) override;
     double energy(const double* q, const LoadParameters& load_parameters) const override {
@@ -89,7 +93,8 @@ class MagneticTerm final : public AppliedFieldTerm, public ElementEnergies {
     std::vector<double> thicknesses_;
     FaceSampling sampling_;
     LargeVector<typename Law::Element> elements_;
-    Fields fields_;  // sampled for the current assembly
+    std::vector<Vec3> by_magnetization_;  // gradient by that of each face, from the last vjp()
+    Fields fields_;                       // sampled for the current assembly
     std::vector<std::array<Index, 3>>
         neighbours_;      // across the edge opposite each corner, -1 for none; see find_neighbours
     bool linear_ = true;  // every magnetization is linear in the positions
@@ -257,6 +262,7 @@ void MagneticTerm<Law>::vjp(const double* q, const LoadParameters& load_paramete
     FieldProbe probe;  // - A~ h w_p (M', M, v_p)
     probe.flux.resize(points.size()), probe.moment.resize(points.size()),
         probe.direction.resize(points.size());
+    by_magnetization_.resize(surface_.n_faces());
     loop_.each_group([&](Index group) {
         SimdVec3 x[3], rate[3];
         loop_.gather(group, q, x);
@@ -297,12 +303,28 @@ void MagneticTerm<Law>::vjp(const double* q, const LoadParameters& load_paramete
             }
             const Vec3 by_coordinates =
                 -volume * (frame_rate.transpose() * flux + frame.transpose() * flux_rate);
-            out.values.segment<3>(magnetization_.at(f)) +=
-                rest_frame(f).transpose().inverse() * by_coordinates;
+            by_magnetization_[f] = rest_frame(f).transpose().inverse() * by_coordinates;
+            out.values.segment<3>(magnetization_.at(f)) += by_magnetization_[f];
             out.values[thickness_.at(f)] += by_coordinates.dot(coordinates) / h;
         }
     });
     field_.add_vjp(points, probe, samples, load_parameters, out);
+}
+
+template <class Law>
+void MagneticTerm<Law>::add_rest_vjp(const double*, const LoadParameters&, const double*, VectorXd& out) {
+    for (Index f = 0; f < surface_.n_faces(); ++f) {
+        const typename Law::Element& e = elements_[f / SimdDouble::width];
+        const int lane = f % SimdDouble::width;
+        const std::array<Vec3, 2> by =
+            magnetic_by_rest_edges(RestShape(surface_.rest_corners(f)),
+                                   {e.alpha[lane], e.beta[lane], e.gamma[lane]}, by_magnetization_[f]);
+        const std::array<Index, 3>& nodes = surface_.corners[f];
+        for (int k = 0; k < 2; ++k) {
+            out.segment<3>(3 * nodes[k + 1]) += by[k];
+            out.segment<3>(3 * nodes[0]) -= by[k];
+        }
+    }
 }
 
 template <class Law>

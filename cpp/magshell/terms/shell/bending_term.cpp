@@ -333,8 +333,7 @@ void BendingTerm::store_rates(const double* p) {
 // C + C e_i e_i^T.
 void BendingTerm::vjp(const double* q, const LoadParameters&, const double* lambda, Gradient& out) {
     store_rates(lambda);
-    std::vector<Vec3> by_scale(sheet_.n_faces()), by_angles(growth_.any() ? sheet_.n_faces() : 0);
-    std::vector<Mat3> by_stiffness(by_angles.size());
+    std::vector<Vec3> by_scale(sheet_.n_faces());
     each_group([&](Index group) {
         SimdDouble delta[3], along[3], stress_rate[3];
         strain(group, q, delta);
@@ -351,18 +350,41 @@ void BendingTerm::vjp(const double* q, const LoadParameters&, const double* lamb
                                rates.cwiseProduct(scale).dot(by_poisson_ratio * scale.cwiseProduct(d)), out);
             by_scale[f] = (rates.cwiseProduct(stress) + d.cwiseProduct(lane_of(stress_rate, lane)))
                               .cwiseQuotient(scale);
-            if (by_angles.empty()) continue;
-            by_angles[f] = -history_.factor() * lane_of(stress_rate, lane);
-            const GrownFace face = grown(f);
-            by_stiffness[f] = face.in_world(face.triangle().bending_by_growth(
-                materials_[f], scale.cwiseProduct(rates), scale.cwiseProduct(d)));
         }
     });
-    for (Index f = 0; f < static_cast<Index>(by_stiffness.size()); ++f)
-        growth_.add_vjp(f, by_stiffness[f], Mat3::Zero(), out);
-    if (growth_.any()) add_natural_angles_vjp(by_angles, out);
+    if (growth_.any()) {
+        const std::vector<ByRestFace> by_faces = by_rest_faces(q, lambda);
+        std::vector<Vec3> by_angles(by_faces.size());
+        for (Index f = 0; f < sheet_.n_faces(); ++f) {
+            growth_.add_vjp(f, by_faces[f].deformation, Mat3::Zero(), out);
+            by_angles[f] = by_faces[f].angles;
+        }
+        add_natural_angles_vjp(by_angles, out);
+    }
     for (Index f = 0; f < sheet_.n_faces(); ++f)
         for (int i = 0; i < 3; ++i) out.values[curvature_scale_.at(sheet_.edges[f][i])] += by_scale[f][i];
+}
+
+std::vector<BendingTerm::ByRestFace> BendingTerm::by_rest_faces(const double* q, const double* lambda) {
+    store_rates(lambda);
+    std::vector<ByRestFace> found(sheet_.n_faces());
+    each_group([&](Index group) {
+        SimdDouble delta[3], along[3], stress_rate[3];
+        strain(group, q, delta);
+        history_.apply(group, delta);
+        rate(group, lambda, along);
+        stiffness_[group].times(along, stress_rate);
+        for (Index f = group * SimdDouble::width;
+             f < std::min((group + 1) * SimdDouble::width, sheet_.n_faces()); ++f) {
+            const int lane = f % SimdDouble::width;
+            const Vec3 d = lane_of(delta, lane), rates = lane_of(along, lane), scale = scales_of(f);
+            const GrownFace face = grown(f);
+            found[f].deformation = face.in_world(face.triangle().bending_by_growth(
+                materials_[f], scale.cwiseProduct(rates), scale.cwiseProduct(d)));
+            found[f].angles = -history_.factor() * lane_of(stress_rate, lane);
+        }
+    });
+    return found;
 }
 
 // Bounds round-off. A dihedral angle is exact to about one unit of round-off of a radian, or to that of the

@@ -11,13 +11,14 @@
 #include "magshell/energy/bending.h"
 #include "magshell/energy/grown_face.h"
 #include "magshell/strain/dihedral_angle.h"
+#include "magshell/terms/rest_shape_term.h"
 #include "magshell/terms/shell/elastic_term.h"
 #include "magshell/terms/shell/shell_growth.h"
 #include "magshell/terms/shell/shell_materials.h"
 
 namespace magshell {
 
-class BendingTerm final : public StrainScaffold<BendingTerm> {
+class BendingTerm final : public StrainScaffold<BendingTerm>, public RestShapeTerm {
   public:
     BendingTerm(const Shell& sheet, Index body, const ColoredLoop& element_blocks, const GrowthForm& growth,
                 const Nodes& nodes, const SystemMatrix& matrix, Registry& registry);
@@ -36,6 +37,9 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
     void strains_vjp(const Strains& stresses, Gradient& out) const override;
+    bool has_rest_gradient() const override { return !growth_.any(); }
+    void add_rest_vjp(const double* q, const LoadParameters&, const double* lambda, VectorXd& out) override;
+    void add_rest_strains_vjp(const Strains& stresses, VectorXd& out) const override;
     std::size_t bytes() const override;
 
     bool grows() const { return growth_.any(); }
@@ -91,6 +95,15 @@ class BendingTerm final : public StrainScaffold<BendingTerm> {
     Vec3 shared(const std::vector<Vec3>& of_faces, Index face) const;
     void find_natural_angles();
     void add_natural_angles_vjp(const std::vector<Vec3>& by_angles, Gradient& out) const;
+    // Gradients of lambda . g at the last evaluated state by the rest shape of a face: by a homogeneous deformation, through its stiffness,
+    // and by the angles from which its strains are measured.
+    struct ByRestFace {
+        Mat3 deformation;
+        Vec3 angles;
+    };
+    std::vector<ByRestFace> by_rest_faces(const double* q, const double* lambda);
+    // Adds the gradient by rest positions through the rest angles, from that by the angles of each face.
+    void add_rest_angles_vjp(const std::vector<Vec3>& by_angles, VectorXd& out) const;
     void assemble_faces(Index group, SystemMatrix& out) const;
     void assemble_dihedrals(Index first, Index last, const double* q, const Strains& stress,
                             SystemMatrix& out) const;

@@ -1,5 +1,7 @@
 #include "magshell/terms/shell/membrane_term.h"
 
+#include "magshell/energy/rest_corners.h"
+
 namespace magshell {
 
 MembraneTerm::MembraneTerm(const Surface& surface, Index body, const MembraneFaces& faces,
@@ -159,7 +161,11 @@ void MembraneTerm::vjp(const double* q, const LoadParameters&, const double* lam
         for (int k = 0; k < 2; ++k)
             materials_.add_vjp(faces_.parts(f)[k].face, 1, by_shares[f][k][0], by_shares[f][k][1], out);
     if (!growth_.any()) return;
-    // lambda . g by growth: of the reference lengths in the strains, and of the stiffness.
+    add_growth_vjp(by_deformation(q, lambda), out);
+}
+
+// The reference lengths change in the strains, and the stiffness.
+std::vector<Mat3> MembraneTerm::by_deformation(const double* q, const double* lambda) const {
     std::vector<Mat3> by_faces(surface_.n_faces());
     each_group([&](Index group) {
         SimdDouble strains[3], rates[3], stresses[3];
@@ -179,18 +185,67 @@ void MembraneTerm::vjp(const double* q, const LoadParameters&, const double* lam
             by_faces[f] = own.in_world(by_growth);
         }
     });
-    add_growth_vjp(by_faces, out);
+    return by_faces;
 }
 
-void MembraneTerm::strains_vjp(const Strains& stresses, Gradient& out) const {
-    if (!growth_.any()) return;
+std::vector<Mat3> MembraneTerm::strains_by_deformation(const Strains& stresses) const {
     std::vector<Mat3> by_faces(surface_.n_faces());
     for (Index f = 0; f < surface_.n_faces(); ++f) {
         const GrownFace own = grown(f);
         by_faces[f] = own.in_world(
             own.lengths_by_growth({-stresses.number(f, 0), -stresses.number(f, 1), -stresses.number(f, 2)}));
     }
-    add_growth_vjp(by_faces, out);
+    return by_faces;
+}
+
+void MembraneTerm::strains_vjp(const Strains& stresses, Gradient& out) const {
+    if (growth_.any()) add_growth_vjp(strains_by_deformation(stresses), out);
+}
+
+void MembraneTerm::add_rest_vjp(const double* q, const LoadParameters&, const double* lambda, VectorXd& out) {
+    add_by_deformation(by_deformation(q, lambda), out);
+    if (!faces_.is_unchanged()) add_parts_vjp(q, lambda, out);
+}
+
+void MembraneTerm::add_rest_strains_vjp(const Strains& stresses, VectorXd& out) const {
+    add_by_deformation(strains_by_deformation(stresses), out);
+}
+
+void MembraneTerm::add_by_deformation(const std::vector<Mat3>& by_faces, VectorXd& out) const {
+    for (Index f = 0; f < surface_.n_faces(); ++f)
+        add_by_rest_corners(RestShape(faces_.rest_corners(f)), by_faces[f], faces_.corners()[f], out);
+}
+
+// The first part of a triangle is A_1 / (A_1 + A_2), with the areas at rest of the two faces of the shell.
+void MembraneTerm::add_parts_vjp(const double* q, const double* lambda, VectorXd& out) const {
+    std::vector<double> by_first(surface_.n_faces(), 0.0);
+    each_group([&](Index group) {
+        SimdDouble strains[3], rates[3];
+        strain(group, q, strains);
+        history_.apply(group, strains);
+        rate(group, lambda, rates);
+        for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+            const Index f = loop_.face(group, lane);
+            const std::array<MembraneFaces::FacePart, 2> parts = faces_.parts(f);
+            if (parts[1].part == 0.0) continue;
+            const Mat3 difference = rest_face(f).membrane_stiffness(materials_[parts[0].face]) -
+                                    rest_face(f).membrane_stiffness(materials_[parts[1].face]);
+            by_first[f] = lane_of(rates, lane).dot(difference * lane_of(strains, lane));
+        }
+    });
+    for (Index f = 0; f < surface_.n_faces(); ++f) {
+        const std::array<MembraneFaces::FacePart, 2> parts = faces_.parts(f);
+        if (parts[1].part == 0.0) continue;
+        const RestShape shapes[2] = {RestShape(surface_.rest_corners(parts[0].face)),
+                                     RestShape(surface_.rest_corners(parts[1].face))};
+        const double by_area = by_first[f] / (shapes[0].area + shapes[1].area);
+        for (int side = 0; side < 2; ++side) {
+            const double by = side == 0 ? by_area * parts[1].part : -by_area * parts[0].part;
+            for (int k = 0; k < 3; ++k)
+                out.segment<3>(3 * surface_.corners[parts[side].face][k]) +=
+                    by * shapes[side].area_by_corner(k);
+        }
+    }
 }
 
 void MembraneTerm::add_growth_vjp(const std::vector<Mat3>& by_faces, Gradient& out) const {

@@ -9,13 +9,14 @@
 #include "magshell/body/membrane_faces.h"
 #include "magshell/energy/grown_face.h"
 #include "magshell/energy/membrane.h"
+#include "magshell/terms/rest_shape_term.h"
 #include "magshell/terms/shell/elastic_term.h"
 #include "magshell/terms/shell/shell_growth.h"
 #include "magshell/terms/shell/shell_materials.h"
 
 namespace magshell {
 
-class MembraneTerm final : public StrainScaffold<MembraneTerm> {
+class MembraneTerm final : public StrainScaffold<MembraneTerm>, public RestShapeTerm {
   public:
     /// Creates the term. `loop` must iterate over the corners of `faces`.
     MembraneTerm(const Surface& surface, Index body, const MembraneFaces& faces, const FaceLoop& loop,
@@ -35,6 +36,9 @@ class MembraneTerm final : public StrainScaffold<MembraneTerm> {
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
     void strains_vjp(const Strains& stresses, Gradient& out) const override;
+    bool has_rest_gradient() const override { return !growth_.any(); }
+    void add_rest_vjp(const double* q, const LoadParameters&, const double* lambda, VectorXd& out) override;
+    void add_rest_strains_vjp(const Strains& stresses, VectorXd& out) const override;
     std::size_t bytes() const override;
 
     bool grows() const { return growth_.any(); }
@@ -52,6 +56,13 @@ class MembraneTerm final : public StrainScaffold<MembraneTerm> {
     void strain(Index group, const double* q, SimdDouble d[3]) const;
     void rate(Index group, const double* p, SimdDouble d[3]) const;
     RestFace rest_face(Index face) const;
+    // Return the derivatives by a homogeneous deformation of each triangle at rest: of lambda . g at the last evaluated state, and of the
+    // strains times stresses.
+    std::vector<Mat3> by_deformation(const double* q, const double* lambda) const;
+    std::vector<Mat3> strains_by_deformation(const Strains& stresses) const;
+    void add_by_deformation(const std::vector<Mat3>& by_faces, VectorXd& out) const;
+    // Adds the gradient by rest positions through the parts of two faces in a triangle.
+    void add_parts_vjp(const double* q, const double* lambda, VectorXd& out) const;
     void add_growth_vjp(const std::vector<Mat3>& by_faces, Gradient& out) const;
     const Symmetric3& stiffness(Index group) const { return elements_[group].stiffness; }
 

@@ -13,13 +13,14 @@
 #include "magshell/energy/grown_six.h"
 #include "magshell/energy/six_node_face.h"
 #include "magshell/strain/dihedral_angle_six.h"
+#include "magshell/terms/rest_shape_term.h"
 #include "magshell/terms/shell/elastic_term.h"
 #include "magshell/terms/shell/shell_growth.h"
 #include "magshell/terms/shell/shell_materials.h"
 
 namespace magshell {
 
-class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
+class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9>, public RestShapeTerm {
   public:
     BendingSixTerm(const SixNodeShell& sheet, Index body, const ColoredLoop& element_blocks,
                    const Nodes& nodes, const GrowthForm& growth, const SystemMatrix& matrix,
@@ -29,6 +30,7 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     Index body() const override { return body_; }
     bool set_values(const Values& values) override;
     bool varies() const override { return growth_.any(); }
+    bool has_rest_gradient() const override { return !growth_.any(); }
     double length_scale() const override { return materials_.thinnest(); }
     double energy(const double* q, const LoadParameters&) const override;
     void evaluate(const double* q, const LoadParameters&, Residual& out) override;
@@ -43,6 +45,8 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     void count_rotations_from_rest(bool from_rest) override;
     void rotations_from_sides(VectorXd& motion) const override;
     void forces_from_rest(VectorXd& forces) const override;
+    void add_rest_vjp(const double* q, const LoadParameters&, const double* lambda, VectorXd& out) override;
+    void add_rest_strains_vjp(const Strains& by_strains, VectorXd& out) const override;
     std::size_t bytes() const override;
 
     /// Returns the strains d at q without changing the term.
@@ -89,6 +93,19 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9> {
     Vec9 rest_angles(Index face) const;
     void grow();
     void add_growth_vjp(const double* q, const double* lambda, Gradient& out) const;
+    // Gradients by what a face takes from its rest shape (rest_), and by the nodes of the rest shape itself.
+    struct ByRestFace {
+        std::array<double, 6> inverse_jacobian{};
+        Vec9 scale = Vec9::Zero();
+        std::array<Vec3, 6> nodes;
+    };
+    // Computes that of by . d for the part d inside of a vector of faces, with the interior at q and at rest.
+    void strains_by_rest(Index group, const BendingSix& now, const SimdDouble by[9],
+                         ByRestFace out[SimdDouble::width]) const;
+    void add_rest_face(Index face, const ByRestFace& by, VectorXd& out) const;
+    void add_rest_angles(const Strains& by_strains, VectorXd& out) const;
+    Mat2 compliance_by_deformation(Index face, const GrownTriangle& triangle, const std::array<double, 3>& at,
+                                   double weight, const Vec9& of_r, const Vec9& of_d) const;
     GrownFace::ByNatural strains_by_growth(const GrownSix& face, Index number, const Vec9& by,
                                            const Vec9& interior) const;
     void begin_strains(const double* q) { store_dihedrals(q); }

@@ -6,21 +6,25 @@
 #include "magshell/energy/magnetic.h"
 #include "magshell/energy/magnetic_rotating.h"
 #include "magshell/energy/magnetic_six.h"
+#include "magshell/energy/rest_point_six.h"
 #include "magshell/terms/element_energies.h"
 #include "magshell/terms/magnetic/applied_field_term.h"
 #include "magshell/terms/magnetic/field_groups.h"
 #include "magshell/terms/magnetic/total_applied_field.h"
+#include "magshell/terms/rest_shape_term.h"
 
 namespace magshell {
 namespace {
 
 template <class Law>
-class MagneticSixTerm final : public AppliedFieldTerm, public ElementEnergies {
+class MagneticSixTerm final : public AppliedFieldTerm, public ElementEnergies, public RestShapeTerm {
   public:
     MagneticSixTerm(const SixNodeShell& sheet, Index body, const ColoredLoop& element_blocks,
                     const SystemMatrix& matrix, const FieldSources& sources, Registry& registry);
 
     std::string_view name() const override { return Magnetic::name; }
+    bool has_rest_gradient() const override { return std::is_same_v<Law, Magnetic>; }
+    void add_rest_vjp(const double*, const LoadParameters&, const double*, VectorXd& out) override;
     Index body() const override { return body_; }
     bool set_values(const Values& values) override;
     double energy(const double* q, const LoadParameters& load_parameters) const override {
@@ -78,8 +82,9 @@ class MagneticSixTerm final : public AppliedFieldTerm, public ElementEnergies {
     ParameterSlice magnetization_, thickness_;  // values
     std::vector<double> thicknesses_;
     std::vector<Points> elements_;
-    std::vector<Fields> fields_;  // sampled for the current assembly; empty in a uniform field
-    bool linear_ = true;          // every magnetization is linear in the positions
+    std::vector<Vec3> by_magnetization_;  // gradient by that of each point, from the last vjp()
+    std::vector<Fields> fields_;          // sampled for the current assembly; empty in a uniform field
+    bool linear_ = true;                  // every magnetization is linear in the positions
 };
 
 template <class Law>
@@ -225,6 +230,7 @@ void MagneticSixTerm<Law>::vjp(const double* q, const LoadParameters& load_param
     FieldProbe probe;  // - V_p (M', M, v)
     probe.flux.resize(places.size()), probe.moment.resize(places.size()),
         probe.direction.resize(places.size());
+    by_magnetization_.resize(places.size());
     loop_.each_group([&](Index group) {
         SimdVec3 x[6], along[6];
         loop_.gather(group, q, x);
@@ -248,8 +254,8 @@ void MagneticSixTerm<Law>::vjp(const double* q, const LoadParameters& load_param
                 const Vec3 by_coordinates =
                     -volume * (frame_rate.transpose() * flux + frame.transpose() * flux_rate);
                 const auto [a1, a2] = rest_edges(f, p);
-                out.values.segment<3>(magnetization_.at(f)) +=
-                    Law::rest_frame(a1, a2).transpose().inverse() * by_coordinates;
+                by_magnetization_[n] = Law::rest_frame(a1, a2).transpose().inverse() * by_coordinates;
+                out.values.segment<3>(magnetization_.at(f)) += by_magnetization_[n];
                 out.values[thickness_.at(f)] += by_coordinates.dot(coordinates) / thicknesses_[f];
                 probe.flux[n] = -volume * (frame_rate * coordinates);
                 probe.moment[n] = -volume * magnetizations[n];
@@ -274,6 +280,20 @@ void MagneticSixTerm<Law>::add_moments(const double* q, const LoadParameters&, s
                 const Index n = loop_.element(group, lane) * points + p;
                 moments[first + n] = elements_[group].at[p].volume[lane] * magnetizations[n];
             }
+}
+
+template <class Law>
+void MagneticSixTerm<Law>::add_rest_vjp(const double*, const LoadParameters&, const double*, VectorXd& out) {
+    for (Index f = 0; f < sheet_.n_faces(); ++f)
+        for (int p = 0; p < points; ++p) {
+            const typename Law::Element& e = elements_[f / SimdDouble::width].at[p];
+            const int lane = f % SimdDouble::width;
+            const RestPointSix rest(sheet_.rest[f], six_nodes::inside[p].at);
+            rest.add_by_edges(magnetic_by_rest_edges(RestShape(rest.corners()),
+                                                     {e.alpha[lane], e.beta[lane], e.gamma[lane]},
+                                                     by_magnetization_[f * points + p]),
+                              sheet_.own_nodes[f], out);
+        }
 }
 
 template <class Law>

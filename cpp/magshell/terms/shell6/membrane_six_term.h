@@ -6,13 +6,14 @@
 #include "magshell/energy/grown_six.h"
 #include "magshell/energy/membrane_six.h"
 #include "magshell/energy/six_node_face.h"
+#include "magshell/terms/rest_shape_term.h"
 #include "magshell/terms/shell/elastic_term.h"
 #include "magshell/terms/shell/shell_growth.h"
 #include "magshell/terms/shell/shell_materials.h"
 
 namespace magshell {
 
-class MembraneSixTerm final : public StrainScaffold<MembraneSixTerm, 9> {
+class MembraneSixTerm final : public StrainScaffold<MembraneSixTerm, 9>, public RestShapeTerm {
   public:
     MembraneSixTerm(const SixNodeShell& sheet, Index body, const ColoredLoop& element_blocks,
                     const Nodes& nodes, const GrowthForm& growth, const SystemMatrix& matrix,
@@ -22,6 +23,7 @@ class MembraneSixTerm final : public StrainScaffold<MembraneSixTerm, 9> {
     Index body() const override { return body_; }
     bool set_values(const Values& values) override;
     bool varies() const override { return growth_.any(); }
+    bool has_rest_gradient() const override { return !growth_.any(); }
     double length_scale() const override { return materials_.thinnest(); }
     double energy(const double* q, const LoadParameters&) const override;
     void evaluate(const double* q, const LoadParameters&, Residual& out) override;
@@ -32,6 +34,8 @@ class MembraneSixTerm final : public StrainScaffold<MembraneSixTerm, 9> {
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
     void strains_vjp(const Strains& stresses, Gradient& out) const override;
+    void add_rest_vjp(const double* q, const LoadParameters&, const double* lambda, VectorXd& out) override;
+    void add_rest_strains_vjp(const Strains& stresses, VectorXd& out) const override;
     std::size_t bytes() const override;
 
     /// Returns the strains d at q without changing the term.
@@ -46,6 +50,8 @@ class MembraneSixTerm final : public StrainScaffold<MembraneSixTerm, 9> {
     }
     GrownSix grown(Index face) const;
     void grow();
+    // Adds the gradient by rest positions from that by the measures at rest.
+    void add_rest_measures_vjp(const Strains& by_measures, VectorXd& out) const;
     void begin_strains(const double*) {}
     void begin_rates(const double*) {}
     void strain(Index group, const double* q, SimdDouble d[9]) const;

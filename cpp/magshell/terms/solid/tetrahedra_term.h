@@ -14,12 +14,13 @@
 
 #include "magshell/assembly/element_blocks.h"
 #include "magshell/energy/viscous_strain.h"
+#include "magshell/terms/rest_shape_term.h"
 #include "magshell/terms/solid/tetrahedra.h"
 
 namespace magshell {
 
 template <class Element, class Material, class Moduli, bool mean>
-class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean> {
+class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean>, public RestShapeTerm {
     using Base = Tetrahedra<Element, Material, Moduli, mean>;
     using Base::N, Base::points, Base::n_constants, Base::loop_, Base::rest_, Base::constants_,
         Base::gradient_of, Base::add_pull;
@@ -179,6 +180,20 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean> 
         for (Index t = 0; t < this->elements(); ++t) this->moduli_.add_vjp(t, of_elements[t].by, out);
     }
 
+    void add_rest_vjp(const double* q, const LoadParameters&, const double* lambda, VectorXd& out) override;
+
+    void add_rest_strains_vjp(const Strains& stresses, VectorXd& out) const override {
+        add_rest(out, [&](Index group, SimdMat3 by_deformation[points]) {
+            SimdVec3 x[N];
+            loop_.gather(group, state_.data(), x);
+            for (int p = 0; p < points; ++p) {
+                const SimdMat3 f = gradient_of(group, p, x);
+                by_deformation[p] =
+                    -multiply(transposed_times(f, f), Green::matrix(stresses.at(group) + 6 * p));
+            }
+        });
+    }
+
     Strains strains(const double* q) override {
         Strains out(this->elements(), 6 * points);
         loop_.each_group([&](Index group) {
@@ -243,6 +258,13 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean> 
         }
     };
 
+    // Returns B of the viscous part of lambda . g at a point (tetrahedra_rest.h).
+    SimdMat3 viscous_by_rest(Index group, int p, const SimdMat3& f, const SimdMat3& along) const;
+    // Adds the gradient by rest positions of a function with the derivative B = of_points(group, B) by a deformation I + H of the rest
+    // shape at each point.
+    template <class OfPoints>
+    void add_rest(VectorXd& out, const OfPoints& of_points) const;
+
     RestModuli viscous_moduli(Index group) const {
         RestModuli moduli = Material::rest_moduli(constants_[group].at);
         if constexpr (mean) moduli.lambda = SimdDouble(-2.0 / 3.0) * moduli.mu;
@@ -282,6 +304,12 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean> 
     ViscousStresses viscous_;
     std::vector<double> state_;  // positions of the last evaluated state
 };
+
+}  // namespace magshell
+
+#include "magshell/terms/solid/tetrahedra_rest.h"
+
+namespace magshell {
 
 /// Creates the term of a solid with linear or quadratic elements of a material.
 template <class Material, class Moduli>

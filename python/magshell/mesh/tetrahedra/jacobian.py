@@ -190,6 +190,17 @@ def shape_integrals(node_positions: np.ndarray) -> np.ndarray:
     return _coefficients(node_positions) @ _integrals().T
 
 
+def by_shape_integrals(node_positions: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+    """Return the gradient by the nodes of ten-node tetrahedra, (n_t, 10, 3), from that by `shape_integrals`, (n_t, 10).
+
+    With the gradients g_k of the shape functions at a point, the Jacobian determinant D there changes by D sum_k g_k . dX_k.
+    """
+    columns = np.einsum("pna,tni->tpia", _AT_POINTS, node_positions)
+    by_determinants = gradient @ (_integrals() @ _FROM_VALUES) * np.linalg.det(columns)
+    slopes = np.einsum("pna,tpai->tpni", _AT_POINTS, np.linalg.inv(columns))
+    return np.einsum("tp,tpni->tni", by_determinants, slopes)
+
+
 def shape_products(node_positions: np.ndarray) -> np.ndarray:
     """Return the integrals of products of two shape functions over ten-node tetrahedra (n_t, 10, 3), (n_t, 10, 10) m3."""
     return np.einsum("tj,klj->tkl", _coefficients(node_positions), _products())

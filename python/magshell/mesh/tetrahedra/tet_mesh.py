@@ -95,6 +95,11 @@ class TetMesh(TetSelection):
         self._rest_positions = positions
         self._tetrahedra = frozen(nodes.astype(np.int32))
 
+    def _with_rest_positions(self, rest_positions: np.ndarray) -> TetMesh:
+        """Return the same tetrahedra with other rest positions (n_v, 3) m."""
+        made = TetMesh(rest_positions, self.tetrahedra, self.parts, self.part_names)
+        return made._with_members(self._groups)
+
     # Copies and worker processes compute the connectivity again, which is cheap.
     def __reduce__(self) -> tuple[Any, ...]:
         made_from = (self.rest_positions, self.tetrahedra, self.parts, self.part_names)

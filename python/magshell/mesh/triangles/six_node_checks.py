@@ -70,6 +70,20 @@ def shape_integrals(positions: np.ndarray, part: np.ndarray | None = None) -> np
     return np.einsum("p,pk,pn->kn", weights, densities, shapes(points)[0])
 
 
+def by_shape_integrals(
+    positions: np.ndarray, gradient: np.ndarray, part: np.ndarray | None = None
+) -> np.ndarray:
+    """Return the gradient by the nodes of elements, (n, 6, 3), from that by their `shape_integrals`, (n, 6)."""
+    points, weights = rule(_REFERENCE_TRIANGLE if part is None else _NODES[part])
+    values, slopes = shapes(points)
+    along = np.einsum("pan,kni->apki", slopes, positions)
+    normal = np.cross(along[0], along[1])
+    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
+    by_density = weights[:, None, None] * np.einsum("kn,pn->pk", gradient, values)[..., None]
+    by_along = np.stack([np.cross(along[1], normal), np.cross(normal, along[0])])
+    return np.einsum("apki,pan->kni", by_density * by_along, slopes)
+
+
 def shape_products(positions: np.ndarray) -> np.ndarray:
     """Return the integrals of the products of two shape functions over elements (n, 6, 3), (n, 6, 6) m2."""
     points, weights = rule(_REFERENCE_TRIANGLE)
@@ -89,6 +103,18 @@ def edge_integrals(positions: np.ndarray) -> np.ndarray:
     slopes = np.stack([4 * s - 3, 4 * s - 1, 4 - 8 * s], axis=1)
     stretches = np.linalg.norm(np.einsum("pn,kni->pki", slopes, positions), axis=2)
     return np.einsum("p,pk,pn->kn", weights, stretches, values)
+
+
+def by_edge_integrals(positions: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+    """Return the gradient by the nodes of edges, (k, 3, 3), from that by their `edge_integrals`, (k, 3)."""
+    at, lengths = np.polynomial.legendre.leggauss(5)
+    s, weights = (at + 1) / 2, lengths / 2
+    values = np.stack([(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)], axis=1)
+    slopes = np.stack([4 * s - 3, 4 * s - 1, 4 - 8 * s], axis=1)
+    along = np.einsum("pn,kni->pki", slopes, positions)
+    unit = along / np.linalg.norm(along, axis=2, keepdims=True)
+    by_stretch = weights[:, None] * np.einsum("kn,pn->pk", gradient, values)
+    return np.einsum("pk,pki,pn->kni", by_stretch, unit, slopes)
 
 
 def edge_lengths(positions: np.ndarray) -> np.ndarray:

@@ -356,6 +356,10 @@ class QuadraticTriangleMesh(MeshBase):
         positions = moved(self.rest_positions, rotation, translation)
         return self._without_warning(positions, self.elements)._with_members(self._groups)
 
+    def _with_rest_positions(self, rest_positions: np.ndarray) -> QuadraticTriangleMesh:
+        """Return the same elements at other rest positions (n_v, 3) m."""
+        return self._without_warning(rest_positions, self.elements)._with_members(self._groups)
+
     def scaled(self, factor: float) -> QuadraticTriangleMesh:
         """Return the mesh with all coordinates multiplied by a positive factor."""
         positions = self.rest_positions * positive("factor", "", factor)

@@ -194,6 +194,16 @@ class Contact(Owner):
             / sum(sheet.thickness.size for sheet in sheets if isinstance(sheet, Shell))
         )
 
+    def _by_width(self, label: str, sheets: Sequence[Shell | Solid], gradient: Gradient) -> float:
+        """Return the gradient by the largest width of the bodies, on which the defaults in `_law` depend."""
+        of_sheets = any(isinstance(sheet, Shell) for sheet in sheets)
+        found = 0.0
+        if self.sticking_speed is None:
+            found += _STICKING * gradient.value(label, "sticking_speed")[0]
+        if self.smoothing is None and not of_sheets:
+            found += _SMOOTHING_OF_SOLIDS * gradient.value(label, "smoothing")[0]
+        return found
+
     def __repr__(self) -> str:
         friction = "" if self.friction_coefficient is None else f", friction {self.friction_coefficient:g}"
         with_what = ", ".join(repr(each) for each in self.obstacles)

@@ -50,9 +50,9 @@ def reshaped(scene: Scene, values: Any, no_gradient_with: Sequence[str] | None =
     if any(requires_gradient(value) for value in given.values()):
         if no_gradient_with is None:
             raise NoGradient(
-                f"no gradient by {REST}: only ms.equilibrium and ms.simulate have one. Detach them here"
+                f"no gradient by {REST} here: only ms.equilibrium, ms.WarmStart and ms.simulate have one. Detach them"
             )
-        _refuse_without_gradient(there, [there._own(body) for body in given], no_gradient_with)
+        _refuse_without_gradient(there, no_gradient_with)
     return there, {there._own(owner): named for owner, named in values.items()}
 
 
@@ -131,6 +131,7 @@ def _made(scene: Scene, numbers: dict[Any, np.ndarray]) -> ReshapedScene:
     }
     there = ReshapedScene(**{**arguments, "allow_rigid_motions": True})
     own[id(scene)] = there
+    own |= {id(body.skin): now[id(body)].skin for body in numbers if getattr(body, "skin", None) is not None}
     remember(
         there,
         _origin=scene,
@@ -174,8 +175,8 @@ def _refuse_what_cannot_follow(scene: Scene) -> None:
         )
 
 
-def _refuse_without_gradient(scene: Scene, bodies: Any, others: Sequence[str]) -> None:
-    if names := [*without_rest_gradient(scene, bodies), *others]:
+def _refuse_without_gradient(scene: Scene, others: Sequence[str]) -> None:
+    if names := [*without_rest_gradient(scene), *others]:
         raise NoGradient(
             f"no gradient by {REST}: there is no derivative by them of {', '.join(names)} yet. Detach them, or leave that "
             "out"

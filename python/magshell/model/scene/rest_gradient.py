@@ -1,4 +1,4 @@
-"""The gradient of an equilibrium by the rest positions of a shell: that of the core, and that through its mesh."""
+"""The gradient by the rest positions of a body: that of the core, and that through numbers computed from its mesh."""
 
 from __future__ import annotations
 
@@ -6,22 +6,28 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ... import _core
 from ..._input.selections import indices
 from ...errors import NoGradient
-from ...mesh.rest_shape import by_areas, by_continuations, by_edge_vectors, by_lengths, by_magnetizations
-from ...mesh.triangles.triangle_mesh import TriangleMesh
-from ..loads.face_energies import FaceEnergy
-from ..loads.loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
-from ..loads.pressure import Pressure
+from ...mesh.rest_shape import (
+    by_continuations,
+    by_edge_vectors,
+    by_lengths,
+    by_nodal_areas,
+    by_nodal_lengths,
+    by_width,
+)
+from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
+from ..contact.body_contact import width_of
+from ..loads.loads import AreaLoad, EdgeCouple, EdgeLoad
 from ..supports.supports import Clamp, rotation_matrix
 
 if TYPE_CHECKING:
     from ..shells.shell import Shell
+    from ..solids.solid import Solid
     from .scene import Scene
     from .solve_inputs import Inputs
     from .values import Gradient, Values
-
-_LOADS = (PointLoad, EdgeLoad, AreaLoad, EdgeCouple, FaceEnergy, Pressure)
 
 
 class AtNodes(NamedTuple):
@@ -31,31 +37,22 @@ class AtNodes(NamedTuple):
     directions: np.ndarray
 
 
-def without_rest_gradient(scene: Scene, bodies: Any) -> list[str]:
-    """Return words for everything in a scene that has no derivative by the rest positions of these bodies."""
-    found = [f"{type(load).__name__}" for load in scene.loads if not isinstance(load, _LOADS)]
-    rubbing = [contact for contact in scene.contacts if contact.friction_coefficient is not None]
-    if any(
-        contact.sticking_speed is None for contact in rubbing
-    ):  # by default in proportion to the width of the mesh
-        found.append("friction without a sticking_speed of its own")
-    if any(not isinstance(body.mesh, TriangleMesh) for body in scene.bodies):
-        found.append("bodies that are no shells of three-node faces")
-    for body in bodies:
-        found += [name for name in ("growth", "rest_curvature") if getattr(body, name) is not None]
-        if scene.is_magnetic and body.magnetization_law != "stretches":
-            found.append("a magnetization that rotates")
-        if body.susceptibility is not None:
+def without_rest_gradient(scene: Scene) -> list[str]:
+    """Return words for everything in a scene that has no derivative by rest positions."""
+    found = []
+    for body in scene.bodies:
+        found += [name for name in ("growth", "rest_curvature") if getattr(body, name, None) is not None]
+        for magnetic in (body, getattr(body, "skin", None)):
+            if scene.is_magnetic and getattr(magnetic, "magnetization_law", "stretches") != "stretches":
+                found.append("a magnetization that rotates")
+        if getattr(body, "susceptibility", None) is not None:
             found.append("a susceptibility")
-        if scene._model.recut_faces and any(
-            np.ptp(getattr(body, name)) > 0.0 for name in ("thickness", "young_modulus", "poisson_ratio")
-        ):
-            found.append("faces of different materials where obtuse ones are cut along their other diagonal")
-    return list(dict.fromkeys(found))
+    # The core knows its terms; words above say why where a term has a derivative in other scenes.
+    return list(dict.fromkeys(found)) or list(dict.fromkeys(_core.without_rest_gradient(scene._model)))
 
 
-def by_rest_positions(inputs: Inputs, body: Shell, gradient: Gradient) -> np.ndarray:
-    """Return the gradient by the rest positions of one shell, (n_v, 3), from the core's gradient.
+def by_rest_positions(inputs: Inputs, body: Shell | Solid, gradient: Gradient) -> np.ndarray:
+    """Return the gradient by the rest positions of one body, (n_v, 3), from the core's gradient.
 
     body: as it is in the scene, whose mesh has these rest positions. Raises NoGradient if the core's gradient was
     computed without rest positions.
@@ -63,17 +60,14 @@ def by_rest_positions(inputs: Inputs, body: Shell, gradient: Gradient) -> np.nda
     if gradient.rest is None:
         raise NoGradient("no gradient by rest_positions: this function has none")
     values, scene = inputs.values, inputs.scene
-    elastic, prescribed = (AtNodes(*each) for each in gradient.rest)
-    held = _by_rest_of_held(inputs, prescribed)
     span = scene._bodies.spans[scene._bodies.number(body)]
-    found = (elastic.vertices + held.vertices)[span.vertices]
-    found += _through_directions(values, span, elastic.directions + held.directions)
+    shape, prescribed = (AtNodes(*each) for each in gradient.rest)
+    held = _by_rest_of_held(inputs, prescribed)
+    found = (shape.vertices + held.vertices)[span.vertices]
+    found += _through_directions(values, span, shape.directions + held.directions)
     found += _through_moves(values, span, gradient)
+    found += _through_contacts(values, body, gradient)
     found += _through_masses(values, values.current(body), span, gradient)
-    label = next(label for each, label in scene._labels if each is body)
-    if gradient.has(label, "remanent_magnetization"):
-        rows = scene._value_layout.of(values.numbers, label, "remanent_magnetization")
-        found += by_magnetizations(span.mesh, rows, gradient.value(label, "remanent_magnetization"))
     for load in map(values.current, scene.loads):
         part = scene._bodies.of(load)
         of_load = np.zeros((scene.mesh.n_vertices, 3))
@@ -111,6 +105,8 @@ def _through_directions(values: Values, span: Any, of_directions: np.ndarray) ->
     edges = np.concatenate([held[clamped, 0], scene._moment_edges])
     by = np.concatenate([of_directions[held[clamped, 1]], of_directions[n_held:]])
     here = (edges >= span.edges.start) & (edges < span.edges.stop)
+    if not here.any():
+        return np.zeros((span.mesh.n_vertices, 3))
     return by_continuations(span.mesh, edges[here] - span.first_edge, by[here])
 
 
@@ -128,13 +124,25 @@ def _through_moves(values: Values, span: Any, gradient: Gradient) -> np.ndarray:
     return found
 
 
-def _through_masses(values: Values, body: Shell, span: Any, gradient: Gradient) -> np.ndarray:
-    """Return the gradient through the weights of the vertices, (n_v, 3)."""
-    mesh, by_masses = span.mesh, values.by_masses(gradient)
-    if by_masses is None:
-        return np.zeros((mesh.n_vertices, 3))
-    of_faces = by_masses[span.vertices][mesh.faces].mean(axis=1)
-    return by_areas(mesh, np.arange(mesh.n_faces), of_faces * body._areal_masses)
+def _through_contacts(values: Values, body: Shell | Solid, gradient: Gradient) -> np.ndarray:
+    """Return the gradient through the width from which contacts take their defaults, (n_v, 3)."""
+    found = np.zeros((body.mesh.n_vertices, 3))
+    for contact, label, bodies in values.contacts:
+        widest = max(bodies, key=lambda each: width_of(each.mesh))
+        if widest is values.current(body):
+            found += by_width(body.mesh, contact._by_width(label, bodies, gradient))
+    return found
+
+
+def _through_masses(values: Values, body: Shell | Solid, span: Any, gradient: Gradient) -> np.ndarray:
+    """Return the gradient through the masses of the vertices, for inertia and for weight, (n_v, 3)."""
+    found = np.zeros((span.mesh.n_vertices, 3))
+    of_inertia, of_weight = values.by_inertia_and_weight(gradient)
+    if of_inertia is not None:
+        found += body._by_rest_masses(of_inertia[span.vertices], weighed=False)
+    if of_weight is not None:
+        found += body._by_rest_masses(of_weight[span.vertices], weighed=True)
+    return found
 
 
 def _through_load(values: Values, load: Any, part: Any, gradient: Gradient) -> np.ndarray | float:
@@ -147,16 +155,17 @@ def _through_load(values: Values, load: Any, part: Any, gradient: Gradient) -> n
         couple = load.couple_per_length
         if couple.ndim == 0:
             return by_lengths(mesh, edges, by_moments * couple)
-        forward = np.where(mesh.edge_faces[edges, 0] >= 0, 1.0, -1.0)
+        faces = mesh.corners.edge_faces if isinstance(mesh, QuadraticTriangleMesh) else mesh.edge_faces
+        forward = np.where(faces[edges, 0] >= 0, 1.0, -1.0)
         return by_edge_vectors(mesh, edges, (forward * by_moments)[:, None] * couple)
     of_solve = "vertex_loads" in values.replaced.get(values.scene, {})  # in place of all such loads
     if of_solve or not isinstance(load, EdgeLoad | AreaLoad):
         return 0.0
     vertices, _ = load._nodal_weights(mesh)
     forces = np.broadcast_to(getattr(load, load._replaceable[0]), (len(vertices), 3))
-    by_forces = gradient.value("loads", "forces")[part.vertices][vertices].mean(axis=1)
-    by_measure = (by_forces * forces).sum(axis=1)  # each vertex carries an equal part
+    by_forces = gradient.value("loads", "forces")[part.vertices][vertices]
+    by_weights = (by_forces * forces[:, None]).sum(axis=2)
     if isinstance(load, EdgeLoad):
-        return by_lengths(mesh, indices("EdgeLoad edges", load.edges, mesh.n_edges), by_measure)
+        return by_nodal_lengths(mesh, indices("EdgeLoad edges", load.edges, mesh.n_edges), by_weights)
     faces = np.arange(mesh.n_faces) if load.faces is None else load.faces
-    return by_areas(mesh, faces, by_measure)
+    return by_nodal_areas(mesh, faces, by_weights)

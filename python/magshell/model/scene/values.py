@@ -290,8 +290,8 @@ class Gradient:
     """The core's gradient of a scalar by all values and load parameters of a scene.
 
     values: (n,). controls: (m,), or (time points, m) of a motion. others: {name: gradient} by the further inputs of a
-    motion. rest: the gradients by rest positions (n_v, 3) and directions across edges (n_d, 3), of the elastic energies of
-    shells, and the same by where supports hold them; or None.
+    motion. rest: the gradients by rest positions (n_v, 3) and directions across edges (n_d, 3), through the shape of
+    bodies at rest, and the same by where supports hold them; or None.
     """
 
     def __init__(

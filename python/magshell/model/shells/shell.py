@@ -11,7 +11,7 @@ from ..._input.owner import Owner
 from ..._input.quantity import quantity, real_numbers
 from ..._runtime.solver_entry_point import grouped
 from ...mesh.face_shapes import corner_axes, sides
-from ...mesh.rest_shape import moved_mesh
+from ...mesh.rest_shape import by_areas, by_nodal_element_areas, moved_mesh
 from ...mesh.triangles.face_quality import MeshQuality
 from ...mesh.triangles.six_node_checks import shape_integrals, shape_products
 from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
@@ -236,8 +236,7 @@ class Shell(Owner):
                 raise ValueError(
                     'curvature_scale [1] must be 1 with bending="midedge2": make the thickness or the modulus another'
                 )
-            absent_here = ("curvature_scale", "rest_positions")
-            self._replaceable = tuple(name for name in self._replaceable if name not in absent_here)
+            self._replaceable = tuple(name for name in self._replaceable if name != "curvature_scale")
         self.remanent_magnetization: np.ndarray | None = (
             None
             if remanent_magnetization is None
@@ -389,6 +388,15 @@ class Shell(Owner):
         masses = np.zeros(self.mesh.n_vertices)
         np.add.at(masses, self.mesh.elements, self._areal_masses[:, None] * nodal_areas)
         return masses
+
+    def _by_rest_masses(self, by_masses: np.ndarray, weighed: bool) -> np.ndarray:
+        """Return the gradient by the rest positions, (n_v, 3), from that by the masses of the vertices, (n_v,)."""
+        by_nodes = by_masses[self.mesh.elements] * self._areal_masses[:, None]
+        if self.mesh.order == 1:
+            return by_areas(self.mesh, np.arange(self.mesh.n_faces), by_nodes.mean(axis=1))
+        if not weighed:  # parts of the area, which is the sum of the integrals
+            by_nodes = np.repeat((by_nodes @ _LUMPED[6])[:, None], 6, axis=1)
+        return by_nodal_element_areas(self.mesh, by_nodes)
 
     @property
     def _areal_masses(self) -> np.ndarray:

@@ -10,6 +10,7 @@ from ..._input.owner import Owner
 from ..._input.quantity import quantity, real_numbers
 from ..._input.selections import indices, selection
 from ..._runtime.frozen import variant
+from ...mesh.rest_shape import by_areas
 from ...mesh.tetrahedra.tet_mesh import TetMesh
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ..shells.shell import checked_magnetization_law, magnetization_of
@@ -117,6 +118,10 @@ class Skin(Owner):
             now["remanent_magnetization"] = np.repeat(of_faces, parts, axis=0)
         return variant(self, faces=on, _corners=mesh.faces[on], _areas=mesh.face_areas[on], **now)
 
+    def _moved_to(self, mesh: TetMesh) -> Skin:
+        """Return the skin on the same faces of its solid at other rest positions."""
+        return variant(self, _areas=mesh.face_areas[self.faces])
+
     def replaced(self, **values: Any) -> Skin:
         """Return the same skin with other values."""
         now = {name: getattr(self, name) for name in self._replaceable}
@@ -149,6 +154,13 @@ class Skin(Owner):
             of_faces = self._areas * self.thickness * self.mass_density
             np.add.at(masses, self._corners, (of_faces / 3.0)[:, None])
         return masses
+
+    def _by_rest_masses(self, mesh: TetMesh, by_masses: np.ndarray) -> np.ndarray:
+        """Return the gradient by the rest positions of its solid, (n_v, 3), from that by `masses`, (n_v,)."""
+        if self.mass_density is None:
+            return np.zeros((mesh.n_vertices, 3))
+        by_areas_here = by_masses[self._corners].mean(axis=1) * self.thickness * self.mass_density
+        return by_areas(mesh, self.faces, by_areas_here)
 
     @property
     def element_masses(self) -> tuple[np.ndarray, np.ndarray]:

@@ -10,6 +10,7 @@ from ..._input.owner import Owner
 from ..._input.quantity import quantity, real_numbers
 from ..._runtime.frozen import variant
 from ..._runtime.solver_entry_point import grouped
+from ...mesh.rest_shape import by_nodal_volumes, moved_solid_mesh
 from ...mesh.tetrahedra.jacobian import shape_integrals, shape_products
 from ...mesh.tetrahedra.tet_mesh import TetMesh
 from ..shells.shell import checked_magnetization_law, magnetization_of
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from ..scene.values import Gradient, Values
 
 ELEMENTS = ("quadratic", "linear")
+# Fractions of a tetrahedron's mass at its nodes (Hinton, Rock, Zienkiewicz 1976).
+_LUMPED = {"quadratic": np.array([1 / 36] * 4 + [4 / 27] * 6), "linear": np.full(4, 1 / 4)}
 
 
 class Solid(Owner):
@@ -47,6 +50,9 @@ class Solid(Owner):
     magnetization_law: "stretches", the default, F M of the papers: the magnetization stretches with the body; or "rotates",
         R M of the polar decomposition F = R U: it turns with the body and keeps its magnitude, as experiments with bodies
         that are stretched show (docs/theory.md).
+
+    A solve can replace the values of the material, mass_density, remanent_magnetization and `rest_positions`, (n_v, 3) m, of
+    `solid.mesh` (docs/how-to/rest-shape.md).
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.box((0.1, 0.02, 0.02), cells=(10, 2, 2))
@@ -106,7 +112,12 @@ class Solid(Owner):
     @property
     def _replaceable(self) -> tuple[str, ...]:
         magnetized = () if self.remanent_magnetization is None else ("remanent_magnetization",)
-        return (*self.material.names, "mass_density", *magnetized)
+        return (*self.material.names, "mass_density", *magnetized, "rest_positions")
+
+    @property
+    def rest_positions(self) -> np.ndarray:
+        """The positions of the mesh's vertices at rest, (n_v, 3) m; of quadratic elements with their midside nodes."""
+        return self.mesh.rest_positions
 
     @property
     def _face_magnetization(self) -> np.ndarray | None:
@@ -144,8 +155,11 @@ class Solid(Owner):
         return array
 
     def replaced(self, **values: Any) -> Solid:
-        """Return the same solid with another mass density, magnetization or values of the material."""
+        """Return the same solid with other rest positions, mass density, magnetization or values of the material."""
         now: dict[str, Any] = {}
+        if "rest_positions" in values:
+            now["mesh"] = moved_solid_mesh(self.mesh, values.pop("rest_positions"))
+            now["skin"] = None if self.skin is None else self.skin._moved_to(now["mesh"])
         if "mass_density" in values:
             density = values.pop("mass_density")
             now["mass_density"] = None if density is None else self._density(density)
@@ -208,10 +222,18 @@ class Solid(Owner):
         """
         volumes = self.mesh.volumes[:, None]
         if self.element == "linear":
-            even = np.repeat(volumes / 4.0, 4, axis=1)
+            even = volumes * _LUMPED["linear"]
             return even, even
-        lumped = np.array([1 / 36] * 4 + [4 / 27] * 6)
-        return volumes * lumped, shape_integrals(self.mesh.rest_positions[self.mesh.tetrahedra])
+        return volumes * _LUMPED["quadratic"], shape_integrals(self.mesh.rest_positions[self.mesh.tetrahedra])
+
+    def _by_rest_masses(self, by_masses: np.ndarray, weighed: bool) -> np.ndarray:
+        """Return the gradient by the rest positions, (n_v, 3), from that by the masses of the vertices, (n_v,)."""
+        by_integrals = self.mass_density[:, None] * by_masses[self.mesh.tetrahedra]
+        if not weighed:  # parts of the volume, which is the sum of the integrals
+            by_volumes = by_integrals @ _LUMPED[self.element]
+            by_integrals = np.repeat(by_volumes[:, None], by_integrals.shape[1], axis=1)
+        found = by_nodal_volumes(self.mesh, by_integrals)
+        return found if self.skin is None else found + self.skin._by_rest_masses(self.mesh, by_masses)
 
     def _assembled_masses(self, nodal_volumes: np.ndarray) -> np.ndarray:
         if self.mass_density is None:

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...errors import NoGradient
 from .eigenvalue import EigenvalueAdjoint, multiplier_of
-from .residual import Residual, Slopes
+from .residual import Residual
 
 if TYPE_CHECKING:
     from ...model.scene.solve_inputs import Leaf
@@ -70,11 +70,11 @@ class BucklingAdjoint(EigenvalueAdjoint):
         multiplier = multiplier_of(here, factor * bent.by_state)
         there = here.at(here.state, self._after).slopes(multiplier)
         total = total.plus(1.0, here.bent(multiplier, response)).plus(-1.0, here.slopes(multiplier))
-        total = Slopes(total.by_state + there.by_state, total.by_values + there.by_values, total.by_controls)
+        total = total.plus(1.0, there._replace(by_controls=np.zeros_like(there.by_controls)))
         by_after = by_after + there.by_controls
         if self._at_rest:
             total = total.at_fixed_state()
         else:
             total = total.plus(1.0, here.slopes(multiplier_of(here, total.by_state)))
-        after = Slopes(np.zeros_like(total.by_state), total.by_values, by_after)
+        after = total.at_fixed_state()._replace(by_controls=by_after)
         return here.by_inputs(total), here.by_inputs(after)

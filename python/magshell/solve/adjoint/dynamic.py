@@ -15,7 +15,7 @@ from ...errors import NoGradient, StepErrorWarning
 from ...model.scene.values import Gradient
 from ..options import ProjectiveDynamics
 from .leaf_gradient import by_leaf
-from .static import curvature_scales, requires_rest
+from .static import requires_rest
 
 if TYPE_CHECKING:
     from ...model.scene.scene import Scene
@@ -45,8 +45,9 @@ class MotionAdjoint:
                 raise NoGradient(f"no gradient here: {why}")
         _warn_of_jumps(inputs.scene, found.divided)
         with inputs.in_core():
-            scales = curvature_scales(inputs) if requires_rest(inputs, wanted) else []
-            found_by = _core.pull_back_motion(inputs.scene._model, asked.core, found, *by_outputs, scales)
+            found_by = _core.pull_back_motion(
+                inputs.scene._model, asked.core, found, *by_outputs, requires_rest(inputs, wanted)
+            )
         rest = found_by.pop("rest", None)
         if rest is not None and asked.starts_at_rest:
             (by_vertices, by_directions), prescribed = rest

@@ -15,6 +15,7 @@ import numpy as np
 
 from ... import _core
 from ...errors import NoGradient
+from ...model.scene.reshaped import REST
 from ...model.scene.values import Gradient
 from .differences import ROUNDING, directional_derivative
 
@@ -31,11 +32,15 @@ _OF_DIFFERENCES = 1e-11
 
 
 class Slopes(NamedTuple):
-    """The derivatives of a number by all unknowns of the core, by all values and by all load parameters."""
+    """The derivatives of a number by all unknowns of the core, by all values and by all load parameters.
+
+    by_rest: those through the shape of bodies at rest, three numbers per node; empty unless rest positions are inputs.
+    """
 
     by_state: np.ndarray
     by_values: np.ndarray
     by_controls: np.ndarray
+    by_rest: np.ndarray = np.zeros(0)
 
     def plus(self, factor: float, other: Slopes) -> Slopes:
         """Return the derivatives of the sum of this number and a multiple of another."""
@@ -60,6 +65,7 @@ class Residual:
         self.state: np.ndarray = state
         self.controls: np.ndarray = controls
         self._model, self._angle_branches = inputs.scene._model, angle_branches
+        self._with_rest = any(leaf.name == REST and leaf.owner is not None for leaf in inputs.leaves)
 
     def at(self, state: np.ndarray, controls: np.ndarray) -> Residual:
         """Return the same at another state and other load parameters."""
@@ -150,13 +156,17 @@ class Residual:
         """
         through = self.prescribed(slopes.by_state)
         others = {} if masses is None else {"mass": masses}
-        return Gradient(
-            self.inputs.scene, slopes.by_values + through[0], slopes.by_controls + through[1], others
-        )
+        rest = None
+        if self._with_rest:
+            model = self._model
+            held = slopes.by_state - model.expand(model.reduce(slopes.by_state))
+            rest = [_core.at_nodes(model, each) for each in (slopes.by_rest, held)]
+        by_values, by_controls = slopes.by_values + through[0], slopes.by_controls + through[1]
+        return Gradient(self.inputs.scene, by_values, by_controls, others, rest=rest)
 
     def _slopes(self, state: np.ndarray, motion: np.ndarray) -> Slopes:
         product = self._model.hessian_product(state, self.controls, motion)
-        return Slopes(product, *_core.vjp(self._model, state, self.controls, motion))
+        return Slopes(product, *_core.vjp(self._model, state, self.controls, motion, self._with_rest))
 
     def _prepare(self) -> None:
         if self.inputs.scene.rigid_parts:
@@ -176,6 +186,8 @@ class Residual:
                 of_key = layout.of(entries, *key).ravel()
                 parts.append(slice(of_key.min(initial=first), of_key.max(initial=first - 1) + 1))
             first += layout.size
+        if self._with_rest:
+            parts += [slice(first, first + vertices), slice(first + vertices, first + directions)]
         return [part for part in parts if part.stop > part.start]
 
     def _sizes(self, parts: list[slice]) -> np.ndarray:
@@ -183,7 +195,11 @@ class Residual:
         scene, values = self.inputs.scene, self.inputs.values
         state = np.ones(len(self.state))
         state[: 3 * scene._bodies.n_points] = scene.mesh.edge_lengths.min(initial=np.inf)
-        flat = np.abs(np.concatenate([state, values.numbers, self.controls]))
+        if self._with_rest:
+            lengths = state[: 3 * (scene._bodies.n_points + len(scene._constraints.directions))]
+        else:
+            lengths = np.zeros(0)
+        flat = np.abs(np.concatenate([state, values.numbers, self.controls, lengths]))
         sizes = np.array([flat[part].max() for part in parts])
         return np.where(np.isfinite(sizes), sizes, 0.0)
 

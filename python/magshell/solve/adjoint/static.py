@@ -36,8 +36,9 @@ class Adjoint:
                 for leaf, asked in zip(inputs.leaves, wanted, strict=True)
             ]
         with inputs.in_core():
-            scales = curvature_scales(inputs) if requires_rest(inputs, wanted) else []
-            by_values, by_controls, *rest = _core.pull_back(model, self._found, *by_outputs, scales)
+            by_values, by_controls, *rest = _core.pull_back(
+                model, self._found, *by_outputs, requires_rest(inputs, wanted)
+            )
         gradient = Gradient(inputs.scene, by_values, by_controls, rest=rest or None)
         leaves = zip(inputs.leaves, wanted, strict=True)
         return [by_leaf(inputs, leaf, gradient) if asked else None for leaf, asked in leaves]
@@ -80,12 +81,6 @@ class Adjoint:
                 f"({found.n_negative_eigenvalues} directions lower its energy, or its Hessian is singular), "
                 "and no body would stay in it. Solve with require_stable=True."
             )
-
-
-def curvature_scales(inputs: Inputs) -> list[np.ndarray]:
-    """Return the curvature scales of all shells of three-node faces, (n_e,) each."""
-    values = inputs.values
-    return [values.current(sheet).curvature_scale for sheet in values.scene._bodies.flat_sheets]
 
 
 def requires_rest(inputs: Inputs, wanted: Sequence[bool]) -> bool:

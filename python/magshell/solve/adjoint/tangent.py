@@ -16,7 +16,8 @@ import numpy as np
 from ... import _core
 from ...errors import NoGradient
 from ...model.rigid.joints import Joint
-from ...model.scene.reshaped import REST
+from ...model.scene.reshaped import REST, reshaped
+from ...model.scene.reshaped_states import directions_of, renumbered_state, renumbered_vector
 from ...model.scene.values import Values
 from .differences import directional_derivative
 
@@ -112,8 +113,10 @@ def _rates(inputs: Inputs, found: _core.StaticsResult, leaf: Leaf, change: np.nd
     advice = "take gradients with backward(), torch.func.vjp or jacrev"
     if leaf.refusal:
         raise NoGradient(f"no tangent by {leaf.name}: {leaf.refusal}")
-    if leaf.name == REST or (isinstance(leaf.owner, Joint) and leaf.name in leaf.owner._geometry):
+    if isinstance(leaf.owner, Joint) and leaf.name in leaf.owner._geometry:
         raise NoGradient(f"no tangent by the {leaf.name} of a {type(leaf.owner).__name__}: {advice}")
+    if leaf.name == REST and leaf.owner is not None:
+        return _rates_by_rest(inputs, found, leaf, change)
     model, state = inputs.scene._model, found.state
 
     def at(step: float) -> np.ndarray:
@@ -125,6 +128,38 @@ def _rates(inputs: Inputs, found: _core.StaticsResult, leaf: Leaf, change: np.nd
     if rates is None:
         raise NoGradient(
             f"no tangent by {leaf.name}: the forces are not smooth in it, or it is at the end of its range; {advice}"
+        )
+    return rates
+
+
+def _rates_by_rest(inputs: Inputs, found: _core.StaticsResult, leaf: Leaf, change: np.ndarray) -> np.ndarray:
+    """Return the same along a change of rest positions, from scenes that are made with others."""
+    scene, body, held = inputs.scene, leaf.owner, directions_of(inputs.scene)
+    if any(np.abs(angles).max(initial=0.0) > np.pi for angles in map(np.asarray, found.turns)):
+        raise NoGradient(
+            f"no tangent by {REST} where an angle is larger than half a turn: take gradients with backward()"
+        )
+    turns = [[0.0] * len(angles) for angles in found.turns]
+
+    def at(step: float) -> np.ndarray:
+        there, _ = reshaped(scene, {body: {REST: body.mesh.rest_positions + step * change}})
+        replaced = {there._own(owner): named for owner, named in inputs.values.replaced.items()}
+        values = Values(there, replaced, inputs.magnetization, sampling_of=inputs.values)
+        state, model = renumbered_state(there, scene, found.state), there._model
+        with values.in_core():
+            model.term_energies(state, turns, inputs.controls)
+            forces = model.gradient(state, inputs.controls)
+            increment = model.driven_increment(state, inputs.controls)
+        rows = np.stack([renumbered_vector(scene, there, each) for each in (forces, increment)])
+        rows[1, held] = increment[directions_of(there)]
+        return rows
+
+    shortest = float(body.mesh.edge_lengths.min())
+    steps = [_STEP * shortest * factor / np.abs(change).max() for factor in _SHORTER]
+    rates = directional_derivative(at, steps)
+    if rates is None:
+        raise NoGradient(
+            f"no tangent by {REST}: the forces are not smooth in it; take gradients with backward()"
         )
     return rates
 

@@ -41,6 +41,7 @@ from ..options import (
     Newton,
     as_adjoint_storage,
 )
+from .differentiable_state import DifferentiableState
 from .motion_inputs import MotionInputs
 from .schedule import split_schedules
 from .step_errors import warn_of_steps
@@ -89,9 +90,7 @@ def preparation(
         raise ValueError(f"solver must be a MixedNewton or a Newton, got {type(solver).__name__}")
     if not isinstance(scene, Scene):
         raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
-    scene, values = reshaped(
-        scene, arguments.pop("values"), no_gradient_with=_without_rest_gradient(scene, arguments)
-    )
+    scene, values = _reshaped(scene, arguments.pop("values"), options.start)
     replaced = requested(
         scene,
         arguments.pop("vertex_loads"),
@@ -196,15 +195,25 @@ def run(
     return Motion(result, asked, found)
 
 
-def _without_rest_gradient(scene: Scene, arguments: dict[str, Any]) -> list[str]:
+def _reshaped(scene: Scene, values: Any, start: Any) -> tuple[Scene, Any]:
+    """Return the scene with the rest positions among the values, and the values by its objects; raise as `reshaped` does.
+
+    Raises ValueError too for a state from which the motion cannot go on with these.
+    """
+    last = vars(scene).get("_reshaped", (None, scene))[1]
+    there, values = reshaped(scene, values, no_gradient_with=_without_rest_gradient(scene))
+    if there not in (scene, last) and isinstance(start, MotionState | DifferentiableState):
+        raise ValueError(
+            "start is the state of a motion at other rest_positions: hand over its "
+            "positions and velocities instead"
+        )
+    return there, values
+
+
+def _without_rest_gradient(scene: Scene) -> list[str]:
     """Return words for what the gradient of a motion by rest positions does not include yet."""
-    found = [
-        name
-        for name in ("stiffness_damping", "maxwell_modulus")
-        if arguments[name] is not None and np.any(np.asarray(detached(arguments[name])))
-    ]
     moved = [support for support in scene.supports if isinstance(support, Pin | Clamp)]
-    return found + ["supports that rotate"] * any(each._move.rotation is not None for each in moved)
+    return ["supports that rotate"] * any(each._move.rotation is not None for each in moved)
 
 
 def _advice(result: Trajectory, chosen: bool) -> str:

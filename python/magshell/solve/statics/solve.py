@@ -107,7 +107,7 @@ def equilibrium(
     values: {object of the scene: {name: value}}, which replace the values that the objects were made with, in this solve:
         numbers of loads, actuators, joints, materials and Water; displacement, rotation and center of supports that move;
         positions and moments of Dipoles; sizes, magnetization, center and rotation of a magnet; center and rotation of
-        an obstacle or a PlacedField; flux_density of a SampledField; the law of a Contact; rest_positions of shells; and
+        an obstacle or a PlacedField; flux_density of a SampledField; the law of a Contact; rest_positions of shells and solids; and
         {scene: {"gravity": value}}. `scene.objects` lists the objects. The keywords applied_flux_density and the factors are
         short forms of {scene: {name: value}}. The structure of the matrix is kept, except with rest_positions.
     start: an earlier Equilibrium of this scene, from whose load parameters and values the solve goes to the new ones; or
@@ -143,8 +143,7 @@ def equilibrium(
 
     Tangents (forward mode) along a change of the inputs cost one back-substitution, too, and four or eight evaluations of
     forces: torch.autograd.forward_ad, torch.func.jvp and jacfwd. torch.func.grad, vjp, jacrev and functional_call work as
-    well; torch.func.vmap solves a batch. By the origins, axes and pitches of joints, and by rest positions, there are
-    gradients, but no tangents.
+    well; torch.func.vmap solves a batch. By the origins, axes and pitches of joints there are gradients, but no tangents.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))

@@ -10,6 +10,7 @@ from ..._input.quantity import quantity
 from ..._input.tensors import to_array
 from ...model.contact.contacts_to_core import check_outside
 from ...model.rigid.equimomental_points import check_rigid
+from ...model.scene.reshaped_states import renumbered_state
 from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs
 from ...model.solids.solid import Solid
@@ -57,24 +58,9 @@ def starting_point(
 
 
 def state_in(scene: Scene, start: Equilibrium) -> np.ndarray:
-    """Return the state of an equilibrium in a scene that is the same but for rest positions.
-
-    Each scene has a numbering of its own. Directions across held edges are carried over if both have as many.
-    """
+    """Return the state of an equilibrium in a scene that is the same but for rest positions."""
     theirs = start.scene
-    if theirs is scene:
-        return start._state
-    at = theirs._model.positions(start._state), theirs._model.edge_rotations(start._state)
-    state = scene._model.state(*at)
-    if directions_of(theirs) == directions_of(scene):
-        state[directions_of(scene)] = start._state[directions_of(theirs)]
-    return state
-
-
-def directions_of(scene: Scene) -> slice:
-    """Return where the directions across held edges are among all unknowns of a scene."""
-    first = 3 * scene._bodies.n_points
-    return slice(first, first + 3 * len(scene._constraints.directions))
+    return start._state if theirs is scene else renumbered_state(scene, theirs, start._state)
 
 
 def check_faces(scene: Scene, positions: np.ndarray, name: str = "start") -> None:

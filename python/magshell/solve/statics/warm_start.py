@@ -15,6 +15,7 @@ from ..._runtime.keywords import CONTROLS, as_keywords
 from ...errors import EquilibriumJumped, Interrupted, NotConverged
 from ...model.scene.fine_faces import fine_faces, having_fine_faces
 from ...model.scene.reshaped import REST, reshaped
+from ...model.scene.reshaped_states import directions_of, renumbered_vector
 from ...model.scene.scene import Scene
 from ..options import MixedNewton, Newton
 from .cases import join, of_case, split, starts_of
@@ -22,7 +23,7 @@ from .designs import between, numbers_only, packed, unpacked
 from .equilibria import EquilibriumSet
 from .equilibrium import Equilibrium
 from .single_solve import Search, Solution, find, inputs_of
-from .start import Origin, directions_of, state_in
+from .start import Origin, state_in
 
 if TYPE_CHECKING:
     from ..._input.kinds import Starting
@@ -202,18 +203,12 @@ def _first_order_change(last: Solution, there: Solution) -> np.ndarray:
         raise ValueError(f"{REST} must be given in every call of a WarmStart, or in none")
     state, model = state_in(ours, last.equilibrium), ours._model
     with there.inputs.in_core():
-        forces = _renumbered(ours, theirs, model.gradient(state, there.inputs.controls))
+        forces = renumbered_vector(theirs, ours, model.gradient(state, there.inputs.controls))
         increment = model.driven_increment(state, there.inputs.controls)
-    moved = _renumbered(ours, theirs, increment)
+    moved = renumbered_vector(theirs, ours, increment)
     moved[held] = increment[held]
     with last.inputs.in_core():
         return theirs._model.positions(_core.push_forward(theirs._model, last.found, forces, moved))
-
-
-def _renumbered(ours: Scene, theirs: Scene, vector: np.ndarray) -> np.ndarray:
-    """Return a vector of all unknowns in the numbering of another scene, zero for directions."""
-    at = ours._model.positions(vector), ours._model.edge_rotations(vector)
-    return theirs._model.state(*at) - theirs._model.state(*map(np.zeros_like, at))
 
 
 def _largest(displacements: np.ndarray) -> float:

@@ -1,0 +1,54 @@
+#include "magshell/scene/rest_gradient.h"
+
+#include "magshell/energy/surface_tension.h"
+#include "magshell/terms/contact/contact_term.h"
+#include "magshell/terms/contact/friction_term.h"
+#include "magshell/terms/load/edge_moment_term.h"
+#include "magshell/terms/load/face_energy.h"
+#include "magshell/terms/load/load_term.h"
+#include "magshell/terms/load/pressure_term.h"
+#include "magshell/terms/load/water_term.h"
+#include "magshell/terms/rest_shape_term.h"
+
+namespace magshell {
+namespace {
+
+// Returns true for the terms that read no rest shape: their forces follow from present positions and from values that the caller computes.
+template <class... Kinds>
+bool is_one_of(const auto& term) {
+    return ((dynamic_cast<const Kinds*>(&term) != nullptr) || ...);
+}
+
+bool has_rest_gradient(const Term& term) {
+    if (const auto* const shaped = dynamic_cast<const RestShapeTerm*>(&term))
+        return shaped->has_rest_gradient();
+    if (const auto* const couples = dynamic_cast<const EdgeMomentTerm*>(&term))
+        return !couples->reads_rest_lengths();
+    return is_one_of<LoadTerm, PressureTerm, ContactTerm, FaceEnergyTerm<SurfaceTension>>(term);
+}
+
+}  // namespace
+
+void add_rest_vjp(Model& model, const VectorXd& q, const LoadParameters& load_parameters,
+                  const VectorXd& lambda, VectorXd& out) {
+    for (const std::unique_ptr<Term>& term : model.terms().energies)
+        if (auto* const shaped = dynamic_cast<RestShapeTerm*>(term.get()))
+            shaped->add_rest_vjp(q.data(), load_parameters, lambda.data(), out);
+}
+
+void add_rest_strains_vjp(const ViscousTerms& terms, const StrainSet& stresses, VectorXd& out) {
+    for (std::size_t k = 0; k < terms.all().size(); ++k)
+        if (const auto* const shaped = dynamic_cast<const RestShapeTerm*>(terms.all()[k]))
+            shaped->add_rest_strains_vjp(stresses.of_terms[k], out);
+}
+
+std::vector<std::string_view> without_rest_gradient(const Model& model) {
+    std::vector<std::string_view> names;
+    for (const std::unique_ptr<Term>& term : model.terms().energies)
+        if (!has_rest_gradient(*term)) names.push_back(term->name());
+    for (const std::unique_ptr<ForceTerm>& force : model.terms().forces)
+        if (!is_one_of<FrictionTerm, WaterTerm>(*force)) names.push_back(force->name());
+    return names;
+}
+
+}  // namespace magshell

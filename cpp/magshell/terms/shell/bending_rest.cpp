@@ -1,0 +1,48 @@
+// The gradient of the bending energy by rest positions. These functions have a file of their own for the reason that
+// bending_projective.cpp gives.
+#include "magshell/assembly/dihedral_angles.h"
+#include "magshell/energy/rest_corners.h"
+#include "magshell/terms/shell/bending_term.h"
+
+namespace magshell {
+
+void BendingTerm::add_rest_vjp(const double* q, const LoadParameters&, const double* lambda, VectorXd& out) {
+    const std::vector<ByRestFace> by_faces = by_rest_faces(q, lambda);
+    std::vector<Vec3> by_angles(by_faces.size());
+    for (Index f = 0; f < sheet_.n_faces(); ++f) {
+        add_by_rest_corners(RestShape(sheet_.rest_corners(f)), by_faces[f].deformation, sheet_.corners[f],
+                            out);
+        by_angles[f] = by_faces[f].angles;
+    }
+    add_rest_angles_vjp(by_angles, out);
+}
+
+void BendingTerm::add_rest_strains_vjp(const Strains& stresses, VectorXd& out) const {
+    std::vector<Vec3> by_angles(sheet_.n_faces());
+    for (Index f = 0; f < sheet_.n_faces(); ++f)
+        by_angles[f] = {-stresses.number(f, 0), -stresses.number(f, 1), -stresses.number(f, 2)};
+    add_rest_angles_vjp(by_angles, out);
+}
+
+// A side has the natural angle weight theta~ of its dihedral angle.
+void BendingTerm::add_rest_angles_vjp(const std::vector<Vec3>& by_angles, VectorXd& out) const {
+    VectorXd q(3 * nodes_.n_nodes());
+    for (Index node = 0; node < nodes_.n_nodes(); ++node) q.segment<3>(3 * node) = nodes_.rest[node];
+    const Index n = sheet_.n_dihedrals();
+    for (Index first = 0; first < n; first += SimdDouble::width) {
+        const Index last = std::min<Index>(first + SimdDouble::width, n);
+        SimdVec3 g[4];
+        dihedral_angles_at(sheet_, first, last, q.data()).gradient(g);
+        for (int lane = 0; lane < last - first; ++lane) {
+            const DihedralStencil& fold = sheet_.dihedrals[first + lane];
+            double by_angle = 0.0;
+            for (const DihedralStencil::Side& side : {fold.left, fold.right})
+                if (side.face >= 0) by_angle += by_angles[side.face][side.corner];
+            for (int k = 0; k < 4; ++k)
+                out.segment<3>(3 * fold.nodes[k]) +=
+                    fold.weight() * by_angle * Vec3(g[k].x[lane], g[k].y[lane], g[k].z[lane]);
+        }
+    }
+}
+
+}  // namespace magshell
