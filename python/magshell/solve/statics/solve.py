@@ -107,9 +107,9 @@ def equilibrium(
     values: {object of the scene: {name: value}}, which replace the values that the objects were made with, in this solve:
         numbers of loads, actuators, joints, materials and Water; displacement, rotation and center of supports that move;
         positions and moments of Dipoles; sizes, magnetization, center and rotation of a magnet; center and rotation of
-        an obstacle or a PlacedField; flux_density of a SampledField; the law of a Contact; rest_positions of shells and solids; and
-        {scene: {"gravity": value}}. `scene.objects` lists the objects. The keywords applied_flux_density and the factors are
-        short forms of {scene: {name: value}}. The structure of the matrix is kept, except with rest_positions.
+        an obstacle or a PlacedField; flux_density of a SampledField; the law of a Contact; rest_positions of shells and
+        solids; and {scene: {"gravity": value}}. `scene.objects` lists the objects. The keywords applied_flux_density and the
+        factors are short forms of {scene: {name: value}}. The structure of the matrix is kept, except with rest_positions.
     start: an earlier Equilibrium of this scene, from whose load parameters and values the solve goes to the new ones; or
         positions (n_v, 3) m. By default the unloaded rest shape. With load cases also an EquilibriumSet. From an
         Equilibrium, obstacles and supports move along straight lines to their new places, in load steps so short that
