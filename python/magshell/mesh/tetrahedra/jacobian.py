@@ -193,12 +193,16 @@ def shape_integrals(node_positions: np.ndarray) -> np.ndarray:
 def by_shape_integrals(node_positions: np.ndarray, gradient: np.ndarray) -> np.ndarray:
     """Return the gradient by the nodes of ten-node tetrahedra, (n_t, 10, 3), from that by `shape_integrals`, (n_t, 10).
 
-    With the gradients g_k of the shape functions at a point, the Jacobian determinant D there changes by D sum_k g_k . dX_k.
+    A Jacobian determinant x_1 . (x_2 x x_3) with the columns x_a = dX/dxi_a changes by x_2 x x_3 . dx_1 and so on.
     """
-    columns = np.einsum("pna,tni->tpia", _AT_POINTS, node_positions)
-    by_determinants = gradient @ (_integrals() @ _FROM_VALUES) * np.linalg.det(columns)
-    slopes = np.einsum("pna,tpai->tpni", _AT_POINTS, np.linalg.inv(columns))
-    return np.einsum("tp,tpni->tni", by_determinants, slopes)
+    points, _, axes = _AT_POINTS.shape
+    slopes = np.ascontiguousarray(np.swapaxes(_AT_POINTS, 1, 2)).reshape(
+        points * axes, -1
+    )  # of the shape functions
+    columns = (slopes @ node_positions).reshape(-1, points, axes, 3)
+    by_columns = np.cross(np.roll(columns, -1, axis=2), np.roll(columns, -2, axis=2))
+    by_columns *= (gradient @ (_integrals() @ _FROM_VALUES))[..., None, None]
+    return slopes.T @ by_columns.reshape(-1, points * axes, 3)
 
 
 def shape_products(node_positions: np.ndarray) -> np.ndarray:
