@@ -42,10 +42,11 @@ def test_no_other_function_has_a_keyword_of_the_table_but_under_its_name() -> No
 
 
 def test_values_of_the_shell_are_those_that_a_solve_can_replace() -> None:
+    # Rest positions and the susceptibility are given by `values=` only.
     replaceable = [
         name
         for name in ms.Shell._replaceable
-        if name not in ("remanent_magnetization", "rest_positions", *ms.Shell._in_time)
+        if name not in ("remanent_magnetization", "rest_positions", "susceptibility", *ms.Shell._in_time)
     ]
     assert sorted(names_of("shell")) == sorted(replaceable)
 

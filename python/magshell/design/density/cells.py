@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -10,6 +10,9 @@ import scipy
 from ..._input.tensors import real_tensor
 from ...mesh.tetrahedra.tet_mesh import TetMesh
 from ...mesh.triangles.triangle_mesh import TriangleMesh
+
+if TYPE_CHECKING:
+    import torch
 
 _ROUNDING = 1e-9  # [-] by which a density may leave [0, 1]
 
@@ -56,7 +59,7 @@ def cells_of(mesh: Any) -> Cells:
     )
 
 
-def checked_density(name: str, values: Any, count: int | str):
+def checked_density(name: str, values: Any, count: int | str) -> torch.Tensor:
     """Return densities (count,) as a tensor of doubles. Raises ValueError if one is not within [0, 1]."""
     density = real_tensor(f"{name} [1]", values, (count,)).double()
     numbers = density.detach()

@@ -46,7 +46,7 @@ class ErrorEstimate:
     scene: Scene
     value: float
     error: float
-    by_face: np.ndarray | None
+    by_face: Any  # (n,) array, or None
     factorizations: int
     n_dofs: int
     wall_time: float
