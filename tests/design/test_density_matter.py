@@ -141,6 +141,25 @@ def test_a_start_carried_over_to_other_matter_takes_fewer_iterations():
     assert warm.iterations < cold.iterations
 
 
+def test_a_part_without_common_vertices_starts_at_rest():
+    x = SHEET.face_barycenters[:, 0]
+    ends = np.flatnonzero((x < 0.005) | (x > x.max() - 0.005))
+    gap = np.where((x > 0.018) & (x < 0.024), 0.0, 1.0)
+    both = density.Matter(SHEET, gap, ends)
+    alone = density.Matter(SHEET, np.where(x < 0.02, gap, 0.0), ROOT)
+    moved = alone.mesh.rest_positions + np.array([0, 0, 1e-3])
+    start = both.start(alone, moved) - both.mesh.rest_positions
+    common = np.isin(both.vertices, alone.vertices)
+    np.testing.assert_allclose(start[common, 2], 1e-3)
+    assert not start[~common].any() and not common.all()
+
+
+def test_values_of_a_tensor_in_single_precision_come_back_as_a_tensor():
+    matter = density.Matter(SHEET, np.ones(SHEET.n_faces), ROOT)
+    values = torch.ones(SHEET.n_faces, dtype=torch.float32, requires_grad=True)
+    assert matter.on_all_faces(values).requires_grad
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_matter_turns_far_without_the_solver_stalling(seed):
     """Check random topologies that roll up by more than a right angle."""

@@ -1,3 +1,5 @@
+// A fast multipole method that interpolates 1/r on Chebyshev grids: sources go to the grids of leaves and up the tree, from grid to
+// distant grid, and down the tree to the points. Near boxes are summed point by point.
 #include <array>
 #include <cstring>
 
@@ -9,13 +11,14 @@ namespace {
 
 constexpr int most = SourceTree::most_counts;
 
-// The Lagrange polynomials of n Chebyshev points and their slopes at one place.
+// The values and slopes at one place u of the Lagrange polynomials of n Chebyshev points.
 template <class T>
 struct Lagrange {
     std::array<T, most> values, slopes;
 
     Lagrange(int n, const T& u) {
-        std::array<T, most + 1> after, after_slopes;  // products over the points behind, and their slopes
+        // Products of u - p_j over the points j > i, and their slopes
+        std::array<T, most + 1> after, after_slopes;
         after[n - 1] = T(1.0), after_slopes[n - 1] = T(0.0);
         for (int i = n - 1; i > 0; --i) {
             const T off = u - T(chebyshev().points[n][i]);
@@ -51,7 +54,7 @@ struct Lagrange {
     }
 };
 
-// The polynomials of a box at one place, along each of its axes.
+// The Lagrange polynomials of the grid of a box at one place: one set along each axis of the box.
 template <class T>
 struct BoxBasis {
     const SourceTree::Box& box;
@@ -69,7 +72,7 @@ struct BoxBasis {
                T(along.dot(box.center));
     }
 
-    // Calls body(number, value) for all points of the grid.
+    // Calls body(number, value) for each point of the grid, with the value of its polynomial at the place.
     template <class Body>
     void each(const Body& body) const {
         std::size_t number = box.grid;
@@ -110,7 +113,8 @@ struct BoxBasis {
     }
 };
 
-// Numbers at the points of all grids: charges or potentials, and three components of currents or vector potentials; each with its rate.
+// Numbers at the points of all grids, in components: the charge or its potential, then three of the current or its vector potential.
+// For Dual, each component has two channels: value and rate.
 template <class T>
 class GridNumbers {
   public:
@@ -141,7 +145,7 @@ class GridNumbers {
     std::array<std::vector<double>, 8> numbers_;
 };
 
-// Carries the sources of the points to the grids of leaves, and from the grids of boxes to those of their parents.
+// Returns the sources at the grid points that replace those of the points: first on leaves, then carried to parents.
 template <class T>
 GridNumbers<T> weights_of(const SourceTree& tree, const std::vector<SourcePoint<T>>& from,
                           bool has_currents) {
@@ -179,7 +183,7 @@ GridNumbers<T> weights_of(const SourceTree& tree, const std::vector<SourcePoint<
     return weights;
 }
 
-// Adds the potentials of one grid at the points of another, for `channels` channels at once.
+// Adds the potentials of the grids of distant boxes at the points of a grid, for `channels` channels at once.
 template <int channels>
 void add_potentials(const SourceTree& targets, const SourceTree::Box& target, const SourceTree& sources,
                     const std::vector<Index>& boxes, const double* const* weights, double* const* out) {
@@ -223,7 +227,7 @@ GridNumbers<T> potentials_of(const SourceTree& targets, const SourceTree& source
         else
             add_potentials<per>(targets, box, sources, pairs.distant[number], from, to);
     });
-    // From the grids of boxes to those of their children.
+    // Carries potentials from the grids of boxes to those of their children.
     for (std::size_t level = 1; level < targets.levels().size(); ++level) {
         const std::vector<Index>& boxes = targets.levels()[level];
         parallel_for(static_cast<int>(boxes.size()), [&](int number) {
@@ -263,7 +267,7 @@ std::vector<SourceSums<T>> tree_sums(const SourceTree& targets, const std::vecto
                 const SourcePoint<T>& point = at[p];
                 SourceSums<T>& sum = sums[p];
                 const BoxBasis<T> basis(box, point.at);
-                // The pull is - grad of q V - c . A with the potentials V and A.
+                // The pull is -grad (q V - c . A) with the potentials V and A of the other points.
                 Triple<T> gradient;
                 basis.interpolate([&](std::size_t k) { return potentials.at(0, k); }, sum.charges, gradient);
                 sum.pull -= point.charge * gradient;

@@ -13,17 +13,19 @@
 namespace magshell {
 namespace {
 
-// Returns true for the terms that read no rest shape: their forces follow from present positions and from values that the caller computes.
+// Returns true for terms of one of the kinds.
 template <class... Kinds>
 bool is_one_of(const auto& term) {
     return ((dynamic_cast<const Kinds*>(&term) != nullptr) || ...);
 }
 
-bool has_rest_gradient(const Term& term) {
+// Returns true if add_rest_vjp() is complete for a term: it has the derivatives, or reads no rest shape, as terms whose
+// forces follow from present positions and from values that the caller computes.
+bool rest_gradient_is_complete(const Term& term) {
     if (const auto* const shaped = dynamic_cast<const RestShapeTerm*>(&term))
         return shaped->has_rest_gradient();
-    if (const auto* const couples = dynamic_cast<const EdgeMomentTerm*>(&term))
-        return !couples->reads_rest_lengths();
+    if (const auto* const moments = dynamic_cast<const EdgeMomentTerm*>(&term))
+        return !moments->reads_rest_lengths();
     return is_one_of<LoadTerm, PressureTerm, ContactTerm, FaceEnergyTerm<SurfaceTension>>(term);
 }
 
@@ -45,7 +47,7 @@ void add_rest_strains_vjp(const ViscousTerms& terms, const StrainSet& stresses, 
 std::vector<std::string_view> without_rest_gradient(const Model& model) {
     std::vector<std::string_view> names;
     for (const std::unique_ptr<Term>& term : model.terms().energies)
-        if (!has_rest_gradient(*term)) names.push_back(term->name());
+        if (!rest_gradient_is_complete(*term)) names.push_back(term->name());
     for (const std::unique_ptr<ForceTerm>& force : model.terms().forces)
         if (!is_one_of<FrictionTerm, WaterTerm>(*force)) names.push_back(force->name());
     return names;

@@ -240,7 +240,7 @@ def test_faces_of_open_pressures_are_refused():
 def test_equilibria_far_from_the_coarse_one_are_refused(monkeypatch):
     rest, tip = cantilever()
     monkeypatch.setattr("magshell.solve.accuracy.enriched._NEAR", 1e-6)
-    with pytest.raises(ms.NotConverged, match="away from this one"):
+    with pytest.raises(ms.NotConverged, match="away from the given one"):
         ms.error_estimate(rest, height_at(tip))
 
 

@@ -13,6 +13,8 @@
 namespace magshell {
 namespace {
 
+// The energy of faces that the applied field magnetizes, -1/2 M . B for each volume, with the magnetization of a thin
+// plate, M = along B - across (n . B) n. The faces do not magnetize each other.
 class InducedTerm final : public AppliedFieldTerm {
   public:
     InducedTerm(const Surface& surface, Index body, const FaceLoop& loop, const FieldSources& sources,
@@ -29,7 +31,7 @@ class InducedTerm final : public AppliedFieldTerm {
                   bool, SystemMatrix& out) const override;
     void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
              Gradient& out) override;
-    // The forces on faces that sample the field once are not compared with those of their neighbours.
+    // Returns NaN where the field varies, as the error of the samples is not estimated; a uniform field has none.
     double field_sampling_error(const double*, const LoadParameters& load_parameters, double) override {
         return field_.varies(load_parameters) ? std::numeric_limits<double>::quiet_NaN() : 0.0;
     }
@@ -38,7 +40,7 @@ class InducedTerm final : public AppliedFieldTerm {
     std::size_t bytes() const override;
 
   private:
-    // The applied field at the sampling points of all faces; no samples in a uniform field.
+    // The applied field: its uniform part, and samples at the sampling points of all faces where it varies in space.
     struct Field {
         bool varies = false;
         Vec3 uniform;
@@ -46,13 +48,13 @@ class InducedTerm final : public AppliedFieldTerm {
     };
 
     std::vector<Vec3> points(const double* q) const;
-    // Returns the magnetization [A/m] of the faces at each point in the field with samples of the sources.
+    // Returns the magnetization [A/m] at each sampling point, in the field uniform + factor * samples.flux.
     std::vector<Vec3> magnetizations(const double* q, const Vec3& uniform, double factor,
                                      const FieldSamples& samples) const;
-    // Order as in AppliedField::add_samples.
+    // Samples the field and its derivatives up to the order, 0 to 2; the second one is multiplied by the magnetization.
     Field sample(const double* q, const LoadParameters& load_parameters, int order) const;
-    // Calls body(point) for the points of the faces in a SIMD vector. Where faces have fewer points than others, the weights of the further
-    // ones are zero.
+    // Calls body(point) for each sampling point of the faces of a group, all lanes at once. A lane whose face has fewer
+    // points than another repeats its first one with weight zero.
     template <class Body>
     void each_point(Index group, const Field& field, int order, const Body& body) const;
 
@@ -62,11 +64,11 @@ class InducedTerm final : public AppliedFieldTerm {
     const TotalAppliedField field_;
     ParameterSlice susceptibility_, thickness_;  // values
     std::optional<ParameterSlice>
-        finely_;  // value, 1 for a face that samples finely, if the field can vary in space
+        sampled_finely_;  // value: 1 for faces with several sampling points; absent if no source varies in space
     std::vector<double> susceptibilities_, thicknesses_;
     FaceSampling sampling_;
     LargeVector<InducedFace::Element> elements_;
-    Field at_assembly_;
+    Field field_at_assembly_;
 };
 
 InducedTerm::InducedTerm(const Surface& surface, Index body, const FaceLoop& loop,
@@ -81,14 +83,14 @@ InducedTerm::InducedTerm(const Surface& surface, Index body, const FaceLoop& loo
       sampling_(loop),
       elements_(loop.groups()) {
     if (!sources.empty())
-        finely_ =
+        sampled_finely_ =
             registry.values.add(surface.owner, "field_sampling", "1", surface.n_faces(), 1, &surface.faces);
     sampling_.set(nullptr, surface.n_faces());
 }
 
 bool InducedTerm::set_values(const Values& values) {
-    const bool resampled = finely_ && values.changed(*finely_);
-    if (resampled) sampling_.set(values[*finely_], surface_.n_faces());
+    const bool resampled = sampled_finely_ && values.changed(*sampled_finely_);
+    if (resampled) sampling_.set(values[*sampled_finely_], surface_.n_faces());
     if (!values.changed(susceptibility_, thickness_)) return resampled;
     susceptibilities_.assign(values[susceptibility_], values[susceptibility_] + susceptibility_.size());
     thicknesses_.assign(values[thickness_], values[thickness_] + thickness_.size());
@@ -114,10 +116,10 @@ std::vector<Vec3> InducedTerm::points(const double* q) const {
         for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
             const Index f = loop_.face(group, lane);
             const Vec3 corners[3] = {lane_of(x[0], lane), lane_of(x[1], lane), lane_of(x[2], lane)};
-            const Vec3 across = thicknesses_[f] * lane_of(face.normal, lane);
+            const Vec3 height = thicknesses_[f] * lane_of(face.normal, lane);
             Index n = sampling_.first(f);
             for (const FacePoint& point : sampling_.points(f))
-                points[n++] = position_of(point, corners, across);
+                points[n++] = position_of(point, corners, height);
         }
     });
     return points;
@@ -210,37 +212,38 @@ void InducedTerm::evaluate(const double* q, const LoadParameters& load_parameter
 }
 
 void InducedTerm::prepare_assembly(const double* q, const LoadParameters& load_parameters) {
-    at_assembly_ = sample(q, load_parameters, 2);
+    field_at_assembly_ = sample(q, load_parameters, 2);
 }
 
 void InducedTerm::assemble(const ElementBlock& element_block, const double* q, const LoadParameters&, bool,
                            SystemMatrix& out) const {
-    if (!at_assembly_.varies && at_assembly_.uniform.isZero(0.0)) return;
+    if (!field_at_assembly_.varies && field_at_assembly_.uniform.isZero(0.0)) return;
     FaceLoop::over_groups(element_block, [&](Index group) {
         SimdVec3 x[3];
         SimdMat3 h[6];
         loop_.gather(group, q, x);
         const InducedFace face(x);
         InducedFace::Hessian by{};
-        each_point(group, at_assembly_, 2, [&](const InducedFace::Point& at) {
-            face.add(elements_[group], at, at_assembly_.varies, by);
+        each_point(group, field_at_assembly_, 2, [&](const InducedFace::Point& at) {
+            face.add(elements_[group], at, field_at_assembly_.varies, by);
         });
         face.by_nodes(by, h);
         loop_.scatter(group, h, out);
     });
 }
 
-// The rate of the energy along lambda, with the rates v_p of the points and n' of the normal,
+// lambda gives the sampling points the rates v_p and the normal the rate n'. The rate of the energy along lambda is
 //
-//   D = A~ h sum_p w_p (- M . G v_p + across (n . B) (n' . B))
+//   D = sum_p A~ h w_p d_p,    d_p = - M . G v_p + c (n . B) (n' . B),
 //
-// has with c = across the derivatives, all times A~ h w_p,
+// with the rest area A~, the thickness h, the weight w_p of a point, the gradient G of B, M = P B and c = across.
+// With C the second gradient of M . B at constant M, the derivatives of D are A~ h w_p times
 //
-//   by B:         - P G v_p + c ((n' . B) n + (n . B) n')       by G: - M (x) v_p
-//   by chi:       - dM/dchi . G v_p + dc/dchi (n . B)(n' . B)
-//   by h:         D/h + z_p (- P G n . G v_p - n . C v_p - M . G n' + c ((n . G n)(n' . B) + (n . B)(n' . G n)))
+//   by B:     - P G v_p + c ((n' . B) n + (n . B) n')        by G: the outer product of - M and v_p
+//   by chi:   - dM/dchi . G v_p + dc/dchi (n . B) (n' . B)
+//   by h:     d_p / h + z_p (- P G n . G v_p - n . C v_p - M . G n' + c ((n . G n) (n' . B) + (n . B) (n' . G n)))
 //
-// where mu_0 dM/dchi = B - (1 - 1/(1 + chi)^2) (n . B) n and z_p h is the height of the point.
+// where mu_0 dM/dchi = B - (1 - 1/(1 + chi)^2) (n . B) n, and z_p h is the height of the point above the middle surface.
 void InducedTerm::vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
                       Gradient& out) {
     const double factor = field_.factor(load_parameters);
@@ -248,6 +251,7 @@ void InducedTerm::vjp(const double* q, const LoadParameters& load_parameters, co
     const std::vector<Vec3> places = points(q);
     const std::vector<Vec3> nothing(places.size(), Vec3::Zero());
     const std::vector<Vec3> m = magnetizations(q, uniform, factor, field_.at_factor_one(places, nothing, 0));
+    // Points off the middle surface move with the thickness, whose derivative needs the second gradient.
     const FieldSamples samples = field_.at_factor_one(places, m, sampling_.any_fine() ? 2 : 1);
 
     FieldProbe probe;
@@ -263,7 +267,7 @@ void InducedTerm::vjp(const double* q, const LoadParameters& load_parameters, co
         for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
             const Index f = loop_.face(group, lane);
             const double along = e.along[lane], across = e.across[lane], h = thicknesses_[f],
-                         stiff = 1.0 + susceptibilities_[f];
+                         permeability = 1.0 + susceptibilities_[f];
             const Vec3 normal = lane_of(face.normal, lane), tilt = lane_of(tilts, lane),
                        rates[3] = {lane_of(rate[0], lane), lane_of(rate[1], lane), lane_of(rate[2], lane)};
             Index n = sampling_.first(f);
@@ -272,23 +276,26 @@ void InducedTerm::vjp(const double* q, const LoadParameters& load_parameters, co
                 const Vec3 b = uniform + factor * samples.flux[n], v = position_of(point, rates, h * tilt);
                 const Mat3 g = factor * samples.gradient[n];
                 const Vec3 gv = g * v;
-                const double through = normal.dot(b), turning = tilt.dot(b);
-                const Vec3 by_flux = across * (turning * normal + through * tilt) -
+                const double flux_through = normal.dot(b), its_rate = tilt.dot(b);
+                const Vec3 by_flux = across * (its_rate * normal + flux_through * tilt) -
                                      (along * gv - (across * normal.dot(gv)) * normal);
-                out.values[thickness_.at(f)] += volume / h * (across * through * turning - m[n].dot(gv));
-                out.values[susceptibility_.at(f)] +=
-                    volume / vacuum_permeability *
-                    ((1.0 - 1.0 / (stiff * stiff)) * through * (turning + normal.dot(gv)) - b.dot(gv));
+                out.values[thickness_.at(f)] +=
+                    volume / h * (across * flux_through * its_rate - m[n].dot(gv));
+                out.values[susceptibility_.at(f)] += volume / vacuum_permeability *
+                                                     ((1.0 - 1.0 / (permeability * permeability)) *
+                                                          flux_through * (its_rate + normal.dot(gv)) -
+                                                      b.dot(gv));
                 if (point.height != 0.0) {
-                    const Vec3 rise = g * normal;
+                    const Vec3 by_height = g * normal;
                     out.values[thickness_.at(f)] +=
                         volume * point.height *
-                        (by_flux.dot(rise) - factor * normal.dot(samples.curvature[n] * v) -
+                        (by_flux.dot(by_height) - factor * normal.dot(samples.curvature[n] * v) -
                          m[n].dot(g * tilt));
                 }
                 probe.flux[n] = volume * by_flux;
                 probe.moment[n] = -volume * m[n];
-                probe.direction[n++] = v;
+                probe.direction[n] = v;
+                ++n;
             }
         }
     });
@@ -309,7 +316,9 @@ void InducedTerm::add_moments(const double* q, const LoadParameters& load_parame
 }
 
 std::size_t InducedTerm::bytes() const {
-    return bytes_of(elements_) + bytes_of(susceptibilities_) + bytes_of(thicknesses_) + sampling_.bytes();
+    const FieldSamples& samples = field_at_assembly_.samples;
+    return bytes_of(elements_) + bytes_of(susceptibilities_) + bytes_of(thicknesses_) + sampling_.bytes() +
+           bytes_of(samples.flux) + bytes_of(samples.gradient) + bytes_of(samples.curvature);
 }
 
 }  // namespace

@@ -25,27 +25,29 @@ if TYPE_CHECKING:
 
 
 class Matter(Frozen):
-    """The faces of a sheet whose density is not void, with their values for a solve.
+    """The faces of a sheet that are dense enough and connected with a support, with their values for a solve.
 
     Void is taken out of the sheet. A soft membrane in its place would be compressed and folded by the matter around it,
-    so that Newton's method finds saddles and folds of what is not there (T. E. Bruns, D. A. Tortorelli, An element
-    removal and reintroduction strategy for the topology optimization of structures and compliant mechanisms, Int. J.
-    Numer. Meth. Eng. 57, 2003). Stiffness and magnetization fall to the least together, as the density comes to
-    `least_density`, so that a face leaves with hardly a jump. Faces return when the filter raises their density again:
-    gradients go to the densities of the faces that remain, and through the filter to design variables around them.
+    and Newton's method would find saddle points and folds that the real sheet does not have (T. E. Bruns, D. A.
+    Tortorelli, An element removal and reintroduction strategy for the topology optimization of structures and compliant
+    mechanisms, Int. J. Numer. Meth. Eng. 57, 2003). Stiffness and magnetization reach their smallest values,
+    `void_stiffness` and zero, together where the density falls to `least_density`, so that the solution hardly jumps
+    when a face is taken out. Removed faces have no gradient of their own. The filter passes gradients of the remaining
+    faces to the design variables around them, so that faces can return.
 
-    Faces that no chain of common edges connects with the holding ones are taken out as well. Parts that touch at a vertex
-    alone get separate vertices there.
+    Faces that are not connected with a holding face through common edges are taken out as well. Parts that touch only at a
+    vertex get separate vertices there.
 
     mesh: the whole sheet, a TriangleMesh. density: (n_f,) in [0, 1], after filter and projection; may be a tensor that
-    needs a gradient. holding: indices of faces at supports, of density `least_density` at least: see `fixed`.
+    needs a gradient. holding: indices of faces at supports; their density must be at least `least_density`, see `fixed`.
     least_density: in [0, 1).
 
     Attributes:
         mesh: the TriangleMesh of the faces that remain, with the groups of the whole one.
-        faces, vertices: the number in the whole sheet of each face (n,) and vertex (n_v,) of `mesh`.
+        original: the TriangleMesh of the whole sheet.
+        faces, vertices: the indices in the whole sheet of the faces (n,) and vertices (n_v,) of `mesh`.
         density: of the faces that remain, (n,).
-        left_out: how many faces were taken out although they are dense enough, because nothing holds them.
+        left_out: the number of faces that were taken out although they are dense enough, because nothing holds them.
 
     >>> import magshell as ms
     >>> whole = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -67,11 +69,11 @@ class Matter(Frozen):
         numbers = detached(density)
         if not len(held):
             raise ValueError("holding must name the faces at supports, at least one")
-        thin = held[numbers[held] < self.least_density]
-        if len(thin):
+        too_light = held[numbers[held] < self.least_density]
+        if len(too_light):
             raise ValueError(
-                f"holding face {thin[0]} has density {numbers[thin[0]]:g}, below least_density {self.least_density:g}: "
-                "make it solid with parametrize.density.fixed"
+                f"holding face {too_light[0]} has density {numbers[too_light[0]]:g}, below least_density "
+                f"{self.least_density:g}: make it solid with parametrize.density.fixed"
             )
         dense = numbers >= self.least_density
         pairs = mesh.edge_faces[mesh.interior_edges]
@@ -98,14 +100,14 @@ class Matter(Frozen):
         mass_power: float | None = None,
         magnetization_power: float | None = None,
     ) -> dict[str, torch.Tensor]:
-        """Return values of a Shell on `mesh`, interpolated by density, for a solve: values={sheet: matter.values(...)}.
+        """Return values for a Shell on `mesh`, interpolated by density, for a solve: values={sheet: matter.values(...)}.
 
-        Each property is that of full density in the whole sheet, with a value for each of its faces or one for all.
+        Give each property as it is at full density: one value, or one for each face of the whole sheet.
 
         young_modulus: Pa. mass_density: kg/m3. remanent_magnetization: (3,) or (n_f, 3) A/m.
         void_stiffness, void_mass: fractions that remain at `least_density`, positive. Void is not magnetized.
-        power: of the stiffness; see `interpolated`. mass_power, magnetization_power: by default the same, so that no face
-        carries more of its weight and of the field's torque, compared with its stiffness, than a solid one does.
+        power: the exponent for the stiffness; see `interpolated`. mass_power, magnetization_power: by default the same, so
+        that a light face has no more weight and magnetic torque for its stiffness than a solid one.
         """
         given = {
             "young_modulus": (young_modulus, "Pa", void_stiffness, power),
@@ -143,15 +145,16 @@ class Matter(Frozen):
             raise ValueError(
                 f"values must have shape (n, ...), n = {len(self.faces)}, got {tuple(given.shape)}"
             )
-        rest = number("fill", detached(fill))
-        whole = torch.full((self.original.n_faces, *given.shape[1:]), rest, dtype=given.dtype)
+        filling = number("fill", detached(fill))
+        whole = torch.full((self.original.n_faces, *given.shape[1:]), filling, dtype=given.dtype)
         whole = whole.index_copy(0, torch.tensor(self.faces), given)
-        return whole if given is values else whole.numpy()
+        return whole if torch.is_tensor(values) else whole.numpy()
 
     def start(self, before: Matter, positions: Numbers) -> np.ndarray:
-        """Return positions (n_v, 3) m to start a solve from, carried over from an equilibrium of other matter of the sheet.
+        """Return positions (n_v, 3) m that start a solve, from an equilibrium of other matter of the same sheet.
 
-        Displacements of vertices that both have are kept; those of new ones are harmonic between them.
+        Common vertices keep their displacements; those of new ones are harmonic between them, and zero for parts without a
+        common vertex. Where parts touched at a vertex only, it has the displacement of one of them.
 
         before: the other Matter. positions: of the vertices of its mesh, (n_v, 3) m.
         """
@@ -162,11 +165,14 @@ class Matter(Frozen):
         moved[before.vertices] = positions - before.mesh.rest_positions
         moved = moved[self.vertices]
         new = np.isnan(moved[:, 0])
-        if new.any() and not new.all():
+        part = groups(self.mesh.n_vertices, self.mesh.edges)
+        moved[~np.isin(part, part[~new])] = 0.0
+        new = np.isnan(moved[:, 0])
+        if new.any():
             stiffness = laplacian(cells_of(self.mesh))[new]
             known = stiffness[:, ~new] @ moved[~new]
             moved[new] = -scipy.sparse.linalg.splu(stiffness[:, new].tocsc()).solve(known)
-        return self.mesh.rest_positions + np.nan_to_num(moved)
+        return self.mesh.rest_positions + moved
 
     def _of_faces(self, label: str, full: Any, vectors: bool):
         """Return a property of the whole sheet for the faces that remain: a number, (n,) or (n, 3)."""

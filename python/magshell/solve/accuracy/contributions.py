@@ -1,4 +1,4 @@
-"""The contributions of faces to the estimated error of an output: the residual weighted by the adjoint."""
+"""The contributions of elements to the estimated error of an output: the residual weighted by the adjoint."""
 
 from __future__ import annotations
 
@@ -13,20 +13,22 @@ from ..adjoint.factorized import Factorized
 if TYPE_CHECKING:
     from .enriched import FinerSolution
 
-_STEP = 1e-3  # [-] largest motion of the differences along the error, over the shortest edge of the bodies
+# [-] Largest displacement of the central differences along e, over the shortest edge of the meshes
+_STEP = 1e-3
 
 
 def contributions(solution: FinerSolution, adjoint: np.ndarray, positions: np.ndarray) -> list[np.ndarray]:
-    """Return the contributions of the elements of each coarse mesh to -z . r, in the unit of the output; (n,) for each body.
+    """Return the contributions of the coarse elements to -z . r, in the unit of the output: (n,) for each body.
 
-    z: the adjoint. r: the residual of the coarse solution, positions (n_v, 3) m, on the finer mesh. There the coarse
-    positions alone are held, and new vertices and edge rotations are in equilibrium; with the difference e of that state
-    from the finer solution, to first order,
+    z: the adjoint. r: the residual of the coarse solution, with positions (n_v, 3) m, on the finer mesh. It is taken in a
+    state that holds the coarse vertices in place and has all other unknowns of the finer mesh in equilibrium. With the
+    difference e of this state from the finer solution, to first order,
 
         z . r = z . K e = sum over elements T of z . K_T e
 
-    The energy of an element is proportional to its Young's modulus, and that of the field to its magnetization, so that the
-    derivatives of z . K e by these are the parts of elements. What other terms contribute is left out.
+    The elastic energy of an element is proportional to its Young's modulus, and its energy in the applied field to its
+    magnetization. So modulus or magnetization times the derivative of z . K e by it is z . K_T e. Other energies, such as
+    those of loads, are left out.
     """
     scene, model = solution.scene, solution.scene._model
     with solution.inputs.in_core():
@@ -48,8 +50,8 @@ def contributions(solution: FinerSolution, adjoint: np.ndarray, positions: np.nd
     return found
 
 
-def scaled_to(parts: list[np.ndarray], total: float) -> list[np.ndarray]:
-    """Return the contributions changed so that they sum to the total: the difference is shared by their magnitudes."""
+def summing_to(parts: list[np.ndarray], total: float) -> list[np.ndarray]:
+    """Return contributions that sum to the total: what is missing is added in proportion to their magnitudes."""
     magnitudes = [np.abs(each) for each in parts]
     size = sum(float(each.sum()) for each in magnitudes)
     missing = total - sum(float(each.sum()) for each in parts)
@@ -60,13 +62,15 @@ def scaled_to(parts: list[np.ndarray], total: float) -> list[np.ndarray]:
 
 
 def _relaxed(solution: FinerSolution, at_coarse: np.ndarray) -> np.ndarray:
-    """Return a motion of all unknowns: as given at coarse vertices, (n, 3) m, and without forces on all others."""
+    """Return a motion of all unknowns: as given at coarse vertices, (n, 3) m; no force acts on the others."""
     model = solution.scene._model
     size, starts, rows, entries = model.hessian(solution.state_of_stiffness, solution.controls)
     lower = scipy.sparse.csc_array((entries, rows, starts), shape=(size, size))
     motion = model.reduce(model.full_vector(solution.from_coarse(at_coarse)))
+    # Unknowns of coarse vertices are marked; random numbers do not cancel where an unknown combines several of them.
     marks = np.random.default_rng(0).uniform(1.0, 2.0, at_coarse.shape)
     free = model.reduce(model.full_vector(solution.from_coarse(marks))) == 0.0
+    # The stiffness times the motion, from its lower triangle
     pulled = lower @ motion + lower.T @ motion - lower.diagonal() * motion
     columns = np.repeat(np.arange(size), np.diff(starts))
     inner = free[rows] & free[columns]
@@ -79,7 +83,7 @@ def _relaxed(solution: FinerSolution, at_coarse: np.ndarray) -> np.ndarray:
 
 
 def _by_values(solution: FinerSolution, motion: np.ndarray, adjoint: np.ndarray) -> np.ndarray:
-    """Return the derivatives of z . g by all values, at a motion from the state; g is the gradient of the energy."""
+    """Return the derivatives of z . g by all values, g the gradient of the energy, in the state moved by `motion`."""
     return _core.vjp(solution.scene._model, solution.state_of_stiffness + motion, solution.controls, adjoint)[
         0
     ]

@@ -26,16 +26,17 @@ from .finer_start import positions_on
 if TYPE_CHECKING:
     from ...model.scene.scene import Scene
 
-# Most factorizations of a search from the coarse solution, before one from the rest shape; fixed by
+# Most factorizations of a search from the coarse solution, after which one from the rest shape begins; see
 # test_estimates_take_few_factorizations.
 _MOST_FROM_COARSE = 12
-# [-] Largest change of a position between coarse and finer solution, over the largest displacement; farther away the finer
-# mesh has found another equilibrium. Fixed by test_equilibria_far_from_the_coarse_one_are_refused.
+# [-] Largest change of a coordinate from the start of the search to the finer solution, over the largest displacement;
+# farther away it is another equilibrium. See test_equilibria_far_from_the_coarse_one_are_refused.
 _NEAR = 0.5
-# [-] Tolerance of solves on the finer mesh, whose remaining residual the adjoint corrects; fixed by
+# [-] Tolerance of solves on the finer mesh; the adjoint corrects the estimate for the residual that remains. See
 # test_estimates_of_loose_solves_are_corrected_by_the_adjoint.
 _LOOSE = 1e-4
-# [-] Difference of products that is round-off; fixed by test_faces_of_open_pressures_are_refused.
+# [-] Largest relative difference, by round-off, of two products that a symmetric stiffness makes equal; see
+# test_faces_of_open_pressures_are_refused.
 _SYMMETRIC = 1e-6
 
 
@@ -43,10 +44,10 @@ _SYMMETRIC = 1e-6
 class FinerSolution:
     """The solution on finer meshes of all bodies, and what the adjoint of an output needs.
 
-    all_positions: (n_v, 3) m, of the finer meshes. inputs: of the solve. state_of_stiffness, controls: all unknowns and the
-    load parameters at which the stiffness is taken: of the solution, or those of the rest shape for a linear response.
-    factorizations: of the search. residual: the gradient of the energy that a loose solve leaves, of all unknowns; None
-    where there is none.
+    all_positions: of the vertices of the finer meshes, (n_v, 3) m. inputs: those of the solve.
+    state_of_stiffness, controls: all unknowns and load parameters where the stiffness is taken: at the solution, or at the
+    rest shape for a linear response. factorizations: the number that the search took. residual: the gradient of the energy
+    by all unknowns that a loose solve leaves; None for other solves.
     """
 
     scene: Scene
@@ -62,6 +63,7 @@ class FinerSolution:
     @property
     def positions(self) -> np.ndarray:
         """The positions at the vertices of the coarse meshes, (n_v of the coarse meshes, 3) m."""
+        # The vertices of a coarse mesh come first in the finer one.
         parts = zip(self.scene._bodies.spans, self.finer, strict=True)
         rows = self.all_positions
         return np.concatenate([rows[span.vertices][: each.coarse.n_vertices] for span, each in parts])
@@ -71,7 +73,7 @@ class FinerSolution:
         return self._adjoint(self.from_coarse(by_positions))
 
     def from_coarse(self, rows: np.ndarray) -> np.ndarray:
-        """Return rows at coarse vertices among those of all vertices, which are zero at new ones."""
+        """Return rows of all vertices, (n_v, 3), from those of coarse vertices, (n, 3): zero at new ones."""
         full = np.zeros((self.scene.mesh.n_vertices, 3))
         first = 0
         for span, each in zip(self.scene._bodies.spans, self.finer, strict=True):
@@ -84,7 +86,7 @@ class FinerSolution:
 def finer_solution(result: Equilibrium | LinearResponse, finer: tuple[FinerMesh, ...]) -> FinerSolution:
     """Solve on finer meshes of the bodies, from the solution on the coarse ones.
 
-    Raises ValueError for what does not go over to a finer mesh; NotConverged if no solution is found near the coarse one.
+    Raises ValueError for objects that a finer mesh cannot take over; NotConverged if no solution is near the coarse one.
     """
     scene = result.scene
     made = finer_scene(
@@ -96,7 +98,7 @@ def finer_solution(result: Equilibrium | LinearResponse, finer: tuple[FinerMesh,
 
 
 def positions_of(result: Equilibrium | LinearResponse) -> np.ndarray:
-    """Return the positions of a result in double precision, whatever tensors it has, (n_v, 3) m."""
+    """Return the positions of a result as an array in double precision, without gradients, (n_v, 3) m."""
     if isinstance(result, Equilibrium):
         return np.asarray(result.scene._model.positions(result._state))
     moved = np.asarray(detached(result.displacements), dtype=np.float64)
@@ -140,7 +142,7 @@ def equilibrium_on(result: Equilibrium, scene: Scene, finer: tuple[FinerMesh, ..
 
 
 def _prolonged(result: Equilibrium, scene: Scene, inputs: Inputs, finer: tuple[FinerMesh, ...]) -> np.ndarray:
-    """Return all unknowns of a scene on finer meshes, deformed as the coarse ones, and in place where they are held."""
+    """Return all unknowns on finer meshes: positions as on the coarse ones, supports in place, edge rotations zero."""
     parts = zip(_by_body(result.scene, positions_of(result)), finer, strict=True)
     placed = np.concatenate([positions_on(each, x) for x, each in parts])
     with inputs.in_core():
@@ -157,7 +159,7 @@ def _refuse_another(result: Equilibrium, scene: Scene, start: np.ndarray, soluti
     )
     if moved > _NEAR * largest:
         raise NotConverged(
-            f"the finer mesh finds an equilibrium that is {moved:.3g} m away from this one, whose largest displacement is "
+            f"the solution on the finer mesh is {moved:.3g} m away from the given one, whose largest displacement is "
             f"{largest:.3g} m: the mesh is too coarse for an estimate, or the equilibrium is near others. Refine the mesh",
             solution.equilibrium,
         )
@@ -168,6 +170,7 @@ def _nonlinear(
 ) -> FinerSolution:
     model = scene._model
     start = _prolonged(result, scene, inputs, finer)
+    # A pressure on an open surface makes the stiffness unsymmetric; the adjoint then cannot correct a loose solve.
     loose = not _has_pressure(scene)
     solver = MixedNewton(tolerance=_LOOSE) if loose else MixedNewton()
     search = Search(solver, result.stable)
@@ -177,9 +180,10 @@ def _nonlinear(
     places = model.positions(found.state)
 
     def adjoint(by_positions: np.ndarray) -> np.ndarray:
-        still = np.zeros(model.size)
+        still = np.zeros(model.size)  # no motion of supports
         with solution.inputs.in_core():
             pulled = model.full_vector(by_positions)
+            # The inverse of a symmetric stiffness gives adjoints too.
             found_adjoint = -_core.push_forward(model, found, pulled, still)
             if not loose:
                 probe = model.expand(np.random.default_rng(0).uniform(-1.0, 1.0, model.free_size))
@@ -204,7 +208,7 @@ def _found(
     search: Search,
     store_factor: bool = False,
 ) -> tuple[Solution, int]:
-    """Return the equilibrium near `start`, or else that from the rest shape, and the factorizations of both searches."""
+    """Return the equilibrium near `start`, or else that from the rest shape, and the factorizations of all searches."""
     options = search.options()
     options.keep_factor = store_factor
     options.max_relaxation_steps = 0
@@ -213,7 +217,7 @@ def _found(
         near = solve(inputs, start, [], inputs.controls, inputs.controls, options)
         return near, near.equilibrium.factorizations
     except NotConverged as failed:
-        spent = failed.last_good.factorizations
+        spent = _MOST_FROM_COARSE if failed.last_good is None else failed.last_good.factorizations
         if not result.stable:
             raise
     from_rest = find(scene, load_parameters(result), None, search, store_factor=store_factor)
@@ -221,12 +225,12 @@ def _found(
 
 
 def _has_pressure(scene: Scene) -> bool:
-    """Return whether the stiffness may be unsymmetric, so that its inverse does not give the adjoint."""
+    """Return whether there is a Pressure, which makes the stiffness unsymmetric if its surface is open."""
     return any(isinstance(load, Pressure) for load in scene.loads)
 
 
 def _refuse_unsymmetric(one: float, other: float) -> None:
-    """Raise ValueError if two products that a symmetric stiffness makes equal differ."""
+    """Raise ValueError if two products differ that a symmetric stiffness makes equal."""
     if abs(one - other) > _SYMMETRIC * max(abs(one), abs(other)):
         raise ValueError(
             "the contributions of faces need a stiffness that is symmetric, and a Pressure here has no potential: its faces "

@@ -18,7 +18,7 @@ from ...model.scene.finer_scene import refuse_what_stays
 from ...model.supports.supports import SymmetryPlane
 from ..linear.response import LinearResponse
 from ..statics.equilibrium import Equilibrium
-from .contributions import contributions, scaled_to
+from .contributions import contributions, summing_to
 from .enriched import FinerSolution, finer_solution, positions_of
 from .output_value import Output
 
@@ -135,7 +135,7 @@ def error_estimate(
     parts, more = None, 0
     if by_face:
         parts = contributions(solution, adjoint, positions)
-        parts = np.concatenate(scaled_to(parts, error))
+        parts = np.concatenate(summing_to(parts, error))
         more = 1 + isinstance(result, LinearResponse)  # those of the inner unknowns, and of the adjoint
     return ErrorEstimate(
         scene=result.scene,
