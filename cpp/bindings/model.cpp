@@ -111,7 +111,7 @@ py::tuple largest_at(const Model& model, const VectorXd& q, const VectorXd& thic
     return to_tuple(largest_of(strains_at(model, q, thickness)));
 }
 
-Rows3 rows_of(const std::vector<Vec3>& vectors) {
+Rows3 rows_from(const std::vector<Vec3>& vectors) {
     Rows3 rows(static_cast<Eigen::Index>(vectors.size()), 3);
     for (std::size_t k = 0; k < vectors.size(); ++k) rows.row(k) = vectors[k].transpose();
     return rows;
@@ -121,7 +121,7 @@ Rows3 own_flux_density(const Model& model, const VectorXd& q, const Rows3& at) {
     std::vector<Vec3> points(at.rows());
     for (Eigen::Index k = 0; k < at.rows(); ++k) points[k] = at.row(k).transpose();
     if (!model.terms().own_field) return Rows3::Zero(at.rows(), 3);
-    return rows_of(model.terms().own_field->field().flux_density(q.data(), points));
+    return rows_from(model.terms().own_field->field().flux_density(q.data(), points));
 }
 
 }  // namespace
@@ -331,7 +331,7 @@ void register_model(py::module_& module) {
                     if (const AppliedFieldTerm* in_field = dynamic_cast<const AppliedFieldTerm*>(term.get());
                         in_field && (name.empty() || term->name() == name))
                         in_field->add_moments(q.data(), load_parameters, points, moments);
-                return std::pair(rows_of(points), rows_of(moments));
+                return std::pair(rows_from(points), rows_from(moments));
             },
             py::arg("name"), py::arg("q"), py::arg("controls"),
             "Points [m] and magnetic moments [A m2] of the terms of one name, or of all of them, in the "

@@ -209,7 +209,8 @@ def thrown(
     if motion is not None:  # a function of the time: there is no gradient by time_step
         fixed["time_step"] = controls.pop("time_step")
     fixed |= options or {}
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=step, reach=REACH, in_time=in_time)
+    reach = {**REACH, "rest_positions": 0.025}  # a quarter of the sheet: contacts begin within larger steps
+    return Kind(scene, controls, ms.simulate, fixed=fixed, step=step, reach=reach, in_time=in_time)
 
 
 def in_a_corner() -> Kind:

@@ -35,7 +35,7 @@ def pressed_solid(moves: bool) -> Kind:
         factors = {"load_factor": 0.9, "support_factor": 0.8, "gravity_factor": 1.1}
         return Kind(scene, factors, fixed=EXACT, reach=REACH)
     floor = ms.Contact(
-        ob.Plane((-0.02, 0.01, 1.0), center=(0.05, 0, body.mesh.rest_positions[:, 2].min() - 2e-4)),
+        ob.Plane((-0.02, 0.01, 1.0), center=(0.05, 0, body.mesh.rest_positions[:, 2].min() - 4e-4)),
         contact_stiffness=5.0,
         offset=3e-4,
         smoothing=1e-4,

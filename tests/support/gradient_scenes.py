@@ -124,9 +124,11 @@ class Kind:
         once = {key: value for key, value in self.entries.items() if self._once(key)}
         rng = np.random.default_rng(23)
         off = {key: admissible(key, 0.02 * rng.uniform(-1, 1, value.shape)) for key, value in once.items()}
+        # Rest positions move by a tenth of a millimetre: contacts neither begin nor end.
         moved = {
-            (owner, name): value + off[owner, name] * self.reach.get(name, value)
-            if self.varies_in_time(owner, name)
+            (owner, name): value
+            + off[owner, name] * (5e-3 if name == "rest_positions" else self.reach.get(name, value))
+            if self.varies_in_time(owner, name) or name == "rest_positions"
             else value * (1.0 + off[owner, name])
             for (owner, name), value in once.items()
         }

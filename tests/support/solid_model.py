@@ -96,6 +96,7 @@ class SolidModel:
             water=None,
             own_field_shells=[],
             own_field_max_points=0,
+            own_field_accuracy=0.0,
         )
         self.layout = Layout(self.core.parameters)
         self.others = {key: np.zeros(1) for key in self.layout if key[0] != "body 0"}
