@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 
@@ -230,6 +230,7 @@ def test_units_do_not_matter_to_a_motion(seed, length, modulus, density):
     mesh = random_mesh(seed)
     force = loads(mesh, seed, 1.0)
     time = length * np.sqrt(density / modulus)
+    assume(2e-3 * time > 1e-11)  # s: simulate refuses steps of 1e-12 s
 
     def motion(size, stress, mass, tick):
         scaled = mesh.scaled(size)
