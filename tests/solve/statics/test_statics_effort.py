@@ -72,12 +72,13 @@ def test_a_semi_cylinder_pulled_and_pushed(cells, force, most, energy):
     assert found.factorizations <= most
 
 
-@pytest.mark.parametrize(("ratio", "most"), [(1e-6, 100), (1e-5, 60), (1e-4, 60), (1e-3, 60), (1e-2, 60)])
+@pytest.mark.parametrize(("ratio", "most"), [(1e-6, 200), (1e-5, 60), (1e-4, 60), (1e-3, 60), (1e-2, 60)])
 def test_a_thin_strip_rolled_up(ratio, most):
     """Limit the effort where the error of an inexact load step would stiffen the next one, a thousandfold in a thin
     strip.
 
-    With such inexact steps it took 343 and 131 factorizations.
+    With such inexact steps it took 343 and 131 factorizations. The thinnest strip takes 61 to 149, as the last bits of its
+    vertices are rounded.
     """
     length, angle, stiffness = 0.1, 1.8 * np.pi, 1e6 * (ratio * 0.1) ** 3 / 12.0
     mesh = ms.meshes.rectangle(length, 0.1 * length, cells=(40, 2))
