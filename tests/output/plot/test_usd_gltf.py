@@ -194,6 +194,14 @@ def test_bad_input_of_usd_and_gltf_is_explained(tmp_path, write, name, options, 
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(("write", "name"), [("write_usd", "sheet.usda"), ("write_gltf", "sheet.glb")])
+def test_a_missing_folder_is_said_before_any_work(tmp_path, monkeypatch, write, name):
+    module = {"write_usd": "usd", "write_gltf": "gltf"}[write]
+    monkeypatch.setattr(f"magshell.output.plot.{module}.moving_parts", None)
+    with pytest.raises(FileNotFoundError, match=name):
+        getattr(ms, write)(tmp_path / "missing" / name, MESH)
+
+
 def test_missing_openusd_is_said_with_what_installs_it(tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "pxr", None)
     with pytest.raises(ImportError, match=r'pip install "magshell\[usd\]"'):

@@ -15,6 +15,7 @@ from ..._input.quantity import quantity
 from ...model.fields.field import AppliedField, UniformField
 from ...solve.statics.equilibrium import Equilibrium
 from ..plot.colors import Scalar
+from ..plot.moving_parts import STATES_PER_SECOND
 from ..results.state import State, states_of
 from .follower import Follower
 from .gizmos import Gizmo
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
     from ..._input.kinds import Numbers
 
 _FRAME = 1.0 / 30.0  # [s] between two states while playing
-_STATES_PER_SECOND = 10.0  # of playing states without times
 
 Coloring = Callable[[list[State]], tuple[list[State], Scalar | None]]
 
@@ -264,7 +264,7 @@ class LiveView:
         """Show one state after another while playing is switched on."""
         times = [state.time for state in self._states]
         if times[0] is None:
-            times = [k / _STATES_PER_SECOND for k in range(len(times) + 1)]
+            times = [k / STATES_PER_SECOND for k in range(len(times) + 1)]
         else:
             times = [each - times[0] for each in times]
         at, before = 0.0, time.perf_counter()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
-from ..._runtime.files import replace_file
+from ..._runtime.files import check_replaceable, replace_file
 from ..._runtime.solver_entry_point import grouped
 from .moving_parts import Motion, Part, moving_parts
 from .style import Color
@@ -64,6 +64,7 @@ def write_gltf(
     path = Path(path)
     if path.suffix.lower() != ".glb":
         raise ValueError(f"cannot write {path.name!r}: the ending must be .glb")
+    check_replaceable(path)
     motion = moving_parts(
         what,
         positions=positions,

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..._input.kinds import Fielded, Numbers, Shown
     from ...model.contact.obstacles.obstacle import Obstacle
 
-_STATES_PER_SECOND = 10.0  # of states without times
+STATES_PER_SECOND = 10.0  # of states without times
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def _solids(state: State, size: float, middle: np.ndarray) -> list[tuple[str, So
 def _shown_at(states: list[State], speed: float) -> np.ndarray:
     times = [state.time for state in states]
     if times[0] is None:
-        return np.arange(len(states)) / _STATES_PER_SECOND
+        return np.arange(len(states)) / STATES_PER_SECOND
     return (np.array(times) - times[0]) / speed
 
 

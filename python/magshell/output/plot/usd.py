@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._input.quantity import quantity
-from ..._runtime.files import replacing
+from ..._runtime.files import check_replaceable, replacing
 from ..._runtime.solver_entry_point import grouped
 from .moving_parts import Motion, Part, moving_parts
 from .style import Color
@@ -67,8 +67,8 @@ def write_usd(
     fps = float(quantity("fps", "1/s", fps, ()))
     if not fps > 0.0:
         raise ValueError(f"fps [1/s] must be positive, got {fps:g}")
-    if not path.parent.is_dir():
-        raise FileNotFoundError(f"cannot write {path.name!r}: there is no folder {str(path.parent)!r}")
+    check_replaceable(path)
+    pxr = _require_usd()
     motion = moving_parts(
         what,
         positions=positions,
@@ -80,7 +80,6 @@ def write_usd(
         color=color,
         speed=speed,
     )
-    pxr = _require_usd()
     with replacing(path) as part:
         part.unlink()  # OpenUSD makes its files itself
         _write(pxr, part, motion, fps)
