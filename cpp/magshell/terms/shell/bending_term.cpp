@@ -329,28 +329,34 @@ void BendingTerm::store_rates(const double* p) {
     });
 }
 
+template <class Body>
+void BendingTerm::each_face(const double* q, const double* lambda, const Body& body) {
+    each_group([&](Index group) {
+        SimdDouble strains[3], rates[3], stress_rates[3];
+        strain(group, q, strains);
+        history_.apply(group, strains);
+        rate(group, lambda, rates);
+        stiffness_[group].times(rates, stress_rates);
+        for (Index f = group * SimdDouble::width;
+             f < std::min((group + 1) * SimdDouble::width, sheet_.n_faces()); ++f) {
+            const int lane = f % SimdDouble::width;
+            body(f, lane_of(strains, lane), lane_of(rates, lane), lane_of(stress_rates, lane));
+        }
+    });
+}
+
 // Gradient by the parameters. With C = S C~ S and S the curvature scales of the edges, dC/ds_i s_i = e_i e_i^T
 // C + C e_i e_i^T.
 void BendingTerm::vjp(const double* q, const LoadParameters&, const double* lambda, Gradient& out) {
     store_rates(lambda);
     std::vector<Vec3> by_scale(sheet_.n_faces());
-    each_group([&](Index group) {
-        SimdDouble delta[3], along[3], stress_rate[3];
-        strain(group, q, delta);
-        history_.apply(group, delta);
-        rate(group, lambda, along);
-        stiffness_[group].times(along, stress_rate);
-        for (Index f = group * SimdDouble::width;
-             f < std::min((group + 1) * SimdDouble::width, sheet_.n_faces()); ++f) {
-            const int lane = f % SimdDouble::width;
-            const Vec3 d = lane_of(delta, lane), rates = lane_of(along, lane), scale = scales_of(f);
-            const Vec3 stress = lane_of(stress_.at(group), lane);
-            const Mat3 by_poisson_ratio = rest_face(f).bending_by_poisson_ratio(materials_[f]);
-            materials_.add_vjp(f, 3, rates.dot(stress),
-                               rates.cwiseProduct(scale).dot(by_poisson_ratio * scale.cwiseProduct(d)), out);
-            by_scale[f] = (rates.cwiseProduct(stress) + d.cwiseProduct(lane_of(stress_rate, lane)))
-                              .cwiseQuotient(scale);
-        }
+    each_face(q, lambda, [&](Index f, const Vec3& d, const Vec3& rates, const Vec3& stress_rates) {
+        const Vec3 scale = scales_of(f),
+                   stress = lane_of(stress_.at(f / SimdDouble::width), f % SimdDouble::width);
+        const Mat3 by_poisson_ratio = rest_face(f).bending_by_poisson_ratio(materials_[f]);
+        materials_.add_vjp(f, 3, rates.dot(stress),
+                           rates.cwiseProduct(scale).dot(by_poisson_ratio * scale.cwiseProduct(d)), out);
+        by_scale[f] = (rates.cwiseProduct(stress) + d.cwiseProduct(stress_rates)).cwiseQuotient(scale);
     });
     if (growth_.any()) {
         const std::vector<ByRestFace> by_faces = by_rest_faces(q, lambda);
@@ -368,21 +374,12 @@ void BendingTerm::vjp(const double* q, const LoadParameters&, const double* lamb
 std::vector<BendingTerm::ByRestFace> BendingTerm::by_rest_faces(const double* q, const double* lambda) {
     store_rates(lambda);
     std::vector<ByRestFace> found(sheet_.n_faces());
-    each_group([&](Index group) {
-        SimdDouble delta[3], along[3], stress_rate[3];
-        strain(group, q, delta);
-        history_.apply(group, delta);
-        rate(group, lambda, along);
-        stiffness_[group].times(along, stress_rate);
-        for (Index f = group * SimdDouble::width;
-             f < std::min((group + 1) * SimdDouble::width, sheet_.n_faces()); ++f) {
-            const int lane = f % SimdDouble::width;
-            const Vec3 d = lane_of(delta, lane), rates = lane_of(along, lane), scale = scales_of(f);
-            const GrownFace face = grown(f);
-            found[f].deformation = face.in_world(face.triangle().bending_by_growth(
-                materials_[f], scale.cwiseProduct(rates), scale.cwiseProduct(d)));
-            found[f].angles = -history_.factor() * lane_of(stress_rate, lane);
-        }
+    each_face(q, lambda, [&](Index f, const Vec3& d, const Vec3& rates, const Vec3& stress_rates) {
+        const Vec3 scale = scales_of(f);
+        const GrownFace face = grown(f);
+        found[f].deformation = face.in_world(face.triangle().bending_by_growth(
+            materials_[f], scale.cwiseProduct(rates), scale.cwiseProduct(d)));
+        found[f].angles = -history_.factor() * stress_rates;
     });
     return found;
 }

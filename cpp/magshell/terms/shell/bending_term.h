@@ -102,6 +102,10 @@ class BendingTerm final : public StrainScaffold<BendingTerm>, public RestShapeTe
         Vec3 angles;
     };
     std::vector<ByRestFace> by_rest_faces(const double* q, const double* lambda);
+    // Calls body(f, strains, rates, stress_rates) for each face, in parallel: the strains at q, and the rates of strains and stresses along
+    // lambda, whose rates of the dihedral angles store_rates() has stored.
+    template <class Body>
+    void each_face(const double* q, const double* lambda, const Body& body);
     // Adds the gradient by rest positions through the rest angles, from that by the angles of each face.
     void add_rest_angles_vjp(const std::vector<Vec3>& by_angles, VectorXd& out) const;
     void assemble_faces(Index group, SystemMatrix& out) const;
