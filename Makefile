@@ -11,7 +11,8 @@ PIP := $(VENV)/bin/python -m pip --disable-pip-version-check
 sources := CMakeLists.txt pyproject.toml README.md LICENSE \
     $(shell find cpp cmake python/magshell -type f ! -name '*.so' ! -name '*.pyc' 2>/dev/null)
 # A file's tests stay together, as they share what is dear to make; what takes longest comes first (tests/support/parallel.py).
-PYTEST = $(VENV)/bin/python -m pytest -n $(PROCESSES) --dist loadfile --no-loadscope-reorder
+# Byte code is kept, in folders that git ignores: compiling the tests anew takes as long as collecting them.
+PYTEST = env -u PYTHONDONTWRITEBYTECODE $(VENV)/bin/python -m pytest -n $(PROCESSES) --dist loadfile --no-loadscope-reorder
 pythons := $(wildcard python benchmarks tests examples docs scripts)
 cpps = $(shell find cpp -name '*.h' -o -name '*.cpp')
 
@@ -29,7 +30,7 @@ demo: $(VENV)/.with-plot  ## the bistable magnetic beam: critical field and pict
 test: $(VENV)/.with-test  ## every test, the notebooks and examples included
 	$(PYTEST)
 
-quick: $(VENV)/.with-test  ## the tests that take little time: three minutes on two processors
+quick: $(VENV)/.with-test  ## the tests that take little time: two minutes on two processors
 	$(PYTEST) -m "not slow"
 
 seconds: $(VENV)/.with-test  ## measure again which tests take long, for `make quick`: every test

@@ -36,6 +36,15 @@ def folder(tmp_path):
     return tmp_path
 
 
+def script():
+    """Import scripts/test_seconds.py, which is in no package."""
+    path = HERE.parent / "scripts" / "test_seconds.py"
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
 def run(folder, *options):
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *options]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
@@ -58,7 +67,7 @@ def test_processes_wait_while_a_marked_test_runs_alone(folder):
     assert any(a < d < b for a, b in others for _, d in others)  # the others did run at the same time
 
 
-def test_seconds_of_the_processor_are_written_for_all_parameters_together(folder):
+def test_seconds_of_the_processor_count_all_parameters_and_fixtures(folder):
     busy = """
     import time, pytest
     @pytest.fixture(scope="module")
@@ -76,12 +85,18 @@ def test_seconds_of_the_processor_are_written_for_all_parameters_together(folder
     """
     (folder / "test_busy.py").write_text(textwrap.dedent(busy))
     run(folder, "--junitxml=report.xml")
-    script = HERE.parent / "scripts" / "test_seconds.py"
-    subprocess.run([sys.executable, script, folder / "report.xml", folder / "seconds.txt"], check=True)
-    lines = [each for each in (folder / "seconds.txt").read_text().splitlines() if not each.startswith("#")]
-    (line,) = lines  # the sleep takes no processor
-    seconds, name = line.split()
-    assert name == "test_busy.py::test_spins" and 0.85 < float(seconds) < 3.0
+    seconds = script().seconds_of(folder / "report.xml")
+    assert 0.85 < seconds["test_busy.py::test_spins"] < 3.0
+    assert seconds["test_busy.py::test_sleeps"] < 0.4  # the sleep takes no processor
+
+
+def test_longest_tests_are_slow_until_the_rest_fit_into_the_budget():
+    seconds = {"a": 3.0, "b": 40.0, "c": 2.0, "d": 30.0}
+    slow_tests = script().slow_tests
+    assert slow_tests(seconds, 75.0) == []
+    assert slow_tests(seconds, 35.0) == ["b"]
+    assert slow_tests(seconds, 34.0) == ["b", "d"]
+    assert slow_tests(seconds, 0.0) == ["a", "b", "c", "d"]
 
 
 def test_tests_listed_with_their_seconds_are_slow_with_all_their_parameters(folder):

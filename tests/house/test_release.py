@@ -10,6 +10,7 @@ yaml = pytest.importorskip("yaml")
 ROOT = Path(__file__).parents[2]
 PROJECT = (ROOT / "pyproject.toml").read_text()
 CLAIMED = re.findall(r'"Programming Language :: Python :: (3\.\d+)"', PROJECT)
+RECIPE = yaml.safe_load((ROOT / "packaging/conda-forge/recipe.yaml").read_text())
 WORKFLOWS = sorted((ROOT / ".github/workflows").glob("*.yml"))
 
 
@@ -38,6 +39,31 @@ def test_every_claimed_python_is_tested_and_gets_a_wheel():
     assert sorted(tested, key=CLAIMED.index) == CLAIMED
     built = re.findall(r'"cp3(\d+)-\*"', re.search(r"^build = \[(.*)\]", PROJECT, re.MULTILINE)[1])
     assert [f"3.{minor}" for minor in built] == CLAIMED
+
+
+def requirements(name: str) -> set[str]:
+    """Return a list of requirements in pyproject.toml, such as {"numpy >=1.24"}."""
+    listed = re.search(rf"^{name} = \[(.*)\]", PROJECT, re.MULTILINE)[1]
+    return {each.replace(">=", " >=") for each in re.findall(r'"([^"]+)"', listed)}
+
+
+def test_conda_recipe_has_the_version_and_requirements_of_the_project():
+    assert RECIPE["schema_version"] == 1
+    assert RECIPE["context"]["version"] == re.search(r'^version = "(.*)"', PROJECT, re.MULTILINE)[1]
+    assert re.fullmatch(r"[0-9a-f]{64}", RECIPE["source"]["sha256"])
+    needed = RECIPE["requirements"]
+    assert set(needed["run"]) == {"python"} | requirements("dependencies")
+    assert set(needed["host"]) == {"python", "pip", "eigen >=3.4"} | requirements("requires")
+    required = re.search(r"cmake_minimum_required\(VERSION ([\d.]+)\)", (ROOT / "CMakeLists.txt").read_text())
+    assert f"cmake >={required[1]}" in needed["build"]
+    assert all((ROOT / name).is_file() for name in RECIPE["about"]["license_file"])
+
+
+def test_conda_recipe_passes_options_that_cmake_has():
+    """Compare the options with those of CMakeLists.txt, because CMake ignores one that it does not have."""
+    passed = re.findall(r"cmake\.define\.(\w+)=", " ".join(RECIPE["build"]["script"]))
+    options = re.findall(r"^option\((\w+)", (ROOT / "CMakeLists.txt").read_text(), re.MULTILINE)
+    assert passed == ["MAGSHELL_NATIVE"] and set(passed) <= set(options)
 
 
 def test_scripts_are_valid_shell():
