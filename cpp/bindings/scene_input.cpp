@@ -191,6 +191,8 @@ SceneInput scene_input(const py::kwargs& given) {
     input.pressures = pressures_of(given["pressures"]);
     input.volumes = volumes_of(given["volumes"]);
     input.tendons = tendons_of(given["tendons"]);
+    input.springs = springs_of(given["springs"]);
+    input.creases = creases_of(given["creases"]);
     input.group_energies = group_energies_of(given["group_energies"]);
     input.gravity = given["gravity"].cast<bool>();
     input.loads = given["loads"].cast<bool>();

@@ -104,4 +104,40 @@ std::vector<TendonInput> tendons_of(const py::list& given) {
     return tendons;
 }
 
+std::vector<SpringsInput> springs_of(const py::list& given) {
+    std::vector<SpringsInput> all;
+    for (const py::handle each : given) {
+        SpringsInput& springs = all.emplace_back();
+        springs.owner = each["owner"].cast<std::string>();
+        springs.stiffness_rows = each["stiffness_rows"].cast<Index>();
+        springs.rest_length_rows = each["rest_length_rows"].cast<Index>();
+        springs.damping_rows = each["damping_rows"].cast<Index>();
+        springs.ground_rows = each["ground_rows"].cast<Index>();
+        springs.stiffness_unit = each["stiffness_unit"].cast<std::string>();
+        springs.damping_unit = each["damping_unit"].cast<std::string>();
+        const Rows3 directions = to_rows3(each["directions"].cast<Array>()),
+                    grounds = to_rows3(each["grounds"].cast<Array>());
+        const std::vector<Index> numbers = each["numbers"].cast<std::vector<Index>>();
+        const std::vector<double> shares = each["shares"].cast<std::vector<double>>();
+        std::size_t k = 0;
+        for (const py::handle point : each["points"]) {
+            springs.springs.push_back({point["vertices"].cast<std::vector<Index>>(),
+                                       point["weights"].cast<std::vector<double>>(),
+                                       directions.row(static_cast<Index>(k)).transpose(), shares[k],
+                                       numbers[k], grounds.row(static_cast<Index>(k)).transpose()});
+            ++k;
+        }
+    }
+    return all;
+}
+
+std::vector<CreaseInput> creases_of(const py::list& given) {
+    std::vector<CreaseInput> all;
+    for (const py::handle each : given)
+        all.push_back({each["owner"].cast<std::string>(),
+                       each["edges"].cast<std::vector<std::array<Index, 4>>>(),
+                       each["stiffness_rows"].cast<Index>(), each["angle_rows"].cast<Index>()});
+    return all;
+}
+
 }  // namespace magshell::bindings

@@ -12,8 +12,10 @@ SolidSurface surface_of(const py::handle& given);
 MagnetizationLaw magnetization_law_of(const py::handle& given);
 std::vector<SolidInput> solids_of(const py::list& given);
 std::vector<SkinInput> skins_of(const py::list& given);
-/// Convert the volumes of cavities and pneumatic cells, and tendons.
+/// Convert the volumes of cavities and pneumatic cells, tendons, springs, and creases.
 std::vector<VolumeInput> volumes_of(const py::list& given);
 std::vector<TendonInput> tendons_of(const py::list& given);
+std::vector<SpringsInput> springs_of(const py::list& given);
+std::vector<CreaseInput> creases_of(const py::list& given);
 
 }  // namespace magshell::bindings

@@ -62,8 +62,10 @@ from .model.fields.magnets import CuboidMagnet, CylinderMagnet
 from .model.fields.posed_field import PlacedField
 from .model.loads.custom_energy import CustomEnergy
 from .model.loads.face_energies import SurfaceTension
+from .model.loads.foundation import ElasticFoundation
 from .model.loads.loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
 from .model.loads.pressure import Pressure
+from .model.loads.spring import Spring
 from .model.loads.water import Water
 from .model.results.body_result import BodyResult
 from .model.results.joint_result import JointResult
@@ -82,6 +84,7 @@ from .model.scene.contact_state import ContactState
 from .model.scene.own_field import OwnField
 from .model.scene.reactions import Reaction
 from .model.scene.scene import Scene
+from .model.shells.crease import Crease
 from .model.shells.shell import Shell
 from .model.shells.strains import Strains
 from .model.solids.fibres import Fibres, fibres_along
@@ -168,6 +171,7 @@ __all__ = [
     "Contact",
     "ContactState",
     "Corotated",
+    "Crease",
     "CriticalPoint",
     "CuboidMagnet",
     "CustomEnergy",
@@ -177,6 +181,7 @@ __all__ = [
     "Dipoles",
     "EdgeCouple",
     "EdgeLoad",
+    "ElasticFoundation",
     "Elastomer",
     "Equilibrium",
     "EquilibriumBatch",
@@ -250,6 +255,7 @@ __all__ = [
     "Solid",
     "SolveLog",
     "SolveStep",
+    "Spring",
     "StVenantKirchhoff",
     "StableNeoHookean",
     "StepErrorWarning",

@@ -152,6 +152,20 @@ def _scenes(s: Sample) -> Iterator[Call]:
     yield Call("EdgeCouple", loaded(ms.EdgeCouple), {"edges": far, "couple_per_length": 1e-3})
     for kind, name in ((ms.SurfaceTension, "surface_tension"), (ms.Pressure, "pressure")):
         yield Call(kind.__name__, loaded(kind), {name: np.full(3, 0.02), "faces": np.arange(3)})
+    spring = {"b": (0.05, 0.01, 0.1), "stiffness": 0.1, "rest_length": 0.05, "damping": 1e-3}
+    yield Call(
+        "Spring",
+        lambda **a: scene(supports=s.clamp, loads=ms.Spring((s.shell, (0.05, 0.01, 0)), **a)),
+        spring,
+    )
+    bed = {"stiffness": np.full(3, 10.0), "faces": np.arange(3), "direction": (0, 0, 1), "damping": 1e-3}
+    yield Call("ElasticFoundation", loaded(ms.ElasticFoundation), bed)
+    fold = {"edges": mesh.interior_edges[:2], "stiffness": [1e-5, 2e-5], "angle": 0.1}
+    yield Call(
+        "Crease",
+        lambda **a: ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, creases=[ms.Crease(**a)]),
+        fold,
+    )
     whole = {
         "bodies": s.shell,
         "supports": [s.clamp],

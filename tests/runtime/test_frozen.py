@@ -185,7 +185,16 @@ def one_more(name: str, thing, **others) -> ms.Scene:
 TWICE = {
     **{
         name: ("loads", name)
-        for name in ("point load", "edge load", "area load", "couple", "pressure", "tension")
+        for name in (
+            "point load",
+            "edge load",
+            "area load",
+            "couple",
+            "pressure",
+            "tension",
+            "spring",
+            "foundation",
+        )
     },
     **{name: ("supports", name) for name in ("pin", "clamp", "symmetry")},
     **{

@@ -39,6 +39,12 @@ from gradient_kinds_skeletons import (
     thrown_skeleton,
     turning_screw,
 )
+from gradient_kinds_springs import (
+    creased_at_rest,
+    creased_in_motion,
+    on_springs_at_rest,
+    on_springs_in_motion,
+)
 from gradient_kinds_steps import step_makers
 from gradient_kinds_susceptibility import susceptible_shells
 from gradient_scenes import Kind
@@ -298,6 +304,13 @@ MAKERS = {
     "from an equilibrium": let_go,
     "actuated at rest": actuated_at_rest,
     "actuated in motion": lambda: actuated_in_motion(ms.TRBDF2(), adjoint_storage="factors"),
+    "creased at rest": creased_at_rest,
+    "creased in motion": creased_in_motion,
+    "on springs at rest": on_springs_at_rest,
+    "on springs in motion, euler": lambda: on_springs_in_motion(ms.ImplicitEuler(), damped=False),
+    "on damped springs in motion, tr_bdf2": lambda: on_springs_in_motion(
+        ms.TRBDF2(), damped=True, adjoint_storage="factors"
+    ),
     "at rest, with a rigid part": rigid_at_rest,
     "in motion, with rigid parts, euler": lambda: rigid_in_motion(ms.ImplicitEuler(), {"inertia": 1.1e-6}),
     "in motion, with rigid parts, tr_bdf2": lambda: rigid_in_motion(

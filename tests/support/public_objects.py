@@ -155,6 +155,8 @@ def _around(given: Arrays, bodies: dict[str, object]) -> dict[str, object]:
         "couple": ms.EdgeCouple(given(flat.edges_at(x=0.04), np.int64), given([0, 1e-3, 0])),
         "pressure": ms.Pressure(given([1.0, 2.0]), faces=given.numbers(0, 1)),
         "tension": ms.SurfaceTension(given([0.01, 0.02]), faces=given.numbers(0, 1)),
+        "spring": ms.Spring((shell, given([0.01, 0.005, 0.0])), given([0.01, 0.005, 0.1]), stiffness=0.1),
+        "foundation": ms.ElasticFoundation(given([10.0, 20.0]), faces=given.numbers(0, 1)),
         "muscle": ms.Muscle(
             solid,
             given([1.0, 0, 0]),
@@ -170,6 +172,7 @@ def _around(given: Arrays, bodies: dict[str, object]) -> dict[str, object]:
             solid, [given.numbers(0, 1), given.numbers(2, 3)], stiffness=given([1e3, 1e3])
         ),
         "tendon": ms.Tendon(given([[0.0, 0.0, 0.0], [0.04, 0.0, 0.0]]), solid, tension=0.1),
+        "crease": ms.Crease(given(flat.interior_edges[:2], np.int64), given([1e-5, 2e-5])),
         "contact": ms.Contact([plane], vertices=given.numbers(0, 1)),
         "body contact": ms.Contact(shell, other),
         "self contact": ms.SelfContact(shell),
@@ -268,7 +271,10 @@ def made_objects(given: Arrays) -> dict[str, object]:
     found["scene"] = scene = ms.Scene(
         found["shell"],
         supports=[found["clamp by numbers"]],
-        loads=[found["point load"], found["area load"], found["tension"], found["pressure"]],
+        loads=[
+            *(found["point load"], found["area load"], found["tension"], found["pressure"]),
+            *(found["spring"], found["foundation"]),
+        ],
         field=[found["uniform"], found["dipoles"]],
         gravity=given([0, 0, -9.81]),
         contacts=[found["contact"]],
@@ -319,6 +325,8 @@ def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
     )
     held = ms.Pin(made["balloon"].mesh.vertices_at(x=0.0))
     blown = ms.Scene(made["balloon"], supports=[held], actuators=[made["cavity"]])
+    spring, bed = ms.Spring((sheet, (0.01, 0.005, 0.0)), stiffness=0.1), ms.ElasticFoundation(10.0)
+    on_springs = ms.equilibrium(ms.Scene(sheet, supports=[clamp], loads=[spring, bed]))
     of_solid = ms.equilibrium(actuated, applied_flux_density=(0, 0, 0))
     swing = ms.simulate(ms.Scene(made["skeleton"], gravity=(0, 0, -9.81)), steps=1, time_step=1e-3)
     welded = ms.weld(mesh, mesh.transformed(translation=(0.04, 0, 0)))
@@ -343,6 +351,8 @@ def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
         "cavity result": ms.equilibrium(blown)[made["cavity"]],
         "cells result": of_solid[made["cells"]],
         "tendon result": of_solid[made["tendon"]],
+        "spring result": on_springs[spring],
+        "foundation result": on_springs[bed],
         "rigid result": swing[made["link"]],
         "joint result": swing[made["hinge"]],
         "strains": rest.strains(),

@@ -65,6 +65,8 @@ class SolidModel:
             pressures=[],
             volumes=[],
             tendons=[],
+            springs=[],
+            creases=[],
             group_energies=[],
             solids=[
                 {

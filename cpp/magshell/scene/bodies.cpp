@@ -45,6 +45,14 @@ Bodies::Bodies(const SceneInput& input) {
             std::sort(nodes.begin(), nodes.end());
             nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
         }
+    for (const SpringsInput& springs : input.springs)
+        for (const SpringsInput::Spring& spring : springs.springs)
+            if (spring.vertices.size() > 1) {
+                std::vector<Index>& nodes = coupled_.emplace_back();
+                for (const Index vertex : spring.vertices) nodes.push_back(nodes_.vertices.core[vertex]);
+                std::sort(nodes.begin(), nodes.end());
+                nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+            }
     for (const EdgeMomentInput& couple : input.couples) {
         if (couple.shell < static_cast<Index>(owned_.size())) continue;
         const std::size_t k = couple.shell - owned_.size();

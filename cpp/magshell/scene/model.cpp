@@ -9,7 +9,7 @@
 #include "magshell/linalg/krylov/operator_factor.h"
 #include "magshell/linalg/low_rank_factor.h"
 #include "magshell/scene/scene_input.h"
-#include "magshell/terms/joint/damper_term.h"
+#include "magshell/terms/damped_term.h"
 #include "magshell/terms/low_rank_term.h"
 #include "magshell/terms/operator_term.h"
 
@@ -85,9 +85,8 @@ Model::~Model() = default;
 
 NodeMatrix Model::projective_stiffness() const {
     NodeMatrix sum(nodes().n_nodes(), nodes().scalars);
-    // Dampers act on few coordinates, whose stiffness in a step L-BFGS learns.
     for (const std::unique_ptr<Term>& term : terms_.energies)
-        if (term.get() != terms_.damper && !term->add_projective_stiffness(sum))
+        if (!term->add_projective_stiffness(sum))
             throw InvalidInput("Projective Dynamics does not support the " + std::string(term->name()) +
                                " energy of this scene: choose another integrator");
     sum.finish();
@@ -115,13 +114,13 @@ VectorXd Model::cancelling_forces(const VectorXd& q) {
             term->add_cancelling_forces(beyond, cancelling_forces_);
     }
     VectorXd forces = terms_.elastic.scale() * cancelling_forces_;
-    if (terms_.damper) terms_.damper->add_cancelling_stage_forces(beyond_, forces);
+    for (const DampedTerm* term : terms_.damped) term->add_cancelling_stage_forces(beyond_, forces);
     return forces;
 }
 
 StrainSet Model::damper_rates(const VectorXd& q, const VectorXd& v) const {
     StrainSet rates;
-    if (terms_.damper) rates.of_terms.push_back(terms_.damper->rates(q.data(), v.data()));
+    for (const DampedTerm* term : terms_.damped) rates.of_terms.push_back(term->rates(q.data(), v.data()));
     return rates;
 }
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "magshell/terms/joint/damper_term.h"
+#include "magshell/terms/damped_term.h"
 #include "magshell/terms/magnetic/applied_field_term.h"
 
 namespace magshell {
@@ -73,8 +73,8 @@ KinematicsGradient ModelParameters::forces_vjp(const Kinematics& at, const LoadP
 
 void ModelParameters::damper_rates_vjp(const VectorXd& q, const VectorXd& v, const StrainSet& by_rates,
                                        VectorXd& by_q, VectorXd& by_v, Gradient& out) const {
-    if (terms_.damper)
-        terms_.damper->rates_vjp(q.data(), v.data(), by_rates.of_terms.front(), by_q, by_v, out);
+    for (std::size_t k = 0; k < terms_.damped.size(); ++k)
+        terms_.damped[k]->rates_vjp(q.data(), v.data(), by_rates.of_terms[k], by_q, by_v, out);
 }
 
 // Parameters may enter in any way, for example as the position of a magnet. Fourth-order differences lose no more digits than a gradient

@@ -21,6 +21,8 @@
 #include "magshell/terms/load/face_energy.h"
 #include "magshell/terms/load/group_energy_term.h"
 #include "magshell/terms/load/pressure_term.h"
+#include "magshell/terms/load/spring_input.h"
+#include "magshell/terms/shell/crease_input.h"
 #include "magshell/terms/shell/shell_growth.h"
 #include "magshell/terms/solid/solid_term.h"
 
@@ -140,6 +142,8 @@ struct SceneInput {
     std::vector<VolumeInput> volumes;
     std::vector<TendonInput> tendons;
     std::vector<GroupEnergyInput> group_energies;
+    std::vector<SpringsInput> springs;
+    std::vector<CreaseInput> creases;
     bool gravity = false, loads = false;
     std::vector<std::shared_ptr<const AppliedField>> field_sources;
     std::vector<ContactInput> contacts;

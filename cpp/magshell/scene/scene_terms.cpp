@@ -17,6 +17,7 @@
 #include "magshell/terms/load/edge_moment_term.h"
 #include "magshell/terms/load/load_term.h"
 #include "magshell/terms/load/pressure_term.h"
+#include "magshell/terms/load/spring_term.h"
 #include "magshell/terms/load/water_term.h"
 #include "magshell/terms/magnetic/induced_term.h"
 #include "magshell/terms/magnetic/magnetic_solid_term.h"
@@ -24,6 +25,7 @@
 #include "magshell/terms/magnetic/moment_term.h"
 #include "magshell/terms/magnetic/own_field_term.h"
 #include "magshell/terms/shell/bending_term.h"
+#include "magshell/terms/shell/crease_term.h"
 #include "magshell/terms/shell/membrane_term.h"
 #include "magshell/terms/shell6/bending_six_term.h"
 #include "magshell/terms/shell6/magnetic_six_term.h"
@@ -111,6 +113,7 @@ class Builder {
     void add_own_field(const SceneInput& input);
     void add_six_node_shell(std::size_t number, const GrowthForm& growth);
     void add_solids(const SceneInput& input);
+    void add_springs(const SceneInput& input);
     void add_volumes(const SceneInput& input);
     void add_water(const SceneInput& input);
 
@@ -166,6 +169,10 @@ void Builder::add_terms(const SceneInput& input) {
     for (const GroupEnergyInput& given : input.group_energies)
         out_.energies.push_back(
             std::make_unique<GroupEnergyTerm>(given, bodies_.nodes(), matrix_, registry_));
+    if (!input.springs.empty()) add_springs(input);
+    if (!input.creases.empty())
+        out_.energies.push_back(
+            std::make_unique<CreaseTerm>(input.creases, bodies_.nodes(), matrix_, registry_));
     add_volumes(input);
     add_moments(input);
     add_joints(input);
@@ -251,6 +258,16 @@ void Builder::add_own_field(const SceneInput& input) {
     out_.energies.push_back(std::move(term));
 }
 
+void Builder::add_springs(const SceneInput& input) {
+    std::unique_ptr<SpringTerm> term =
+        std::make_unique<SpringTerm>(input.springs, bodies_.nodes(), matrix_, registry_);
+    if (term->capabilities().has_own_viscosity) {
+        out_.damped.push_back(term.get());
+        out_.dampers.add(term.get());
+    }
+    out_.energies.push_back(std::move(term));
+}
+
 void Builder::add_volumes(const SceneInput& input) {
     const auto add = [&](std::unique_ptr<LowRankTerm> term) {
         out_.low_rank.push_back(term.get());
@@ -301,7 +318,7 @@ void Builder::add_joints(const SceneInput& input) {
     if (!damped.empty()) {
         std::unique_ptr<DamperTerm> term =
             std::make_unique<DamperTerm>(damped, bodies_.nodes().rest, matrix_, registry_);
-        out_.damper = term.get();
+        out_.damped.push_back(term.get());
         out_.dampers.add(term.get());
         out_.energies.push_back(std::move(term));
     }

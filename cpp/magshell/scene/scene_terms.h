@@ -17,7 +17,7 @@
 
 namespace magshell {
 
-class DamperTerm;
+class DampedTerm;
 class LowRankTerm;
 class MuscleTerm;
 class OperatorTerm;
@@ -48,8 +48,8 @@ struct SceneTerms {
     std::vector<LowRankTerm*> low_rank;
     std::vector<const OperatorTerm*> operators;
     const OwnFieldTerm* own_field = nullptr;
-    ViscousTerms elastic, dampers;  // those to which viscosity applies; there may be no dampers of joints
-    const DamperTerm* damper = nullptr;
+    ViscousTerms elastic, dampers;          // those to which viscosity applies; there may be no dampers
+    std::vector<const DampedTerm*> damped;  // the dampers
     std::vector<const SolidTerm*> solids;
     std::vector<const MuscleTerm*> muscles;
     Contacts contacts;

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from ..model.loads.face_energies import FaceEnergy
     from ..model.loads.loads import DeadLoad, EdgeCouple
     from ..model.loads.pressure import Pressure
+    from ..model.loads.springs import Springs
     from ..model.scene.scene import Scene
     from ..model.shells.shell import Shell
     from ..model.solids.solid import Solid
@@ -78,7 +79,7 @@ if TYPE_CHECKING:
     Cutting: TypeAlias = str | Sequence[Any]
 
     Fielded: TypeAlias = AppliedField | Iterable[AppliedField]
-    Load: TypeAlias = DeadLoad | EdgeCouple | FaceEnergy | Pressure | CustomEnergy
+    Load: TypeAlias = DeadLoad | EdgeCouple | FaceEnergy | Pressure | CustomEnergy | Springs
     EnvActuator: TypeAlias = Action
 
     # An optimizer, or a function that makes one for a list of parameters.

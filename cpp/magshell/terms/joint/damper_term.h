@@ -1,24 +1,19 @@
 // DamperTerm: viscous dampers in joints. They apply a torque against the rate of the joint coordinate; in a
 // ball joint, against the relative angular velocity of the links.
 //
-// A damper is an ElasticTerm without elastic energy: its strains are the joint coordinates s, and within a
-// stage of a time step, with the history of set_history,
-//
-//   sigma = d (s - s^)/(a dt)
-//
-// which approximates d s' with the order of the time integrator and a symmetric matrix. A ball joint has nine
+// A damper is a DampedTerm without elastic energy. Its strains are the joint coordinates; a ball joint has nine
 // strains instead (JointKind::damped).
 #pragma once
 
 #include <string>
 #include <vector>
 
+#include "magshell/terms/damped_term.h"
 #include "magshell/terms/joint/joint_form.h"
-#include "magshell/terms/shell/elastic_term.h"
 
 namespace magshell {
 
-class DamperTerm final : public ElasticTerm {
+class DamperTerm final : public DampedTerm {
   public:
     struct Input {
         std::string owner;
@@ -33,6 +28,8 @@ class DamperTerm final : public ElasticTerm {
     std::string_view name() const override { return "joints"; }
     Capabilities capabilities() const override { return {.has_own_viscosity = true}; }
     bool set_values(const Values& values) override;
+    /// Dampers act on few coordinates, whose stiffness in a step L-BFGS learns.
+    bool add_projective_stiffness(NodeMatrix&) const override { return true; }
     double energy(const double*, const LoadParameters&) const override { return 0.0; }
     void evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) override;
     void finish_assembly(const double* q, const LoadParameters& load_parameters,
@@ -52,15 +49,10 @@ class DamperTerm final : public ElasticTerm {
     Strains stresses(const Strains& strains) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
 
-    /// rates() returns ds/dt at q for node velocities v. rates_vjp() adds the gradients by q, v and parameters
-    /// of a function of these rates, given its gradient by them.
-    Strains rates(const double* q, const double* v) const;
+    Strains rates(const double* q, const double* v) const override;
     void rates_vjp(const double* q, const double* v, const Strains& by_rates, VectorXd& by_q, VectorXd& by_v,
-                   Gradient& out) const;
-
-    /// Adds the magnitude [N] of the forces that cancel in a stage. `beyond` [m] is how much larger the
-    /// coordinates are than in the reference shape.
-    void add_cancelling_stage_forces(double beyond, VectorXd& out) const;
+                   Gradient& out) const override;
+    void add_cancelling_stage_forces(double beyond, VectorXd& out) const override;
 
   private:
     using Corners = JointForm::Corners;

@@ -9,12 +9,12 @@ import numpy as np
 
 from ..._input.quantity import quantity
 from ..bodies.bodies import BODIES, Bodies, on_body
+from ..bodies.embedded_points import embed_points
 from ..rigid.rigid import RigidBody
 from ..shells.shell import Shell
 from ..solids.solid import Solid
 from .actuator import Actuator, number
 from .actuator_results import TendonResult
-from .embedded_points import embed_points
 
 if TYPE_CHECKING:
     from ..._input.kinds import Computed, Numbers

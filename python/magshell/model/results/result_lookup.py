@@ -22,9 +22,10 @@ if TYPE_CHECKING:
 def result_of(
     result: SolveResult, body: Shell | Solid | RigidBody | Joint | Muscle
 ) -> BodyResult | SolidResult | RigidBodyResult | JointResult | MuscleResult:
-    """Return `result[body]`, `result[joint]` or `result[actuator]`. Raises ValueError if it is not in the scene."""
+    """Return `result[body]`, `result[joint]`, `result[actuator]` or `result[spring]`. Raises ValueError if it is
+    not in the scene."""
     body = result.scene._own(body)
-    if hasattr(body, "_result_in"):  # an actuator
+    if hasattr(body, "_result_in"):  # an actuator or springs
         return body._result_in(result)
     if isinstance(body, Joint):
         return JointResult(result, body)

@@ -12,6 +12,7 @@ from ..._input.tensors import detached, is_tensor, requires_gradient
 from ..._runtime.frozen import remember, variant
 from ...errors import NoGradient
 from ..loads.custom_energy import CustomEnergy
+from ..loads.springs import Springs
 from .rest_gradient import without_rest_gradient
 from .scene import Scene
 
@@ -166,6 +167,7 @@ def _refuse_what_cannot_follow(scene: Scene) -> None:
         ("contact between bodies", scene._body_contacts),
         ("an OwnField", scene.own_field),
         ("a CustomEnergy", [load for load in scene.loads if isinstance(load, CustomEnergy)]),
+        ("springs", [load for load in scene.loads if isinstance(load, Springs)]),
     )
     found = [name for name, some in has if some]
     if found:

@@ -33,11 +33,13 @@ from ..loads.custom_energy import CustomEnergy
 from ..loads.face_energies import FaceEnergy
 from ..loads.loads import AreaLoad, DeadLoad, EdgeCouple, EdgeLoad, PointLoad
 from ..loads.pressure import Pressure
+from ..loads.springs import Springs
 from ..loads.water import Water
 from ..rigid.equimomental_points import rigid_body_points
 from ..rigid.joints import Joint
 from ..rigid.rigid import RigidBody
 from ..rigid.skeleton import Skeleton, skeleton_inputs
+from ..shells.crease import Crease
 from ..shells.obtuse_faces import ObtuseFaces
 from ..shells.shell import Shell
 from ..solids.solid import Solid
@@ -50,10 +52,12 @@ from .parameter_layout import Layout
 from .scene_to_core import (
     actuator_inputs,
     body_inputs,
+    crease_inputs,
     face_inputs,
     moment_directions,
     moment_edges,
     muscle_inputs,
+    spring_inputs,
 )
 from .values import Values
 
@@ -61,7 +65,7 @@ if TYPE_CHECKING:
     from ..._input.kinds import Fielded, Load, Numbers
     from ..supports.supports import Support
 
-_LOADS = (PointLoad, EdgeLoad, AreaLoad, EdgeCouple, FaceEnergy, Pressure, CustomEnergy)
+_LOADS = (PointLoad, EdgeLoad, AreaLoad, EdgeCouple, FaceEnergy, Pressure, CustomEnergy, Springs)
 _SUPPORTS = (Pin, Clamp, SymmetryPlane)
 _ACTUATORS = "Muscle, Cavity, PneumaticCells and Tendon objects"
 
@@ -76,8 +80,8 @@ class Scene(PlotMixin):
         only. Positions and faces of a result are those of one body after another, `result[body]` has those of one.
     ties: Tie objects: bodies that are welded to each other.
     supports: Pin, Clamp and SymmetryPlane objects; with several bodies `body=` says which one a support holds.
-    loads: PointLoad, EdgeLoad, AreaLoad, EdgeCouple, Pressure, SurfaceTension and CustomEnergy objects; with several bodies
-        likewise.
+    loads: PointLoad, EdgeLoad, AreaLoad, EdgeCouple, Pressure, SurfaceTension, CustomEnergy, Spring and ElasticFoundation
+        objects; with several bodies likewise.
     actuators: Muscle, Cavity, PneumaticCells and Tendon objects.
     field: None, an applied field, or several that superpose. A UniformField takes its value when the scene is solved.
     own_field: an OwnField, with which magnetized shells attract and repel each other and themselves. None: bodies feel the
@@ -245,6 +249,8 @@ class Scene(PlotMixin):
             **face_inputs(self),
             muscles=muscle_inputs(self),
             **actuator_inputs(self),
+            springs=spring_inputs(self),
+            creases=crease_inputs(self),
             loads=any(isinstance(load, DeadLoad) for load in self.loads),
             field_sources=[source._core for source in self._sources],
             contacts=contact_inputs(self._obstacle_contacts, bodies),
@@ -273,6 +279,7 @@ class Scene(PlotMixin):
         """The objects of the scene, each with the name under which the core has its values."""
         kinds = (
             ("body", self.bodies),
+            ("crease", self.creases),
             ("skin", self._bodies.skins),
             ("rigid", self.rigid_parts),
             ("joint", self.joints),
@@ -325,6 +332,11 @@ class Scene(PlotMixin):
         return self._bodies.ties
 
     @property
+    def creases(self) -> tuple[Crease, ...]:
+        """The creases of all shells."""
+        return tuple(crease for sheet in self._bodies.sheets for crease in sheet.creases)
+
+    @property
     def rigid_parts(self) -> tuple[RigidBody, ...]:
         """The rigid bodies, links of skeletons among them."""
         return self._bodies.rigid
@@ -352,6 +364,7 @@ class Scene(PlotMixin):
         water = () if self.water is None else (self.water,)
         return (
             *self.bodies,
+            *self.creases,
             *self._bodies.skins,
             *self.rigid_parts,
             *self.joints,

@@ -15,8 +15,10 @@ from ..actuators.muscle import Muscle
 from ..actuators.tendon import Tendon
 from ..loads.custom_energy import CustomEnergy
 from ..loads.face_energies import FaceEnergy
+from ..loads.foundation import ElasticFoundation
 from ..loads.loads import EdgeCouple
 from ..loads.pressure import Pressure
+from ..loads.spring import Spring
 from ..shells.shell import Shell, core_form
 from ..solids.solid import Solid
 from ..supports.supports import continuations
@@ -105,6 +107,27 @@ def actuator_inputs(scene: Scene) -> dict[str, list[dict[Any, Any]]]:
         if isinstance(each, Tendon)
     ]
     return {"volumes": volumes, "tendons": tendons}
+
+
+def spring_inputs(scene: Scene) -> list[dict[Any, Any]]:
+    bodies, found = scene._bodies, []
+    for each, label in scene._labels:
+        if isinstance(each, Spring):
+            found.append(each._core_input(label, bodies, scene._rigid))
+        elif isinstance(each, ElasticFoundation):
+            found.append(each._core_input(label, bodies))
+    return found
+
+
+def crease_inputs(scene: Scene) -> list[dict[Any, Any]]:
+    """Return the input of the creases of all shells."""
+    labels, bodies = {id(each): label for each, label in scene._labels}, scene._bodies
+    return [
+        crease._core_input(labels[id(crease)], span.mesh, bodies.original[span.vertices])
+        for body, span in zip(bodies.shells, bodies.spans, strict=True)
+        if isinstance(body, Shell)
+        for crease in body.creases
+    ]
 
 
 def _directed_by_body(scene, directed_edges: np.ndarray) -> list[np.ndarray]:

@@ -10,8 +10,10 @@ from ..._runtime.keywords import nearest_first
 from ..actuators.actuator import Actuator
 from ..fields.field import AppliedField
 from ..loads.custom_energy import CustomEnergy
+from ..loads.springs import Springs
 from ..rigid.joints import Joint
 from ..rigid.rigid import RigidBody
+from ..shells.crease import Crease
 from ..shells.shell import UNITS as _GROWTH_UNITS
 from ..shells.shell import Shell
 from ..supports.supports import Support
@@ -57,7 +59,11 @@ def row_in_time(owner: Any, name: str) -> tuple[int, ...] | None:
 
 def unit_in_time(owner: Any, name: str) -> str:
     """Return the unit of a parameter that may change during a motion."""
-    return owner._unit(name) if isinstance(owner, Joint | Actuator | CustomEnergy) else _UNITS[name]
+    return (
+        owner._unit(name)
+        if isinstance(owner, Joint | Actuator | CustomEnergy | Springs | Crease)
+        else _UNITS[name]
+    )
 
 
 def may_jump(owner: Any) -> bool:

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..._input.checked_list import checked_list
 from ..._input.owner import Owner
 from ..._input.quantity import quantity, real_numbers
+from ..._runtime.frozen import variant
 from ..._runtime.solver_entry_point import grouped
 from ...mesh.face_shapes import corner_axes, sides
 from ...mesh.rest_shape import by_areas, by_nodal_element_areas, moved_mesh
@@ -16,8 +18,11 @@ from ...mesh.triangles.face_quality import MeshQuality
 from ...mesh.triangles.six_node_checks import shape_integrals, shape_products
 from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 from ...mesh.triangles.triangle_mesh import TriangleMesh
+from .crease import Crease, check_creases, softened
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from ..._input.kinds import Numbers
     from ..scene.values import Gradient, Values
 
@@ -131,6 +136,8 @@ class Shell(Owner):
     poisson_ratio: in (-1, 1/2].
     mass_density: kg/m3, positive; needed for gravity and motions only.
     curvature_scale: positive factor on every bending strain, [Chen22] k_cur; not for "midedge2".
+    creases: Crease objects, fold lines with a stiffness of their own. They set the
+        curvature_scale of their edges.
     bending: "midedge", the default (second order, on irregular meshes too, see `quality`; one rotation per edge: the
         lowest-order Hellan-Herrmann-Johnson element); "midedge2", the default and the only one for a
         QuadraticTriangleMesh (fourth order in smooth problems; curved elements, two rotations per edge, linear moments, and
@@ -202,6 +209,7 @@ class Shell(Owner):
         poisson_ratio: Numbers = 0.5,
         mass_density: Numbers | None = None,
         curvature_scale: Numbers = 1.0,
+        creases: Crease | Iterable[Crease] = (),
         bending: str | None = None,
         remanent_magnetization: Numbers | None = None,
         magnetization_law: str = "stretches",
@@ -231,12 +239,19 @@ class Shell(Owner):
         self.curvature_scale: np.ndarray = _positive(
             "curvature_scale", "1", curvature_scale, ("n_e", mesh.n_edges)
         )
+        self.creases: tuple[Crease, ...] = checked_list("creases", creases, (Crease,))
         if mesh.order == 2:
-            if (self.curvature_scale != 1.0).any():
+            if (self.curvature_scale != 1.0).any() or self.creases:
                 raise ValueError(
-                    'curvature_scale [1] must be 1 with bending="midedge2": make the thickness or the modulus another'
+                    'curvature_scale [1] must be 1, and there are no creases, with bending="midedge2": make the thickness '
+                    "or the modulus another, or use a TriangleMesh"
                 )
             self._replaceable = tuple(name for name in self._replaceable if name != "curvature_scale")
+        elif self.creases:
+            check_creases(self.creases, mesh)
+            stiffness = self.young_modulus * self.thickness**3 / (12.0 * (1.0 - self.poisson_ratio**2))
+            of_faces = np.broadcast_to(stiffness, (mesh.n_faces,))
+            self.curvature_scale = softened(self.curvature_scale, self.creases, mesh, of_faces)
         self.remanent_magnetization: np.ndarray | None = (
             None
             if remanent_magnetization is None
@@ -269,7 +284,8 @@ class Shell(Owner):
             if name in values
         }
         kept = {"bending": self.bending, "magnetization_law": self.magnetization_law}
-        return Shell(mesh, **kept, **{**properties, **values, **grown})
+        # Its curvature_scale is soft at the creases already, unless `values` hold another.
+        return variant(Shell(mesh, **kept, **{**properties, **values, **grown}), creases=self.creases)
 
     @property
     def rest_positions(self) -> np.ndarray:

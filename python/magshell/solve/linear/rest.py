@@ -9,6 +9,7 @@ import numpy as np
 from ... import _core
 from ...model.actuators.muscle import FibreStates, muscles_in
 from ...model.loads.custom_energy import CustomEnergy
+from ...model.loads.springs import Springs
 from ...model.scene.solve_inputs import Inputs
 from .stiffness import Stiffness, refuse_indefinite
 
@@ -78,10 +79,19 @@ def forces_at_rest(inputs: Inputs) -> np.ndarray | None:
 
 
 def refuse_what_acts(inputs: Inputs) -> None:
-    """Raise ValueError if the rest shape is no equilibrium: a muscle or a CustomEnergy pulls there, or a shell has grown."""
+    """Raise ValueError if the rest shape is no equilibrium: a muscle, springs or a CustomEnergy pull there, or a shell has
+    grown.
+    """
     model = inputs.scene._model
     _refuse_custom_forces(inputs)
-    for body in map(inputs.values.current, inputs.scene._bodies.sheets):
+    for own in inputs.scene._bodies.sheets:
+        for crease in map(inputs.values.current, own.creases):
+            if crease._pulls_in(own.mesh):
+                raise ValueError(
+                    f"{crease!r} pulls at the rest shape, which is no equilibrium then: find one with ms.equilibrium, and "
+                    "hand it over as `equilibrium`"
+                )
+        body = inputs.values.current(own)
         if body._has_grown:
             raise ValueError(
                 f"{body!r} has grown or bent at rest, and its rest shape is no equilibrium then: find one with "
@@ -97,16 +107,24 @@ def refuse_what_acts(inputs: Inputs) -> None:
 
 
 def _refuse_custom_forces(inputs: Inputs) -> None:
-    """Raise ValueError if a CustomEnergy that is no load has forces at the rest shape that are more than round-off."""
+    """Raise ValueError if springs, or a CustomEnergy that is no load, have forces at the rest shape beyond
+    round-off.
+    """
     scene = inputs.scene
-    own = [each for each in scene.loads if isinstance(each, CustomEnergy) and not each.is_load]
+    own: dict[str, CustomEnergy | Springs] = {}
+    for each in scene.loads:
+        if isinstance(each, CustomEnergy) and not each.is_load:
+            own[each.name] = each
+        elif isinstance(each, Springs):
+            own["springs"] = each
     if not own:
         return
     model, state, controls = scene._model, scene._model.rest_state(), scene._control_layout.zeros()
-    forces = [np.abs(model.term_gradient(each.name, state, controls)).max() for each in own]
+    forces = [np.abs(model.term_gradient(name, state, controls)).max() for name in own]
     _, _, _, stiffness = model.hessian(state, controls, reduced=False)
-    for each, force in zip(own, forces, strict=True):
-        if force > _ROUND_OFF * np.abs(stiffness).max() * scene._bodies.extent:
+    size = max(scene._bodies.extent, np.abs(state).max())
+    for each, force in zip(own.values(), forces, strict=True):
+        if force > _ROUND_OFF * np.abs(stiffness).max() * size:
             raise ValueError(
                 f"{each!r} pulls at the rest shape, which is no equilibrium then: find one with ms.equilibrium, and hand "
                 "it over as `equilibrium`"

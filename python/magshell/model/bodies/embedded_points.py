@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...mesh.topology import EDGES, FLAT
 from ...mesh.triangles.six_node_checks import shapes
 from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
-from ..bodies.bodies import Bodies
 from ..rigid.rigid import RigidBody
 from ..solids.solid import Solid
+from .bodies import Bodies
 
 if TYPE_CHECKING:
-    from ..._input.kinds import Numbers
     from ..rigid.equimomental_points import RigidBodyPoints
 
 
@@ -30,12 +29,16 @@ _CORNERS_OF_FACES = np.concatenate([np.eye(3), 0.5 * (np.eye(3) + np.roll(np.eye
 
 
 def embed_points(
-    points: Numbers, bodies: Bodies, rigid_points: Sequence[RigidBodyPoints]
+    points: Sequence[tuple[Any, np.ndarray]],
+    bodies: Bodies,
+    rigid_points: Sequence[RigidBodyPoints],
+    owner: str = "Tendon",
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return the nodes and weights of each point; the weights add up to 1.
 
-    points: [(body, (3,) m)]. rigid_points: of the scene's rigid bodies. Nodes are vertices of the scene, followed by the
-    points of rigid bodies, ten each. Raises ValueError if a point lies outside its body.
+    points: [(body, (3,) m)]. rigid_points: of the scene's rigid bodies. owner: whose points they are, for messages.
+    Nodes are vertices of the scene, followed by the points of rigid bodies, ten each. Raises ValueError if a point lies
+    outside its body.
     """
     found = []
     for k, (body, point) in enumerate(points):
@@ -45,7 +48,7 @@ def embed_points(
         vertices, weights, gap = _in_solid(body, point) if isinstance(body, Solid) else _on_shell(body, point)
         if not gap <= _OUTSIDE * body.mesh.size:
             raise ValueError(
-                f"point {k} of the Tendon, {np.round(point, 9).tolist()} m, lies outside every element of its body, "
+                f"point {k} of the {owner}, {np.round(point, 9).tolist()} m, lies outside every element of its body, "
                 f"{gap:.3g} m from the nearest"
             )
         span = bodies.spans[bodies.number(body)]
