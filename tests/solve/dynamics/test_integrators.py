@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+import torch
 
 import magshell as ms
+from benchmarks import motion_costs
 from benchmarks.timing import resident_memory
 
 LENGTH, WIDTH = 0.05, 0.01
@@ -184,3 +186,25 @@ def test_a_long_run_neither_grows_nor_loses_a_step(name):
     assert second.times[-1] == pytest.approx(2 * steps * time_step)
     if before is not None:  # the system tells how large a process is
         assert resident_memory() - before < 4e6
+
+
+@pytest.mark.parametrize(
+    "integrator", [ms.TRBDF2(), ms.SDIRK2(), ms.SDIRK3()], ids=lambda each: type(each).__name__
+)
+def test_stages_of_a_step_share_a_factorization(integrator):
+    """Check that a free motion takes one factorization a step, and that its gradient by stored ones is right."""
+    scene, steps = motion_costs.strip((10, 2)), 6
+    move = motion_costs.drive(scene, steps, integrator=integrator)
+    assert move.factorizations == steps
+    exact = motion_costs.drive(scene, steps, integrator=integrator, solver=ms.MixedNewton(tolerance=1e-13))
+    away = np.abs(move.positions[-1] - exact.positions[-1]).max()
+    assert away < 1e-8 * np.abs(exact.displacements[-1]).max()
+    gradients = []
+    for storage in ("factors", "stages"):
+        field = torch.tensor(motion_costs.turning(steps), requires_grad=True)
+        kept = motion_costs.drive(
+            scene, steps, integrator=integrator, applied_flux_density=field, adjoint_storage=storage
+        )
+        assert kept.factorizations == steps
+        gradients += torch.autograd.grad(kept.positions[-1, :, 2].mean(), field)
+    assert (gradients[0] - gradients[1]).abs().max() < 1e-11 * gradients[1].abs().max()

@@ -26,9 +26,12 @@ std::size_t bytes_of(const MotionState& state) {
 
 std::size_t bytes_of(const SubstepRecord& substep) {
     std::size_t bytes = bytes_of(substep.begin);
-    for (const StageState& stage : substep.stages)
-        bytes += sizeof(double) * (stage.q.size() + stage.contact.size()) +
-                 (stage.factor ? stage.factor->own_bytes() : 0);
+    const Factor* last = nullptr;  // stages in a row may share a factorization
+    for (const StageState& stage : substep.stages) {
+        bytes += sizeof(double) * (stage.q.size() + stage.contact.size());
+        if (stage.factor && stage.factor.get() != last) bytes += stage.factor->own_bytes();
+        last = stage.factor.get();
+    }
     return bytes;
 }
 

@@ -50,7 +50,7 @@ Stepper::Stepper(Newton& newton, const Tableau& tableau, Inertia inertia, const 
 }
 
 NewtonReport Stepper::solve(VectorXd& q, const MotionState& begin, const LoadParameters& load_parameters,
-                            const ProximalTerm& proximal) {
+                            const ProximalTerm& proximal, const FactorReport* factor) {
     Model& model = newton_.model();
     if (projective_) {
         const double scale = viscosity_.any() ? viscosity_.scale(proximal.motion->time) : 1.0;
@@ -58,7 +58,13 @@ NewtonReport Stepper::solve(VectorXd& q, const MotionState& begin, const LoadPar
     }
     const VectorXd predicted = q;
     const Model::AngleBranches angle_branches = model.angle_branches();
-    NewtonReport report = newton_.solve(q, load_parameters, {.proximal = proximal, .defers_count = true});
+    NewtonReport report =
+        newton_.solve(q, load_parameters, {.proximal = proximal, .defers_count = true, .factor = factor});
+    if (factor && !report.converged) {
+        q = predicted;
+        model.set_angle_branches(angle_branches);
+        report = newton_.solve(q, load_parameters, {.proximal = proximal, .defers_count = true});
+    }
     // After contact between bodies, Newton has used its line search already.
     const Capabilities& has = model.capabilities();
     const bool searched = has.has_barrier && report.had_contact;
@@ -121,6 +127,16 @@ StepRates::StepRates(const Model& model, const StepAlgebra& step, const std::vec
     }
 }
 
+// The stages of a step have the same inertia and nearly the same stiffness. So a factorization that served a whole stage serves the next one
+// too, except where contact, which need not act in both, changes the stiffness more.
+bool Stepper::serves_again(const NewtonReport& last, int factorizations, bool in_contact, const VectorXd& q,
+                           const LoadParameters& load_parameters) const {
+    Model& model = newton_.model();
+    return !projective_ && factorizations <= 1 && last.factor.succeeded && newton_.factor() &&
+           newton_.factor()->pattern() == model.dof_map().pattern() && !in_contact &&
+           !model.contacts().acts(q, load_parameters);
+}
+
 bool Stepper::step(MotionState& state, double dt, bool dissipative,
                    std::span<const LoadParameters> load_parameters, SubstepRecord* kept, bool with_factors,
                    std::string& reason) {
@@ -142,6 +158,9 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative,
     VectorXd q = state.q, x_hat, v_hat;
     MaxwellStrains e;
     VectorXd motor_forces, held;
+    NewtonReport report;  // of the last stage
+    int factorizations = 0;
+    bool in_contact = false;
     for (int i = 0; i < tableau.stages; ++i) {
         step.start_of_stage(i, state, rates, x_hat, v_hat);
         flight.add_defect(i, x_hat, v_hat);
@@ -190,13 +209,19 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative,
         }
         const StageMotion motion{&x_hat, &v_hat, step.stage_time()};
         const ProximalTerm proximal{&step.weights(), &target, &motion};
-        const NewtonReport report = solve(q, state, load_parameters[i + 1], proximal);
+        const bool reused =
+            i > 0 && serves_again(report, factorizations, in_contact, q, load_parameters[i + 1]);
+        const FactorReport last = report.factor;
+        factorizations = newton_.factorizations();
+        report = solve(q, state, load_parameters[i + 1], proximal, reused ? &last : nullptr);
+        factorizations = newton_.factorizations() - factorizations;
         if (!report.converged) {
             reason = model.not_finite(q, load_parameters[i + 1]);
             if (reason.empty()) reason = report.reason;
             model.set_angle_branches(state.angle_branches);
             return false;
         }
+        in_contact = i + 1 < tableau.stages && model.contacts().acts(q, load_parameters[i + 1]);
         StageRates& now = rates.emplace_back();
         VectorXd reactions;  // of supports, only because implicit contact is scaled by the factor
         if (tableau.implicit_contact) {
@@ -222,8 +247,7 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative,
         if (damped) joints.finish(damper_law, T, model.dampers().strains(q), now.joints);
         if (kept) {
             const bool factorized = with_factors && report.iterations > 0;
-            stages.push_back(
-                {q, model.angle_branches(), factorized ? newton_.release_factor() : nullptr, now.c});
+            stages.push_back({q, model.angle_branches(), factorized ? newton_.factor() : nullptr, now.c});
         }
     }
     reason =

@@ -95,7 +95,7 @@ class Stepper {
 
     /// Advances the state by a step, with the load parameters at its beginning and at the stages of tableau_from(). On failure the state
     /// is unchanged, and `reason` says why. `kept` receives the step if it is not null, and with_factors the last factorization
-    /// of each stage.
+    /// of each stage, which stages may share.
     bool step(MotionState& state, double dt, bool dissipative,
               std::span<const LoadParameters> load_parameters, SubstepRecord* kept, bool with_factors,
               std::string& reason);
@@ -111,9 +111,13 @@ class Stepper {
 
   private:
     /// Solves a stage of a step from q, the prediction; by standard Newton steps or a descent if the usual steps fail.
-    /// begin: the beginning of the step.
+    /// begin: the beginning of the step. factor: of a factorization with which the iteration may begin; or null.
     NewtonReport solve(VectorXd& q, const MotionState& begin, const LoadParameters& load_parameters,
-                       const ProximalTerm& proximal);
+                       const ProximalTerm& proximal, const FactorReport* factor);
+    /// Returns true if the last factorization may serve a stage predicted at q. last: report of the stage before, which took so many
+    /// factorizations and ended in contact or not.
+    bool serves_again(const NewtonReport& last, int factorizations, bool in_contact, const VectorXd& q,
+                      const LoadParameters& load_parameters) const;
 
     Newton& newton_;
     std::unique_ptr<ProjectiveSolver> projective_;  // nullptr: stages are solved by Newton

@@ -56,8 +56,9 @@ class Stopwatch {
 Newton::Newton(Model& model, const NewtonOptions& options, Watch watch)
     : model_(model), options_(options), watch_(std::move(watch)) {}
 
-std::shared_ptr<Factor> Newton::release_factor() {
-    return std::exchange(factor_, nullptr);
+void Newton::give_up_factor() {
+    if (factor_.use_count() == 1) model_.store_spare_factor(std::move(factor_));
+    factor_ = nullptr;
 }
 
 VectorXd Newton::gradient(const VectorXd& q, const ProximalTerm& proximal) const {
@@ -222,8 +223,8 @@ void Newton::check_effort() const {
 
 FactorReport Newton::factorize_assembled(const VectorXd& q, const ProximalTerm& proximal) {
     check_effort();
-    if (!factor_ || factor_->pattern() != model_.dof_map().pattern()) {
-        model_.store_spare_factor(std::exchange(factor_, nullptr));
+    if (!factor_ || factor_.use_count() > 1 || factor_->pattern() != model_.dof_map().pattern()) {
+        give_up_factor();
         factor_ = model_.new_factor([this] { watch(watched_); });
     }
     touched_ = model_.contacts().obstacle_points();

@@ -64,7 +64,7 @@ struct NewtonPolicy {
     bool defers_count = false;
     const StressPredictor* stress_predictor = nullptr;  // of the previous load step
     const FactorReport* factor =
-        nullptr;  // of the last factorization, if it was made at the state where the solve begins
+        nullptr;  // of the last factorization, if it was made at or near the state where the solve begins
     std::function<VectorXd(const VectorXd&)> correction =
         {};  // returns what to add to the first step, or an empty vector
     std::function<void(const VectorXd&)> visit = {};  // called with every state after the first
@@ -101,7 +101,7 @@ class Newton {
     Newton(Model& model, const NewtonOptions& options, Watch watch = {});
     Newton(const Newton&) = delete;
     Newton& operator=(const Newton&) = delete;
-    ~Newton() { model_.store_spare_factor(std::move(factor_)); }
+    ~Newton() { give_up_factor(); }
 
     /// Solves from q for a stationary point at these load parameters; leaves q at the last state if it fails. Prescribed nodes are moved to
     /// their target in the first iteration, with its linearization.
@@ -166,7 +166,7 @@ class Newton {
     bool is_equilibrium(const VectorXd& q, const LoadParameters& load_parameters);
 
     Model& model() { return model_; }
-    /// The last factorization; null before the first.
+    /// The last factorization; null before the first. While others hold it, the next one is made in new memory.
     const std::shared_ptr<Factor>& factor() const { return factor_; }
     /// Returns true if the matrix assembled last is nonsymmetric.
     bool is_unsymmetric() const { return unsymmetric_; }
@@ -174,8 +174,6 @@ class Newton {
     int factorizations() const { return factorizations_; }
     int failed_factorizations() const { return failed_factorizations_; }
     int iterations() const { return iterations_; }
-    /// Returns the last factorization and gives it up; the next one is made in new memory.
-    std::shared_ptr<Factor> release_factor();
     double linear_time() const { return linear_time_; }  // [s] spent in factorizations and solves
     /// Sets the number of factorizations after which the next one throws EffortSpent; 0: unlimited. Iterations without a
     /// factorization count as well, by their cost.
@@ -194,6 +192,8 @@ class Newton {
     void describe_contact(NewtonReport& report) const;
     void assemble(const VectorXd& q, const LoadParameters& load_parameters, bool extrapolated_stress,
                   const ProximalTerm& proximal, bool project_psd = false);
+    /// Keeps the memory of the last factorization for another solve, unless others hold it.
+    void give_up_factor();
     void check_effort() const;
     FactorReport factorize_assembled(const VectorXd& q, const ProximalTerm& proximal);
 
