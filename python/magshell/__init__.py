@@ -22,6 +22,8 @@ from .design.printable_minimum import PrintableMinimum, PrintableStage
 from .design.printable_set import PrintableSet
 from .design.printing import minimize_printable
 from .design.study.points import latin_hypercube
+from .design.study.stored import StoredStudy
+from .design.study.stream import stream_study
 from .design.study.study import study
 from .design.study.table import Study, StudyRow
 from .errors import (
@@ -259,6 +261,7 @@ __all__ = [
     "StVenantKirchhoff",
     "StableNeoHookean",
     "StepErrorWarning",
+    "StoredStudy",
     "Strains",
     "Study",
     "StudyRow",
@@ -331,6 +334,7 @@ __all__ = [
     "show",
     "show_config",
     "simulate",
+    "stream_study",
     "study",
     "to_pandas",
     "to_xarray",

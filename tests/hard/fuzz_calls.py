@@ -391,6 +391,22 @@ def _solves(s: Sample) -> Iterator[Call]:
             "progress": False,
         },
     )
+    yield Call(
+        "stream_study",
+        ms.stream_study,
+        {
+            "function": _root,
+            "parameters": {"x": [1.0, 4.0]},
+            "folder": s.folder / "streamed",
+            "executor": _here(),
+            "chunk": 2,
+            "workers": None,
+            "attempts": 1,
+            "resume": True,
+            "progress": False,
+        },
+    )
+    yield Call("StoredStudy", ms.StoredStudy, {"folder": s.folder / "streamed"})
     bounds = {"x": (1.0, 2.0), "y": (0.1, 10.0)}
     yield Call(
         "latin_hypercube", ms.latin_hypercube, {"count": 3, "bounds": bounds, "logarithmic": "y", "seed": 0}

@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib.util
 import inspect
 import pkgutil
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from public_names import public_names
@@ -296,6 +298,13 @@ def _from_fields(cls) -> object:
     return cls(**{name: np.zeros(3) for name, each in inspect.signature(cls).parameters.items()})
 
 
+def _stored_study() -> ms.StoredStudy:
+    """Return a study of two points on the disk, in a temporary folder that stays."""
+    folder = tempfile.mkdtemp()
+    with ThreadPoolExecutor(1) as executor:
+        return ms.stream_study(lambda x: x, {"x": [1.0, 2.0]}, folder, executor, progress=False)
+
+
 def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
     """Return the results of functions."""
     mesh = made["flat"]
@@ -394,6 +403,7 @@ def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
         ms.Study,
         ms.StudyRow,
     )
+    found["StoredStudy"] = _stored_study()
     return found | {
         cls.__name__: _from_fields(cls) for cls in (*rare, ms.control.RecedingHorizonResult, ms.envs.Episode)
     }

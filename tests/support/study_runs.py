@@ -2,7 +2,11 @@
 
 import os
 import signal
+import time
+from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
+
+import numpy as np
 
 import magshell as ms
 
@@ -38,3 +42,21 @@ def killed(x: float) -> float:
 
 def other(x: float) -> float:
     return x**3
+
+
+def wave(x: float, folder: str) -> dict:
+    """Return an array, a number and a text, and leave a file for every call.
+
+    From x = 0.9 on it waits as long as there is a file "hold".
+    """
+    Path(folder, f"{x:g}-{os.getpid()}").touch()
+    while x > 0.85 and Path(folder, "hold").exists():
+        time.sleep(0.01)
+    return {"wave": np.sin(x * np.arange(4.0)), "square": x**2, "name": f"x = {x:g}"}
+
+
+def stream_waves(folder: str, calls: str, executor: Executor | None = None, **options) -> ms.StoredStudy:
+    """Write a study of 20 points to the disk in chunks of 3, by default on one thread."""
+    grid = {"x": [0.1 * k for k in range(20)], "folder": [calls]}
+    executor = executor or ThreadPoolExecutor(1)
+    return ms.stream_study(wave, grid, folder, executor, chunk=3, progress=False, **options)

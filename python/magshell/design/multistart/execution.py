@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import numbers
 import os
 import pickle
@@ -20,7 +21,7 @@ class Work(Protocol):
     """Calls to be made, by number, and the outcomes so far."""
 
     @property
-    def outcomes(self) -> Mapping[int, Outcome]: ...
+    def outcomes(self) -> Mapping[int, Any]: ...
 
     @property
     def unfinished(self) -> list[int]: ...
@@ -37,21 +38,22 @@ def drive(
     bar: Any,
     workers: int | None = None,
     attempts: int = 1,
+    in_flight: int | None = None,
 ) -> None:
     """Make every unfinished call on an executor, or on processes made here and ended, and store the outcomes.
 
     task: function of a number and a CallOff that returns the arguments for the executor's `submit`, as `tasks` gives.
-    workers, attempts: as in ms.multistart.
+    workers, attempts: as in ms.multistart. in_flight: how many calls the executor holds at most; None: all.
     """
     if executor is not None:
-        _drive(work, executor, task, bar)
+        _drive(work, executor, task, bar, in_flight)
     elif work.unfinished:
         count = min(workers or _processors(), len(work.unfinished))
         with WorkerProcesses(count, attempts) as own:
-            _drive(work, own, task, bar)
+            _drive(work, own, task, bar, in_flight)
 
 
-def _drive(work: Work, executor: Executor, task: Callable[..., Any], bar: Any) -> None:
+def _drive(work: Work, executor: Executor, task: Callable[..., Any], bar: Any, in_flight: int | None) -> None:
     """Make every unfinished call, and store the outcomes as they come.
 
     Ctrl-C may come at any moment, also between the end of a call and the storing of its outcome: finished calls
@@ -60,15 +62,22 @@ def _drive(work: Work, executor: Executor, task: Callable[..., Any], bar: Any) -
     done: queue.SimpleQueue[tuple[int, Future]] = queue.SimpleQueue()
     running: dict[int, Future] = {}
     call_off = CallOff()
-    try:
-        for number in work.unfinished:
+    waiting = iter(work.unfinished)
+
+    def submit(count: int | None) -> None:
+        for number in itertools.islice(waiting, count):
             running[number] = executor.submit(*task(number, call_off))
             running[number].add_done_callback(lambda future, number=number: done.put((number, future)))
-        for _ in running:
+
+    try:
+        submit(in_flight)
+        while running:
             number, future = _next(done)
             work.take(number, _outcome(future))
+            del running[number]  # with its result
             bar.update()
             bar.set_postfix_str(work.summary())
+            submit(1)
     finally:
         call_off.done = True
         for future in running.values():
@@ -98,16 +107,17 @@ def tasks(
     starts: Sequence[Any],
     executor: Executor | None,
     labels: tuple[str, str] = ("run", "start"),
+    checked: int | None = None,
 ) -> Callable[[int, CallOff], tuple[Any, ...]]:
     """Return a function that gives what to submit for each start.
 
-    labels: what the run and a start are called in messages. Raises ValueError, before any work, if the run or a start
-    cannot be sent to another process.
+    labels: what the run and a start are called in messages. checked: how many starts are tried; None: all. Raises
+    ValueError, before any work, if the run or a start cannot be sent to another process.
     """
     if executor is not None and not isinstance(executor, futures.ProcessPoolExecutor):
         return lambda number, call_off: (attempt_sent, run, starts[number], this_process(), call_off)
     contents = packed(labels[0], run)
-    for number, start in enumerate(starts):
+    for number, start in enumerate(itertools.islice(starts, checked)):
         packed(f"{labels[1]} {number}", start)
     return lambda number, _: (attempt_packed, contents, packed(f"{labels[1]} {number}", starts[number]))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import numbers
 from collections.abc import Mapping, Sequence
@@ -66,12 +65,38 @@ def listed_points(parameters: Any) -> list[Point]:
 
     Raises ValueError for anything else, and for values that are not numbers or texts.
     """
+    return list(point_sequence(parameters))
+
+
+class Combinations(Sequence[Any]):
+    """All combinations of {name: values}, the last name varying fastest; each is made when it is asked for."""
+
+    def __init__(self, axes: Mapping[str, list[Any]]):
+        self.axes: dict[str, list[Any]] = dict(axes)
+
+    def __len__(self) -> int:
+        return math.prod(map(len, self.axes.values())) if self.axes else 0
+
+    def __getitem__(self, index: Any) -> Point:
+        if not 0 <= index < len(self):
+            raise IndexError(index)
+        point = {}
+        for name, values in reversed(self.axes.items()):
+            index, place = divmod(index, len(values))
+            point[name] = values[place]
+        return {name: point[name] for name in self.axes}
+
+
+def point_sequence(parameters: Any) -> Sequence[Point]:
+    """Return what `listed_points` lists; combinations of values are not all made at once."""
     if hasattr(parameters, "to_dict") and hasattr(parameters, "columns"):
-        rows: list[Any] = parameters.to_dict("records")
+        rows: Sequence[Any] = parameters.to_dict("records")
     elif isinstance(parameters, Mapping):
-        axes = {name: _values(name, values) for name, values in parameters.items()}
-        rows = (
-            [dict(zip(axes, each, strict=True)) for each in itertools.product(*axes.values())] if axes else []
+        rows = Combinations(
+            {
+                _checked_name(name): [_checked_value(name, each) for each in _values(name, values)]
+                for name, values in parameters.items()
+            }
         )
     elif isinstance(parameters, Sequence) and not isinstance(parameters, str | bytes):
         rows = list(parameters)
@@ -82,6 +107,8 @@ def listed_points(parameters: Any) -> list[Point]:
         )
     if not rows:
         raise ValueError("parameters has no point: there is nothing to compute")
+    if isinstance(rows, Combinations):
+        return rows
     return [_checked_point(number, row, rows[0]) for number, row in enumerate(rows)]
 
 

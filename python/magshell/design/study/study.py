@@ -66,7 +66,9 @@ def study(
     """
     refuse_while_importing("ms.study")
     points = listed_points(parameters)
-    _check(function, points[0], checkpoint, resume)
+    check_function(function, points[0])
+    if resume and checkpoint is None:
+        raise ValueError("resume needs the checkpoint to continue from")
     check_executor(executor, workers, attempts)
     task = tasks(_Row(function), points, executor, ("function", "point"))
     file = None if checkpoint is None else StudyFile(checkpoint, function, flag("resume", resume))
@@ -96,7 +98,7 @@ class _Row:
     function: Callable[..., Any]
 
     def __call__(self, point: Point) -> tuple[float, dict[str, Any]]:
-        return 0.0, _outputs(self.function(**point), point)
+        return 0.0, named_outputs(self.function(**point), point, plain)
 
 
 class _State:
@@ -143,8 +145,11 @@ class _State:
         return ", ".join(filter(None, (f"{failed} failed" if failed else "", resumed)))
 
 
-def _outputs(returned: Any, point: Point) -> dict[str, Any]:
-    """Return what the function returned as {name: value}. Raises TypeError or ValueError for anything else."""
+def named_outputs(returned: Any, point: Point, stored: Callable[[Any], Any]) -> dict[str, Any]:
+    """Return what the function returned as {name: value}. Raises TypeError or ValueError for anything else.
+
+    stored: returns a value as it is stored, or raises TypeError.
+    """
     named = returned if isinstance(returned, dict | FixedDict) else {"output": returned}
     outputs = {}
     for name, value in named.items():
@@ -153,7 +158,7 @@ def _outputs(returned: Any, point: Point) -> dict[str, Any]:
                 f"an output needs a name of its own, other than the parameters', {' and '.join(RESERVED)}, got {name!r:.60}"
             )
         try:
-            outputs[name] = plain(value)
+            outputs[name] = stored(value)
         except TypeError as error:
             raise TypeError(
                 f"the function must return a number or {{name: number or text}}, and its {name} is {error}"
@@ -165,8 +170,8 @@ def _outputs(returned: Any, point: Point) -> dict[str, Any]:
     return outputs
 
 
-def _check(function: Any, point: Point, checkpoint: Any, resume: Any) -> None:
-    """Raise ValueError for what is no function of these parameters, and for `resume` without a checkpoint."""
+def check_function(function: Any, point: Point) -> None:
+    """Raise ValueError for what is no function of these parameters."""
     if not callable(function):
         raise ValueError(f"function must be a function of the parameters, got {function!r:.60}")
     try:
@@ -180,5 +185,3 @@ def _check(function: Any, point: Point, checkpoint: Any, resume: Any) -> None:
             raise ValueError(
                 f"function cannot be called with the parameters {', '.join(point)}: {error}"
             ) from None
-    if resume and checkpoint is None:
-        raise ValueError("resume needs the checkpoint to continue from")
