@@ -12,6 +12,7 @@ from painter import Body, Camera, Film, boundary
 
 import magshell as ms
 
+_QUARTERS = ((1, 0), (0, 1), (-1, 0), (0, -1))  # cosines and sines of quarter turns
 FRAMES = 20  # of a motion
 
 
@@ -470,6 +471,31 @@ def pinched_cylinder() -> dict[str, Any]:
     )
 
 
+def tapered_arc() -> dict[str, Any]:
+    import tapered_arc as example
+
+    found, strip = example.main()["logarithms"], example.Strip((60, 4), 6e-3)
+    states = [strip.positions(found, f).numpy() for f in np.linspace(0.0, 1.0, 16)]
+    return shown(states, [(strip.mesh.faces, SHEET)], (24, -50), held=6, back=True)
+
+
+def gripper_outline() -> dict[str, Any]:
+    import gripper_outline as example
+    import torch
+
+    arm = example.Arm(1e-3)
+    found = example.search(arm, True, True, 30)
+    numbers = [torch.tensor(found[name]) for name in ("widths", "angles")]
+    loads = np.linspace(0.0, 1.0, 16)
+    single = [arm.closed(*numbers, f).positions.numpy() for f in loads]
+    turns = [np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) for c, s in _QUARTERS]
+    out = np.array([0.5 * numbers[0][0], 0, 0])
+    states = [np.concatenate([(x + out) @ t.T for t in turns]) for x in single]
+    faces = arm.outline.mesh.faces
+    four = np.concatenate([faces + k * len(single[0]) for k in range(4)])
+    return shown(states, [(four, SHEET)], (24, -60), held=6, back=True)
+
+
 def _robot(
     robot: Any,
     steps: int,
@@ -565,6 +591,8 @@ _COMPUTED: dict[str, tuple[str, Callable[[], dict[str, Any]]]] = {
     "relaxation_fit": ("A bar of silicone is pulled and held", relaxation_fit),
     "shell_against_volume": ("A plate of tetrahedra is twisted", shell_against_volume),
     "pinched_cylinder": ("A pinched cylinder on small elements", pinched_cylinder),
+    "tapered_arc": ("A tapered strip bends to an arc", tapered_arc),
+    "gripper_outline": ("Four arms of a designed outline close", gripper_outline),
 }
 SCENES = {
     name: Scene(words, compute, film) for name, (words, compute) in _COMPUTED.items()

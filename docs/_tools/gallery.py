@@ -34,6 +34,8 @@ SMALL = {
     "pneumatic_finger": "",
     "snap_design": "cells=(24, 4)",
     "topology": "cells=(24, 12), iterations=8",
+    "tapered_arc": "cells=(40, 2)",
+    "gripper_outline": "size=1.3e-3, solves=12",
     "shell_against_volume": "cells=(32, 4), layers=(2, 6), angles=(1.0, 3.14159)",
     "pinched_cylinder": "((6, 6), (8, 8), (16, 16)), ((8, 8), (8, 8), (16, 16))",
 }

@@ -272,3 +272,10 @@ def test_hexagram_takes_fewer_solves_than_with_lbfgs():
 
     newton, lbfgs = solves(ms.optim.NewtonCG), solves(ms.optim.LBFGS)
     assert newton <= 26 and lbfgs >= 4 * newton
+
+
+@pytest.mark.parametrize("method", ["NewtonCG", "GaussNewton"])
+def test_first_steps_beyond_all_numbers_are_refused(method):
+    x = torch.zeros(2, dtype=torch.float64, requires_grad=True)
+    with pytest.raises(ValueError, match=r"first_step must be at most 1e\+100 sizes, got 1e\+200"):
+        getattr(ms.optim, method)([x], first_step=1e200)

@@ -141,8 +141,28 @@ def _objectives(s: Sample) -> Iterator[Call]:
         {"mesh": s.mesh, "controls": np.full((5, 3), 0.1), "loop": 0},
     )
     yield from _densities(s)
+    yield from _outlines()
     yield Call("parametrize.softly_limited", parametrize.softly_limited, {"vectors": vectors, "limit": 1.0})
     yield Call("parametrize.clip_to_limit", parametrize.clip_to_limit, {"vectors": vectors, "limit": 1.0})
+
+
+def _outlines() -> Iterator[Call]:
+    corners = [[0.0, 0], [1, 0], [1, 1], [0, 1]]
+    for name in ("Polygon", "ClosedSpline", "Slit"):
+        yield Call(f"parametrize.{name}", getattr(parametrize, name), {"points": corners})
+    yield Call("parametrize.Circle", parametrize.Circle, {"center": (0.5, 0.5), "radius": 0.3})
+    square = parametrize.Polygon(corners)
+    slit = parametrize.Slit([(0.2, 0.5), (0.8, 0.5)])
+    yield Call(
+        "parametrize.MeshedOutline",
+        parametrize.MeshedOutline,
+        {"borders": square, "slits": slit, "size": 0.25, "most_stretch": 2.0, "on_remesh": None},
+    )
+    outline = parametrize.MeshedOutline(square, slit, size=0.25)
+    controls = [each.detach().numpy() for each in outline.controls()]
+    yield Call("parametrize.MeshedOutline.positions", outline.positions, {"controls": controls})
+    values = np.ones(outline.first_mesh.n_faces)
+    yield Call("parametrize.MeshedOutline.transferred", outline.transferred, {"values": values})
 
 
 def _densities(s: Sample) -> Iterator[Call]:

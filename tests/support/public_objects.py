@@ -262,6 +262,22 @@ def _options(given: Arrays) -> dict[str, object]:
         found |= {"filter": density.HelmholtzFilter(mesh, 0.1), "cone filter": density.ConeFilter(mesh, 0.1)}
         found["matter"] = density.Matter(mesh, given([1.0, 1.0, 0.5, 0.0]), given.numbers(0, 1))
         found["robust densities"] = density.robust(given([0.2, 0.6]), 8.0, 0.7)
+        found |= _outlines(given)
+    return found
+
+
+def _outlines(given: Arrays) -> dict[str, object]:
+    """Return borders of flat sheets, and with gmsh an outline of them."""
+    parametrize = ms.parametrize
+    found = {
+        "polygon": parametrize.Polygon(given([[0.0, 0], [1, 0], [1, 1], [0, 1]])),
+        "spline": parametrize.ClosedSpline(given([[0.0, 0], [1, 0], [1, 1], [0, 1]])),
+        "round border": parametrize.Circle(given([0.3, 0.5]), radius=0.2),
+        "slit": parametrize.Slit(given([[0.6, 0.2], [0.6, 0.9]])),
+    }
+    if importlib.util.find_spec("gmsh"):
+        borders = [found["polygon"], found["round border"]]
+        found["meshed outline"] = parametrize.MeshedOutline(borders, found["slit"], size=0.2)
     return found
 
 

@@ -11,7 +11,10 @@ import numpy as np
 from .._input.quantity import quantity
 from .._input.tensors import detached, positive_number, real_tensor, require_torch, tensor_of
 from . import density
-from .outlines import outline, with_boundary
+from .outlines.borders import Circle, ClosedSpline, Polygon, Slit
+from .outlines.displaced import outline
+from .outlines.following import with_boundary
+from .outlines.meshed_outline import MeshedOutline
 
 if TYPE_CHECKING:
     import torch
@@ -22,6 +25,11 @@ if TYPE_CHECKING:
 
 
 __all__ = [
+    "Circle",
+    "ClosedSpline",
+    "MeshedOutline",
+    "Polygon",
+    "Slit",
     "along",
     "clip_to_limit",
     "density",

@@ -23,6 +23,9 @@ _SHORTER, _LONGER = 0.25, 2.0
 _AT_RADIUS = 0.8  # [-] a step that is at least this fraction of the radius was limited by it
 _ROUNDING = 4 * np.finfo(float).eps  # [-] a relative decrease of the objective below this is round-off
 
+# [-] Largest first radius, in sizes, whose square is a number; see test_first_steps_beyond_all_numbers_are_refused.
+_LARGEST_STEP = 1e100
+
 
 class StepModel(Protocol):
     """A model of the objective about a design, for steps in the sizes of the variables."""
@@ -60,6 +63,8 @@ class TrustRegionOptimizer(BoxOptimizer):
         max_backtracks: int,
     ):
         self.first_step = positive("first_step", "", first_step)
+        if self.first_step > _LARGEST_STEP:
+            raise ValueError(f"first_step must be at most {_LARGEST_STEP:g} sizes, got {first_step:g}")
         self.max_evaluations = positive_count("max_evaluations", max_evaluations)
         super().__init__(params, defaults, max_backtracks)
 

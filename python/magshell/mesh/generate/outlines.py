@@ -13,7 +13,9 @@ from ..._runtime.solver_entry_point import grouped
 from ..triangles.triangle_mesh import TriangleMesh
 from ._gmsh_session import gmsh_session
 from ._grid import check_size
-from ._polygon import (
+from ._six_nodes import check_order, sheet_of_order
+from .cuts import cut
+from .polygon import (
     checked_polygon,
     checked_polyline,
     contains,
@@ -24,8 +26,6 @@ from ._polygon import (
     segments,
     sides,
 )
-from ._six_nodes import check_order, sheet_of_order
-from .cuts import cut
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
