@@ -63,7 +63,7 @@ def beam(cells, *, width=WIDTH, thickness=THICKNESS, shortening=SHORTENING, pois
     ]
     magnetization = np.zeros((mesh.n_faces, 3))
     outwards = np.sign(mesh.face_barycenters[:, 0] - LENGTH / 2)
-    magnetization[:, 0] = outwards * ms.residual_to_remanent(RESIDUAL_FLUX_DENSITY)
+    magnetization[:, 0] = outwards * ms.magnetization_from_remanence(RESIDUAL_FLUX_DENSITY)
     middle = mesh.nearest_vertex((LENGTH / 2, width / 2, 0))
     return Beam(ms.Scene(sheet, supports=clamps, field=ms.UniformField()), magnetization, middle, shortening)
 

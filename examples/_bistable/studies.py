@@ -71,7 +71,7 @@ def beam_theory(
     k = 2 * a / LENGTH
     integral = a - 4 * np.tan(a / 2) + (a + np.sin(a)) / (2 * np.cos(a / 2) ** 2)
     force = 2 * k**2 * modulus * inertia * np.sqrt(left_for_bending(k) * k / integral)
-    return height, force / (2 * ms.residual_to_remanent(RESIDUAL_FLUX_DENSITY) * area)
+    return height, force / (2 * ms.magnetization_from_remanence(RESIDUAL_FLUX_DENSITY) * area)
 
 
 def straight_buckling(beam: Beam) -> float:

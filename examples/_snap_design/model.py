@@ -47,7 +47,9 @@ class Beam:
         x = self.mesh.face_barycenters[:, 0]
         self.wave: torch.Tensor = torch.from_numpy(0.5 * np.cos(2 * np.pi * x / LENGTH))
         self.magnetization: np.ndarray = np.zeros((self.mesh.n_faces, 3))
-        self.magnetization[:, 0] = np.sign(x - LENGTH / 2) * ms.residual_to_remanent(RESIDUAL_FLUX_DENSITY)
+        self.magnetization[:, 0] = np.sign(x - LENGTH / 2) * ms.magnetization_from_remanence(
+            RESIDUAL_FLUX_DENSITY
+        )
         rows = self.mesh.rest_positions
         middle = np.flatnonzero(np.abs(rows[:, 1] - WIDTH / 2) < 1e-9)
         self.line: np.ndarray = middle[np.argsort(rows[middle, 0])]  # vertices of the center line

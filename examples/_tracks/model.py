@@ -75,7 +75,7 @@ def strip(cells=CELLS) -> Strip:
     )
     scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
     clamped_half = mesh.face_barycenters[:, 0] < LENGTH / 2
-    magnetization = ms.residual_to_remanent(RESIDUAL_FLUX_DENSITY) * np.where(
+    magnetization = ms.magnetization_from_remanence(RESIDUAL_FLUX_DENSITY) * np.where(
         clamped_half[:, None], (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
     )
     tip = mesh.nearest_vertex((LENGTH, WIDTH / 2, 0.0))

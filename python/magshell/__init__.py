@@ -59,7 +59,13 @@ from .model.contact.body_contact import BodyContact, SelfContact
 from .model.contact.contact import Contact
 from .model.elastomers import Elastomer, elastomer
 from .model.fields.adapters import CustomField, MagpylibField
-from .model.fields.field import AppliedField, Dipoles, SampledField, UniformField, residual_to_remanent
+from .model.fields.field import (
+    AppliedField,
+    Dipoles,
+    SampledField,
+    UniformField,
+    magnetization_from_remanence,
+)
 from .model.fields.magnets import CuboidMagnet, CylinderMagnet
 from .model.fields.posed_field import PlacedField
 from .model.loads.custom_energy import CustomEnergy
@@ -309,6 +315,7 @@ __all__ = [
     "linear_buckling",
     "linear_response",
     "load",
+    "magnetization_from_remanence",
     "mass_matrix",
     "meshes",
     "minimize",
@@ -326,7 +333,6 @@ __all__ = [
     "read_fields",
     "read_mesh",
     "refined_for",
-    "residual_to_remanent",
     "richardson_extrapolation",
     "save",
     "set_num_threads",

@@ -210,7 +210,11 @@ def _fields(s: Sample) -> Iterator[Call]:
     }
     texts = {"name": "ink", "source": "own", "note": "tension", "remanent_magnetization": 1e4}
     yield Call("Elastomer", ms.Elastomer, {**texts, **rubber})
-    yield Call("residual_to_remanent", ms.residual_to_remanent, {"residual_flux_density": np.ones((2, 3))})
+    yield Call(
+        "magnetization_from_remanence",
+        ms.magnetization_from_remanence,
+        {"residual_flux_density": np.ones((2, 3))},
+    )
 
 
 def _magpylib_field(length_scale):

@@ -123,13 +123,14 @@ class Elastomer:
 
         volume_fraction: c of the particles, 1, from 0 to 0.3. Of a mass fraction m and densities rho_p and rho of particles
             and elastomer it is c = (m / rho_p) / (m / rho_p + (1 - m) / rho).
-        particle_magnetization: M_p, A/m; ms.residual_to_remanent computes it from the powder's residual flux density.
+        particle_magnetization: M_p, A/m; ms.magnetization_from_remanence computes it from the powder's residual
+            flux density.
         mass_density, particle_density: kg/m3, of the elastomer and of the particles; with both, the mixture has one.
 
         Raises ValueError on bad input.
 
         >>> import magshell as ms
-        >>> ink = ms.elastomer("Ecoflex 00-30").filled(0.2, particle_magnetization=ms.residual_to_remanent(0.7))
+        >>> ink = ms.elastomer("Ecoflex 00-30").filled(0.2, particle_magnetization=ms.magnetization_from_remanence(0.7))
         >>> round(ink.young_modulus), round(ink.remanent_magnetization)
         (99182, 111408)
         """

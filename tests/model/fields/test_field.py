@@ -339,7 +339,7 @@ def test_a_magnetised_sphere_is_a_dipole(points, moments):
     radius, polarization = 0.008, np.array([0.1, -0.4, 1.1])
     ball = magpylib.magnet.Sphere(polarization=polarization, diameter=2 * radius, position=POSITIONS[0])
     volume = 4 / 3 * np.pi * radius**3
-    dipole = ms.Dipoles(POSITIONS[:1], [ms.residual_to_remanent(polarization) * volume])
+    dipole = ms.Dipoles(POSITIONS[:1], [ms.magnetization_from_remanence(polarization) * volume])
     field = ms.MagpylibField(magpylib.Collection(ball), length_scale=0.02)
     for actual, wanted in zip(samples(field, points, moments), samples(dipole, points, moments), strict=True):
         assert_close(actual, wanted, 1e-8)

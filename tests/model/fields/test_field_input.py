@@ -194,11 +194,11 @@ def test_uniform_field_has_no_core_object_and_others_have():
 
 def test_residual_flux_density_converts_to_remanent_magnetization():
     mu_0 = pytest.importorskip("scipy.constants").mu_0
-    assert ms.residual_to_remanent(0.1) == pytest.approx(0.1 / mu_0, rel=1e-9)
-    np.testing.assert_allclose(ms.residual_to_remanent([0, 0, 0.1]), [0, 0, 0.1 / mu_0], rtol=1e-9)
+    assert ms.magnetization_from_remanence(0.1) == pytest.approx(0.1 / mu_0, rel=1e-9)
+    np.testing.assert_allclose(ms.magnetization_from_remanence([0, 0, 0.1]), [0, 0, 0.1 / mu_0], rtol=1e-9)
     torch = pytest.importorskip("torch")
     residual = torch.tensor([0.1, 0.2], dtype=torch.float64, requires_grad=True)
-    ms.residual_to_remanent(residual).sum().backward()
+    ms.magnetization_from_remanence(residual).sum().backward()
     np.testing.assert_allclose(residual.grad.numpy(), 1 / mu_0, rtol=1e-9)
 
 
@@ -206,8 +206,8 @@ def test_residual_flux_density_converts_to_remanent_magnetization():
 def test_invalid_residual_flux_density_is_refused(value):
     torch = pytest.importorskip("torch")
     with pytest.raises(ValueError, match="residual_flux_density"):
-        ms.residual_to_remanent(value)
+        ms.magnetization_from_remanence(value)
     if not isinstance(value, str):
         with pytest.raises(ValueError, match="residual_flux_density"):
-            ms.residual_to_remanent(torch.tensor(value))
-    assert ms.residual_to_remanent(torch.tensor(1)).dtype == torch.float64  # not float32
+            ms.magnetization_from_remanence(torch.tensor(value))
+    assert ms.magnetization_from_remanence(torch.tensor(1)).dtype == torch.float64  # not float32

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..._input.kinds import FilePath, Numbers
 
 
-def residual_to_remanent(residual_flux_density: Numbers) -> Any:
+def magnetization_from_remanence(residual_flux_density: Numbers) -> Any:
     """Return the remanent magnetization M_r = B_r / mu_0 [A/m] for the residual flux density B_r [T] of a data sheet.
 
     It takes numbers, sequences, numpy arrays and torch tensors; a tensor stays in its graph. Raises ValueError for
@@ -28,7 +28,7 @@ def residual_to_remanent(residual_flux_density: Numbers) -> Any:
 
     residual_flux_density: T, of any shape.
 
-    >>> round(residual_to_remanent(0.1))
+    >>> round(magnetization_from_remanence(0.1))
     79577
     """
     residual = quantity("residual_flux_density", "T", detached(residual_flux_density), ("...",))

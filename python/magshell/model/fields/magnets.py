@@ -20,8 +20,8 @@ class Magnet(AppliedField):
     """A uniformly magnetised body; the base class of magnets.
 
     A point x of the world is y = R^T (x - center) in the magnet's own frame, R = exp(rotation). The remanent
-    magnetization M_r [A/m] is given in that frame and rotates with the magnet; `residual_to_remanent` computes it from the
-    residual flux density [T] of a data sheet. The magnet is ideally hard: no field changes M_r.
+    magnetization M_r [A/m] is given in that frame and rotates with the magnet; `magnetization_from_remanence` computes it
+    from the residual flux density [T] of a data sheet. The magnet is ideally hard: no field changes M_r.
 
     B = mu_0 (H + M_r) inside, mu_0 H outside; on a face it has the value just outside, on an edge NaN. Across a face B
     jumps, so no sheet should pass through one: a Contact with an obstacle of the same shape keeps it out.
