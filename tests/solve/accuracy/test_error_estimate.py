@@ -244,6 +244,18 @@ def test_equilibria_far_from_the_coarse_one_are_refused(monkeypatch):
         ms.error_estimate(rest, height_at(tip))
 
 
+def test_a_scene_without_displacements_has_no_error(monkeypatch):
+    """Check that round-off is not taken for another equilibrium, however small the displacements are."""
+    monkeypatch.setattr("magshell.solve.accuracy.enriched._NEAR", 0.0)
+    turn = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
+    mesh = ms.meshes.cylinder(0.02, 0.05, cells=(12, 4)).transformed(turn)
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+    scene = ms.Scene(sheet, supports=[ms.Pin(mesh.boundary_vertices)])
+    inside = np.setdiff1d(np.arange(mesh.n_vertices), mesh.boundary_vertices)[0]
+    found = ms.error_estimate(ms.equilibrium(scene), lambda rest: rest.displacements[inside, 2])
+    assert abs(found.value) + abs(found.error) < 1e-13
+
+
 def test_pins_hold_new_vertices_between_held_ones_only():
     mesh = ms.meshes.rectangle(2.0, 2.0, cells=(2, 2))
     sheet = ms.Shell(mesh, thickness=0.1, young_modulus=1e6, poisson_ratio=0.0)

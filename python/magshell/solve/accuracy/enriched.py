@@ -32,6 +32,8 @@ _MOST_FROM_COARSE = 12
 # [-] Largest change of a coordinate from the start of the search to the finer solution, over the largest displacement;
 # farther away it is another equilibrium. See test_equilibria_far_from_the_coarse_one_are_refused.
 _NEAR = 0.5
+# [-] Largest change by round-off, over the size of the scene; see test_a_scene_without_displacements_has_no_error.
+_ROUND_OFF = 1e-10
 # [-] Tolerance of solves on the finer mesh; the adjoint corrects the estimate for the residual that remains. See
 # test_estimates_of_loose_solves_are_corrected_by_the_adjoint.
 _LOOSE = 1e-4
@@ -157,7 +159,7 @@ def _refuse_another(result: Equilibrium, scene: Scene, start: np.ndarray, soluti
         np.abs(places - before).max(),
         np.abs(positions_of(result) - result.scene.mesh.rest_positions).max(),
     )
-    if moved > _NEAR * largest:
+    if moved > _NEAR * largest + _ROUND_OFF * scene._bodies.extent:
         raise NotConverged(
             f"the solution on the finer mesh is {moved:.3g} m away from the given one, whose largest displacement is "
             f"{largest:.3g} m: the mesh is too coarse for an estimate, or the equilibrium is near others. Refine the mesh",
