@@ -103,8 +103,8 @@ def error_estimate(
     The estimate takes longer than the solve given: there are three or four times as many unknowns, and the finer scene is
     made anew, which alone takes one to three solves. Of a cantilever of 400 to 6400 faces, whose solve takes 5
     factorizations, it takes 11 to 16 solves, and 8 to 12 without the contributions of faces. `factorizations` and
-    `wall_time` have what it took. It tells errors of the mesh only, not of the model, the loads or the time steps. Errors below the
-    tolerance of the solver (1e-8) cannot be told.
+    `wall_time` have what it took. It tells errors of the mesh only, not of the model, the loads or the time steps. Errors
+    below the tolerance of the solver (1e-8) cannot be told.
 
     Raises ValueError for outputs that are not smooth scalar functions of positions, and for results and objects of the scene
     that do not go over to a finer mesh, with their names; NotConverged if the finer mesh finds no equilibrium near this one.
