@@ -11,6 +11,7 @@
 #include "bindings/strains.h"
 #include "bindings/watch.h"
 #include "magshell/adjoint/dynamic.h"
+#include "magshell/adjoint/motion_tangent.h"
 #include "magshell/core/errors.h"
 
 namespace magshell::bindings {
@@ -277,6 +278,50 @@ py::dict back(Model& model, const MotionInput& input, const MotionResult& motion
     return result;
 }
 
+// Returns the tangents of positions, edge rotations, velocities and motor forces of all recorded states, from those of all inputs.
+py::tuple forward(Model& model, const MotionInput& input, const MotionResult& motion, const VectorXd& values,
+                  const py::dict& given, const py::object& progress) {
+    const Watch watch(progress);
+    const auto array = [&](const char* name) { return given[name].cast<Array>(); };
+    MotionInputTangent along;
+    along.values = to_vector(array("values"));
+    if (const py::object function = given["values_at"]; !function.is_none())
+        along.values_at = [function](double t) -> VectorXd {
+            const py::gil_scoped_acquire locked;
+            const py::object found = call_python(function, t);
+            if (found.is_none()) throw InvalidInput("beyond the range of a value");
+            return to_vector(found.cast<Array>());
+        };
+    along.load_parameters = load_parameters_of(model, input.varying, array("controls"));
+    along.positions = to_vector(array("state"));
+    along.velocities = to_vector(array("velocity"));
+    along.mass = model.bodies().vertex_weights(to_vector(array("mass")));
+    along.damping = model.bodies().vertex_weights(to_vector(array("damping")));
+    along.time_steps = given["time_steps"].cast<std::vector<double>>();
+    along.viscosity = viscosity_of(given);
+    along.first_step = given["first_step"].cast<double>();
+    along.length = given["length"].cast<double>();
+    MotionTangent found;
+    {
+        const py::gil_scoped_release unlocked;
+        const std::lock_guard lock(model.in_use());
+        found = motion_jvp(model, input, motion, values, along,
+                           [&](double at, double residual) { watch(at, residual); });
+    }
+    const py::ssize_t n = static_cast<py::ssize_t>(found.states.size()),
+                      n_v = model.nodes().n_user_vertices(), n_e = model.bodies().n_edges();
+    Array points({n, n_v, py::ssize_t{3}}), velocities({n, n_v, py::ssize_t{3}}), rotations({n, n_e});
+    Knots driving(n, motion.last.motor_forces.size());
+    for (py::ssize_t k = 0; k < n; ++k) {
+        const MotionTangent::State& each = found.states[k];
+        Eigen::Map<Rows3>(points.mutable_data(k, 0, 0), n_v, 3) = model.bodies().points(each.q);
+        Eigen::Map<Rows3>(velocities.mutable_data(k, 0, 0), n_v, 3) = model.bodies().points(each.v);
+        Eigen::Map<VectorXd>(rotations.mutable_data() + k * n_e, n_e) = model.bodies().edge_rotations(each.q);
+        driving.row(k) = each.motor_forces.transpose();
+    }
+    return py::make_tuple(points, rotations, velocities, driving, found.factorizations);
+}
+
 }  // namespace
 
 void register_dynamics(py::module_& module) {
@@ -352,6 +397,10 @@ void register_dynamics(py::module_& module) {
     module.def("pull_back_motion", &back, py::arg("model"), py::arg("input"), py::arg("motion"),
                py::arg("by_positions"), py::arg("by_edge_rotations"), py::arg("by_velocities"),
                py::arg("by_driving") = Knots(), py::arg("by_rest") = false, py::arg("progress") = py::none());
+    module.def("push_forward_motion", &forward, py::arg("model"), py::arg("input"), py::arg("motion"),
+               py::arg("values"), py::arg("along"), py::arg("progress") = py::none(),
+               "The derivatives of positions, edge rotations, velocities and motor forces of recorded states "
+               "along a direction of the inputs, and the number of factorizations that they took.");
 }
 
 }  // namespace magshell::bindings

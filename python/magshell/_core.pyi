@@ -1316,6 +1316,18 @@ def pull_back_motion(
     by_rest: bool = False,
     progress: typing.Any = None,
 ) -> dict[str, typing.Any]: ...
+def push_forward_motion(
+    model: Model,
+    input: MotionInput,
+    motion: MotionResult,
+    values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    along: dict[str, typing.Any],
+    progress: typing.Any = None,
+) -> tuple[typing.Any, ...]:
+    """
+    The derivatives of positions, edge rotations, velocities and motor forces of recorded states along a direction of the inputs, and the number of factorizations that they took.
+    """
+
 def push_forward(
     model: Model,
     equilibrium: StaticsResult,

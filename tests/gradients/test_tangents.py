@@ -201,21 +201,6 @@ def test_second_derivatives_of_tangents_are_refused(second):
         second(lambda x: heights(x).sum())
 
 
-def test_motions_have_gradients_but_no_tangents():
-    def height(x):
-        given = {"remanent_magnetization": torch.stack([30e3 * x, 0 * x, 0 * x])}
-        motion = ms.simulate(
-            SCENE, steps=3, time_step=1e-3, applied_flux_density=(0, 0, 5e-3), progress=False, **given
-        )
-        return 1e3 * motion.positions[-1, TIP, 2].mean()
-
-    x = torch.tensor(1.0, dtype=torch.float64, requires_grad=True)
-    (by,) = torch.autograd.grad(height(x), x)
-    assert torch.func.grad(height)(x.detach()) == by
-    with pytest.raises(ms.NoGradient, match=r"no tangents of a motion.*jacrev"):
-        torch.func.jvp(height, (x.detach(),), (x.detach(),))
-
-
 def test_batches_of_designs_are_those_of_single_solves():
     designs = torch.stack([START, 1.1 * START])
     found = torch.func.vmap(heights)(designs)

@@ -31,7 +31,7 @@ class GaussNewton(TrustRegionOptimizer):
 
     lower, upper: bounds of a group: a number, a tensor that fits each parameter, or a list with one of these each.
     scale: the typical size of a variable, in the same forms; by default upper - lower where both are finite, else 1.
-    jacobian: how J is found. "backward" by rows, m gradients; "forward" by columns, n tangents (not through motions);
+    jacobian: how J is found. "backward" by rows, m gradients; "forward" by columns, n tangents;
         "products" not at all: conjugate gradients with products J s and J^T r. "auto" takes columns if 3 n < m, as
         a tangent costs about three gradients, else rows; and products if both m and n exceed 2000.
     first_step: first radius of the trust region: the root mean square of the steps of all variables, in sizes.

@@ -108,7 +108,7 @@ class ResidualTrial:
         ):
             try:
                 return self._by_columns(n_parameters)
-            # Rows serve where a motion has no tangents (NoGradient), or an operator of torch no second derivative, for
+            # Rows serve where a solve has no tangents (NoGradient), or an operator of torch no second derivative, for
             # which torch raises NotImplementedError.
             except (NoGradient, NotImplementedError):
                 if self._how == "forward":

@@ -15,6 +15,7 @@ from ...errors import NoGradient, StepErrorWarning
 from ...model.scene.values import Gradient
 from ..options import ProjectiveDynamics
 from .leaf_gradient import by_leaf
+from .motion_tangent import motion_tangents
 from .static import requires_rest
 
 if TYPE_CHECKING:
@@ -33,17 +34,8 @@ class MotionAdjoint:
 
         Raises NoGradient where there is none.
         """
+        self._refuse()
         asked, found, inputs = self._asked, self._found, self._asked.inputs
-        if found.outcome != _core.Outcome.converged:
-            raise NoGradient(
-                f"no gradient here: the motion stopped after {100 * found.fraction_done:.3g} % of its {asked.steps} steps "
-                f"({found.reason})"
-            )
-        if isinstance(asked.integrator, ProjectiveDynamics):
-            why = asked.integrator.without_gradient(inputs.scene)
-            if why:
-                raise NoGradient(f"no gradient here: {why}")
-        _warn_of_jumps(inputs.scene, found.divided)
         with inputs.in_core():
             found_by = _core.pull_back_motion(
                 inputs.scene._model, asked.core, found, *by_outputs, requires_rest(inputs, wanted)
@@ -59,11 +51,25 @@ class MotionAdjoint:
         return [by_leaf(inputs, leaf, gradient) if is_wanted else None for leaf, is_wanted in leaves]
 
     def tangents(self, along: list[np.ndarray]) -> list[np.ndarray]:
-        """Raise NoGradient: motions have no forward mode."""
-        raise NoGradient(
-            "no tangents of a motion: ms.simulate has gradients in reverse mode only. Use backward(), torch.func.vjp or "
-            'jacrev, and GaussNewton(jacobian="backward")'
-        )
+        """Compute the derivatives of positions, edge rotations, velocities and forces of motors along changes of all leaves.
+
+        Raises NoGradient where there are none.
+        """
+        self._refuse()
+        return motion_tangents(self._asked, self._found, along)
+
+    def _refuse(self) -> None:
+        asked, found, inputs = self._asked, self._found, self._asked.inputs
+        if found.outcome != _core.Outcome.converged:
+            raise NoGradient(
+                f"no gradient here: the motion stopped after {100 * found.fraction_done:.3g} % of its {asked.steps} steps "
+                f"({found.reason})"
+            )
+        if isinstance(asked.integrator, ProjectiveDynamics):
+            why = asked.integrator.without_gradient(inputs.scene)
+            if why:
+                raise NoGradient(f"no gradient here: {why}")
+        _warn_of_jumps(inputs.scene, found.divided)
 
 
 def _warn_of_jumps(scene: Scene, divided: Sequence[int]) -> None:

@@ -89,18 +89,23 @@ def _required(derivative: np.ndarray | None) -> np.ndarray:
 def changed(inputs: Inputs, leaf: Leaf, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the numbers of all values and the load parameters after the change of a leaf. Raises ValueError beyond its
     range."""
+    if leaf.owner is None and leaf.name != "remanent_magnetization":
+        layout, key = inputs.scene._control_layout, ("scene", leaf.name)
+        now = _added(layout.of(inputs.controls, *key)[0], change)
+        return inputs.values.numbers, layout.packed({key: now}, inputs.controls)
+    return changed_values(inputs, leaf, change).numbers, inputs.controls
+
+
+def changed_values(inputs: Inputs, leaf: Leaf, change: np.ndarray) -> Values:
+    """Return the values of the scene after the change of a leaf that is one of them. Raises ValueError beyond its range."""
     scene, values = inputs.scene, inputs.values
     replaced, magnetization = values.replaced, inputs.magnetization
-    if leaf.owner is not None:
-        now = _added(values.replaced[leaf.owner][leaf.name], change)
-        replaced = {**replaced, leaf.owner: {**replaced[leaf.owner], leaf.name: now}}
-    elif leaf.name == "remanent_magnetization":
+    if leaf.owner is None:
         magnetization = _added(magnetization, change)
     else:
-        layout, key = scene._control_layout, ("scene", leaf.name)
-        now = _added(layout.of(inputs.controls, *key)[0], change)
-        return values.numbers, layout.packed({key: now}, inputs.controls)
-    return Values(scene, replaced, magnetization, sampling_of=values).numbers, inputs.controls
+        now = _added(values.replaced[leaf.owner][leaf.name], change)
+        replaced = {**replaced, leaf.owner: {**replaced[leaf.owner], leaf.name: now}}
+    return Values(scene, replaced, magnetization, sampling_of=values)
 
 
 def _added(value, change: np.ndarray) -> np.ndarray:

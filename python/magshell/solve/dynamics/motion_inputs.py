@@ -90,7 +90,9 @@ class MotionInputs:
         self.tolerance: float = tolerance_of(inputs.scene, adaptive)
         self._mass = inputs.values.masses
         self._damping = self._damping_of_points(arguments["damping"])
-        law = self._viscosity(arguments)
+        law = self._law = self._viscosity(arguments)
+        self._given_start = start
+        self._begins_anew: bool = not isinstance(start, Trajectory | MotionState | DifferentiableState)
         self.start: MotionState = self._begin(start, arguments["velocities"])
         clock = clock_of(self.start)
         if adaptive is None or chosen is None:
@@ -115,6 +117,7 @@ class MotionInputs:
                 self.interrupted = True
         if self._outside is not None:
             check_outside(inputs.scene, inputs.values, self._outside, 0.0)
+        self._rows = self._all_controls()
         self.core: _core.MotionInput = _core.MotionInput(
             inputs.scene._model,
             {
@@ -131,7 +134,7 @@ class MotionInputs:
                 "time_steps": [] if chooses else self.time_steps.lengths,
                 "recorded": [0] if chooses else self.time_steps.grid_ends[:: self.record_every],
                 "adaptive": self._ladder(adaptive) if chooses else None,
-                "controls": self._all_controls(),
+                "controls": self._rows,
                 "varying": self._scheduled.entries,
                 "newton": solver._newton_options(),
                 "projective": getattr(integrator, "_projective", None),

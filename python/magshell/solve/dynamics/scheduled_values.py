@@ -95,7 +95,9 @@ class ScheduledValues:
             if its_own := {each.name: each.value for each in schedules if each.owner is obstacle}:
                 path = ObstaclePath(self._asked, obstacle, its_own)
                 self._paths[k] = path
-                self.poses[k] = self._asked.inputs.take("center", path.poses, _Pose(k))
+                self.poses[k] = self._asked.inputs.take(
+                    "center", path.poses, _Pose(self._asked.inputs.scene._control_layout, k)
+                )
                 values.move(obstacle, path)
 
 
@@ -108,12 +110,21 @@ class _Values:
     def by_time_points(self, gradient: Any) -> np.ndarray:
         return sum(gradient.of_controls(part) for part in self._slices[self._key])
 
+    def columns(self) -> list[np.ndarray]:
+        """Return the columns of the core's load parameters that have these numbers, once for each slice."""
+        return [np.arange(part.start, part.stop) for part in self._slices[self._key]]
+
 
 class _Pose:
     """The owner of an obstacle's poses as a leaf: gives their gradient at all time points."""
 
-    def __init__(self, number: int):
-        self._number = number
+    def __init__(self, layout: Any, number: int):
+        self._layout, self._number = layout, number
 
     def by_time_points(self, gradient: Any) -> np.ndarray:
         return gradient.control(f"obstacle {self._number}", "pose")
+
+    def columns(self) -> list[np.ndarray]:
+        """Return the columns of the core's load parameters that have these poses."""
+        entries = np.arange(self._layout.size)
+        return [self._layout.of(entries, f"obstacle {self._number}", "pose").ravel()]

@@ -155,6 +155,10 @@ def simulate(
     Trajectory as start; time_step if a function of the time leaves torch) raises NoGradient. So do second derivatives; the
     product of the Hessian with v is (g(x + h v) - g(x - h v)) / 2h.
 
+    Tangents (forward mode: torch.autograd.forward_ad, torch.func.jvp and jacfwd) follow a change of the inputs through the
+    stored stages: one factorization and four or eight evaluations of forces for each stage, half a motion to a whole one.
+    Steps of which only checkpoints are stored are repeated. By rest positions there are gradients, but no tangents.
+
     Gradients are exact where the motion is differentiable, which includes impact, stick and slip on smooth obstacles. It is
     not differentiable where a point touches a kink of an obstacle (Trajectory.nonsmooth_vertices), where a small change
     divides a step differently (Trajectory.substeps), and in water whose tables have kinks (Water.is_smooth). Gradients

@@ -1,0 +1,201 @@
+#include "magshell/adjoint/motion_derivatives.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace magshell {
+namespace {
+
+// [-] First step of differences along a motion, of the shortest edge. See test_tangents_of_motions_agree_with_gradients_in_every_kind.
+constexpr double first_fraction = 1.0 / 64.0;
+
+VectorXd numbers_of(const StrainSet& strains) {
+    std::vector<double> numbers;
+    for (const Strains& part : strains.of_terms)
+        for (Index element = 0; element < part.elements; ++element)
+            for (int i = 0; i < part.width; ++i) numbers.push_back(part.number(element, i));
+    return Eigen::Map<const VectorXd>(numbers.data(), static_cast<Index>(numbers.size()));
+}
+
+StrainSet strains_of(const VectorXd& numbers, StrainSet strains) {
+    Index at = 0;
+    for (Strains& part : strains.of_terms)
+        for (Index element = 0; element < part.elements; ++element)
+            for (int i = 0; i < part.width; ++i) part.set(element, i, numbers[at++]);
+    return strains;
+}
+
+}  // namespace
+
+VectorXd joined(std::initializer_list<VectorXd> parts) {
+    Index size = 0;
+    for (const VectorXd& part : parts) size += part.size();
+    VectorXd all(size);
+    Index at = 0;
+    for (const VectorXd& part : parts) {
+        all.segment(at, part.size()) = part;
+        at += part.size();
+    }
+    return all;
+}
+
+double largest(const VectorXd& of) {
+    return of.size() > 0 ? of.lpNorm<Eigen::Infinity>() : 0.0;
+}
+
+MotionDerivatives::MotionDerivatives(Model& model, const VectorXd& values, const MotionInputTangent& along)
+    : model_(model),
+      values_(values),
+      along_(along),
+      values_change_(!along.values.isZero(0.0)),
+      unit_(VectorXd::Ones(model.size())) {
+    unit_.tail(model.size() - model.n_coordinates()).setConstant(1.0 / along.length);
+}
+
+void MotionDerivatives::set(double t, const LoadParameters& load_parameters) {
+    if (values_change_) model_.parameters().set_values(values_at(t));
+    model_.parameters().set_time_varying(load_parameters);
+}
+
+VectorXd MotionDerivatives::values_at(double t) {
+    if (t == 0.0 || !along_.values_at) return values_ + t * along_.values;
+    const auto known = known_values_.find(t);
+    return known != known_values_.end() ? known->second : known_values_[t] = along_.values_at(t);
+}
+
+double MotionDerivatives::step_along(std::initializer_list<std::pair<double, double>> sizes_and_rates) const {
+    double step = along_.first_step;
+    for (const auto& [size, rate] : sizes_and_rates)
+        if (rate > 0.0 && size > 0.0) step = std::min(step, first_fraction * size / rate);
+    return step;
+}
+
+VectorXd MotionDerivatives::energy_gradient(const VectorXd& q, const LoadParameters& load_parameters,
+                                            const LoadParameters& tangent) {
+    if (!values_change_ && tangent.isZero(0.0)) return VectorXd::Zero(q.size());
+    const VectorXd found = energy_.of(
+        [&](double t) {
+            const LoadParameters there = load_parameters + t * tangent;
+            set(t, there);
+            model_.evaluate(q, there);
+            return VectorXd(unit_.cwiseProduct(model_.residual().gradient));
+        },
+        along_.first_step, 0.0, "the force on the start");
+    set(0.0, load_parameters);
+    model_.evaluate(q, load_parameters);
+    return found.cwiseQuotient(unit_);
+}
+
+StrainSet MotionDerivatives::strains(ViscousTerms& terms, const VectorXd& q, const VectorXd& motion,
+                                     const LoadParameters& load_parameters, const LoadParameters& tangent) {
+    StrainSet found = terms.rates(motion);
+    const Index varying = model_.parameters().time_varying().size();
+    if (!values_change_ && tangent.tail(varying).isZero(0.0)) return found;
+    const VectorXd by_inputs = strains_.of(
+        [&](double t) {
+            set(t, load_parameters + t * tangent);
+            return numbers_of(terms.strains(q));
+        },
+        along_.first_step, 1.0, "a strain");
+    set(0.0, load_parameters);
+    found.add(1.0, strains_of(by_inputs, terms.zeros()));
+    return found;
+}
+
+void MotionDerivatives::set_stage(const StageTangent& stage) {
+    model_.parameters().set_time_varying(stage.load_parameters);
+    model_.set_angle_branches(stage.angle_branches);
+    begin_step(stage, 0.0);
+}
+
+// Begins the step again, with the contact forces of its beginning, which have no factor.
+void MotionDerivatives::begin_step(const StageTangent& stage, double t) {
+    model_.contacts().set_factor(1.0);
+    model_.begin_step(stage.record.begin.q + t * stage.q_begin_tangent,
+                      stage.begin + t * stage.begin_tangent);
+    model_.contacts().set_factor(stage.contact_factor);
+}
+
+ForceTangent MotionDerivatives::forces(const StageTangent& stage, const VectorXd& q, bool with_contact) {
+    const Index size = q.size();
+    const bool moving = model_.capabilities().has_velocity_forces;
+    ForceTangent found{VectorXd::Zero(size), with_contact ? VectorXd::Zero(size) : VectorXd()};
+    if (!moving && !values_change_ && stage.tangent.isZero(0.0)) return found;
+    const auto forces = [&](double t) {
+        const LoadParameters there = stage.load_parameters + t * stage.tangent;
+        set(t, there);
+        model_.set_angle_branches(stage.angle_branches);
+        if (moving) begin_step(stage, t);
+        const VectorXd x_hat = stage.x_hat + t * stage.x_hat_tangent,
+                       v_hat = stage.v_hat + t * stage.v_hat_tangent;
+        const StageMotion motion{&x_hat, &v_hat, stage.T + t * stage.T_tangent};
+        model_.evaluate(q, there);
+        model_.evaluate_forces(q, there, motion);
+        const VectorXd gradient = unit_.cwiseProduct(model_.residual().gradient);
+        return with_contact ? joined({gradient, unit_.cwiseProduct(model_.contact_forces(q, there))})
+                            : gradient;
+    };
+    double step = along_.first_step;
+    if (moving)
+        step = step_along({{along_.length, largest(stage.q_begin_tangent)},
+                           {along_.length, largest(stage.x_hat_tangent)},
+                           {along_.length / stage.T, largest(stage.v_hat_tangent)},
+                           {stage.T, std::abs(stage.T_tangent)}});
+    const double cancelling = values_change_ ? largest(unit_.cwiseProduct(model_.cancelling_forces(q))) : 0.0;
+    const std::array<Index, 1> ends{size};
+    const VectorXd all =
+        forces_.of(forces, with_contact ? std::span<const Index>(ends) : std::span<const Index>(), step,
+                   std::array{cancelling, cancelling}, "a force");
+    found.gradient = all.head(size).cwiseQuotient(unit_);
+    if (with_contact) found.contact = all.tail(size).cwiseQuotient(unit_);
+    set(0.0, stage.load_parameters);
+    set_stage(stage);
+    return found;
+}
+
+PrescribedTangent MotionDerivatives::prescribed(const StageTangent& stage, const VectorXd& q,
+                                                const VectorXd& gradient) {
+    const DofMap& dof_map = model_.dof_map();
+    const bool changes = values_change_ || !stage.tangent.isZero(0.0);
+    if (!changes || !dof_map.has_values()) return {};
+    const bool joints = dof_map.has_reduced_coordinates() && values_change_;
+    const auto target = [&](double t) {
+        const LoadParameters there = stage.load_parameters + t * stage.tangent;
+        set(t, there);
+        VectorXd moved = q;
+        if (joints) dof_map.project_state(moved, nullptr);
+        const VectorXd driven = dof_map.prescribed_increment(moved, there);
+        if (!joints) return driven;
+        model_.linearize(moved);
+        return joined({moved, driven, dof_map.vector(gradient)});
+    };
+    const Index n = q.size();
+    const std::array<Index, 2> ends{n, 2 * n};
+    const VectorXd all =
+        prescribed_.of(target, joints ? std::span<const Index>(ends) : std::span<const Index>(),
+                       along_.first_step, std::array{model_.extent(), model_.extent(), largest(gradient)},
+                       "the place of a support, motor or joint");
+    set(0.0, stage.load_parameters);
+    model_.linearize(q);
+    if (!joints) return {VectorXd::Zero(n), all, {}};
+    return {all.head(n), all.segment(n, n), all.tail(all.size() - 2 * n)};
+}
+
+StrainSet MotionDerivatives::damper_rates(const MotionState& begin, const VectorXd& q_tangent,
+                                          const VectorXd& v_tangent, const LoadParameters& load_parameters,
+                                          const LoadParameters& tangent) {
+    const StrainSet zero = model_.dampers().zeros();
+    if (!model_.capabilities().has_own_viscosity) return zero;
+    const VectorXd found = dampers_.of(
+        [&](double t) {
+            set(t, load_parameters + t * tangent);
+            return numbers_of(model_.damper_rates(begin.q + t * q_tangent, begin.v + t * v_tangent));
+        },
+        step_along({{along_.length, largest(q_tangent)}, {largest(begin.v), largest(v_tangent)}}), 0.0,
+        "the rate of a joint");
+    set(0.0, load_parameters);
+    return strains_of(found, zero);
+}
+
+}  // namespace magshell

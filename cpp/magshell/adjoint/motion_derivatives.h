@@ -1,0 +1,79 @@
+// Derivatives of what a scene computes at a fixed state, along a direction of the inputs of a motion and of what a stage begins with.
+#pragma once
+
+#include <map>
+#include <utility>
+
+#include "magshell/adjoint/directional_derivative.h"
+#include "magshell/adjoint/motion_tangent.h"
+
+namespace magshell {
+
+/// A stage: where it is, and the derivatives of what it begins with.
+struct StageTangent {
+    const SubstepRecord& record;
+    const VectorXd &x_hat, &v_hat;
+    const VectorXd &x_hat_tangent, &v_hat_tangent;
+    const Model::AngleBranches& angle_branches;
+    double T, T_tangent;
+    double contact_factor;
+    LoadParameters load_parameters, tangent, begin, begin_tangent;
+    const VectorXd& q_begin_tangent;  // of the state at the beginning of the step
+};
+
+/// The derivatives of the forces at a fixed state, and of the contact forces among them.
+struct ForceTangent {
+    VectorXd gradient, contact;
+};
+
+/// The change of the state by what is prescribed, and of the reduced residual by moved joints; empty where there is none.
+struct PrescribedTangent {
+    VectorXd moved, driven, turned;
+    VectorXd all() const { return driven.size() > 0 ? VectorXd(moved + driven) : moved; }
+};
+
+class MotionDerivatives {
+  public:
+    /// values: of the scene, in the order of the caller.
+    MotionDerivatives(Model& model, const VectorXd& values, const MotionInputTangent& along);
+
+    bool values_change() const { return values_change_; }
+    /// Gives the scene its values, and those that vary in time, at a place along the direction.
+    void set(double t, const LoadParameters& load_parameters);
+    /// Sets the model to the conditions of a stage.
+    void set_stage(const StageTangent& stage);
+    /// Returns a step of differences over which the inputs change little, and so do numbers of these sizes at these rates.
+    double step_along(std::initializer_list<std::pair<double, double>> sizes_and_rates) const;
+
+    /// Return the derivatives at a fixed state q: of the gradient of the energy; of the forces of a stage.
+    VectorXd energy_gradient(const VectorXd& q, const LoadParameters& load_parameters,
+                             const LoadParameters& tangent);
+    ForceTangent forces(const StageTangent& stage, const VectorXd& q, bool with_contact);
+    /// Returns the derivative of the strains at q, the state evaluated last, along a motion and by the inputs.
+    StrainSet strains(ViscousTerms& terms, const VectorXd& q, const VectorXd& motion,
+                      const LoadParameters& load_parameters, const LoadParameters& tangent);
+    /// Returns that of the strain rates of joint dampers at the beginning of a step; tangents: of q and v there.
+    StrainSet damper_rates(const MotionState& begin, const VectorXd& q_tangent, const VectorXd& v_tangent,
+                           const LoadParameters& load_parameters, const LoadParameters& tangent);
+    /// Returns how supports, motors and joints move a state at which the model was evaluated last; gradient: of the stage there.
+    PrescribedTangent prescribed(const StageTangent& stage, const VectorXd& q, const VectorXd& gradient);
+
+  private:
+    VectorXd values_at(double t);
+    void begin_step(const StageTangent& stage, double t);
+
+    Model& model_;
+    const VectorXd& values_;
+    const MotionInputTangent& along_;
+    const bool values_change_;
+    VectorXd unit_;                            // of forces on all dofs: moments count over the shortest edge
+    std::map<double, VectorXd> known_values_;  // by their place along the direction
+    DirectionalDerivative forces_, energy_, strains_, prescribed_, dampers_;
+};
+
+/// Returns vectors one after another.
+VectorXd joined(std::initializer_list<VectorXd> parts);
+/// Returns the largest magnitude of the entries; 0 if there are none.
+double largest(const VectorXd& of);
+
+}  // namespace magshell

@@ -1,0 +1,494 @@
+#include "magshell/adjoint/motion_tangent.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "magshell/adjoint/motion_derivatives.h"
+#include "magshell/adjoint/viscous_tangent.h"
+#include "magshell/core/errors.h"
+#include "magshell/solve/motion/edge_rotations.h"
+#include "magshell/solve/motion/motor_reactions.h"
+#include "magshell/solve/newton/unsymmetric.h"
+
+namespace magshell {
+namespace {
+
+// RAII guard that gives the scene its values again.
+class ScopedValues {
+  public:
+    ScopedValues(ModelParameters& parameters, const VectorXd& values)
+        : parameters_(parameters), values_(values) {}
+    ScopedValues(const ScopedValues&) = delete;
+    ScopedValues& operator=(const ScopedValues&) = delete;
+    ~ScopedValues() { parameters_.set_values(values_); }
+
+  private:
+    ModelParameters& parameters_;
+    const VectorXd& values_;
+};
+
+class Forward {
+  public:
+    Forward(Newton& newton, const MotionInput& input, const MotionResult& motion, const VectorXd& values,
+            const MotionInputTangent& along)
+        : newton_(newton),
+          model_(newton.model()),
+          input_(input),
+          motion_(motion),
+          along_(along),
+          stepper_(newton, input.tableau, input.inertia, input.viscosity, input.projective),
+          derivatives_(model_, values, along) {}
+
+    MotionTangent run() {
+        begin();
+        record(0, {});
+        const Index stored = motion_.steps_done - static_cast<Index>(motion_.steps.size());
+        MotionState state = motion_.start;
+        for (Index step = 0; step < motion_.steps_done; ++step) {
+            progress_ = static_cast<double>(step) / static_cast<double>(motion_.steps_done);
+            const Substeps substeps = substeps_of(motion_.substeps, step);
+            std::vector<SubstepRecord> repeated;
+            if (step < stored) repeat_step(stepper_, input_, step, substeps, state, &repeated);
+            const std::vector<SubstepRecord>& records =
+                step < stored ? repeated : motion_.steps[step - stored];
+            const bool recorded = input_.recorded_after(step + 1) >= 0;
+            VectorXd motor_forces;
+            for (std::size_t k = 0; k < substeps.size(); ++k)
+                motor_forces = take(step, substeps[k], records[k], recorded && k + 1 == substeps.size());
+            record(step + 1, std::move(motor_forces));
+        }
+        return {std::move(states_), newton_.factorizations()};
+    }
+
+    double progress() const { return progress_; }
+
+  private:
+    LoadParameters load_tangent(Index step, double fraction) const {
+        const auto [first, weight] = input_.between(step, fraction);
+        return interpolate(along_.load_parameters[first], along_.load_parameters[first + 1], weight);
+    }
+
+    void record(Index steps, VectorXd motor_forces) {
+        if (input_.recorded_after(steps) < 0) return;
+        if (motor_forces.size() == 0) motor_forces = VectorXd::Zero(motion_.last.motor_forces.size());
+        states_.push_back({now_.q, now_.v, std::move(motor_forces)});
+    }
+
+    // The tangent of the start: it is made consistent, edge rotations are in equilibrium, Maxwell branches are without stress.
+    void begin() {
+        const DofMap& dof_map = model_.dof_map();
+        const VectorXd &q = motion_.start.q, &v = motion_.start.v;
+        const LoadParameters load_parameters = input_.load_parameters_at(0, 0.0),
+                             tangent = load_tangent(0, 0.0);
+        now_.q = along_.positions;
+        now_.v = along_.velocities;
+        if (dof_map.has_reduced_coordinates() &&
+            (derivatives_.values_change() || !now_.q.isZero(0.0) || !now_.v.isZero(0.0))) {
+            const Index n = q.size();
+            const auto made_consistent = [&](double t) {
+                derivatives_.set(t, load_parameters);
+                VectorXd moved = q + t * along_.positions, moving = v + t * along_.velocities;
+                dof_map.project_state(moved, &moving);
+                return joined({moved, moving});
+            };
+            const std::array<Index, 1> ends{n};
+            const VectorXd both = at_start_.of(
+                made_consistent, ends,
+                derivatives_.step_along({{along_.length, largest(now_.q)}, {largest(v), largest(now_.v)}}),
+                std::array{model_.extent(), largest(v)}, "the start");
+            derivatives_.set(0.0, load_parameters);
+            // Nodes that follow vertices are part of what is made consistent; edge rotations and supported nodes stay.
+            now_.q = both.head(n);
+            now_.v = both.tail(n);
+        }
+        model_.set_angle_branches(input_.start.angle_branches);
+        derivatives_.set(0.0, load_parameters);
+        if (!input_.rotations_given) {
+            const EdgeRotationEquilibrium rotations(model_, q, load_parameters);
+            VectorXd forces(q.size());
+            model_.multiply(now_.q, forces);
+            now_.q += rotations.adjoint(forces + derivatives_.energy_gradient(q, load_parameters, tangent));
+        }
+        const bool branches = input_.viscosity.maxwell(), explicit_first = input_.tableau.begins_explicitly;
+        if (branches && input_.start.e.empty()) {
+            model_.evaluate(q, load_parameters);
+            now_.e.assign(input_.viscosity.branches.size(),
+                          derivatives_.strains(model_.elastic(), q, now_.q, load_parameters, tangent));
+        } else if (branches) {
+            now_.e.assign(input_.viscosity.branches.size(), model_.elastic().zeros());
+        }
+        if (!explicit_first) return;
+        now_.rates.w = VectorXd::Zero(q.size());
+        if (motion_.start.rates.c.size() > 0) now_.rates.c = VectorXd::Zero(q.size());
+        now_.rates.elastic.d = model_.elastic().zeros();
+        now_.rates.elastic.e.assign(input_.viscosity.branches.size(), model_.elastic().zeros());
+    }
+
+    FreeFlight flight_at(double t, const Tableau& tableau, double dt, double dt_tangent,
+                         const MotionState& begin, std::vector<FreeBody>& bodies) const {
+        bodies = free_bodies(model_.dof_map(), input_.inertia.mass + t * along_.mass);
+        return FreeFlight(bodies, tableau, dt + t * dt_tangent, begin.q + t * now_.q, begin.v + t * now_.v);
+    }
+
+    double step_of_flight(double dt, double dt_tangent, const MotionState& begin) const {
+        return derivatives_.step_along({{along_.length, largest(now_.q)},
+                                        {largest(begin.v), largest(now_.v)},
+                                        {dt, std::abs(dt_tangent)}});
+    }
+
+    // Returns the derivatives of what free flight adds to the predictions of all stages.
+    VectorXd flight_tangent(const StepAlgebra& algebra, double dt_tangent, const MotionState& begin) {
+        const int n = algebra.tableau().stages;
+        const Index size = model_.size();
+        std::vector<Index> ends;
+        for (int k = 1; k < 2 * n; ++k) ends.push_back(k * size);
+        const std::vector<double> noise(2 * n, model_.extent() + largest(begin.v));
+        return flights_.of(
+            [&](double t) {
+                std::vector<FreeBody> bodies;
+                const FreeFlight flight =
+                    flight_at(t, algebra.tableau(), algebra.dt(), dt_tangent, begin, bodies);
+                VectorXd added(2 * n * size);
+                for (int i = 0; i < n; ++i) {
+                    VectorXd x = VectorXd::Zero(size), v = x;
+                    flight.add_defect(i, x, v);
+                    added.segment(2 * i * size, size) = x;
+                    added.segment((2 * i + 1) * size, size) = v;
+                }
+                return added;
+            },
+            ends, step_of_flight(algebra.dt(), dt_tangent, begin), noise, "a free flight");
+    }
+
+    // Continues the rates at the end of a step to those after FreeFlight::finish.
+    void finish_flight(const StepAlgebra& algebra, double dt_tangent, const MotionState& begin,
+                       const VectorXd& q, const StageRates& last, StageRates& tangent,
+                       const VectorXd& q_tangent) {
+        const Index size = model_.size();
+        const std::array<Index, 1> ends{size};
+        const VectorXd both = landings_.of(
+            [&](double t) {
+                std::vector<FreeBody> bodies;
+                const FreeFlight flight =
+                    flight_at(t, algebra.tableau(), algebra.dt(), dt_tangent, begin, bodies);
+                StageRates rates;
+                rates.v = last.v + t * tangent.v;
+                rates.w = last.w + t * tangent.w;
+                flight.finish(q + t * q_tangent, rates);
+                return joined({rates.v, rates.w});
+            },
+            ends, step_of_flight(algebra.dt(), dt_tangent, begin),
+            std::array{largest(last.v), largest(last.v) / algebra.dt()}, "the end of a free flight");
+        tangent.v = both.head(size);
+        tangent.w = both.tail(size);
+    }
+
+    // Returns (H + W) times a change of the state evaluated last.
+    VectorXd product(const VectorXd& change, const VectorXd& weights) const {
+        VectorXd forces(change.size());
+        model_.multiply(change, forces);
+        model_.nonsymmetric_tangent().add_product(change, false, forces);
+        return forces + weights.cwiseProduct(change);
+    }
+
+    // Returns the change of the state that cancels a change of the residual of a stage, while what is prescribed changes; and that
+    // change of the residual. The model was evaluated last at q.
+    VectorXd solve(const VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
+                   const PrescribedTangent& change, VectorXd residual, const Factor* nearby) {
+        newton_.watch(0.0);
+        const DofMap& dof_map = model_.dof_map();
+        VectorXd all = change.all();
+        if (all.size() == 0) all = VectorXd::Zero(q.size());
+        if (!all.isZero(0.0)) {
+            model_.assemble(q, load_parameters, false);
+            model_.assemble_forces(load_parameters);
+            VectorXd pull = product(all, *proximal.weights);
+            if (change.driven.size() > 0)
+                dof_map.add_motor_increment_forces(newton_.gradient(q, proximal), change.driven, pull);
+            residual += pull;
+        }
+        VectorXd reduced = -dof_map.vector(residual);
+        if (change.turned.size() > 0) reduced -= change.turned;
+        if (reduced.isZero(0.0)) return all;
+        const bool symmetric =
+            !model_.capabilities().has_unsymmetric_tangent && !model_.capabilities().has_velocity_forces;
+        if (nearby && symmetric && change.turned.size() == 0) {
+            VectorXd solution = -residual;
+            if (newton_.solve_gmres_adjoint(q, load_parameters, proximal, *nearby, solution).converged)
+                return all + solution;
+        }
+        Eigen::MatrixXd no_moves(q.size(), 0);
+        const FactorReport factor = newton_.factorize(q, load_parameters, false, proximal, no_moves);
+        if (!factor.succeeded)
+            throw InvalidInput("the tangent of a time step cannot be computed: " + factor.reason);
+        if (newton_.is_unsymmetric()) {
+            const GmresReport report =
+                solve_unsymmetric(model_, *newton_.factor(), false, to_round_off, reduced);
+            if (!report.converged)
+                throw InvalidInput(
+                    "a linear solve of the tangent of a time step did not converge: its relative residual "
+                    "is " +
+                    std::to_string(report.residual));
+        } else {
+            newton_.factor()->solve_approximately(reduced, to_round_off.tolerance);
+        }
+        return all + dof_map.expand(reduced);
+    }
+
+    // Returns the derivative of M (v - v^)/T + Gamma v at a fixed state q, with v = (q - x^)/T. rates: v, and w = (v - v^)/T.
+    VectorXd inertia_tangent(const StageTangent& stage, const VectorXd& v, const VectorXd& w) const {
+        const Inertia& inertia = input_.inertia;
+        const VectorXd v_tangent = -(stage.x_hat_tangent + stage.T_tangent * v) / stage.T;
+        const VectorXd w_tangent = (v_tangent - stage.v_hat_tangent - stage.T_tangent * w) / stage.T;
+        return along_.mass.cwiseProduct(w) + inertia.mass.cwiseProduct(w_tangent) +
+               along_.damping.cwiseProduct(v) + inertia.damping.cwiseProduct(v_tangent);
+    }
+
+    // Returns the derivative of the acceleration by contact, c = J (J^T M J)^-1 J^T f, of a stage that moves by q_tangent.
+    VectorXd contact_tangent(const StageTangent& stage, const VectorXd& q, const VectorXd& q_tangent,
+                             const VectorXd& by_inputs, const VectorXd& c) {
+        const DofMap& dof_map = model_.dof_map();
+        const VectorXd& mass = input_.inertia.mass;
+        const VectorXd force = model_.contact_forces(q, stage.load_parameters) / stage.contact_factor;
+        model_.multiply_contact_transposed(q, stage.load_parameters, q_tangent);  // assembles contact alone
+        const VectorXd pull = product(q_tangent, VectorXd::Zero(q.size()));
+        const VectorXd force_tangent = (by_inputs - pull) / stage.contact_factor;
+        VectorXd found = dof_map.acceleration(mass, force_tangent - along_.mass.cwiseProduct(c));
+        if (!dof_map.has_reduced_coordinates()) return found;
+        found += turns_.of(
+            [&](double t) {
+                derivatives_.set(t, stage.load_parameters + t * stage.tangent);
+                model_.linearize(q + t * q_tangent);
+                return dof_map.acceleration(mass, force);
+            },
+            derivatives_.step_along({{along_.length, largest(q_tangent)}}), 0.0,
+            "the acceleration by contact");
+        derivatives_.set(0.0, stage.load_parameters);
+        model_.linearize(q);
+        return found;
+    }
+
+    // Continues the tangent through a substep. Returns that of the motor forces at its end, if it is wanted.
+    VectorXd take(Index step, const Substep& part, const SubstepRecord& record, bool wants_motor_forces) {
+        const double fraction = part.fraction(), dt_tangent = fraction * along_.time_steps[step];
+        const StepAlgebra algebra = stepper_.algebra(fraction * input_.time_steps[step],
+                                                     stepper_.tableau_from(record.begin, part.dissipative));
+        const Tableau& tableau = algebra.tableau();
+        const int n = tableau.stages, first = tableau.begins_explicitly ? 1 : 0;
+        const double dt = algebra.dt(), T = algebra.stage_time(), T_tangent = tableau.diagonal * dt_tangent;
+        const Index size = model_.size(), coordinates = model_.n_coordinates();
+        const ScopedStrainHistory elastic_afterwards(model_);
+        const ScopedContactFactor usual_contact_afterwards(model_);
+        const LoadParameters begin = input_.load_parameters_at(step, part.begin),
+                             begin_tangent = load_tangent(step, part.begin);
+        derivatives_.set(0.0, begin);
+        model_.set_angle_branches(record.begin.angle_branches);
+        const StepRates at(model_, algebra, stepper_.free_bodies(), record);
+        const VectorXd flight =
+            at.flight.any() ? flight_tangent(algebra, dt_tangent, record.begin) : VectorXd();
+
+        std::vector<StageRates> tangents;
+        if (first) {
+            tangents.push_back(now_.rates);
+            tangents.front().v = now_.v;
+            tangents.front().joints.d =
+                derivatives_.damper_rates(record.begin, now_.q, now_.v, begin, begin_tangent);
+        }
+        ViscousTangent strains(model_.elastic(), input_.viscosity, along_.viscosity, &StageRates::elastic),
+            joints(model_.dampers(), damper_law, no_change_, &StageRates::joints);
+        model_.evaluate(record.begin.q, begin);
+        if (!strains.idle())
+            strains.begin(
+                algebra, dt_tangent, model_.elastic().strains(record.begin.q),
+                derivatives_.strains(model_.elastic(), record.begin.q, now_.q, begin, begin_tangent),
+                record.begin.e, now_.e, first ? &at.all.front() : nullptr,
+                first ? &tangents.front() : nullptr);
+        if (!joints.idle())
+            joints.begin(algebra, dt_tangent, model_.dampers().strains(record.begin.q),
+                         derivatives_.strains(model_.dampers(), record.begin.q, now_.q, begin, begin_tangent),
+                         {}, {}, first ? &at.all.front() : nullptr, first ? &tangents.front() : nullptr);
+
+        VectorXd q_tangent, motor_forces;
+        for (int i = 0; i < n; ++i) {
+            VectorXd x_hat_tangent = now_.q, v_hat_tangent = now_.v;
+            for (std::size_t j = 0; j < tangents.size(); ++j) {
+                const double a = tableau.a[i][j];
+                x_hat_tangent += a * (dt * tangents[j].v + dt_tangent * at.all[j].v);
+                v_hat_tangent += a * (dt * tangents[j].w + dt_tangent * at.all[j].w);
+            }
+            if (flight.size() > 0) {
+                x_hat_tangent += flight.segment(2 * i * size, size);
+                v_hat_tangent += flight.segment((2 * i + 1) * size, size);
+            }
+            // Dofs without velocity are not predicted.
+            VectorXd from_vertices = VectorXd::Zero(size);
+            from_vertices.head(coordinates) = x_hat_tangent.head(coordinates);
+            const double place = part.begin + tableau.time(i) * fraction;
+            const StageTangent stage{record,
+                                     at.x_hat[i],
+                                     at.v_hat[i],
+                                     from_vertices,
+                                     v_hat_tangent,
+                                     record.stages[i].angle_branches,
+                                     T,
+                                     T_tangent,
+                                     tableau.contact_factor(i),
+                                     input_.load_parameters_at(step, place),
+                                     load_tangent(step, place),
+                                     begin,
+                                     begin_tangent,
+                                     now_.q};
+            const VectorXd& q = record.stages[i].q;
+            const VectorXd& v = at.all[first + i].v;
+            const VectorXd w = algebra.stage_acceleration(at.all[first + i], at.v_hat[i]);
+            const VectorXd target = algebra.target(at.x_hat[i], at.v_hat[i]);
+            const StageMotion motion{&at.x_hat[i], &at.v_hat[i], T};
+            const ProximalTerm proximal{&algebra.weights(), &target, &motion};
+            derivatives_.set_stage(stage);
+            strains.set_history(i);
+            joints.set_history(i);
+            const ForceTangent forces = derivatives_.forces(stage, q, tableau.implicit_contact);
+            newton_.evaluate(q, stage.load_parameters, proximal);
+            const VectorXd residual = forces.gradient + inertia_tangent(stage, v, w) +
+                                      strains.forces(q, size) + joints.forces(q, size);
+            const PrescribedTangent change = derivatives_.prescribed(stage, q, newton_.gradient(q, proximal));
+            q_tangent =
+                solve(q, stage.load_parameters, proximal, change, residual, record.stages[i].factor.get());
+            StageRates& now = tangents.emplace_back();
+            now.v = VectorXd::Zero(size);
+            now.v.head(coordinates) = (q_tangent - x_hat_tangent - T_tangent * v).head(coordinates) / T;
+            now.w = (now.v - v_hat_tangent - T_tangent * w) / T;
+            if (tableau.implicit_contact) {
+                now.c = contact_tangent(stage, q, q_tangent, forces.contact, record.stages[i].contact);
+                now.w -= stage.contact_factor * now.c;
+            }
+            if (!strains.idle())
+                strains.finish(model_.elastic().strains(q),
+                               derivatives_.strains(model_.elastic(), q, q_tangent, stage.load_parameters,
+                                                    stage.tangent));
+            if (!joints.idle())
+                joints.finish(model_.dampers().strains(q),
+                              derivatives_.strains(model_.dampers(), q, q_tangent, stage.load_parameters,
+                                                   stage.tangent));
+            if (i + 1 == n && wants_motor_forces && model_.dof_map().has_motors())
+                motor_forces = motor_tangent(algebra, at, stage, q, proximal, v_hat_tangent, now, dt_tangent,
+                                             strains, joints);
+        }
+        StageRates last = std::move(tangents.back());
+        if (at.flight.any())
+            finish_flight(algebra, dt_tangent, record.begin, record.stages.back().q, at.all.back(), last,
+                          q_tangent);
+        if (model_.dof_map().has_motors()) {
+            v_before_ = now_.v;
+            dt_before_tangent_ = dt_tangent;
+        }
+        now_.q = std::move(q_tangent);
+        now_.v = last.v;
+        if (!strains.idle()) {
+            now_.e = strains.e_tangent();
+            last.elastic = strains.rates_tangent();
+        }
+        now_.rates = std::move(last);
+        return motor_forces;
+    }
+
+    // Returns the tangent of the motor forces at the end of a substep (solve/motion/motor_reactions.h).
+    VectorXd motor_tangent(const StepAlgebra& algebra, const StepRates& at, const StageTangent& last,
+                           const VectorXd& q_last, const ProximalTerm& there, const VectorXd& v_hat_tangent,
+                           const StageRates& rates_tangent, double dt_tangent, const ViscousTangent& strains,
+                           const ViscousTangent& joints) {
+        const DofMap& dof_map = model_.dof_map();
+        const Index coordinates = model_.n_coordinates();
+        StageTangent stage = last;
+        stage.contact_factor = 1.0;
+        const MotionState& begin = stage.record.begin;
+        derivatives_.set_stage(stage);
+        const VectorXd& v_hat = stage.v_hat;
+        const MotorReactions end(newton_, input_.inertia, begin, algebra, q_last, stage.load_parameters,
+                                 there, v_hat, at.all.back());
+        if (!end.converged())
+            throw InvalidInput(
+                "the motor forces have no tangent in a step in which they could not be computed (NaN)");
+        const ProximalTerm proximal = end.proximal();
+        const VectorXd& q = end.q();
+        const ForceTangent forces = derivatives_.forces(stage, q, false);
+        newton_.evaluate(q, stage.load_parameters, proximal);
+        VectorXd v = VectorXd::Zero(q.size());
+        v.head(coordinates) = (q - stage.x_hat).head(coordinates) / stage.T;
+        VectorXd residual = forces.gradient + inertia_tangent(stage, v, (v - v_hat) / stage.T) +
+                            strains.forces(q, q.size()) + joints.forces(q, q.size());
+        if (end.acceleration_change().size() > 0) {
+            residual += along_.mass.cwiseProduct(end.acceleration_change());
+            VectorXd change = VectorXd::Zero(q.size());
+            if (end.is_first_step()) {
+                change = end.contact_weight() * rates_tangent.c;
+            } else {
+                // The acceleration is of degree -1 in the lengths of this substep and the one before.
+                const VectorXd w = algebra.stage_acceleration(at.all.back(), v_hat);
+                const VectorXd by_dt =
+                    -(end.acceleration_change() + w + begin.dt_before * end.change_by_dt_before()) /
+                    algebra.dt();
+                change = end.weight_last() * rates_tangent.v + end.weight_begin() * now_.v +
+                         end.weight_before() * v_before_ + dt_tangent * by_dt +
+                         dt_before_tangent_ * end.change_by_dt_before() -
+                         (rates_tangent.v - v_hat_tangent - stage.T_tangent * w) / stage.T;
+            }
+            residual += input_.inertia.mass.cwiseProduct(change);
+        }
+        const VectorXd gradient = newton_.gradient(q, proximal);
+        const PrescribedTangent change = derivatives_.prescribed(stage, q, gradient);
+        const VectorXd q_tangent = solve(q, stage.load_parameters, proximal, change, residual, nullptr);
+        // Assembles again, because the factorization has rotated the blocks of rotated nodes.
+        newton_.evaluate(q, stage.load_parameters, proximal);
+        model_.assemble(q, stage.load_parameters, false);
+        model_.assemble_forces(stage.load_parameters);
+        VectorXd found = dof_map.motor_forces(residual + product(q_tangent, *proximal.weights));
+        found += motors_.of(
+            [&](double t) {
+                derivatives_.set(t, stage.load_parameters + t * stage.tangent);
+                model_.linearize(q + t * q_tangent);
+                return dof_map.motor_forces(gradient);
+            },
+            derivatives_.step_along({{along_.length, largest(q_tangent)}}), 0.0, "the force of a motor");
+        derivatives_.set(0.0, stage.load_parameters);
+        model_.linearize(q);
+        return found;
+    }
+
+    Newton& newton_;
+    Model& model_;
+    const MotionInput& input_;
+    const MotionResult& motion_;
+    const MotionInputTangent& along_;
+    Stepper stepper_;
+    MotionDerivatives derivatives_;
+    const Viscosity no_change_{0.0, {}, 0.0};
+    MotionState now_;    // the tangent of the present state
+    VectorXd v_before_;  // as MotionState::v_before
+    double dt_before_tangent_ = 0.0;
+    std::vector<MotionTangent::State> states_;
+    DirectionalDerivative at_start_, flights_, landings_, turns_, motors_;
+    double progress_ = 0.0;
+};
+
+}  // namespace
+
+MotionTangent motion_jvp(Model& model, const MotionInput& input, const MotionResult& motion,
+                         const VectorXd& values, const MotionInputTangent& along, const MotionWatch& watch) {
+    if (motion.keep == AdjointStorage::nothing)
+        throw InvalidInput("the motion has no stored states: it was computed without gradients");
+    const ScopedValues values_afterwards(model.parameters(), values);
+    const ScopedTimeVarying varying(model.parameters(), input.varying);
+    const Forward* running = nullptr;
+    Newton newton(model, input.newton, [&](double residual) {
+        if (watch) watch(running ? running->progress() : 0.0, residual);
+    });
+    Forward forward(newton, input, motion, values, along);
+    running = &forward;
+    return forward.run();
+}
+
+}  // namespace magshell

@@ -1,0 +1,47 @@
+// The tangent of a motion: the derivative of its states along one direction of its inputs, forwards through its stages. In the notation of
+// solve/motion/stepper.h, with d for derivatives along the direction:
+//
+//   dx^_i = dx + d(dt sum a_ij v_j),  dv^_i = dv + d(dt sum a_ij w_j)
+//   (W + H) dx_i = - (r + (H + W) dx_h)
+//       r: change of the residual of the stage at the fixed x_i, by x^_i, v^_i, masses, forces and strain history
+//       dx_h: of what supports and motors prescribe
+//   dv_i = d((x_i - x^_i)/(a dt)),  dw_i = d((v_i - v^_i)/(a dt))
+//
+// The change of the forces by the inputs is a central difference along the direction (directional_derivative.h), so that it costs the same
+// for any number of inputs; inertia and strain history are differentiated exactly. One factorization and one back-substitution a stage.
+#pragma once
+
+#include "magshell/solve/motion/dynamics.h"
+
+namespace magshell {
+
+/// The derivatives of all inputs of a motion along one direction.
+struct MotionInputTangent {
+    VectorXd values;  // of the scene, in the order of the caller
+    /// Returns all values at a place along the direction, if they are no linear function of it; throws InvalidInput beyond their range.
+    std::function<VectorXd(double)> values_at;
+    std::vector<LoadParameters> load_parameters;  // as MotionInput::load_parameters
+    VectorXd positions, velocities;               // at the start, of all dofs
+    VectorXd mass, damping;                       // of all dofs
+    std::vector<double> time_steps;               // one number a step
+    Viscosity viscosity;                          // of the same branches
+    double first_step = 1.0;  // along the direction, over which values change by a small part of themselves
+    double length = 1.0;      // [m] of the shortest edge
+};
+
+/// The tangents of the recorded states.
+struct MotionTangent {
+    struct State {
+        VectorXd q, v, motor_forces;
+    };
+    std::vector<State> states;
+    int factorizations = 0;  // including those of repeated steps
+};
+
+/// Returns the tangents of all recorded states. values: of the scene, in the order of the caller, as the motion was computed with.
+/// Throws InvalidInput if the motion was not stored for gradients, and where forces are not smooth.
+MotionTangent motion_jvp(Model& model, const MotionInput& input, const MotionResult& motion,
+                         const VectorXd& values, const MotionInputTangent& along,
+                         const MotionWatch& watch = {});
+
+}  // namespace magshell

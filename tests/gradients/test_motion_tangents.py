@@ -1,0 +1,186 @@
+"""Tangents of motions: against gradients in every kind of scene, and the transforms of torch that use them."""
+
+import numpy as np
+import pytest
+from gradient_kinds import MAKERS, kind
+from gradient_scenes import admissible, label
+
+import magshell as ms
+
+torch = pytest.importorskip("torch")
+
+from torch.autograd import forward_ad  # noqa: E402
+
+LARGE, FAST = 1e-3, 1e-1  # m and m/s, of meshes of 0.1 m
+IN_MOTION = [name for name in MAKERS if kind(name).function is ms.simulate]
+PRECISION, ROUNDING = 1e-9, 1e-13  # of the tangent, and of the result itself
+# Kinds in which every input is tried alone, too, so that large tangents by others do not hide its own.
+ALONE = (
+    "in motion, tr_bdf2",
+    "sheets rubbing late, contact implicit",
+    "in motion, with rigid parts, tr_bdf2",
+)
+EXACT = ms.MixedNewton(tolerance=1e-13)
+MESH = ms.meshes.rectangle(0.04, 0.01, cells=(6, 2))
+SHEET = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, mass_density=2e3)
+SCENE = ms.Scene(
+    SHEET, supports=[ms.Clamp(MESH.edges_at(x=0.0))], field=ms.UniformField(), gravity=(0, 0, -9.81)
+)
+TIP = MESH.vertices_at(x=0.04)
+START = torch.tensor([1.0, 0.8, 1.2], dtype=torch.float64)
+ALONG = torch.tensor([0.3, -0.5, 0.2], dtype=torch.float64)
+
+
+def heights(x, scene=SCENE, steps=4, **options):
+    """Return two coordinates of the tip in mm after a motion with (thickness [mm], strength [30 kA/m], step [ms])."""
+    motion = ms.simulate(
+        scene,
+        steps=steps,
+        time_step=1e-3 * x[2],
+        thickness=1e-3 * x[0],
+        remanent_magnetization=torch.stack([30e3 * x[1], 0 * x[1], 0 * x[1]]),
+        applied_flux_density=(0, 0, 5e-3),
+        solver=EXACT,
+        progress=False,
+        **options,
+    )
+    return 1e3 * motion.positions[-1, TIP][0, [0, 2]]
+
+
+def jacobian(x, **options):
+    x = x.clone().requires_grad_()
+    rows = [torch.autograd.grad(each, x, retain_graph=True)[0] for each in heights(x, **options)]
+    return torch.stack(rows)
+
+
+def results_of(found):
+    """Return all results with derivatives, in sizes of about one."""
+    yield torch.as_tensor(found.positions) / LARGE
+    yield torch.as_tensor(found.edge_rotations)
+    yield torch.as_tensor(found.velocities) / FAST
+    if torch.as_tensor(found._driving).numel():
+        forces = torch.as_tensor(found._driving)[1:]  # none at the start
+        yield forces / forces.detach().abs().max()
+    if found._own_points is not None:
+        yield torch.as_tensor(found._own_points) / LARGE
+        yield torch.as_tensor(found._own_velocities) / FAST
+
+
+def direction(name, key, value, rng):
+    size = kind(name).reach.get(key[1], np.abs(value).max(initial=0.0) or 1.0)
+    return torch.as_tensor(np.asarray(size * admissible(key, rng.standard_normal(value.shape))))
+
+
+@pytest.mark.parametrize("name", IN_MOTION)
+@pytest.mark.filterwarnings("ignore::magshell.FieldSamplingWarning", "ignore::magshell.StepErrorWarning")
+def test_tangents_of_motions_agree_with_gradients_in_every_kind(name):
+    rng = np.random.default_rng(len(name))
+    together = {key: value for key, value in kind(name).together.items() if key[1] != "rest_positions"}
+    alone = [{key: value} for key, value in kind(name).entries.items() if key[1] != "rest_positions"]
+    for given in (*(alone if name in ALONE else ()), together):
+        tensors = {key: torch.tensor(value, requires_grad=True) for key, value in given.items()}
+        results = [each for each in results_of(kind(name).found(tensors)) if each.requires_grad]
+        inputs = list(tensors.values())
+        zeros = [torch.zeros_like(each, requires_grad=True) for each in results]
+        transposed = torch.autograd.grad(results, inputs, zeros, create_graph=True)
+        along = [direction(name, key, value, rng) for key, value in given.items()]
+        tangents = torch.autograd.grad(transposed, zeros, along)
+        weights = [torch.as_tensor(rng.standard_normal(each.shape)) for each in results]
+        gradients = torch.autograd.grad(results, inputs, weights)
+        forward = sum(float((w * t).sum()) for w, t in zip(weights, tangents, strict=True))
+        backward = sum(float((g * d).sum()) for g, d in zip(gradients, along, strict=True))
+        size = sum(float(w.norm() * t.norm()) for w, t in zip(weights, tangents, strict=True))
+        rounding = ROUNDING * sum(
+            float(w.norm() * r.detach().norm()) for w, r in zip(weights, results, strict=True)
+        )
+        told = ", ".join(label(kind(name), key) for key in given)
+        assert forward == pytest.approx(backward, rel=0.0, abs=PRECISION * size + rounding), told
+
+
+@pytest.mark.parametrize("storage", ["checkpoints", "stages", "factors"])
+def test_tangents_of_motions_do_not_depend_on_what_is_stored(storage):
+    _, tangent = torch.func.jvp(lambda x: heights(x, adjoint_storage=storage), (START,), (ALONG,))
+    torch.testing.assert_close(tangent, jacobian(START) @ ALONG, rtol=1e-9, atol=0.0)
+
+
+@pytest.mark.parametrize(
+    "integrator",
+    [ms.ImplicitEuler(), ms.TRBDF2(), ms.SDIRK2(), ms.SDIRK3()],
+    ids=lambda each: type(each).__name__,
+)
+def test_tangents_of_motions_agree_with_differences(integrator):
+    with forward_ad.dual_level():
+        dual = forward_ad.make_dual(START, ALONG)
+        tangent = forward_ad.unpack_dual(heights(dual, integrator=integrator)).tangent
+    step = 1e-3
+    by = [heights(START + n * step * ALONG, integrator=integrator) for n in (1, -1, 2, -2)]
+    slope = (8 * (by[0] - by[1]) - (by[2] - by[3])) / (12 * step)
+    torch.testing.assert_close(tangent, slope, rtol=1e-6, atol=1e-9)
+
+
+def test_tangents_of_chosen_steps_agree_with_gradients():
+    def tip(x):
+        steps = ms.Adaptive(2e-3, tolerance=1e-5)
+        motion = ms.simulate(
+            SCENE,
+            steps=4,
+            time_step=steps,
+            young_modulus=1e6 * x,
+            remanent_magnetization=(3e4, 0, 0),
+            applied_flux_density=(0, 0, 5e-3),
+            solver=EXACT,
+            progress=False,
+        )
+        return motion.positions[-1, TIP, 2]
+
+    x = torch.tensor(1.0, dtype=torch.float64)
+    torch.testing.assert_close(torch.func.jacfwd(tip)(x), torch.func.jacrev(tip)(x), rtol=1e-9, atol=0.0)
+
+
+def test_jacobians_of_motions_agree_in_both_modes():
+    torch.testing.assert_close(torch.func.jacfwd(heights)(START), jacobian(START), rtol=1e-9, atol=0.0)
+    torch.testing.assert_close(torch.func.jacrev(heights)(START), jacobian(START), rtol=1e-12, atol=0.0)
+
+
+def test_gradcheck_of_a_motion_passes_in_both_modes():
+    x = START.clone().requires_grad_()
+    assert torch.autograd.gradcheck(heights, x, eps=1e-5, rtol=1e-5, atol=1e-6, check_forward_ad=True)
+
+
+def test_a_tangent_motion_takes_one_factorization_a_stage(caplog):
+    def motion(x):
+        return ms.simulate(
+            SCENE,
+            steps=5,
+            time_step=1e-3,
+            integrator=ms.ImplicitEuler(),
+            young_modulus=x,
+            remanent_magnetization=(3e4, 0, 0),
+            applied_flux_density=(0, 0, 5e-3),
+            progress=False,
+        )
+
+    with caplog.at_level("DEBUG", logger="magshell"), forward_ad.dual_level():
+        x = torch.tensor(1e6, dtype=torch.float64)
+        found = motion(forward_ad.make_dual(x, torch.ones_like(x)))
+    assert "tangent of a motion: 5 factorizations" in caplog.text
+    assert found.iterations >= 15
+
+
+def test_rest_positions_of_a_motion_have_no_tangent():
+    at = torch.tensor(MESH.rest_positions)
+
+    def tip(positions):
+        motion = ms.simulate(
+            SCENE,
+            steps=2,
+            time_step=1e-3,
+            values={SHEET: {"rest_positions": positions}},
+            remanent_magnetization=(3e4, 0, 0),
+            applied_flux_density=(0, 0, 5e-3),
+            progress=False,
+        )
+        return motion.positions[-1, TIP, 2].mean()
+
+    with pytest.raises(ms.NoGradient, match="no tangent of a motion by rest_positions"):
+        torch.func.jvp(tip, (at,), (torch.ones_like(at),))
