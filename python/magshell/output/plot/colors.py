@@ -118,6 +118,40 @@ def _wider(scalar: Scalar) -> tuple[float, float]:
     return min(low, least), max(high, most)
 
 
+def averaged_at_vertices(states: list[State], scalar: Scalar, keeps_limits: bool) -> Scalar:
+    """Return the scalar with means at vertices in place of numbers on faces, weighted by the areas of the faces.
+
+    keeps_limits: whether the colour scale stays as it is; else it has the range of the means. Faces without a number do not
+    count. Raises ValueError for a cyclic scale.
+    """
+    if scalar.scale == "cyclic":
+        raise ValueError(f"the color {scalar.label!r} has angles, which have no mean: leave averaged out")
+    values = [
+        each if len(each) == state.mesh.n_vertices else _vertex_means(state, each)
+        for state, each in zip(states, scalar.values, strict=True)
+    ]
+    limits = scalar.limits
+    if not keeps_limits:
+        low, high = _range(values)
+        if scalar.scale == "diverging":
+            high = max(-low, high)
+            low = -high
+        limits = (0.0 if scalar.limits[0] == 0.0 else low, high)
+    return replace(scalar, values=values, limits=limits)
+
+
+def _vertex_means(state: State, of_faces: np.ndarray) -> np.ndarray:
+    """Return the means at vertices of numbers on faces, NaN where no face has one, (n_v,)."""
+    faces, n_vertices = state.mesh.faces, state.mesh.n_vertices
+    a, b, c = np.moveaxis(state.positions[faces], 1, 0)
+    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) * np.isfinite(of_faces)
+    weights = np.repeat(areas, 3)
+    numbers = np.repeat(np.nan_to_num(of_faces), 3)
+    total = np.bincount(faces.ravel(), weights, n_vertices)
+    summed = np.bincount(faces.ravel(), weights * numbers, n_vertices)
+    return np.where(total > 0.0, summed / np.where(total > 0.0, total, 1.0), np.nan)
+
+
 def _automatic(states: list[State]) -> str | None:
     """Choose the magnetization if it varies, otherwise the displacement if there is one, otherwise nothing."""
     magnetizations = [s.remanent_magnetization for s in states if s.is_magnetized]
