@@ -15,7 +15,7 @@ import magshell as ms
 from magshell import _core
 from magshell.model.scene.solve_inputs import Inputs
 
-from . import batches, busy_machine, skeleton_scaling, solid_scaling
+from . import batches, busy_machine, core_limits, skeleton_scaling, solid_scaling
 from .ratios import note
 from .report import add_rounds, bar, chosen, print_table
 from .statics import strongly_bent
@@ -82,6 +82,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     _print_times(one, two, exponents)
     _print_memory(one, exponents)
     _print_orderings(one)
+    core_limits.print_limits(one)
     _print_targets(one, two, exponents)
     if ended is not None:
         print(f"\nThe process of {ended} faces was ended, {_WHY}. It and larger sizes are left out.")
@@ -166,6 +167,7 @@ def costs(faces: int, threads: int, bending: str, rounds: int) -> dict[str, Any]
         "factorizations": found.factorizations,
         "operations": operations,
         "metis": metis,
+        "cores": _core_limits(scene, found),
         "processor": {name: each.processor for name, each in times.items()},
         "wall": {name: each.wall for name, each in times.items()},
         "model": scene._model.bytes,
@@ -218,6 +220,14 @@ def _orderings(scene: ms.Scene, found: ms.Equilibrium) -> tuple[dict[str, float]
     if "metis" not in operations:
         return operations, None
     return operations, clocked(lambda: _core.analyze(n, starts, rows, ordering="metis"), rounds=1).processor
+
+
+def _core_limits(scene: ms.Scene, found: ms.Equilibrium) -> dict[str, Any] | None:
+    """Return work, span and gains of a factorization; None in a build without MAGSHELL_TESTING."""
+    if not hasattr(_core, "elimination_fronts"):
+        return None
+    n, starts, rows, _ = scene._model.hessian(found._state, found._controls)
+    return core_limits.limits(_core.elimination_fronts(n, starts, rows, scene._model.free_points))
 
 
 def _print_orderings(sizes: list[dict[str, Any]]) -> None:

@@ -32,6 +32,7 @@ PYBIND11_MODULE(_core, module) {
     b::register_dynamics(module);
 #ifdef MAGSHELL_TESTING
     b::register_contact_pairs(module);
+    b::register_elimination_fronts(module);
     b::register_kernels(module);
 #endif
 }

@@ -1118,6 +1118,16 @@ def element_energies(
     [(name, whether of a solid, number of the sheet or solid, J of each element)] of the terms that are sums over elements, in the order of term_energies. Angles have no turns.
     """
 
+def elimination_fronts(
+    size: typing.SupportsInt | typing.SupportsIndex,
+    column_starts: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+    rows: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+    points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None,
+) -> dict[str, typing.Any]:
+    """
+    The fronts of a pattern, given as to analyze(), in the order of elimination: {'pivots', 'below', 'parent' (-1: none), 'task' (the subtree that one thread takes; -1: above all subtrees)}.
+    """
+
 def factor_backends() -> list[str]: ...
 def factor_orderings() -> list[str]: ...
 def fibre_states(

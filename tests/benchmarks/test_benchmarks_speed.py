@@ -5,6 +5,7 @@ import time
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
+import numpy as np
 import pytest
 from bench_figures import is_a_picture
 
@@ -12,10 +13,13 @@ import magshell as ms
 from benchmarks import timing
 from benchmarks.__main__ import main
 from benchmarks.busy_machine import COMPANY
+from benchmarks.core_limits import CORES, front_span, front_work, limits, makespan
 from benchmarks.paper import examples_folder
 from benchmarks.paper_rows import ROWS
 from benchmarks.scaling import MEMORIES, TIMES, fitted_exponent
+from benchmarks.statics import strongly_bent
 from benchmarks.terms import PARTS, _together
+from magshell import _core
 
 
 @pytest.fixture(autouse=True)
@@ -119,6 +123,7 @@ def test_scaling_without_the_memory_for_it(monkeypatch, tmp_path, capsys) -> Non
         "peak": None,
         "operations": {"best": 1.0, "amd": 1.0},
         "metis": None,
+        "cores": {"work": 2.0, "span": 1.0, "path": 1.0, "gains": {str(cores): 2.0 for cores in CORES}},
     }
     size |= {clock: dict.fromkeys(TIMES, 1.0) for clock in ("processor", "wall")}
 
@@ -249,3 +254,36 @@ def test_paper_without_examples(tmp_path) -> None:
 def test_sizes_that_make_no_sense(arguments) -> None:
     with pytest.raises(SystemExit, match="must be at least"):
         main(arguments)
+
+
+def test_span_of_fronts_known_by_hand() -> None:
+    assert makespan([3.0, 3.0, 2.0, 2.0, 2.0], 2) == 7.0 and makespan([], 4) == 0.0
+    assert front_work(1, 0) == 1.0 and front_work(2, 3) == 5.0 + 12.0 + 24.0
+    for pivots, below in ((1, 0), (40, 0), (200, 700), (7, 300)):
+        assert front_span(pivots, below, 1) == pytest.approx(front_work(pivots, below), rel=1e-12)
+        assert front_span(pivots, below, 2) <= front_span(pivots, below, 1)
+    # Two equal subtrees of one front each, and a small root above them.
+    fronts = {
+        "pivots": np.array([100, 100, 10]),
+        "below": np.array([10, 10, 0]),
+        "parent": np.array([2, 2, -1]),
+        "task": np.array([0, 1, -1]),
+    }
+    found = limits(fronts)
+    each, root = front_work(100, 10), front_work(10, 0)
+    assert found["work"] == 2 * each + root and found["path"] == each + root
+    assert found["span"] == each + front_span(10, 0, 1)
+    assert found["gains"]["4"] == pytest.approx((2 * each + root) / found["span"])
+
+
+def test_fronts_of_a_matrix_hold_all_its_operations() -> None:
+    scene, inputs = strongly_bent(512, "midedge")
+    found = ms.equilibrium(scene, **inputs)
+    n, starts, rows, _ = scene._model.hessian(found._state, found._controls)
+    points = scene._model.free_points
+    fronts = _core.elimination_fronts(n, starts, rows, points)
+    assert fronts["pivots"].sum() == n and fronts["parent"][-1] == -1
+    assert all(up == -1 or up > k for k, up in enumerate(fronts["parent"].tolist()))
+    assert limits(fronts)["work"] == pytest.approx(
+        _core.analyze(n, starts, rows, points=points).flops, rel=1e-12
+    )

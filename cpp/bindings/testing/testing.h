@@ -7,6 +7,7 @@
 namespace magshell::bindings {
 
 void register_contact_pairs(py::module_& module);
+void register_elimination_fronts(py::module_& module);
 void register_kernels(py::module_& module);
 
 }  // namespace magshell::bindings
