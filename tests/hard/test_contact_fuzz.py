@@ -6,6 +6,7 @@ MAGSHELL_CONTACT_SCENES says how many: 500 take two or three minutes.
 import os
 
 import pytest
+from contact_costs import motion
 from contact_scenes import verdict
 
 import magshell as ms
@@ -21,3 +22,11 @@ def test_a_random_contact_ends_well(seed) -> None:
 @pytest.mark.parametrize("seed", range(SCENES // 3))
 def test_a_random_contact_ends_well_if_contact_is_implicit(seed) -> None:
     assert verdict(seed, ms.TRBDF2(implicit_contact=True)) is None
+
+
+@pytest.mark.parametrize("seed, most", [(63, 29), (86, 43)])
+def test_a_stage_with_contact_wastes_few_factorizations(seed, most) -> None:
+    """Count factorizations per step: 36 and 53 if Newton's method is given up only after all of its iterations."""
+    move, wrong, _ = motion(seed, ms.TRBDF2(implicit_contact=True))
+    assert wrong is None
+    assert move.factorizations <= most * move.steps

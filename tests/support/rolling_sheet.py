@@ -1,7 +1,8 @@
 """Hu et al.'s sheet rolls over a plane in a field that turns.
 
 `PYTHONPATH=. python tests/support/rolling_sheet.py [MS ...]` prints counts and travel for steps of these lengths, and
-`... rolling_sheet.py adaptive` for steps that are chosen by tolerances.
+`... rolling_sheet.py adaptive` for steps that are chosen by tolerances; `... rolling_sheet.py implicit [MS ...]` takes
+TR-BDF2 with implicit contact instead of implicit Euler.
 """
 
 import sys
@@ -21,9 +22,12 @@ def flux_density(t: float) -> np.ndarray:
 
 
 def rolling_sheet(
-    time_step: float | ms.Adaptive, factor: float = 1.0, duration: float = DURATION
+    time_step: float | ms.Adaptive,
+    factor: float = 1.0,
+    duration: float = DURATION,
+    integrator: ms.ImplicitEuler | ms.TRBDF2 | None = None,
 ) -> ms.Trajectory:
-    """Simulate the sheet by implicit Euler, with the field times a factor; on straight lines between given steps."""
+    """Simulate the sheet, with the field times a factor; on straight lines between given steps. Default: implicit Euler."""
     mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells=(20, 8)).transformed(translation=(0, 0, THICKNESS / 2))
     angle = 2 * np.pi * mesh.face_barycenters[:, 0] / LENGTH - np.pi / 4
     sheet = ms.Shell(
@@ -46,7 +50,7 @@ def rolling_sheet(
         scene,
         steps=steps,
         time_step=time_step,
-        integrator=ms.ImplicitEuler(),
+        integrator=integrator or ms.ImplicitEuler(),
         stiffness_damping=2e-3,
         applied_flux_density=field,
     )
@@ -68,8 +72,10 @@ def main() -> None:
                 flush=True,
             )
         return
-    for step in [float(word) for word in sys.argv[1:]] or [8.0, 4.0, 2.0, 1.0]:
-        move = rolling_sheet(1e-3 * step)
+    implicit = sys.argv[1:2] == ["implicit"]
+    integrator = ms.TRBDF2(implicit_contact=True) if implicit else ms.ImplicitEuler()
+    for step in [float(word) for word in sys.argv[1 + implicit :]] or [8.0, 4.0, 2.0, 1.0]:
+        move = rolling_sheet(1e-3 * step, integrator=integrator)
         print(
             f"{step:g} ms: {move.factorizations} factorizations, {move.iterations} iterations, "
             f"in parts {move.substeps}, {travel(move):.9f} mm",

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import magshell as ms
+from tests.support.ball_impacts import ball_rebound, ball_with_backspin, point_rebound
 from tests.support.impacts import bar_on_a_wall, bars_that_collide, cube_on_a_plane, rebound
 
 IMPLICIT = ms.TRBDF2(implicit_contact=True)
@@ -26,6 +27,26 @@ def test_colliding_bars_exchange_their_speeds():
     back = -(mass @ move[move.scene.bodies[0]].velocities[-1][:, 0]) / mass.sum() / speed
     assert 0.97 <= back < 1.0
     assert move.energy.max() <= (1.0 + 1e-6) * move.energy[0]
+
+
+@pytest.mark.parametrize("steps, restitution", [(30, 0.95), (59, 0.975), (75, 0.98)])
+def test_an_elastic_ball_rebounds_better_than_a_point(steps, restitution):
+    """Compare with 1 and with a point mass whose force is that of Hertz (docs/theory.md); no energy may be gained."""
+    back, move = ball_rebound(IMPLICIT, steps)
+    assert max(restitution, point_rebound(steps)) <= back < 1.0
+    assert move.energy.max() <= (1.0 + 1e-6) * move.energy[0]
+
+
+def test_loss_of_a_rebound_is_of_first_order():
+    few, many = 1.0 - point_rebound(100), 1.0 - point_rebound(200)
+    assert few / many == pytest.approx(2.0, rel=0.02)
+
+
+def test_a_ball_with_backspin_ends_up_rolling():
+    """Compare speed and time with their closed forms (issue 32)."""
+    speed, time, _ = ball_with_backspin(IMPLICIT, 2e-3)
+    assert speed == pytest.approx(1.0, abs=0.03)
+    assert time == pytest.approx(1.0, abs=0.03)
 
 
 @pytest.mark.parametrize("ratio", [20.0, 200.0])

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <utility>
+#include <vector>
 
 #include "magshell/solve/globalization/contact_predictor.h"
 
@@ -93,6 +94,9 @@ class FullSteps final : public NewtonIteration {
           mixed_(policy.mixed && newton.options().mixed),
           tolerance_(newton.options().tolerance) {}
 
+    /// Returns the residual at the first state; 0 if the iteration took no step.
+    double first_residual() const { return first_residual_; }
+
   private:
     bool begin() override {
         if (policy_.factor) report_.factor = *policy_.factor;
@@ -140,6 +144,20 @@ class FullSteps final : public NewtonIteration {
                                                                 inexact_thickness * model_.length_scale()) *
                                                            step_before_ * step_before_ &&
                report_.factor.negative_pivots <= first_negative_pivots_;
+    }
+
+    // Returns true if contact acts in a time stage while the residual does not halve: the iteration then goes between sticking and
+    // slipping, or between touching and not, and the methods that follow it take fewer factorizations.
+    bool is_slow_in_contact() {
+        // Iterations in which the residual must halve; see test_a_stage_with_contact_wastes_few_factorizations, test_counts.py.
+        constexpr std::size_t patience = 4;
+        if (report_.iterations == 0) first_residual_ = report_.residual;
+        if (!proximal_.motion || !(report_.had_contact || !model_.contacts().obstacle_points().empty()))
+            return false;
+        residuals_in_contact_.push_back(report_.residual);
+        const std::size_t n = residuals_in_contact_.size();
+        return n > patience &&
+               report_.residual > required_contraction * residuals_in_contact_[n - 1 - patience];
     }
 
     // Factorizes at the current state. Returns false, with a reason in the report, if the iteration cannot go on.
@@ -191,6 +209,7 @@ class FullSteps final : public NewtonIteration {
     }
 
     bool step() override {
+        if (is_slow_in_contact()) return fail("contact slows the iteration down");
         pull_ = move_;
         const double contraction = report_.residual / last_residual_;
         last_residual_ = report_.residual;
@@ -265,7 +284,8 @@ class FullSteps final : public NewtonIteration {
     Index first_negative_pivots_ = 0;
     double last_step_ = 0.0, step_before_ = 0.0;              // [m]
     double moved_ = std::numeric_limits<double>::infinity();  // [m] displacement since the last factorization
-    double last_residual_ = std::numeric_limits<double>::infinity();
+    double last_residual_ = std::numeric_limits<double>::infinity(), first_residual_ = 0.0;
+    std::vector<double> residuals_in_contact_;
     StressPredictor last_;
 };
 
@@ -377,12 +397,18 @@ NewtonReport Newton::solve(VectorXd& q, const LoadParameters& load_parameters, c
     const bool may_search = policy.search_at_barrier && model_.capabilities().has_barrier;
     const VectorXd from = may_search ? q : VectorXd();
     const Model::AngleBranches angle_branches = may_search ? model_.angle_branches() : Model::AngleBranches();
-    NewtonReport report = FullSteps(*this, q, load_parameters, policy, max_iterations).run();
+    FullSteps full(*this, q, load_parameters, policy, max_iterations);
+    NewtonReport report = full.run();
     if (!may_search || report.converged || !report.had_contact) return report;
     constexpr int searched = 5;  // times max_iterations; see test_strip_folds_onto_itself
     const int iterations = report.iterations;
-    // If a step was blocked, the line search continues from there; otherwise the iteration may have led anywhere and starts again.
-    if (report.blocked_by.empty()) {
+    // If a step was blocked, or a time stage came closer to its solution, the line search continues from there; otherwise the iteration
+    // may have led anywhere and starts again.
+    const auto has_approached = [&] {
+        evaluate(q, load_parameters, policy.proximal);
+        return relative_residual(q, policy.proximal) < full.first_residual();
+    };
+    if (report.blocked_by.empty() && !(policy.proximal.motion && has_approached())) {
         q = from;
         model_.set_angle_branches(angle_branches);
     }
