@@ -8,6 +8,7 @@
 #include "magshell/solve/globalization/deflation.h"
 #include "magshell/solve/globalization/proximal_continuation.h"
 #include "magshell/solve/newton/load_control.h"
+#include "magshell/solve/newton/newton_iteration.h"
 #include "magshell/solve/nonsymmetric_modes.h"
 
 namespace magshell {
@@ -144,7 +145,8 @@ class Statics {
                                  newton_.model().extent(), stop_on_instability_);
         FactorReport factor;  // at the end of the last load step
         bool may_descend = longest_step == 1.0 && can_relax_at_once();
-        int halvings = 0;  // of a load step that ended beyond an obstacle
+        std::string no_descent;  // why the descent at the final loads fails from the state of the result
+        int halvings = 0;        // of a load step that ended beyond an obstacle
         while (result_.progress < 1.0) {
             const double left = 1.0 - result_.progress, step = clear_step(steps.propose(left));
             if (step == 0.0) return false;
@@ -168,6 +170,7 @@ class Statics {
                 last_ = std::move(report.stress_predictor);
                 factor = report.factor_is_current ? report.factor : FactorReport();
                 steps.accept(step, report);
+                no_descent.clear();
                 continue;
             }
             newton_.model().set_angle_branches(result_.angle_branches);
@@ -180,6 +183,7 @@ class Statics {
             if (through.empty() && may_descend && load_path_has_ended(steps, report)) {
                 may_descend = false;
                 if (relax_to_stable(1.0)) return true;
+                no_descent = result_.reason;
             }
             if (through.empty() && steps.reject(step, report) && options_.start_at_rest) continue;
             // Rotations and obstacles must be followed in steps; other loads may be relaxed at their final values at once.
@@ -188,6 +192,10 @@ class Statics {
             if (relaxed == 0.0) return false;
             const double end = relaxed < left ? result_.progress + relaxed : 1.0;
             if (stop_on_instability_ || !try_standard_newton(end)) {
+                if (end == 1.0 && !no_descent.empty()) {
+                    result_.reason = no_descent;
+                    return false;
+                }
                 if (!relax_to_stable(end)) return false;
                 if (end == 1.0) return true;
             }
@@ -363,9 +371,8 @@ class Statics {
         newton_.evaluate(trial, result_.load_parameters, {});
         const double after = newton_.relative_residual(trial, {}, false);
         // Below the floor, round-off decides which residual is smaller; for a step this short the matrix is more reliable.
-        constexpr double rounding = 1e-9;  // [-] over the extent; see test_fine_roof_takes_small_steps
         const bool tiny = p.head(newton_.model().n_coordinates()).lpNorm<Eigen::Infinity>() <=
-                          rounding * newton_.model().extent();
+                          negligible_length * newton_.model().extent();
         if (!(after < before) &&
             !(tiny && newton_.relative_residual(trial, {}) <= newton_.options().tolerance))
             return;

@@ -109,3 +109,18 @@ def test_a_saved_result_keeps_its_log(tmp_path) -> None:
 
 def test_an_empty_log_says_so() -> None:
     assert repr(ms.SolveLog()) == "SolveLog: no steps"
+
+
+def test_a_descent_that_fails_is_not_tried_again_from_the_same_state() -> None:
+    box = ms.meshes.box((0.03, 0.03, 0.03), cells=(2, 2, 1))
+    mesh = ms.TriangleMesh(box.rest_positions, box.faces)
+    sheet = ms.Shell(mesh, thickness=2e-4, young_modulus=1e4)
+    vacuum = ms.Cavity(sheet, gas_pressure=0.0)
+    scene = ms.Scene(sheet, supports=[ms.Pin(mesh.vertices_at(z=0.0))], actuators=[vacuum])
+    with pytest.raises(ms.NotConverged) as caught:
+        ms.equilibrium(scene)
+    log = caught.value.last_good.log
+    assert_sums(caught.value.last_good)
+    assert [step.method for step in log].count("descent") == 1
+    # A saddle is left to states with an energy only, so no iteration begins at a cavity of negative volume.
+    assert not any(step.failure.startswith("a cavity") for step in log)

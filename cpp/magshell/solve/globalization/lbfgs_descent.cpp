@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "magshell/solve/globalization/lbfgs_history.h"
+#include "magshell/solve/newton/newton_iteration.h"
 
 namespace magshell {
 namespace {
@@ -15,12 +16,6 @@ namespace {
 constexpr std::size_t descent_history = 12;
 // [-] Longest step, over the extent, and largest multiple of an L-BFGS step; see test_a_semi_cylinder_pulled_and_pushed.
 constexpr double max_step_extent = 0.1, max_step_factor_lbfgs = 4.0;
-// [-] Constant of the curvature condition (N&W 3.1); see test_a_semi_cylinder_pulled_and_pushed.
-constexpr double wolfe_c2 = 0.5;
-// Evaluations of the energy in one line search, at most; see test_a_semi_cylinder_pulled_and_pushed.
-constexpr int max_search_trials = 8;
-// [-] Predicted decrease that ends the descent, over that of the first step; see test_a_flat_strip_far_beyond_where_it_buckles.
-constexpr double min_relative_decrease = 1e-6;
 // [-] Smallest fraction of a rejected step that is tried next; see test_a_semi_cylinder_pulled_and_pushed.
 constexpr double min_backtrack = 0.05;
 
@@ -49,14 +44,17 @@ class Descent {
             const VectorXd d = direction();
             const double slope = here_.gradient.dot(d), before = here_.energy;
             if (k == 0) first = -slope;
-            if (!(slope < 0.0) || -slope < min_relative_decrease * first) break;
-            if (!line_search_along(d, slope)) break;
-            if (before - here_.energy <= energy_tolerance * std::abs(before)) break;
+            if (!(slope < 0.0)) break;
+            stationary_ = -slope < negligible_share * first;
+            if (stationary_ || !line_search_along(d, slope)) break;
+            stationary_ = before - here_.energy <= energy_tolerance * std::abs(before);
+            if (stationary_) break;
         }
         model_.set_angle_branches(here_.angle_branches);
         return here_;
     }
 
+    bool stationary() const { return stationary_; }
     const std::string& crossing_reason() const { return crossing_reason_; }
 
   private:
@@ -87,7 +85,7 @@ class Descent {
         double alpha = std::min(1.0, max_alpha), last = 0.0, last_slope = slope, accepted_alpha = 0.0;
         bool too_far = false;
         DescentState end;
-        for (int trial = 0; trial < max_search_trials; ++trial) {
+        for (int trial = 0; trial < max_attempts; ++trial) {
             VectorXd there = here_.q;
             model_.dof_map().retract(there, alpha * step);
             const double energy = model_.energy(there, load_parameters_), change = energy - here_.energy;
@@ -108,7 +106,7 @@ class Descent {
             end = at(there, energy);
             accepted_alpha = alpha;
             const double slope_there = end.gradient.dot(d);
-            if (slope_there > wolfe_c2 * slope || alpha >= max_alpha || too_far) break;
+            if (slope_there > flat_slope * slope || alpha >= max_alpha || too_far) break;
             // The energy still falls fast: extrapolates its slope linearly to find a longer step.
             const double flatter = slope_there - last_slope;
             const double secant = flatter > 0.0 ? alpha - slope_there * (alpha - last) / flatter : max_alpha;
@@ -127,6 +125,7 @@ class Descent {
     const LoadParameters& load_parameters_;
     LbfgsHistory history_;
     DescentState here_;
+    bool stationary_ = false;  // whether the energy no longer falls
     std::string crossing_reason_;
 };
 
@@ -139,7 +138,7 @@ LbfgsRound lbfgs_descent(Newton& newton, VectorXd& q, double& energy, const Load
     const double moved = (end.q - q).head(newton.model().n_coordinates()).lpNorm<Eigen::Infinity>();
     q = end.q;
     energy = end.energy;
-    return {moved, descent.crossing_reason()};
+    return {moved, descent.stationary(), descent.crossing_reason()};
 }
 
 }  // namespace magshell

@@ -11,8 +11,8 @@
 //              without regard to the energy between, which membrane strains would dominate.
 //
 // Success lowers the shift, down to zero, where the iteration is Newton's method for the equilibrium itself; failure raises it so that the
-// step becomes shorter [Hebden 1973]. A stationary state with negative pivots is a saddle: it is left along its lowest mode, to
-// the side where the energy falls deeper.
+// step becomes shorter [Hebden 1973]. Where L-BFGS ends because the energy no longer falls, the Hessian without a shift decides. A
+// stationary state with negative pivots is a saddle: it is left along its lowest mode, to the side where the energy falls deeper.
 #pragma once
 
 #include <string>

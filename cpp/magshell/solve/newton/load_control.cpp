@@ -2,13 +2,16 @@
 
 #include <algorithm>
 
+#include "magshell/solve/newton/newton_iteration.h"
+
 namespace magshell {
 namespace {
 
 // [-] Displacement of the first iteration that a step aims at, over the extent; see test_a_thin_strip_rolled_up.
 constexpr double good_length = 0.25;
-// [-] Length that counts as zero, over the extent; see test_a_thin_strip_rolled_up.
-constexpr double negligible_length = 1e-9;
+// [-] Factor by which steps grow and shrink as a rule; its square where the last iteration says that more is needed, and its cube
+// between the smallest step and a good one. See test_a_thin_strip_rolled_up.
+constexpr double step_factor = 2.0;
 
 }  // namespace
 
@@ -24,15 +27,13 @@ void LoadStepController::accept(double step, const NewtonReport& report) {
     constexpr double failed_step_growth = 1.2;
     // [-] Largest step, over the one that failed; see test_a_field_from_behind.
     constexpr double below_failed_step = 0.75;
-    // [-] Growth of the step, at most and as a rule; see test_a_thin_strip_rolled_up.
-    constexpr double max_growth = 4.0, usual_growth = 2.0;
     const double length = length_of(report);
     // The step that failed bounds the next one, or if the scene now moves less per unit of load, the length that failed.
     const double failed =
         length > negligible_length ? std::max(failed_step_, failed_length_ / length * step) : failed_step_;
     const double times = stop_on_instability_ ? std::clamp(good_length / std::max(length, negligible_length),
-                                                           usual_growth, max_growth)
-                                              : usual_growth;
+                                                           step_factor, step_factor * step_factor)
+                                              : step_factor;
     step_ = std::min(times * step, below_failed_step * failed);
     failed_step_ *= failed_step_growth;
     failed_length_ *= failed_step_growth;
@@ -45,17 +46,16 @@ bool LoadStepController::is_short(const NewtonReport& report) const {
 }
 
 bool LoadStepController::reject(double step, const NewtonReport& report) {
-    // [-] Shortening after a diverged iteration, after another failure, and at most; see test_a_flat_strip_far_beyond_where_it_buckles.
-    constexpr double diverged_factor = 0.25, usual_factor = 0.5, least_factor = 0.125;
     // [-] Smallest step in any case, of the load path; see test_a_thin_strip_rolled_up.
     constexpr double shortest_step = 1e-6;
     failed_step_ = step;
-    step_ = (report.diverged ? diverged_factor : usual_factor) * step;
+    step_ = step / (report.diverged ? step_factor * step_factor : step_factor);
     if (stop_on_instability_) {
         const double length = failed_length_ = length_of(report);
         const double good_step = good_length / std::max(length, negligible_length) * step;
         // On a load path that moves the scene by many extents, even a small fraction may be a long step.
-        if (!fixed_) smallest_ = std::max(std::min(smallest_, least_factor * good_step), shortest_step);
+        constexpr double least = step_factor * step_factor * step_factor;
+        if (!fixed_) smallest_ = std::max(std::min(smallest_, good_step / least), shortest_step);
         if (length > 0.5 * good_length && step > smallest_)
             step_ = std::max(std::min(step_, good_step), smallest_);
     }

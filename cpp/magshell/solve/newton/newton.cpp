@@ -8,6 +8,7 @@
 
 #include "magshell/core/bracket.h"
 #include "magshell/core/errors.h"
+#include "magshell/solve/newton/newton_iteration.h"
 #include "magshell/solve/newton/unsymmetric.h"
 
 namespace magshell {
@@ -131,8 +132,6 @@ double Newton::apply_increment(VectorXd& q, VectorXd& step, double shortest, New
 // is bracketed and found by regula falsi (Illinois variant).
 double Newton::contact_step_length(const VectorXd& q, const VectorXd& step, double alpha,
                                    double slope) const {
-    // [-] Slopes between which the search ends, over the initial slope; see test_strip_folds_onto_itself.
-    constexpr double max_rise = 0.5, max_fall = 0.5;
     constexpr int max_trials = 6;  // see test_strip_folds_onto_itself
     // [-] Longest step, and remaining slope below which a longer one is not tried; see test_block_on_a_slope_sticks_or_slides.
     constexpr double longest = 8.0, remaining_slope = 0.2;
@@ -151,13 +150,13 @@ double Newton::contact_step_length(const VectorXd& q, const VectorXd& step, doub
     Bracket ends{0.0, -slope, 1.0, slope_at(1.0)};
     while (alpha == 1.0 && ends.at_upper < -remaining_slope * slope && ends.upper < longest)
         ends = {ends.upper, ends.at_upper, 2.0 * ends.upper, slope_at(2.0 * ends.upper)};
-    if (ends.at_upper <= max_rise * slope) return ends.upper;
+    if (ends.at_upper <= flat_slope * slope) return ends.upper;
     for (int trial = 0; trial < max_trials; ++trial) {
         // Contact forces grow faster than linearly, so a secant falls short; the Illinois rule halves the slope of the end that stays.
         const double alpha_contact = ends.secant_zero(bracket_margin), there = slope_at(alpha_contact);
-        if (there > max_rise * slope)
+        if (there > flat_slope * slope)
             ends.move_upper(alpha_contact, there, trial > 0 ? 0.5 : 1.0);
-        else if (there < -max_fall * slope)
+        else if (there < -flat_slope * slope)
             ends.move_lower(alpha_contact, there, 0.5);
         else
             return alpha_contact;
@@ -174,13 +173,11 @@ void Newton::describe_contact(NewtonReport& report) const {
 
 double Newton::line_search(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
                            const VectorXd& from, const VectorXd& step, double slope) {
-    constexpr double enough =
-        0.5;  // [-] slope at the end over the initial one; see test_strip_folds_onto_itself
     constexpr int max_trials = 12;  // see test_strip_folds_onto_itself
     const auto slope_here = [&] { return gradient(q, proximal).dot(step); };
     double alpha_contact = 1.0;
     Bracket ends{0.0, -slope, 1.0, slope_here()};
-    if (ends.at_upper <= enough * slope) return alpha_contact;
+    if (ends.at_upper <= flat_slope * slope) return alpha_contact;
     for (int trial = 0; trial < max_trials; ++trial) {
         // The contact force grows faster than linearly: the Illinois rule halves the slope of the end that stays.
         alpha_contact = ends.secant_zero(bracket_margin);
@@ -188,7 +185,7 @@ double Newton::line_search(VectorXd& q, const LoadParameters& load_parameters, c
         model_.dof_map().retract(q, alpha_contact * step);
         evaluate(q, load_parameters, proximal);
         const double there = slope_here();
-        if (!(std::abs(there) > enough * slope)) break;
+        if (!(std::abs(there) > flat_slope * slope)) break;
         if (there > 0.0)
             ends.move_upper(alpha_contact, there, trial > 0 ? 0.5 : 1.0);
         else

@@ -266,7 +266,9 @@ class FullSteps final : public NewtonIteration {
             (report_.factor.negative_pivots > first_negative_pivots_ ||
              (report_.iterations == 1 && length > max_second_growth * std::max(last_step_, model_.extent()))))
             return fail("the iteration leaves the stable states");
-        if (mixed_ && report_.iterations >= settling_iterations && length > last_step_ &&
+        // Standard steps of a user who asks for them take what they need; those in place of mixed ones are given up alike.
+        const bool must_settle = mixed_ || (newton_.options().mixed && !proximal_.weights);
+        if (must_settle && report_.iterations >= settling_iterations && length > last_step_ &&
             length > settled_step * model_.extent())
             return fail("the steps of the iteration do not get shorter");
         step_before_ = last_step_;
