@@ -51,7 +51,7 @@ class Crease(Owner):
     0.5
     """
 
-    body = None
+    body: None = None
 
     def __init__(self, edges: Numbers, stiffness: Numbers, *, angle: Numbers | None = None):
         self.edges: np.ndarray = selection("Crease edges", edges)
