@@ -2,8 +2,10 @@
 #
 # Everything lives in .venv; the stamps in it make a second call quick. PYTHON=python3.12 chooses the interpreter of a
 # new .venv. Tests run in as many processes as there are processors: PROCESSES=0 runs them one after another.
+# COMPILE_TOGETHER=OFF compiles each C++ file alone, so that a change to one takes less time (CONTRIBUTING.md).
 PYTHON ?= python3
 PROCESSES ?= auto
+COMPILE_TOGETHER ?= ON
 VENV := .venv
 PIP := $(VENV)/bin/python -m pip --disable-pip-version-check
 
@@ -88,7 +90,8 @@ $(VENV)/.wheel: $(sources) $(VENV)/.created
 	@echo "Building magshell (some minutes the first time; all that is said goes into build/make.log):"
 	@$(VENV)/bin/python scripts/build_progress.py build/make.log \
 	    $(PIP) wheel --verbose --no-deps --no-build-isolation --check-build-dependencies \
-	    --config-settings=build-dir=build/make --config-settings=cmake.define.MAGSHELL_TESTING=ON --wheel-dir build/wheels .
+	    --config-settings=build-dir=build/make --config-settings=cmake.define.MAGSHELL_TESTING=ON \
+	    --config-settings=cmake.define.MAGSHELL_COMPILE_TOGETHER=$(COMPILE_TOGETHER) --wheel-dir build/wheels .
 	$(PIP) install --quiet --no-deps --force-reinstall build/wheels/*.whl
 	touch $@
 

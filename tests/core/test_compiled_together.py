@@ -10,18 +10,15 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 ASIDE = re.compile(r"//[^\n]*|/\*.*?\*/|\"(?:\\.|[^\"\\\n])*\"|^[ \t]*#[^\n]*", re.DOTALL | re.MULTILINE)
-TYPE = re.compile(r"\b(?:struct|class|enum(?:\s+class)?|using)\s+(\w+)")
+TYPE = re.compile(r"\b(?:struct|class|enum(?:\s+class)?|using(?=\s+\w+\s*=))\s+(\w+)")
 OTHER = re.compile(r"([A-Za-z_]\w*)\s*(?:\(|=|\{|\[|$)")
 
 
 def folders() -> dict[str, set[str]]:
     """Return the files of each folder that are compiled alone, as CMakeLists.txt lists them."""
     build = (ROOT / "CMakeLists.txt").read_text()
-    found = {f"magshell/{name}": set() for name in re.search(r"foreach\(folder ([\w ]+)\)", build)[1].split()}
-    for call in re.findall(r"^compile_together\(\w+ (.+)\)", build, re.MULTILINE):
-        folder, _, *alone = call.split()
-        found[folder] = {Path(name).name for name in alone}
-    return found
+    calls = re.findall(r"^ *compile_together\(\w+ (\S+) \d+([^)]*)\)", build, re.MULTILINE)
+    return {folder: set(alone.split()) for folder, alone in calls}
 
 
 def outermost(text: str) -> str:
@@ -43,7 +40,9 @@ def local_names(text: str) -> set[str]:
     for opened in re.finditer(r"\bnamespace\s*\{", text):
         for statement in outermost(text[opened.end() :]).split(";"):
             plain = re.sub(r"\btemplate\s*<[^;{]*?>(?=\s*[a-zA-Z])", " ", statement).strip()
-            if found := TYPE.search(plain) or OTHER.search(plain):
+            found = TYPE.search(plain) or OTHER.search(plain)
+            # neither a member of a class nor a using-declaration
+            if found and not plain[: found.start(1)].endswith("::"):
                 names.add(found[1])
     return names
 
@@ -55,9 +54,12 @@ def test_local_names_are_found() -> None:
     struct Part { int inner = 0; };
     template <typename T> T twice(T x) { const T mine = x; return 2 * mine; }
     std::vector<int> rows{1, 2};
+    using other::Name;
+    using Short = std::vector<int>;
+    int Part::member(int x) { return x; }
     } void shared() {} }
     """
-    assert local_names(text) == {"small", "Part", "twice", "rows"}
+    assert local_names(text) == {"small", "Part", "twice", "rows", "Short"}
 
 
 def test_no_two_files_share_a_local_name() -> None:

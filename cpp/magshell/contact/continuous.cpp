@@ -16,7 +16,7 @@ constexpr double small_rest = 0.01;
 // Relative round-off of a projected difference of positions. [-] A position x + t p has an error of two units
 // of round-off, a difference of two such positions five, and its product with a unit direction (itself accurate
 // to four) less than 32. Fixed by test_bound_far_from_the_origin_is_smaller_but_never_too_large.
-constexpr double round_off = 32.0 * std::numeric_limits<double>::epsilon();
+constexpr double projection_round_off = 32.0 * std::numeric_limits<double>::epsilon();
 
 /// Returns the number of nodes of a pair's first part.
 int first_part(PairKind kind) {
@@ -34,7 +34,8 @@ double largest_coordinate(PairKind kind, const PairPositions& x) {
 double collision_free_step(PairKind kind, const PairPositions& from, const PairPositions& to,
                            double thickness, double keep) {
     const int count = nodes_of(kind), first = first_part(kind);
-    const double error = round_off * (largest_coordinate(kind, from) + largest_coordinate(kind, to));
+    const double error =
+        projection_round_off * (largest_coordinate(kind, from) + largest_coordinate(kind, to));
     PairPositions way = to;
     for (int i = 0; i < count; ++i) way[i] = to[i] - from[i];
     PairPositions x = from;

@@ -1,10 +1,10 @@
 #include "magshell/linalg/low_rank_factor.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <limits>
 #include <utility>
 
+#include "magshell/linalg/dense_decompositions.h"
 #include "magshell/linalg/pattern_checks.h"
 
 namespace magshell {
@@ -48,8 +48,8 @@ FactorReport LowRankFactor::factorize() {
         report_.reason = "the stiffness is singular without what its cavities and tendons add";
         return report_;
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(m);
-    VectorXd inverse = parts.eigenvalues();
+    const SymmetricEigen parts = eigen_of_symmetric(m);
+    VectorXd inverse = parts.values;
     for (Index k = 0; k < inverse.size(); ++k) {
         if (std::abs(inverse[k]) < singular) {
             ++report_.perturbed_pivots;
@@ -59,8 +59,8 @@ FactorReport LowRankFactor::factorize() {
         report_.negative_pivots -= signs_[k] > 0.0;
         inverse[k] = 1.0 / inverse[k];
     }
-    border_ = scale.asDiagonal() * parts.eigenvectors() * inverse.asDiagonal() *
-              parts.eigenvectors().transpose() * scale.asDiagonal();
+    border_ = scale.asDiagonal() * parts.vectors * inverse.asDiagonal() * parts.vectors.transpose() *
+              scale.asDiagonal();
     return report_;
 }
 

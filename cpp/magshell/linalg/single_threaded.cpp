@@ -36,9 +36,9 @@ struct Dependencies {
     }
 };
 
-const Dependencies& loaded() {
-    static const Dependencies dependencies;
-    return dependencies;
+const Dependencies& dependencies() {
+    static const Dependencies found;
+    return found;
 }
 
 std::mutex guards_mutex;
@@ -47,33 +47,35 @@ int threads_before = 0;
 
 }  // namespace
 
-SingleThreaded::SingleThreaded() : openmp_levels_(loaded().openmp_levels ? loaded().openmp_levels() : 1) {
-    if (loaded().set_openmp_levels) loaded().set_openmp_levels(0);
+SingleThreaded::SingleThreaded()
+    : openmp_levels_(dependencies().openmp_levels ? dependencies().openmp_levels() : 1) {
+    if (dependencies().set_openmp_levels) dependencies().set_openmp_levels(0);
     const std::lock_guard lock(guards_mutex);
-    if (guards++ == 0 && loaded().set_blas_threads && loaded().blas_threads) {
-        threads_before = loaded().blas_threads();
-        if (threads_before != 1) loaded().set_blas_threads(1);
+    if (guards++ == 0 && dependencies().set_blas_threads && dependencies().blas_threads) {
+        threads_before = dependencies().blas_threads();
+        if (threads_before != 1) dependencies().set_blas_threads(1);
     }
 }
 
 SingleThreaded::~SingleThreaded() {
-    if (loaded().set_openmp_levels) loaded().set_openmp_levels(openmp_levels_);
+    if (dependencies().set_openmp_levels) dependencies().set_openmp_levels(openmp_levels_);
     const std::lock_guard lock(guards_mutex);
-    if (--guards == 0 && threads_before > 1) loaded().set_blas_threads(threads_before);
+    if (--guards == 0 && threads_before > 1) dependencies().set_blas_threads(threads_before);
 }
 
 std::string blas_path() {
     Dl_info info;
-    return loaded().blas_routine && dladdr(loaded().blas_routine, &info) && info.dli_fname ? info.dli_fname
-                                                                                           : "";
+    return dependencies().blas_routine && dladdr(dependencies().blas_routine, &info) && info.dli_fname
+               ? info.dli_fname
+               : "";
 }
 
 std::string blas_config() {
-    return loaded().blas_config ? loaded().blas_config() : "";
+    return dependencies().blas_config ? dependencies().blas_config() : "";
 }
 
 int blas_threads() {
-    return loaded().blas_threads ? loaded().blas_threads() : 0;
+    return dependencies().blas_threads ? dependencies().blas_threads() : 0;
 }
 
 #else

@@ -1,8 +1,9 @@
 #include "magshell/solve/modes.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+
+#include "magshell/linalg/dense_decompositions.h"
 
 namespace magshell {
 using Eigen::MatrixXd;
@@ -52,15 +53,14 @@ std::vector<Mode> modes_near_zero(Newton& newton, int count) {
     for (int round = 0; round < 40; ++round) {
         MatrixXd my = weighed(y), x = my;
         newton.factor()->solve(x);
-        const Eigen::HouseholderQR<MatrixXd> qr(scaled(x));
-        const MatrixXd r = qr.matrixQR().topRows(columns);
+        const MatrixXd r = triangle_of_qr(scaled(x));
         r.triangularView<Eigen::Upper>().solveInPlace<Eigen::OnTheRight>(x);
         r.triangularView<Eigen::Upper>().solveInPlace<Eigen::OnTheRight>(my);
         const MatrixXd k = x.transpose() * my;
-        const Eigen::SelfAdjointEigenSolver<MatrixXd> ritz(0.5 * (k + k.transpose()));
+        const SymmetricEigen ritz = eigen_of_symmetric(0.5 * (k + k.transpose()));
         const VectorXd before = eigenvalues;
-        eigenvalues = ritz.eigenvalues();
-        y = x * ritz.eigenvectors();
+        eigenvalues = ritz.values;
+        y = x * ritz.vectors;
         const double scale = eigenvalues.cwiseAbs().minCoeff();
         Index nearest, nearest_before;
         eigenvalues.cwiseAbs().minCoeff(&nearest);

@@ -1,10 +1,10 @@
 #include "magshell/solve/nonsymmetric_modes.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "magshell/linalg/dense_decompositions.h"
 #include "magshell/solve/modes.h"
 #include "magshell/solve/newton/unsymmetric.h"
 
@@ -52,7 +52,7 @@ class InverseTangent {
 MatrixXd orthonormal(MatrixXd x, const MatrixXd& basis) {
     for (int pass = 0; pass < 2; ++pass) {
         x -= basis * (basis.transpose() * x);
-        x = Eigen::HouseholderQR<MatrixXd>(x).householderQ() * MatrixXd::Identity(x.rows(), x.cols());
+        x = orthonormal_columns(x);
     }
     return x;
 }
@@ -65,8 +65,8 @@ struct RitzPairs {
 };
 
 RitzPairs ritz_pairs(const MatrixXd& basis, const MatrixXd& projected, const MatrixXd& next) {
-    const Eigen::EigenSolver<MatrixXd> eigen(projected);
-    RitzPairs pairs{eigen.eigenvalues(), eigen.eigenvectors(), {}, {}};
+    ComplexEigen eigen = eigen_of_real(projected);
+    RitzPairs pairs{std::move(eigen.values), std::move(eigen.vectors), {}, {}};
     const Index n = projected.rows();
     for (Index k = 0; k < n; ++k) {
         const double residual =

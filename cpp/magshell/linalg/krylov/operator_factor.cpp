@@ -1,6 +1,5 @@
 #include "magshell/linalg/krylov/operator_factor.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -8,6 +7,7 @@
 #include <vector>
 
 #include "magshell/core/errors.h"
+#include "magshell/linalg/dense_decompositions.h"
 #include "magshell/linalg/krylov/gmres.h"
 #include "magshell/linalg/pattern_checks.h"
 
@@ -67,16 +67,16 @@ Count count_below(const Factor& positive, const OperatorFactor::Operator& produc
         const bool invariant = length <= negligible * largest || step == n;
         if (step >= fewest || invariant) {
             const Index size = static_cast<Index>(step);
-            Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> ritz;
-            ritz.computeFromTridiagonal(Eigen::Map<const VectorXd>(diagonal.data(), size),
-                                        Eigen::Map<const VectorXd>(beside.data(), size - 1));
+            const SymmetricEigen ritz =
+                eigen_of_tridiagonal(Eigen::Map<const VectorXd>(diagonal.data(), size),
+                                     Eigen::Map<const VectorXd>(beside.data(), size - 1));
             count.below = 0;
-            while (count.below < size && ritz.eigenvalues()[count.below] < bound) ++count.below;
+            while (count.below < size && ritz.values[count.below] < bound) ++count.below;
             // The Ritz values below the bound and the next one must be known well enough to tell their sides.
             bool certain_of_all = count.below < size;
             for (Index k = 0; k <= count.below && certain_of_all; ++k)
-                certain_of_all = length * std::abs(ritz.eigenvectors()(size - 1, k)) <=
-                                 certain * std::abs(ritz.eigenvalues()[k] - bound);
+                certain_of_all = length * std::abs(ritz.vectors(size - 1, k)) <=
+                                 certain * std::abs(ritz.values[k] - bound);
             count.settled = invariant || certain_of_all;
         }
         beside.push_back(length);

@@ -1,12 +1,18 @@
 #include "magshell/solve/motion/edge_rotations.h"
 
+#include <Eigen/SparseCholesky>
+
 #include "magshell/core/errors.h"
 
 namespace magshell {
 
+struct EdgeRotationEquilibrium::Factorization {
+    Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> of;
+};
+
 EdgeRotationEquilibrium::EdgeRotationEquilibrium(Model& model, const VectorXd& q,
                                                  const LoadParameters& load_parameters)
-    : model_(model), first_(model.nodes().first_scalar()) {
+    : model_(model), first_(model.nodes().first_scalar()), factor_(new Factorization) {
     model.evaluate(q, load_parameters);
     model.assemble(q, load_parameters, false);
     const SystemMatrix& matrix = model.matrix();
@@ -17,12 +23,14 @@ EdgeRotationEquilibrium::EdgeRotationEquilibrium(Model& model, const VectorXd& q
     const Index n = matrix.size() - first_;
     Eigen::SparseMatrix<double> lower(n, n);
     lower.setFromTriplets(entries.begin(), entries.end());
-    factor_.compute(lower);
-    if (n > 0 && factor_.info() != Eigen::Success)
+    factor_->of.compute(lower);
+    if (n > 0 && factor_->of.info() != Eigen::Success)
         throw InvalidInput(
             "the edge rotations of the start have no bending stiffness, so they cannot be computed: give "
             "them");
 }
+
+EdgeRotationEquilibrium::~EdgeRotationEquilibrium() = default;
 
 VectorXd EdgeRotationEquilibrium::correction() const {
     return adjoint(model_.residual().gradient);
@@ -31,7 +39,7 @@ VectorXd EdgeRotationEquilibrium::correction() const {
 VectorXd EdgeRotationEquilibrium::adjoint(const VectorXd& by_state) const {
     VectorXd solution = VectorXd::Zero(model_.size());
     const Index n = model_.size() - first_;
-    if (n > 0) solution.tail(n) = -factor_.solve(by_state.tail(n));
+    if (n > 0) solution.tail(n) = -factor_->of.solve(by_state.tail(n));
     return solution;
 }
 

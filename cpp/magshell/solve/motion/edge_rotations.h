@@ -1,7 +1,7 @@
 // Edge rotations in equilibrium at fixed vertices. They have no inertia, and the energy is quadratic in them.
 #pragma once
 
-#include <Eigen/SparseCholesky>
+#include <memory>
 
 #include "magshell/scene/model.h"
 
@@ -11,6 +11,7 @@ class EdgeRotationEquilibrium {
   public:
     /// Evaluates and assembles at q, and factorizes the stiffness of the rotations.
     EdgeRotationEquilibrium(Model& model, const VectorXd& q, const LoadParameters& load_parameters);
+    ~EdgeRotationEquilibrium();
 
     /// Returns the increment of the edge rotations of q to equilibrium; zero for all other dofs.
     VectorXd correction() const;
@@ -20,7 +21,8 @@ class EdgeRotationEquilibrium {
   private:
     Model& model_;
     Index first_;  // index of the first edge rotation among the dofs
-    Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor_;
+    struct Factorization;
+    std::unique_ptr<Factorization> factor_;
 };
 
 }  // namespace magshell

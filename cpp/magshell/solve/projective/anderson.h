@@ -4,10 +4,10 @@
 // least-squares sense. No energy is needed, so G may be nonsmooth (contact with friction, solve/projective/coulomb_contact.h).
 #pragma once
 
-#include <Eigen/QR>
 #include <deque>
 
 #include "magshell/core/types.h"
+#include "magshell/linalg/dense_decompositions.h"
 
 namespace magshell {
 
@@ -34,7 +34,7 @@ class Anderson {
         const Eigen::Index count = static_cast<Eigen::Index>(changes_.size());
         Eigen::MatrixXd moves(move.size(), count);
         for (Eigen::Index k = 0; k < count; ++k) moves.col(k) = changes_[k].move;
-        const VectorXd weights = moves.colPivHouseholderQr().solve(move);
+        const VectorXd weights = least_squares(moves, move);
         VectorXd mixed = end;
         for (Eigen::Index k = 0; k < count; ++k) mixed -= weights[k] * changes_[k].end;
         return mixed;

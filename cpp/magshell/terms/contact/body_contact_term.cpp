@@ -12,7 +12,7 @@
 namespace magshell {
 namespace {
 
-constexpr Index block_length = 256;  // [pairs] size of a parallel task
+constexpr Index pairs_per_task = 256;  // [pairs] size of a parallel task
 // [-] fraction of the gap that remains after the longest admissible step
 constexpr double remaining_gap = 0.1;
 
@@ -74,11 +74,11 @@ BodyContactTerm::ActiveContacts BodyContactTerm::found(const double* q) const {
         if (each.at == at) return each.active_contacts;
     const std::vector<NearPair>& near = candidates_.near(q);
     const Index count = static_cast<Index>(near.size());
-    const int blocks = static_cast<int>((count + block_length - 1) / block_length);
+    const int blocks = static_cast<int>((count + pairs_per_task - 1) / pairs_per_task);
     if (parts_.size() < static_cast<std::size_t>(blocks)) parts_.resize(blocks);
     parallel_for(blocks, [&](int block) {
         parts_[block].clear();
-        const Index first = block * block_length, last = std::min(count, first + block_length);
+        const Index first = block * pairs_per_task, last = std::min(count, first + pairs_per_task);
         for (Index k = first; k < last; ++k) {
             if (!candidates_.may_be_active(k)) continue;
             const PairPositions x = positions_of(near[k].pair, q);

@@ -11,7 +11,7 @@
 namespace magshell {
 namespace {
 
-constexpr Index block_length = 512;  // [points] size of a parallel task
+constexpr Index points_per_task = 512;  // [points] size of a parallel task
 
 Vec3 weighted(const ContactPoint& point, const double* all) {
     Vec3 sum = Vec3::Zero();
@@ -116,9 +116,9 @@ std::vector<ContactTerm::ActiveContact> ContactTerm::active_contacts(
         const Index count = static_cast<Index>(contact.points.size());
         for (const Index o : contact.obstacles) {
             const ObstacleState obstacle = obstacle_state(o, load_parameters);
-            std::vector<std::vector<ActiveContact>> found((count + block_length - 1) / block_length);
+            std::vector<std::vector<ActiveContact>> found((count + points_per_task - 1) / points_per_task);
             parallel_for(static_cast<int>(found.size()), [&](int block) {
-                const Index first = block * block_length, last = std::min(count, first + block_length);
+                const Index first = block * points_per_task, last = std::min(count, first + points_per_task);
                 for (Index p = first; p < last; ++p) {
                     const Vec3 x = weighted(contact.points[p], q);
                     const Distance at = obstacle.distance(x);

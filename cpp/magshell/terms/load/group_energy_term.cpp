@@ -1,10 +1,10 @@
 #include "magshell/terms/load/group_energy_term.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 
 #include "magshell/assembly/lanes.h"
 #include "magshell/core/errors.h"
+#include "magshell/linalg/dense_decompositions.h"
 
 namespace magshell {
 
@@ -86,7 +86,6 @@ void GroupEnergyTerm::finish_assembly(const double* q, const LoadParameters& loa
     const double scale = factor(load_parameters);
     if (scale == 0.0) return;
     const VectorXd hessians = energy_->sample(gather(q), values_, 2).hessians;
-    Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen;
     for (Index group = 0; group < groups(); ++group) {
         Eigen::MatrixXd hessian = scale * Eigen::Map<const Eigen::MatrixXd>(
                                               hessians.data() + group * width() * width(), width(), width());
@@ -94,9 +93,8 @@ void GroupEnergyTerm::finish_assembly(const double* q, const LoadParameters& loa
             throw InvalidInput("the second derivatives of the energy '" + name_ + "' are not finite in " +
                                describe(group) + ", where it is not smooth: write it so that it is");
         if (psd_projection_) {
-            eigen.compute(hessian);
-            hessian = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() *
-                      eigen.eigenvectors().transpose();
+            const SymmetricEigen eigen = eigen_of_symmetric(hessian);
+            hessian = eigen.vectors * eigen.values.cwiseMax(0.0).asDiagonal() * eigen.vectors.transpose();
         }
         scatter(group, hessian, out);
     }
