@@ -346,6 +346,17 @@ void register_model(py::module_& module) {
             py::arg("q"), py::arg("points"),
             "The flux density of the magnetized shells at points outside of them, (n, 3) [T].")
         .def(
+            "own_field_on_moments",
+            [](const Model& model, const VectorXd& q) {
+                OwnField::DipoleActions on;
+                if (model.terms().own_field) on = model.terms().own_field->field().on_dipoles(q.data());
+                return std::tuple(rows_from(on.positions), rows_from(on.forces), rows_from(on.couples));
+            },
+            py::arg("q"),
+            "Of each rigid body with a moment in the own field: the place of the moment [m], the force [N] "
+            "and the couple "
+            "[N m] on it, (n, 3) each.")
+        .def(
             "own_energies",
             [](const Model& model, const VectorXd& q) {
                 return model.terms().own_field ? model.terms().own_field->own_energies(q.data())

@@ -503,6 +503,16 @@ class Model:
         """
         Points [m] and magnetic moments [A m2] of the terms of one name, or of all of them, in the applied field, (n, 3) each.
         """
+    def own_field_on_moments(
+        self, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
+    ) -> tuple[
+        typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"],
+        typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"],
+        typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"],
+    ]:
+        """
+        Of each rigid body with a moment in the own field: the place of the moment [m], the force [N] and the couple [N m] on it, (n, 3) each.
+        """
     def own_energies(
         self, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> list[float]:

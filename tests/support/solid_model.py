@@ -97,6 +97,9 @@ class SolidModel:
             obstacles=[],
             water=None,
             own_field_shells=[],
+            own_field_solids=[],
+            own_field_skins=[],
+            own_field_rigid=[],
             own_field_max_points=0,
             own_field_accuracy=0.0,
         )

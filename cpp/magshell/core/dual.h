@@ -41,6 +41,10 @@ inline Dual sqrt(const Dual& a) {
     return {root, a.rate / (2.0 * root)};
 }
 
+inline Dual log(const Dual& a) {
+    return {std::log(a.value), a.rate / a.value};
+}
+
 inline Dual atan2(const Dual& y, const Dual& x) {
     return {std::atan2(y.value, x.value),
             (y.rate * x.value - x.rate * y.value) / (x.value * x.value + y.value * y.value)};

@@ -41,12 +41,20 @@ Entries selected(const Entries& entries, const std::vector<bool>& marked) {
 
 }  // namespace
 
-OwnField::OwnField(Faces faces) {
+OwnField::OwnField(Faces faces, const Triangles& triangles, const std::vector<RigidNodes>& rigid)
+    : n_tetrahedra_(triangles.n_tetrahedra) {
     const Index n = static_cast<Index>(faces.nodes.size());
     for (const std::array<Index, 3>& corners : faces.nodes)
         nodes_.insert(nodes_.end(), corners.begin(), corners.end());
+    for (const std::array<Index, 3>& corners : triangles.nodes)
+        nodes_.insert(nodes_.end(), corners.begin(), corners.end());
+    for (const RigidNodes& body : rigid)
+        nodes_.insert(nodes_.end(), body.nodes.begin(), body.nodes.begin() + 4);
     std::sort(nodes_.begin(), nodes_.end());
     nodes_.erase(std::unique(nodes_.begin(), nodes_.end()), nodes_.end());
+    const auto local = [&](Index node) {
+        return static_cast<Index>(std::lower_bound(nodes_.begin(), nodes_.end(), node) - nodes_.begin());
+    };
     Rows3i corners(n, 3);
     faces_.resize(n);
     for (Index f = 0; f < n; ++f) {
@@ -56,8 +64,7 @@ OwnField::OwnField(Faces faces) {
         face.area = 0.5 * across.norm();
         face.normal = across.normalized();
         for (int i = 0; i < 3; ++i) {
-            corners(f, i) = face.nodes[i] = static_cast<Index>(
-                std::lower_bound(nodes_.begin(), nodes_.end(), faces.nodes[f][i]) - nodes_.begin());
+            corners(f, i) = face.nodes[i] = local(faces.nodes[f][i]);
             const Vec3 along = x[(i + 2) % 3] - x[(i + 1) % 3];
             face.conormals[i] = along.cross(face.normal);
             face.size = std::max(face.size, along.norm());
@@ -71,38 +78,60 @@ OwnField::OwnField(Faces faces) {
             for (int c = 0; c < 2; ++c) face.in_plane[i][c] = face.conormals[i].dot(face.basis[c]);
     }
     for (const HalfEdge& half : sorted_half_edges(corners, static_cast<Index>(nodes_.size()))) {
-        const std::array<Index, 2> ends{half.low, half.high};
-        if (edges_.empty() || edges_.back().nodes != ends) {
+        const std::array<Index, 3> ends{half.low, half.high, -1};
+        if (elements_.empty() || elements_.back().nodes != ends) {
             const double length = faces_[half.face].conormals[half.corner].norm();
-            edges_.push_back({ends, {half.face, -1}, {half.forward ? 1.0 : -1.0, 0.0}, {1.0, 0.0}, length});
+            elements_.push_back(
+                {ends, {half.face, -1}, {half.forward ? 1.0 : -1.0, 0.0}, {1.0, 0.0}, length, Vec3::Zero()});
         } else {
-            Edge& edge = edges_.back();
-            if (edge.faces[1] >= 0)
+            Element& element = elements_.back();
+            if (element.bodies[1] >= 0)
                 throw InvalidInput(
                     "own_field: three magnetized faces meet at one edge, as where shells are tied; exclude "
                     "one "
                     "of the shells: ms.OwnField(bodies=...)");
-            edge.faces[1] = half.face;
-            edge.turns[1] = half.forward ? 1.0 : -1.0;
-            edge.normals[1] = edge.turns[0] * edge.turns[1] < 0.0 ? 1.0 : -1.0;
+            element.bodies[1] = half.face;
+            element.turns[1] = half.forward ? 1.0 : -1.0;
+            element.normals[1] = element.turns[0] * element.turns[1] < 0.0 ? 1.0 : -1.0;
         }
-        faces_[half.face].edges[half.corner] = static_cast<Index>(edges_.size()) - 1;
+        faces_[half.face].edges[half.corner] = static_cast<Index>(elements_.size()) - 1;
+    }
+    for (std::size_t t = 0; t < triangles.nodes.size(); ++t) {
+        const std::array<Vec3, 3>& x = triangles.rest[t];
+        Element& element = elements_.emplace_back();
+        for (int i = 0; i < 3; ++i) {
+            element.nodes[i] = local(triangles.nodes[t][i]);
+            element.length = std::max(element.length, (x[(i + 1) % 3] - x[i]).norm());
+        }
+        element.bodies = triangles.tetrahedra[t];
+        element.turns = {1.0, -1.0};
+        element.area = 0.5 * (x[1] - x[0]).cross(x[2] - x[0]);
+    }
+    rigid_of_node_.assign(nodes_.size(), -1);
+    for (const RigidNodes& body : rigid) {
+        Dipole& dipole = dipoles_.emplace_back();
+        for (int k = 0; k < 4; ++k) dipole.nodes[k] = local(body.nodes[k]);
+        for (const Index node : body.nodes)
+            if (const Index k = local(node); k < static_cast<Index>(nodes_.size()) && nodes_[k] == node)
+                rigid_of_node_[k] = static_cast<Index>(dipoles_.size()) - 1;
     }
 }
 
-void OwnField::set(const std::vector<Vec3>& magnetization, const std::vector<double>& thickness) {
+void OwnField::set(const std::vector<Vec3>& magnetization, const std::vector<double>& thickness,
+                   const std::vector<Vec3>& of_tetrahedra) {
     // [-] Charges and normal components below this part of the largest one are round-off; see
     // test_uniform_tangential_magnetization_has_sources_on_the_border_only.
     constexpr double round_off = 1e-12;
     magnetization_ = magnetization;
     thickness_ = thickness;
-    const Index n_faces = static_cast<Index>(faces_.size()), n_edges = static_cast<Index>(edges_.size());
+    const Index n_faces = static_cast<Index>(faces_.size()),
+                n_elements = static_cast<Index>(elements_.size());
     rest_currents_.assign(n_faces, 0.0);
     side_charges_.assign(n_faces, 0.0);
-    edge_charges_.assign(n_edges, 0.0);
-    has_charge_.assign(n_edges, false);
-    edge_thickness_.assign(n_edges, 0.0);
-    std::vector<double> largest(n_edges, 0.0);
+    charges_.assign(n_elements, 0.0);
+    has_charge_.assign(n_elements, false);
+    element_thickness_.assign(n_elements, 0.0);
+    std::vector<double> largest(n_elements, 0.0);
     for (Index f = 0; f < n_faces; ++f) {
         const Face& face = faces_[f];
         const Vec3& m = magnetization[f];
@@ -115,57 +144,86 @@ void OwnField::set(const std::vector<Vec3>& magnetization, const std::vector<dou
             const double tangential = (m - along * face.normal).norm();
             if (face.rotates && tangential > round_off * m.norm()) has_charge_[face.edges[i]] = true;
             if (face.rotates) continue;
-            edge_charges_[face.edges[i]] += thickness[f] * m.dot(face.conormals[i]);
+            charges_[face.edges[i]] += thickness[f] * m.dot(face.conormals[i]);
             largest[face.edges[i]] =
                 std::max(largest[face.edges[i]], thickness[f] * m.norm() * face.conormals[i].norm());
         }
     }
+    for (Index e = 0; e < n_elements; ++e) {
+        const Element& element = elements_[e];
+        for (int side = 0; side < 2 && !element.is_edge(); ++side) {
+            if (element.bodies[side] < 0) continue;
+            const Vec3& m = of_tetrahedra[element.bodies[side]];
+            charges_[e] += element.turns[side] * m.dot(element.area);
+            largest[e] = std::max(largest[e], m.norm() * element.area.norm());
+        }
+    }
     has_charges_ = false;
-    for (Index e = 0; e < n_edges; ++e) {
-        const std::array<Index, 2>& at = edges_[e].faces;
-        edge_thickness_[e] = at[1] < 0 ? thickness[at[0]] : 0.5 * (thickness[at[0]] + thickness[at[1]]);
-        if (std::abs(edge_charges_[e]) <= round_off * largest[e]) edge_charges_[e] = 0.0;
-        if (edge_charges_[e] != 0.0) has_charge_[e] = true;
+    for (Index e = 0; e < n_elements; ++e) {
+        const std::array<Index, 2>& at = elements_[e].bodies;
+        if (elements_[e].is_edge())
+            element_thickness_[e] =
+                at[1] < 0 ? thickness[at[0]] : 0.5 * (thickness[at[0]] + thickness[at[1]]);
+        if (std::abs(charges_[e]) <= round_off * largest[e]) charges_[e] = 0.0;
+        if (charges_[e] != 0.0) has_charge_[e] = true;
         has_charges_ |= has_charge_[e];
     }
     active_faces_ = partition_numbers(n_faces, face_order_, [&](Index f) { return side_charges_[f] != 0.0; });
-    active_edges_ = partition_numbers(n_edges, edge_order_, [&](Index e) {
-        const std::array<Index, 2>& at = edges_[e].faces;
-        return has_charge_[e] || side_charges_[at[0]] != 0.0 || (at[1] >= 0 && side_charges_[at[1]] != 0.0);
+    active_elements_ = partition_numbers(n_elements, element_order_, [&](Index e) {
+        const std::array<Index, 2>& at = elements_[e].bodies;
+        if (has_charge_[e]) return true;
+        return elements_[e].is_edge() &&
+               (side_charges_[at[0]] != 0.0 || (at[1] >= 0 && side_charges_[at[1]] != 0.0));
     });
 }
 
+void OwnField::set(const std::vector<DipoleWeights>& dipoles) {
+    for (std::size_t d = 0; d < dipoles_.size(); ++d) dipoles_[d].weights = dipoles[d];
+}
+
 OwnField OwnField::of_sources() const {
-    std::vector<bool> edges(edges_.size(), false), faces(faces_.size(), false), nodes(nodes_.size(), false);
-    for (Index k = 0; k < active_edges_; ++k) {
-        edges[edge_order_[k]] = true;
-        for (const Index f : edges_[edge_order_[k]].faces)
-            if (f >= 0) faces[f] = true;
+    std::vector<bool> elements(elements_.size(), false), faces(faces_.size(), false),
+        nodes(nodes_.size(), false);
+    for (Index k = 0; k < active_elements_; ++k) {
+        const Element& element = elements_[element_order_[k]];
+        elements[element_order_[k]] = true;
+        for (int i = 0; i < element.n_nodes(); ++i) nodes[element.nodes[i]] = true;
+        for (const Index f : element.bodies)
+            if (f >= 0 && element.is_edge()) faces[f] = true;
     }
     for (std::size_t f = 0; f < faces_.size(); ++f)
         if (faces[f])
             for (const Index node : faces_[f].nodes) nodes[node] = true;
-    const std::vector<Index> edge_numbers = numbered(edges), face_numbers = numbered(faces),
+    for (const Dipole& dipole : dipoles_)
+        for (const Index node : dipole.nodes) nodes[node] = true;
+    const std::vector<Index> element_numbers = numbered(elements), face_numbers = numbered(faces),
                              node_numbers = numbered(nodes);
     OwnField part;
     part.nodes_ = selected(nodes_, nodes);
-    part.edges_ = selected(edges_, edges);
-    for (Edge& edge : part.edges_) {
-        for (Index& node : edge.nodes) node = node_numbers[node];
-        for (Index& f : edge.faces) f = f < 0 ? f : face_numbers[f];
+    part.elements_ = selected(elements_, elements);
+    part.n_tetrahedra_ = n_tetrahedra_;
+    part.dipoles_ = dipoles_;
+    for (Dipole& dipole : part.dipoles_)
+        for (Index& node : dipole.nodes) node = node_numbers[node];
+    part.rigid_of_node_ = selected(rigid_of_node_, nodes);
+    for (Element& element : part.elements_) {
+        for (int i = 0; i < element.n_nodes(); ++i) element.nodes[i] = node_numbers[element.nodes[i]];
+        for (Index& f : element.bodies)
+            if (f >= 0 && element.is_edge()) f = face_numbers[f];
     }
     part.faces_ = selected(faces_, faces);
     for (Face& face : part.faces_) {
         for (Index& node : face.nodes) node = node_numbers[node];
-        for (Index& edge : face.edges) edge = edge_numbers[edge];
+        for (Index& edge : face.edges) edge = element_numbers[edge];
     }
-    for (Index k = 0; k < active_edges_; ++k) part.edge_order_.push_back(edge_numbers[edge_order_[k]]);
+    for (Index k = 0; k < active_elements_; ++k)
+        part.element_order_.push_back(element_numbers[element_order_[k]]);
     for (Index k = 0; k < active_faces_; ++k) part.face_order_.push_back(face_numbers[face_order_[k]]);
-    part.active_edges_ = active_edges_;
+    part.active_elements_ = active_elements_;
     part.active_faces_ = active_faces_;
-    part.edge_charges_ = selected(edge_charges_, edges);
-    part.has_charge_ = selected(has_charge_, edges);
-    part.edge_thickness_ = selected(edge_thickness_, edges);
+    part.charges_ = selected(charges_, elements);
+    part.has_charge_ = selected(has_charge_, elements);
+    part.element_thickness_ = selected(element_thickness_, elements);
     part.thickness_ = selected(thickness_, faces);
     part.rest_currents_ = selected(rest_currents_, faces);
     part.magnetization_ = selected(magnetization_, faces);
@@ -176,7 +234,7 @@ OwnField OwnField::of_sources() const {
 }
 
 std::size_t OwnField::bytes() const {
-    return nodes_.size() * sizeof(Index) + edges_.size() * (sizeof(Edge) + 2 * sizeof(double)) +
+    return nodes_.size() * sizeof(Index) + elements_.size() * (sizeof(Element) + 2 * sizeof(double)) +
            faces_.size() * (sizeof(Face) + sizeof(Vec3) + 3 * sizeof(double));
 }
 

@@ -1,6 +1,6 @@
-// OwnField: the magnetostatic energy of magnetized sheets in the field that they make themselves, mutual and self parts.
+// OwnField: the magnetostatic energy of magnetized sheets and solids in the field that they make themselves, mutual and self parts.
 //
-// With a magnetization M~ that is constant on each face and carried along by the deformation (F M~), the sources lie on the edges:
+// Sheets. // With a magnetization M~ that is constant on each face and carried along by the deformation (F M~), the sources lie on the edges:
 //
 //   tangential  charge Q_e = sum over faces f at e of h_f l~_e (M~_f . nu~_fe),  nu~ the outward conormal at rest; a constant of the motion
 //               a face whose magnetization rotates without stretching, R M~, has U^-1 M~ instead of M~ (energy/unstretched_vector.h)
@@ -16,6 +16,16 @@
 // faces at an edge. Pairs of edges nearer than 1.5 edge lengths are sampled at 4 x 4 points; near sides are replaced by two layers of
 // dipoles, whose potential is the solid angle. Between near and far the two values are blended with a smooth weight of the distance, so
 // that the energy is a function of the state with continuous second derivatives.
+//
+// Solids. With M~ constant on each tetrahedron (F M~ / J), the sources are charges on its faces, which the deformation does not change:
+//
+//   Q_t = a~_t . (M~_1 - M~_2)      a~_t: area vector at rest, out of the tetrahedron 1 into 2
+//
+// A charge is uniform on its triangle: four points, 16 where triangles or edges are near, and the closed form of its energy with itself.
+//
+// Rigid bodies with a magnetic moment are point dipoles in the field of all elements and of each other.
+//
+// An element is an edge of a sheet or a triangle of a solid: what carries charges and currents.
 #pragma once
 
 #include <array>
@@ -36,35 +46,57 @@ class OwnField {
         std::vector<std::array<Vec3, 3>> rest;
         std::vector<bool> rotates;
     };
-    /// The gradient by the values of each face.
+    /// The triangles of all solids: their nodes, their corners at rest [m], counterclockwise seen from outside of the first of the two
+    /// tetrahedra at them; -1: none.
+    struct Triangles {
+        std::vector<std::array<Index, 3>> nodes;
+        std::vector<std::array<Vec3, 3>> rest;
+        std::vector<std::array<Index, 2>> tetrahedra;
+        Index n_tetrahedra = 0;
+    };
+    /// A rigid body with a moment: all of its nodes, first the corners x_k of its tetrahedron. The dipole m = sum moment_k x_k is at
+    /// sum position_k x_k.
+    struct RigidNodes {
+        std::vector<Index> nodes;
+    };
+    struct DipoleWeights {
+        std::array<double, 4> position{}, moment{};
+    };
+    /// The gradient by the values of each face and of each tetrahedron, and by the weights of each dipole.
     struct FaceGradient {
         std::vector<Vec3> magnetization;  // [J m/A]
         std::vector<double> thickness;    // [J/m]
+        std::vector<Vec3> of_tetrahedra;  // by the magnetization [J m/A]
+        std::vector<DipoleWeights> of_dipoles;
     };
     /// Trees of the source points, and the pairs of boxes whose sums they replace.
     struct Trees;
-    /// Pairs that are near: for each target edge its source edges, and the pairs (edge, face) with charged sides. Trees if the sums are
-    /// not direct.
+    /// Pairs that are near: for each target element its source elements, and the pairs (element, face) with charged sides. Trees if the
+    /// sums are not direct.
     struct Neighbours {
-        std::vector<std::vector<Index>> edges;
+        std::vector<std::vector<Index>> elements;
         std::vector<std::array<Index, 2>> sides;
         std::shared_ptr<const Trees> trees;
     };
 
     /// Throws InvalidInput if more than two faces meet at an edge.
-    explicit OwnField(Faces faces);
+    OwnField(Faces faces, const Triangles& triangles, const std::vector<RigidNodes>& rigid);
 
-    /// Sets the remanent magnetization [A/m] and the thickness [m] of each face.
-    void set(const std::vector<Vec3>& magnetization, const std::vector<double>& thickness);
+    /// Sets the remanent magnetization [A/m] and the thickness [m] of each face, and the magnetization of each tetrahedron.
+    void set(const std::vector<Vec3>& magnetization, const std::vector<double>& thickness,
+             const std::vector<Vec3>& of_tetrahedra);
+    /// Sets the dipole of each rigid body.
+    void set(const std::vector<DipoleWeights>& dipoles);
     /// Sets the accuracy of sums over more than most_direct points; 0: they are direct.
     void set_accuracy(double accuracy) { accuracy_ = accuracy; }
     double accuracy() const { return accuracy_; }
     static constexpr Index most_direct =
         16000;  // trees take less time beyond; see benchmarks/own_field_costs.py
-    /// Returns the number of source points: four per edge with a source, six per face with a normal magnetization if there are charges.
-    Index n_points() const { return 4 * active_edges_ + (has_charges_ ? 6 * active_faces_ : 0); }
+    /// Returns the number of source points: four per element with a source, six per face with a normal magnetization if there are
+    /// charges.
+    Index n_points() const { return 4 * active_elements_ + (has_charges_ ? 6 * active_faces_ : 0); }
 
-    /// Returns the edges with a source and the faces at them: the same energy and gradient, without derivatives by the values of faces.
+    /// Returns the elements with a source and the faces at them: the same energy and gradient, without derivatives by the values of faces.
     OwnField of_sources() const;
 
     /// Finds the near pairs of sources at positions q of all nodes.
@@ -75,22 +107,36 @@ class OwnField {
     void add_hessian_product(const double* q, const Neighbours& near, const double* p, double* out) const;
     /// Returns the derivatives of the rate of the energy along lambda by the values of each face.
     FaceGradient vjp(const double* q, const double* lambda) const;
-    /// Returns the flux density [T] at points outside of the sheets.
+    /// The force [N] and the couple [N m] on each dipole, and its position [m].
+    struct DipoleActions {
+        std::vector<Vec3> positions, forces, couples;
+    };
+    DipoleActions on_dipoles(const double* q) const;
+    /// Returns the flux density [T] at points outside of the bodies.
     std::vector<Vec3> flux_density(const double* q, const std::vector<Vec3>& points) const;
 
-    /// Returns the nodes of the scene that the sheets have.
+    /// Returns the nodes of the scene that the bodies have.
     const std::vector<Index>& nodes() const { return nodes_; }
     /// Returns true if there is any source.
-    bool acts() const { return active_edges_ > 0; }
+    bool acts() const { return active_elements_ > 0 || !dipoles_.empty(); }
     std::size_t bytes() const;
 
   private:
-    struct Edge {
-        std::array<Index, 2> nodes;     // local nodes a, b
-        std::array<Index, 2> faces;     // -1: none
+    struct Element {
+        std::array<Index, 3> nodes;     // local; of an edge a, b, and -1
+        std::array<Index, 2> bodies;    // the faces at an edge, the tetrahedra at a triangle; -1: none
         std::array<double, 2> turns;    // +-1: the face runs the edge from a to b or back
         std::array<double, 2> normals;  // sign of each face's normal in that of the edge
-        double length = 0.0;            // at rest [m]
+        double length = 0.0;            // at rest, of a triangle its longest side [m]
+        Vec3 area = Vec3::Zero();       // of a triangle at rest [m2]
+
+        bool is_edge() const { return nodes[2] < 0; }
+        int n_nodes() const { return is_edge() ? 2 : 3; }
+    };
+    /// A source point of an element: its position as the weights of the nodes and the fraction of the thickness, and its weight.
+    struct SamplePoint {
+        double weights[3];
+        double zeta, weight;
     };
     struct Face {
         std::array<Index, 3> nodes;     // local
@@ -104,13 +150,21 @@ class OwnField {
         std::array<double, 4> inverse;                    // of the edges at rest in the basis; by rows
         std::array<std::array<double, 2>, 3> in_plane{};  // the conormals in the basis
     };
+    struct Dipole {
+        std::array<Index, 4> nodes;  // local
+        DipoleWeights weights;
+    };
     template <class T>
-    struct EdgeAdjoint {
-        Triple<T> a, b, normal;
+    struct DipoleAdjoint {
+        Triple<T> position, moment;
+    };
+    template <class T>
+    struct ElementAdjoint {
+        Triple<T> nodes[3], normal;
         T charge{}, current{}, thickness{};
 
-        EdgeAdjoint& operator+=(const EdgeAdjoint& other);
-        EdgeAdjoint& operator-=(const EdgeAdjoint& other);
+        ElementAdjoint& operator+=(const ElementAdjoint& other);
+        ElementAdjoint& operator-=(const ElementAdjoint& other);
         void scale(const T& factor);
     };
     template <class T>
@@ -127,17 +181,18 @@ class OwnField {
     struct Evaluation {
         T energy{};
         std::vector<Triple<T>> by_position;  // of local nodes
-        std::vector<EdgeAdjoint<T>> edges;
+        std::vector<ElementAdjoint<T>> elements;
         std::vector<FaceAdjoint<T>> faces;
+        std::vector<DipoleAdjoint<T>> dipoles;
     };
 
     OwnField() = default;
 
-    /// Where sums are evaluated: at the sources, or at all edges and faces, for derivatives by values that are zero now.
+    /// Where sums are evaluated: at the sources, or at all elements and faces, for derivatives by values that are zero now.
     enum class Targets { sources, all };
 
-    Index target_edges(Targets at) const {
-        return at == Targets::all ? static_cast<Index>(edges_.size()) : active_edges_;
+    Index target_elements(Targets at) const {
+        return at == Targets::all ? static_cast<Index>(elements_.size()) : active_elements_;
     }
     Index target_faces(Targets at) const {
         return at == Targets::all ? static_cast<Index>(faces_.size()) : active_faces_;
@@ -155,27 +210,45 @@ class OwnField {
     template <class T>
     Evaluation<T> evaluate(const std::vector<Triple<T>>& x, const Neighbours& near, Targets targets) const;
     template <class T>
-    void add_edge_pairs(const Geometry<T>& at, const Neighbours& near, Targets targets,
-                        Evaluation<T>& out) const;
+    void add_element_pairs(const Geometry<T>& at, const Neighbours& near, Targets targets,
+                           Evaluation<T>& out) const;
     template <class T>
     void add_sides(const Geometry<T>& at, const Neighbours& near, Targets targets, Evaluation<T>& out) const;
     template <class T>
-    void add_near_side(const Geometry<T>& at, Index e, Index f, EdgeAdjoint<T>& of_edge,
+    void add_near_side(const Geometry<T>& at, Index e, Index f, ElementAdjoint<T>& of_element,
                        FaceAdjoint<T>& of_face) const;
+    /// Returns true if all nodes of an element belong to the rigid body of a dipole.
+    bool is_part_of(Index element, Index dipole) const {
+        for (int k = 0; k < elements_[element].n_nodes(); ++k)
+            if (rigid_of_node_[elements_[element].nodes[k]] != dipole) return false;
+        return true;
+    }
+    template <class T>
+    void add_dipole(const Geometry<T>& at, std::size_t number, Targets targets, Evaluation<T>& out) const;
+    template <class T>
+    void add_dipole_pair(const Geometry<T>& at, std::size_t first, std::size_t second,
+                         Evaluation<T>& out) const;
+    template <class T>
+    void add_dipoles(const Geometry<T>& at, Targets targets, Evaluation<T>& out) const;
+    template <class T>
+    void add_self(const Geometry<T>& at, Index element, ElementAdjoint<T>& out) const;
     template <class T>
     void collect(const Geometry<T>& at, Evaluation<T>& out) const;
 
-    std::vector<Index> nodes_;  // local -> node of the scene
-    std::vector<Edge> edges_;
+    std::vector<Index> nodes_;       // local -> node of the scene
+    std::vector<Element> elements_;  // edges, then triangles
+    Index n_tetrahedra_ = 0;
+    std::vector<Dipole> dipoles_;
+    std::vector<Index> rigid_of_node_;  // the dipole whose rigid body a local node belongs to; -1: none
     std::vector<Face> faces_;
-    std::vector<Index> edge_order_, face_order_;  // those with a source first
-    Index active_edges_ = 0;                      // number of edges with a source
-    Index active_faces_ = 0;                      // number of faces with a normal magnetization
-    std::vector<double> edge_charges_;            // Q_e [A m] of faces whose magnetization stretches
-    std::vector<bool> has_charge_;                // of edges
-    std::vector<double> edge_thickness_;          // [m]
-    std::vector<double> thickness_;               // of faces [m]
-    std::vector<double> rest_currents_;           // h_f (M~_f . n~_f) [A]
+    std::vector<Index> element_order_, face_order_;  // those with a source first
+    Index active_elements_ = 0;                      // number of those with a source
+    Index active_faces_ = 0;                         // number of faces with a normal magnetization
+    std::vector<double> charges_;   // Q [A m] of faces whose magnetization stretches and of tetrahedra
+    std::vector<bool> has_charge_;  // of elements
+    std::vector<double> element_thickness_;  // of elements [m]
+    std::vector<double> thickness_;          // of faces [m]
+    std::vector<double> rest_currents_;      // h_f (M~_f . n~_f) [A]
     std::vector<Vec3> magnetization_;
     std::vector<double> side_charges_;  // A~_f (M~_f . n~_f) [A m]
     bool has_charges_ = false;

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "magshell/core/parallel.h"
+#include "magshell/energy/face_points.h"
 #include "magshell/energy/own_field.h"
 #include "magshell/energy/own_field_pairs.h"
 #include "magshell/energy/source_tree.h"
@@ -32,12 +33,18 @@ inline constexpr GaussRule coarse{2, points_2, weights_2}, fine{4, points_4, wei
 inline constexpr double face_points[3][3] = {
     {2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0}, {1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0}, {1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0}};
 
-// Distances of midpoints over the length of the longer edge, or the size of the face, up to which a pair is near, and from which on it
+// Four points of a triangle, exact for cubic functions [Strang, Fix 1973]; near ones have the sixteen of energy/face_points.h.
+inline constexpr FacePoint triangle_points[4] = {{{1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0}, 0.0, -27.0 / 48.0},
+                                                 {{0.6, 0.2, 0.2}, 0.0, 25.0 / 48.0},
+                                                 {{0.2, 0.6, 0.2}, 0.0, 25.0 / 48.0},
+                                                 {{0.2, 0.2, 0.6}, 0.0, 25.0 / 48.0}};
+
+// Distances of midpoints over the length of the longer element, or the size of the face, up to which a pair is near, and from which on it
 // is far [-]; see test_force_between_plates_equals_the_closed_form.
 struct Blend {
     double near, far;
 };
-inline constexpr Blend of_edges{1.5, 2.0}, of_sides{2.5, 3.5};
+inline constexpr Blend of_elements{1.5, 2.0}, of_sides{2.5, 3.5};
 
 // The weight of the near value and its derivatives by t: 1 below near, 0 above far, with continuous second derivatives.
 struct BlendWeight {
@@ -75,16 +82,16 @@ template <class T>
 struct OwnField::Geometry {
     const OwnField& field;
     const std::vector<Triple<T>>& x;
-    std::vector<Triple<T>> normals, edge_normals;            // of faces, of edges
-    std::vector<T> areas, currents, edge_currents, charges;  // charges of edges
+    std::vector<Triple<T>> normals, element_normals;            // of faces, of elements
+    std::vector<T> areas, currents, element_currents, charges;  // charges of elements
 
     Geometry(const OwnField& f, const std::vector<Triple<T>>& positions) : field(f), x(positions) {
         normals.resize(f.faces_.size());
         areas.resize(f.faces_.size());
         currents.resize(f.faces_.size());
-        edge_normals.resize(f.edges_.size());
-        edge_currents.resize(f.edges_.size());
-        charges.assign(f.edge_charges_.begin(), f.edge_charges_.end());
+        element_normals.resize(f.elements_.size());
+        element_currents.resize(f.elements_.size());
+        charges.assign(f.charges_.begin(), f.charges_.end());
         for (std::size_t k = 0; k < f.faces_.size(); ++k) {
             const Face& face = f.faces_[k];
             const Triple<T>& origin = x[face.nodes[0]];
@@ -99,14 +106,15 @@ struct OwnField::Geometry {
                 if (face.edges[i] >= 0)
                     charges[face.edges[i]] += T(face.in_plane[i][0]) * m[0] + T(face.in_plane[i][1]) * m[1];
         }
-        for (std::size_t k = 0; k < f.edges_.size(); ++k) {
-            const Edge& edge = f.edges_[k];
-            edge_normals[k] = normals[edge.faces[0]];
-            edge_currents[k] = T(edge.turns[0]) * currents[edge.faces[0]];
-            if (edge.faces[1] < 0) continue;
-            const Triple<T> sum = edge_normals[k] + T(edge.normals[1]) * normals[edge.faces[1]];
-            edge_normals[k] = (T(1.0) / norm(sum)) * sum;
-            edge_currents[k] += T(edge.turns[1]) * currents[edge.faces[1]];
+        for (std::size_t k = 0; k < f.elements_.size(); ++k) {
+            const Element& element = f.elements_[k];
+            if (!element.is_edge()) continue;
+            element_normals[k] = normals[element.bodies[0]];
+            element_currents[k] = T(element.turns[0]) * currents[element.bodies[0]];
+            if (element.bodies[1] < 0) continue;
+            const Triple<T> sum = element_normals[k] + T(element.normals[1]) * normals[element.bodies[1]];
+            element_normals[k] = (T(1.0) / norm(sum)) * sum;
+            element_currents[k] += T(element.turns[1]) * currents[element.bodies[1]];
         }
     }
 
@@ -116,35 +124,69 @@ struct OwnField::Geometry {
         return {{x[face.nodes[1]] - origin, x[face.nodes[2]] - origin}, face.inverse};
     }
     // Returns sum l~_e nu~_e dE/dQ_e over the edges of a face, in the basis of its plane.
-    std::array<T, 2> by_charges(const Face& face, const std::vector<EdgeAdjoint<T>>& edges) const {
+    std::array<T, 2> by_charges(const Face& face, const std::vector<ElementAdjoint<T>>& edges) const {
         std::array<T, 2> sum{};
         for (int i = 0; i < 3; ++i)
             if (face.edges[i] >= 0)
                 for (int c = 0; c < 2; ++c) sum[c] += T(face.in_plane[i][c]) * edges[face.edges[i]].charge;
         return sum;
     }
-    Triple<T> along(const Edge& edge) const { return x[edge.nodes[1]] - x[edge.nodes[0]]; }
-    Triple<T> middle(const Edge& edge) const { return T(0.5) * (x[edge.nodes[0]] + x[edge.nodes[1]]); }
+    Triple<T> along(const Element& element) const { return x[element.nodes[1]] - x[element.nodes[0]]; }
+    Triple<T> middle(const Element& element) const {
+        Triple<T> sum = x[element.nodes[0]] + x[element.nodes[1]];
+        if (element.is_edge()) return T(0.5) * sum;
+        sum += x[element.nodes[2]];
+        return T(1.0 / 3.0) * sum;
+    }
+    // Carries the derivative by middle(element) on to its nodes.
+    void add_by_middle(const Element& element, const Triple<T>& by_middle, ElementAdjoint<T>& out) const {
+        const T share = T(element.is_edge() ? 0.5 : 1.0 / 3.0);
+        for (int k = 0; k < element.n_nodes(); ++k) out.nodes[k] += share * by_middle;
+    }
+    Triple<T> position(const Dipole& dipole) const { return sum(dipole, dipole.weights.position); }
+    Triple<T> moment(const Dipole& dipole) const { return sum(dipole, dipole.weights.moment); }
+    Triple<T> sum(const Dipole& dipole, const std::array<double, 4>& weights) const {
+        Triple<T> total;
+        for (int k = 0; k < 4; ++k) total += T(weights[k]) * x[dipole.nodes[k]];
+        return total;
+    }
     Triple<T> center(const Face& face) const {
         return T(1.0 / 3.0) * (x[face.nodes[0]] + x[face.nodes[1]] + x[face.nodes[2]]);
     }
 
-    // Calls body(point, s, zeta, weight) for the Gauss points of an edge; zeta over the thickness.
+    // Calls body(point, sample) for the Gauss points of an edge or the points of a triangle.
     template <class Body>
     void each_point(Index e, const own_field::GaussRule& rule, const Body& body) const {
-        const Edge& edge = field.edges_[e];
-        const Triple<T> line = along(edge);
+        const Element& element = field.elements_[e];
+        if (!element.is_edge()) return each_point_of_triangle(e, rule, body);
+        const Triple<T> line = along(element);
         for (int i = 0; i < rule.count; ++i)
             for (int j = 0; j < rule.count; ++j) {
                 const double s = rule.points[i], zeta = rule.points[j] - 0.5,
                              weight = rule.weights[i] * rule.weights[j];
                 SourcePoint<T> point;
-                point.at =
-                    x[edge.nodes[0]] + T(s) * line + T(zeta * field.edge_thickness_[e]) * edge_normals[e];
+                point.at = x[element.nodes[0]] + T(s) * line +
+                           T(zeta * field.element_thickness_[e]) * element_normals[e];
                 point.charge = T(weight) * charges[e];
-                point.current = (T(weight) * edge_currents[e]) * line;
-                body(point, s, zeta, weight);
+                point.current = (T(weight) * element_currents[e]) * line;
+                body(point, SamplePoint{{1.0 - s, s, 0.0}, zeta, weight});
             }
+    }
+    template <class Body>
+    void each_point_of_triangle(Index e, const own_field::GaussRule& rule, const Body& body) const {
+        const std::array<Index, 3>& nodes = field.elements_[e].nodes;
+        const auto add = [&](const FacePoint& given, double weight) {
+            const SamplePoint sample{{given.at[0], given.at[1], given.at[2]}, 0.0, weight};
+            SourcePoint<T> point;
+            for (int k = 0; k < 3; ++k) point.at += T(sample.weights[k]) * x[nodes[k]];
+            point.charge = T(weight) * charges[e];
+            body(point, sample);
+        };
+        if (&rule == &own_field::coarse)
+            for (const FacePoint& point : own_field::triangle_points) add(point, point.weight);
+        else  // the points of both levels through a thickness, of which there is none here
+            for (std::size_t k = 0; k < face_points::fine.size(); k += 2)
+                add(face_points::fine[k], 2.0 * face_points::fine[k].weight);
     }
 
     // Calls body(point, barycentric, zeta, weight) for the points of the charged sides of a face.
@@ -162,17 +204,19 @@ struct OwnField::Geometry {
             }
     }
 
-    // Adds the derivatives of the sums at a Gauss point of an edge by the values of that edge.
-    void add(Index e, const SourceSums<T>& sums, double s, double zeta, double weight,
-             EdgeAdjoint<T>& out) const {
+    // Adds the derivatives of the sums at a point of an element by the values of that element.
+    void add(Index e, const SourceSums<T>& sums, const SamplePoint& sample, ElementAdjoint<T>& out) const {
         const Triple<T> pull = T(-own_field::strength) * sums.pull;
-        const Triple<T> by_element = T(-own_field::strength * weight) * sums.currents;
-        out.a += T(1.0 - s) * pull - edge_currents[e] * by_element;
-        out.b += T(s) * pull + edge_currents[e] * by_element;
-        out.normal += T(zeta * field.edge_thickness_[e]) * pull;
-        out.thickness += T(zeta) * dot(edge_normals[e], pull);
-        out.charge += T(own_field::strength * weight) * sums.charges;
-        out.current += dot(by_element, along(field.edges_[e]));
+        const Element& element = field.elements_[e];
+        for (int k = 0; k < element.n_nodes(); ++k) out.nodes[k] += T(sample.weights[k]) * pull;
+        out.charge += T(own_field::strength * sample.weight) * sums.charges;
+        if (!element.is_edge()) return;
+        const Triple<T> by_element = T(-own_field::strength * sample.weight) * sums.currents;
+        out.nodes[0] -= element_currents[e] * by_element;
+        out.nodes[1] += element_currents[e] * by_element;
+        out.normal += T(sample.zeta * field.element_thickness_[e]) * pull;
+        out.thickness += T(sample.zeta) * dot(element_normals[e], pull);
+        out.current += dot(by_element, along(element));
     }
 
     // Does the same at a point of a charged side.
@@ -187,22 +231,25 @@ struct OwnField::Geometry {
 };
 
 template <class T>
-OwnField::EdgeAdjoint<T>& OwnField::EdgeAdjoint<T>::operator+=(const EdgeAdjoint& other) {
-    a += other.a, b += other.b, normal += other.normal;
+OwnField::ElementAdjoint<T>& OwnField::ElementAdjoint<T>::operator+=(const ElementAdjoint& other) {
+    for (int k = 0; k < 3; ++k) nodes[k] += other.nodes[k];
+    normal += other.normal;
     charge += other.charge, current += other.current, thickness += other.thickness;
     return *this;
 }
 
 template <class T>
-OwnField::EdgeAdjoint<T>& OwnField::EdgeAdjoint<T>::operator-=(const EdgeAdjoint& other) {
-    a -= other.a, b -= other.b, normal -= other.normal;
+OwnField::ElementAdjoint<T>& OwnField::ElementAdjoint<T>::operator-=(const ElementAdjoint& other) {
+    for (int k = 0; k < 3; ++k) nodes[k] -= other.nodes[k];
+    normal -= other.normal;
     charge -= other.charge, current -= other.current, thickness -= other.thickness;
     return *this;
 }
 
 template <class T>
-void OwnField::EdgeAdjoint<T>::scale(const T& factor) {
-    a = factor * a, b = factor * b, normal = factor * normal;
+void OwnField::ElementAdjoint<T>::scale(const T& factor) {
+    for (Triple<T>& node : nodes) node = factor * node;
+    normal = factor * normal;
     charge = factor * charge, current = factor * current, thickness = factor * thickness;
 }
 
@@ -221,20 +268,19 @@ void OwnField::FaceAdjoint<T>::scale(const T& factor) {
     current = factor * current, charge = factor * charge, thickness = factor * thickness;
 }
 
-/// Trees over the coarse points of the target edges and over the charged sides of the target faces, in the order of `edge_order_` and
-/// `face_order_`. Edges and faces without a source among them have no strength.
+/// Trees over the coarse points of the target elements and over the charged sides of the target faces, in the order of `element_order_` and
+/// `face_order_`. Elements and faces without a source among them have no strength.
 struct OwnField::Trees {
-    SourceTree edges, faces;
-    BoxPairs edge_pairs{}, side_pairs_of_edges{}, side_pairs_of_faces{};
-    std::vector<std::size_t> edge_positions{}, face_positions{};  // in the order of the tree
+    SourceTree elements, faces;
+    BoxPairs element_pairs{}, side_pairs_of_elements{}, side_pairs_of_faces{};
+    std::vector<std::size_t> element_positions{}, face_positions{};  // in the order of the tree
 
     template <class T>
-    std::vector<SourcePoint<T>> edge_points(const Geometry<T>& at) const {
+    std::vector<SourcePoint<T>> element_points(const Geometry<T>& at) const {
         std::vector<SourcePoint<T>> points;
-        for (const Index k : edges.order())
-            at.each_point(
-                at.field.edge_order_[k], own_field::coarse,
-                [&](const SourcePoint<T>& point, double, double, double) { points.push_back(point); });
+        for (const Index k : elements.order())
+            at.each_point(at.field.element_order_[k], own_field::coarse,
+                          [&](const SourcePoint<T>& point, const SamplePoint&) { points.push_back(point); });
         return points;
     }
     template <class T>
@@ -246,17 +292,19 @@ struct OwnField::Trees {
         return points;
     }
     template <class T>
-    std::vector<SourceSums<T>> edge_sums(const Geometry<T>& at) const {
-        const std::vector<SourcePoint<T>> points = edge_points(at);
-        return tree_sums(edges, points, edges, points, edge_pairs, at.field.active_faces_ > 0, true);
+    std::vector<SourceSums<T>> element_sums(const Geometry<T>& at) const {
+        const std::vector<SourcePoint<T>> points = element_points(at);
+        return tree_sums(elements, points, elements, points, element_pairs, at.field.active_faces_ > 0, true);
     }
     template <class T>
-    std::vector<SourceSums<T>> side_sums_at_edges(const Geometry<T>& at) const {
-        return tree_sums(edges, edge_points(at), faces, side_points(at), side_pairs_of_edges, false, false);
+    std::vector<SourceSums<T>> side_sums_at_elements(const Geometry<T>& at) const {
+        return tree_sums(elements, element_points(at), faces, side_points(at), side_pairs_of_elements, false,
+                         false);
     }
     template <class T>
-    std::vector<SourceSums<T>> edge_sums_at_sides(const Geometry<T>& at) const {
-        return tree_sums(faces, side_points(at), edges, edge_points(at), side_pairs_of_faces, false, false);
+    std::vector<SourceSums<T>> element_sums_at_sides(const Geometry<T>& at) const {
+        return tree_sums(faces, side_points(at), elements, element_points(at), side_pairs_of_faces, false,
+                         false);
     }
 };
 

@@ -9,7 +9,7 @@ using namespace own_field;
 
 namespace {
 
-// Balls around edges or faces, which are near each other if one of them has the other's center in it.
+// Balls around elements or faces, which are near each other if one of them has the other's center in it.
 struct Balls {
     std::vector<Vec3> centers;
     std::vector<double> radii;
@@ -70,31 +70,32 @@ std::vector<std::size_t> positions_in(const SourceTree& tree) {
 
 OwnField::Neighbours OwnField::neighbours(const double* q, Targets targets) const {
     const std::vector<Triple<double>> x = positions<double>(q, nullptr);
-    const auto middle = [&](const auto& nodes) {
-        Vec3 sum = Vec3::Zero();
-        for (const Index node : nodes) sum += values_of(x[node]);
-        return Vec3(sum / static_cast<double>(nodes.size()));
+    const auto middle = [&](const std::array<Index, 3>& nodes) {  // of two nodes if the last is negative
+        Vec3 sum = values_of(x[nodes[0]]) + values_of(x[nodes[1]]);
+        if (nodes[2] < 0) return Vec3(sum / 2.0);
+        sum += values_of(x[nodes[2]]);
+        return Vec3(sum / 3.0);
     };
     Neighbours near;
-    Balls sources, all, side_edges, side_faces;
-    for (Index k = 0; k < target_edges(targets); ++k) {
-        const Edge& edge = edges_[edge_order_[k]];
-        const Vec3 center = middle(edge.nodes);
-        all.add(center, of_edges.far * edge.length);
-        if (k < active_edges_) sources.add(center, of_edges.far * edge.length);
-        side_edges.add(center, of_sides.far * edge.length);
+    Balls sources, all, side_elements, side_faces;
+    for (Index k = 0; k < target_elements(targets); ++k) {
+        const Element& element = elements_[element_order_[k]];
+        const Vec3 center = middle(element.nodes);
+        all.add(center, of_elements.far * element.length);
+        if (k < active_elements_) sources.add(center, of_elements.far * element.length);
+        side_elements.add(center, of_sides.far * element.length);
     }
-    near.edges = near_balls(all, sources, [](Index) { return true; });
-    for (Index k = 0; k < active_edges_; ++k) std::erase(near.edges[k], k);
+    near.elements = near_balls(all, sources, [](Index) { return true; });
+    for (Index k = 0; k < active_elements_; ++k) std::erase(near.elements[k], k);
     if (n_points() > most_direct && accuracy_ > 0.0) near.trees = trees(x, targets);
     if (!has_sides(targets)) return near;
     for (Index k = 0; k < target_faces(targets); ++k) {
         const Face& face = faces_[face_order_[k]];
         side_faces.add(middle(face.nodes), of_sides.far * face.size);
     }
-    const auto wanted = [&](Index k) { return targets == Targets::all || has_charge_[edge_order_[k]]; };
-    const std::vector<std::vector<Index>> near_faces = near_balls(side_edges, side_faces, wanted);
-    for (Index k = 0; k < target_edges(targets); ++k)
+    const auto wanted = [&](Index k) { return targets == Targets::all || has_charge_[element_order_[k]]; };
+    const std::vector<std::vector<Index>> near_faces = near_balls(side_elements, side_faces, wanted);
+    for (Index k = 0; k < target_elements(targets); ++k)
         for (const Index j : near_faces[k]) near.sides.push_back({k, j});
     return near;
 }
@@ -102,21 +103,21 @@ OwnField::Neighbours OwnField::neighbours(const double* q, Targets targets) cons
 std::shared_ptr<const OwnField::Trees> OwnField::trees(const std::vector<Triple<double>>& x,
                                                        Targets targets) const {
     const Geometry<double> at(*this, x);
-    std::vector<Vec3> edge_points, side_points;
-    for (Index k = 0; k < target_edges(targets); ++k)
-        at.each_point(edge_order_[k], coarse, [&](const SourcePoint<double>& point, double, double, double) {
-            edge_points.push_back(values_of(point.at));
+    std::vector<Vec3> element_points, side_points;
+    for (Index k = 0; k < target_elements(targets); ++k)
+        at.each_point(element_order_[k], coarse, [&](const SourcePoint<double>& point, const SamplePoint&) {
+            element_points.push_back(values_of(point.at));
         });
     if (has_sides(targets))
         for (Index k = 0; k < target_faces(targets); ++k)
             at.each_side_point(face_order_[k], [&](const SourcePoint<double>& point, const double*, double,
                                                    double) { side_points.push_back(values_of(point.at)); });
-    Trees trees{.edges = SourceTree(edge_points, 4, accuracy_),
+    Trees trees{.elements = SourceTree(element_points, 4, accuracy_),
                 .faces = SourceTree(side_points, 6, accuracy_)};
     BoxPairs mirrored;
-    pair_boxes(trees.edges, trees.edges, trees.edge_pairs, mirrored);
-    pair_boxes(trees.edges, trees.faces, trees.side_pairs_of_edges, trees.side_pairs_of_faces);
-    trees.edge_positions = positions_in(trees.edges);
+    pair_boxes(trees.elements, trees.elements, trees.element_pairs, mirrored);
+    pair_boxes(trees.elements, trees.faces, trees.side_pairs_of_elements, trees.side_pairs_of_faces);
+    trees.element_positions = positions_in(trees.elements);
     trees.face_positions = positions_in(trees.faces);
     return std::make_shared<const Trees>(std::move(trees));
 }

@@ -17,7 +17,7 @@
 
 namespace magshell {
 
-/// [m] Place of sources without strength, so that their distance is not zero.
+/// [m] SamplePoint of sources without strength, so that their distance is not zero.
 inline constexpr double far_away = 1e30;
 
 /// Returns 1 / sqrt(a), to an error of a few units in the last place, for normal numbers.

@@ -33,13 +33,13 @@ template <class T>
 void OwnField::add_sides(const Geometry<T>& at, const Neighbours& near, Targets targets,
                          Evaluation<T>& out) const {
     constexpr bool has_rates = std::is_same_v<T, Dual>;
-    SourceArrays edge_points, side_points;
-    edge_points.resize(4 * static_cast<std::size_t>(active_edges_), false, has_rates);
+    SourceArrays element_points, side_points;
+    element_points.resize(4 * static_cast<std::size_t>(active_elements_), false, has_rates);
     side_points.resize(6 * static_cast<std::size_t>(active_faces_), false, has_rates);
-    for (Index k = 0; k < active_edges_; ++k) {
+    for (Index k = 0; k < active_elements_; ++k) {
         std::size_t number = 4 * static_cast<std::size_t>(k);
-        at.each_point(edge_order_[k], coarse, [&](const SourcePoint<T>& point, double, double, double) {
-            edge_points.set(number++, point);
+        at.each_point(element_order_[k], coarse, [&](const SourcePoint<T>& point, const SamplePoint&) {
+            element_points.set(number++, point);
         });
     }
     for (Index k = 0; k < active_faces_; ++k) {
@@ -48,27 +48,27 @@ void OwnField::add_sides(const Geometry<T>& at, const Neighbours& near, Targets 
             side_points.set(number++, point);
         });
     }
-    std::vector<SourceSums<T>> at_edges, at_faces;
+    std::vector<SourceSums<T>> at_elements, at_faces;
     if (near.trees) {
-        at_edges = near.trees->template side_sums_at_edges<T>(at);
-        at_faces = near.trees->template edge_sums_at_sides<T>(at);
+        at_elements = near.trees->template side_sums_at_elements<T>(at);
+        at_faces = near.trees->template element_sums_at_sides<T>(at);
     }
-    std::vector<T> potentials(target_edges(targets));  // dE/dQ_e of the sides
-    in_blocks(target_edges(targets), [&](Index first, Index last) {
+    std::vector<T> potentials(target_elements(targets));  // dE/dQ_e of the sides
+    in_blocks(target_elements(targets), [&](Index first, Index last) {
         for (Index k = first; k < last; ++k) {
-            const Index e = edge_order_[k];
-            EdgeAdjoint<T> adjoint;
-            std::size_t number = near.trees ? 4 * near.trees->edge_positions[k] : 0;
-            at.each_point(e, coarse, [&](const SourcePoint<T>& point, double s, double zeta, double weight) {
+            const Index e = element_order_[k];
+            ElementAdjoint<T> adjoint;
+            std::size_t number = near.trees ? 4 * near.trees->element_positions[k] : 0;
+            at.each_point(e, coarse, [&](const SourcePoint<T>& point, const SamplePoint& sample) {
                 SourceSums<T> sums;
                 if (near.trees)
-                    sums = at_edges[number++];
+                    sums = at_elements[number++];
                 else
                     side_points.add_sums(point, 0, side_points.size(), 0, 0, sums);
-                at.add(e, sums, s, zeta, weight, adjoint);
+                at.add(e, sums, sample, adjoint);
             });
             potentials[k] = adjoint.charge;
-            out.edges[e] += adjoint;
+            out.elements[e] += adjoint;
         }
     });
     in_blocks(target_faces(targets), [&](Index first, Index last) {
@@ -81,66 +81,66 @@ void OwnField::add_sides(const Geometry<T>& at, const Neighbours& near, Targets 
                     if (near.trees)
                         sums = at_faces[number++];
                     else
-                        edge_points.add_sums(point, 0, edge_points.size(), 0, 0, sums);
+                        element_points.add_sums(point, 0, element_points.size(), 0, 0, sums);
                     at.add(f, sums, weights, zeta, weight, out.faces[f]);
                 });
         }
     });
-    std::vector<EdgeAdjoint<T>> of_edges_near(near.sides.size());
+    std::vector<ElementAdjoint<T>> of_elements_near(near.sides.size());
     std::vector<FaceAdjoint<T>> of_faces_near(near.sides.size());
     in_blocks(static_cast<Index>(near.sides.size()), [&](Index first, Index last) {
         for (Index k = first; k < last; ++k)
-            add_near_side(at, edge_order_[near.sides[k][0]], face_order_[near.sides[k][1]], of_edges_near[k],
-                          of_faces_near[k]);
+            add_near_side(at, element_order_[near.sides[k][0]], face_order_[near.sides[k][1]],
+                          of_elements_near[k], of_faces_near[k]);
     });
     for (std::size_t k = 0; k < near.sides.size(); ++k) {
-        const Index e = edge_order_[near.sides[k][0]], f = face_order_[near.sides[k][1]];
-        potentials[near.sides[k][0]] += of_edges_near[k].charge;
-        out.edges[e] += of_edges_near[k];
+        const Index e = element_order_[near.sides[k][0]], f = face_order_[near.sides[k][1]];
+        potentials[near.sides[k][0]] += of_elements_near[k].charge;
+        out.elements[e] += of_elements_near[k];
         out.faces[f] += of_faces_near[k];
     }
-    for (Index k = 0; k < active_edges_; ++k) out.energy += at.charges[edge_order_[k]] * potentials[k];
+    for (Index k = 0; k < active_elements_; ++k) out.energy += at.charges[element_order_[k]] * potentials[k];
 }
 
-// Replaces the points of a charged side by two layers of dipoles, with the weight of the near value; takes the pair away if the edge
-// belongs to the face.
+// Replaces the points of a charged side by two layers of dipoles, with the weight of the near value; takes the pair away if the element
+// is an edge of the face.
 template <class T>
-void OwnField::add_near_side(const Geometry<T>& at, Index e, Index f, EdgeAdjoint<T>& of_edge,
+void OwnField::add_near_side(const Geometry<T>& at, Index e, Index f, ElementAdjoint<T>& of_element,
                              FaceAdjoint<T>& of_face) const {
-    const Edge& edge = edges_[e];
+    const Element& element = elements_[e];
     const Face& face = faces_[f];
     const T charge = at.charges[e];
-    EdgeAdjoint<T> edge_change;
+    ElementAdjoint<T> element_change;
     FaceAdjoint<T> face_change;
     // Their energy with the points is subtracted.
     at.each_side_point(
         f, [&](const SourcePoint<T>& side, const double* weights, double side_zeta, double side_weight) {
             SourceSums<T> at_side;
-            at.each_point(e, coarse, [&](const SourcePoint<T>& point, double s, double zeta, double weight) {
+            at.each_point(e, coarse, [&](const SourcePoint<T>& point, const SamplePoint& sample) {
                 const Triple<T> d = point.at - side.at;
                 const T inverse = T(1.0) / norm(d);
                 const T cubed = inverse * inverse * inverse;
-                SourceSums<T> at_edge;
-                at_edge.charges = -side.charge * inverse;
-                at_edge.pull = (-point.charge * side.charge) * cubed * d;
-                at.add(e, at_edge, s, zeta, weight, edge_change);
+                SourceSums<T> at_element;
+                at_element.charges = -side.charge * inverse;
+                at_element.pull = (-point.charge * side.charge) * cubed * d;
+                at.add(e, at_element, sample, element_change);
                 at_side.charges -= point.charge * inverse;
-                at_side.pull -= at_edge.pull;
+                at_side.pull -= at_element.pull;
             });
             at.add(f, at_side, weights, side_zeta, side_weight, face_change);
         });
-    const bool meet = edge.faces[0] == f || edge.faces[1] == f;
+    const bool meet = element.is_edge() && (element.bodies[0] == f || element.bodies[1] == f);
     if (!meet)
         for (int level = 0; level < coarse.count; ++level) {
             const double side_zeta = coarse.points[level] - 0.5;
             const Triple<T> shift = T(side_zeta * thickness_[f]) * at.normals[f];
-            at.each_point(e, fine, [&](const SourcePoint<T>& point, double s, double zeta, double weight) {
+            at.each_point(e, fine, [&](const SourcePoint<T>& point, const SamplePoint& sample) {
                 Triple<T> r[3], by_corner[3];
                 for (int k = 0; k < 3; ++k) r[k] = at.x[face.nodes[k]] + shift - point.at;
                 const T angle = solid_angle(r, by_corner);
-                const double share = strength * weight * coarse.weights[level];
+                const double share = strength * sample.weight * coarse.weights[level];
                 const T potential = T(share) * at.currents[f] * angle;
-                edge_change.charge += potential;
+                element_change.charge += potential;
                 face_change.current += T(share) * charge * angle;
                 const T force = T(share) * charge * at.currents[f];
                 Triple<T> sum;
@@ -151,24 +151,23 @@ void OwnField::add_near_side(const Geometry<T>& at, Index e, Index f, EdgeAdjoin
                 }
                 face_change.normal += T(side_zeta * thickness_[f]) * sum;
                 face_change.thickness += T(side_zeta) * dot(at.normals[f], sum);
-                edge_change.a -= T(1.0 - s) * sum;
-                edge_change.b -= T(s) * sum;
-                edge_change.normal -= T(zeta * edge_thickness_[e]) * sum;
-                edge_change.thickness -= T(zeta) * dot(at.edge_normals[e], sum);
+                for (int k = 0; k < element.n_nodes(); ++k)
+                    element_change.nodes[k] -= T(sample.weights[k]) * sum;
+                element_change.normal -= T(sample.zeta * element_thickness_[e]) * sum;
+                element_change.thickness -= T(sample.zeta) * dot(at.element_normals[e], sum);
             });
         }
-    const Triple<T> apart = at.middle(edge) - at.center(face);
-    const T distance = norm(apart), longer = std::max(edge.length, face.size);
+    const Triple<T> apart = at.middle(element) - at.center(face);
+    const T distance = norm(apart), longer = std::max(element.length, face.size);
     T weight, slope;
     lift(meet ? BlendWeight{1.0, 0.0, 0.0} : blend(of_sides, value_of(distance) / value_of(longer)),
          distance / longer, weight, slope);
-    const Triple<T> by_middle = (charge * edge_change.charge * slope / (distance * longer)) * apart;
-    edge_change.scale(weight);
+    const Triple<T> by_middle = (charge * element_change.charge * slope / (distance * longer)) * apart;
+    element_change.scale(weight);
     face_change.scale(weight);
-    edge_change.a += T(0.5) * by_middle;
-    edge_change.b += T(0.5) * by_middle;
+    at.add_by_middle(element, by_middle, element_change);
     for (Triple<T>& corner : face_change.corners) corner -= T(1.0 / 3.0) * by_middle;
-    of_edge += edge_change;
+    of_element += element_change;
     of_face += face_change;
 }
 

@@ -24,76 +24,105 @@ std::vector<Triple<T>> OwnField::positions(const double* q, const double* rate) 
 template std::vector<Triple<double>> OwnField::positions(const double*, const double*) const;
 
 template <class T>
-void OwnField::add_edge_pairs(const Geometry<T>& at, const Neighbours& near, Targets targets,
-                              Evaluation<T>& out) const {
+void OwnField::add_element_pairs(const Geometry<T>& at, const Neighbours& near, Targets targets,
+                                 Evaluation<T>& out) const {
     constexpr bool has_rates = std::is_same_v<T, Dual>;
     const std::size_t few = 4, many = 16;
     SourceArrays coarse_points, fine_points;
     const bool has_currents = active_faces_ > 0;
     std::vector<SourceSums<T>> by_tree;
-    if (near.trees) by_tree = near.trees->template edge_sums<T>(at);
-    coarse_points.resize(few * active_edges_, has_currents, has_rates);
-    fine_points.resize(many * active_edges_, has_currents, has_rates);
-    in_blocks(active_edges_, [&](Index first, Index last) {
+    if (near.trees) by_tree = near.trees->template element_sums<T>(at);
+    coarse_points.resize(few * active_elements_, has_currents, has_rates);
+    fine_points.resize(many * active_elements_, has_currents, has_rates);
+    in_blocks(active_elements_, [&](Index first, Index last) {
         for (Index k = first; k < last; ++k) {
             std::size_t coarse_k = few * k, fine_k = many * k;
-            at.each_point(edge_order_[k], coarse, [&](const SourcePoint<T>& point, double, double, double) {
+            at.each_point(element_order_[k], coarse, [&](const SourcePoint<T>& point, const SamplePoint&) {
                 coarse_points.set(coarse_k++, point);
             });
-            at.each_point(edge_order_[k], fine, [&](const SourcePoint<T>& point, double, double, double) {
+            at.each_point(element_order_[k], fine, [&](const SourcePoint<T>& point, const SamplePoint&) {
                 fine_points.set(fine_k++, point);
             });
         }
     });
-    in_blocks(target_edges(targets), [&](Index first, Index last) {
+    in_blocks(target_elements(targets), [&](Index first, Index last) {
         for (Index k = first; k < last; ++k) {
-            const Index e = edge_order_[k];
-            EdgeAdjoint<T>& adjoint = out.edges[e];
-            const std::size_t own = k < active_edges_ ? few * k : few * active_edges_, own_end = own + few;
-            std::size_t number = near.trees ? few * near.trees->edge_positions[k] : 0;
-            at.each_point(e, coarse, [&](const SourcePoint<T>& point, double s, double zeta, double weight) {
+            const Index e = element_order_[k];
+            ElementAdjoint<T>& adjoint = out.elements[e];
+            const std::size_t own = k < active_elements_ ? few * k : few * active_elements_,
+                              own_end = own + few;
+            std::size_t number = near.trees ? few * near.trees->element_positions[k] : 0;
+            at.each_point(e, coarse, [&](const SourcePoint<T>& point, const SamplePoint& sample) {
                 SourceSums<T> sums;
                 if (near.trees)
                     sums = by_tree[number++];
                 else
-                    coarse_points.add_sums(point, 0, few * active_edges_, own, own_end, sums);
-                at.add(e, sums, s, zeta, weight, adjoint);
+                    coarse_points.add_sums(point, 0, few * active_elements_, own, own_end, sums);
+                at.add(e, sums, sample, adjoint);
             });
-            for (const Index j : near.edges[k]) {
-                const Edge &edge = edges_[e], &other = edges_[edge_order_[j]];
-                EdgeAdjoint<T> change;
-                at.each_point(e, fine,
-                              [&](const SourcePoint<T>& point, double s, double zeta, double weight) {
-                                  SourceSums<T> sums;
-                                  fine_points.add_sums(point, many * j, many * (j + 1), 0, 0, sums);
-                                  at.add(e, sums, s, zeta, weight, change);
-                              });
-                EdgeAdjoint<T> before;
-                at.each_point(e, coarse,
-                              [&](const SourcePoint<T>& point, double s, double zeta, double weight) {
-                                  SourceSums<T> sums;
-                                  coarse_points.add_sums(point, few * j, few * (j + 1), 0, 0, sums);
-                                  at.add(e, sums, s, zeta, weight, before);
-                              });
+            for (const Index j : near.elements[k]) {
+                const Element &element = elements_[e], &other = elements_[element_order_[j]];
+                ElementAdjoint<T> change;
+                at.each_point(e, fine, [&](const SourcePoint<T>& point, const SamplePoint& sample) {
+                    SourceSums<T> sums;
+                    fine_points.add_sums(point, many * j, many * (j + 1), 0, 0, sums);
+                    at.add(e, sums, sample, change);
+                });
+                ElementAdjoint<T> before;
+                at.each_point(e, coarse, [&](const SourcePoint<T>& point, const SamplePoint& sample) {
+                    SourceSums<T> sums;
+                    coarse_points.add_sums(point, few * j, few * (j + 1), 0, 0, sums);
+                    at.add(e, sums, sample, before);
+                });
                 change -= before;
-                const Triple<T> apart = at.middle(edge) - at.middle(other);
-                const T distance = norm(apart), longer = std::max(edge.length, other.length);
+                const Triple<T> apart = at.middle(element) - at.middle(other);
+                const T distance = norm(apart), longer = std::max(element.length, other.length);
                 T weight, slope;
-                lift(blend(of_edges, value_of(distance) / value_of(longer)), distance / longer, weight,
+                lift(blend(of_elements, value_of(distance) / value_of(longer)), distance / longer, weight,
                      slope);
-                const T pair_energy = at.charges[e] * change.charge + at.edge_currents[e] * change.current;
+                const T pair_energy = at.charges[e] * change.charge + at.element_currents[e] * change.current;
                 const Triple<T> by_middle = (pair_energy * slope / (distance * longer)) * apart;
                 change.scale(weight);
-                change.a += T(0.5) * by_middle;
-                change.b += T(0.5) * by_middle;
+                at.add_by_middle(element, by_middle, change);
                 adjoint += change;
             }
+            if (!elements_[e].is_edge()) add_self(at, e, adjoint);
         }
     });
-    for (Index k = 0; k < active_edges_; ++k) {
-        const Index e = edge_order_[k];
-        out.energy +=
-            T(0.5) * (at.charges[e] * out.edges[e].charge + at.edge_currents[e] * out.edges[e].current);
+    for (Index k = 0; k < active_elements_; ++k) {
+        const Index e = element_order_[k];
+        out.energy += T(0.5) * (at.charges[e] * out.elements[e].charge +
+                                at.element_currents[e] * out.elements[e].current);
+    }
+}
+
+// The energy of a charge that is uniform on a triangle with itself is mu_0/(4 pi) Q^2/2 times
+//
+//   S = - 4/3 sum_i ln(1 - l_i / s) / l_i,      l_i: lengths of the sides, s half their sum         [Eibert, Hansen 1995]
+template <class T>
+void OwnField::add_self(const Geometry<T>& at, Index element, ElementAdjoint<T>& out) const {
+    using std::log;
+    const std::array<Index, 3>& nodes = elements_[element].nodes;
+    Triple<T> sides[3];
+    T lengths[3], half{}, mean{}, by_half{};
+    for (int i = 0; i < 3; ++i) {
+        sides[i] = at.x[nodes[(i + 2) % 3]] - at.x[nodes[(i + 1) % 3]];
+        lengths[i] = norm(sides[i]);
+        half += T(0.5) * lengths[i];
+    }
+    for (int i = 0; i < 3; ++i) {
+        mean -= T(4.0 / 3.0) * log(T(1.0) - lengths[i] / half) / lengths[i];
+        by_half -= T(4.0 / 3.0) / (half * (half - lengths[i]));
+    }
+    out.charge += T(strength) * at.charges[element] * mean;
+    const T factor = T(0.5 * strength) * at.charges[element] * at.charges[element];
+    for (int i = 0; i < 3; ++i) {
+        const T& l = lengths[i];
+        const T by_length =
+            T(0.5) * by_half + T(4.0 / 3.0) * (log(T(1.0) - l / half) / l + T(1.0) / (half - l)) / l;
+        const Triple<T> pull = (factor * by_length / l) * sides[i];
+        out.nodes[(i + 2) % 3] += pull;
+        out.nodes[(i + 1) % 3] -= pull;
     }
 }
 
@@ -101,20 +130,21 @@ void OwnField::add_edge_pairs(const Geometry<T>& at, const Neighbours& near, Tar
 template <class T>
 void OwnField::collect(const Geometry<T>& at, Evaluation<T>& out) const {
     out.by_position.assign(nodes_.size(), {});
-    for (std::size_t e = 0; e < edges_.size(); ++e) {
-        const Edge& edge = edges_[e];
-        EdgeAdjoint<T>& adjoint = out.edges[e];
-        out.by_position[edge.nodes[0]] += adjoint.a;
-        out.by_position[edge.nodes[1]] += adjoint.b;
+    for (std::size_t e = 0; e < elements_.size(); ++e) {
+        const Element& element = elements_[e];
+        ElementAdjoint<T>& adjoint = out.elements[e];
+        for (int k = 0; k < element.n_nodes(); ++k) out.by_position[element.nodes[k]] += adjoint.nodes[k];
+        if (!element.is_edge()) continue;
         Triple<T> by_normal = adjoint.normal;
-        if (edge.faces[1] >= 0) {
-            const Triple<T>& n = at.edge_normals[e];
-            const T length = norm(at.normals[edge.faces[0]] + T(edge.normals[1]) * at.normals[edge.faces[1]]);
+        if (element.bodies[1] >= 0) {
+            const Triple<T>& n = at.element_normals[e];
+            const T length =
+                norm(at.normals[element.bodies[0]] + T(element.normals[1]) * at.normals[element.bodies[1]]);
             by_normal = (T(1.0) / length) * (by_normal - dot(n, by_normal) * n);
         }
-        for (int k = 0; k < 2 && edge.faces[k] >= 0; ++k) {
-            out.faces[edge.faces[k]].normal += T(edge.normals[k]) * by_normal;
-            out.faces[edge.faces[k]].current += T(edge.turns[k]) * adjoint.current;
+        for (int k = 0; k < 2 && element.bodies[k] >= 0; ++k) {
+            out.faces[element.bodies[k]].normal += T(element.normals[k]) * by_normal;
+            out.faces[element.bodies[k]].current += T(element.turns[k]) * adjoint.current;
         }
     }
     for (std::size_t f = 0; f < faces_.size(); ++f) {
@@ -132,11 +162,16 @@ void OwnField::collect(const Geometry<T>& at, Evaluation<T>& out) const {
         out.by_position[face.nodes[2]] += adjoint.corners[2] + by_second;
         if (!face.rotates) continue;
         const std::array<Triple<T>, 2> by_edges =
-            at.unstretched(face).by_edges(at.by_charges(face, out.edges), at.lifted(tangential(f)));
+            at.unstretched(face).by_edges(at.by_charges(face, out.elements), at.lifted(tangential(f)));
         out.by_position[face.nodes[0]] -= by_edges[0] + by_edges[1];
         out.by_position[face.nodes[1]] += by_edges[0];
         out.by_position[face.nodes[2]] += by_edges[1];
     }
+    for (std::size_t d = 0; d < dipoles_.size(); ++d)
+        for (int k = 0; k < 4; ++k)
+            out.by_position[dipoles_[d].nodes[k]] +=
+                T(dipoles_[d].weights.position[k]) * out.dipoles[d].position +
+                T(dipoles_[d].weights.moment[k]) * out.dipoles[d].moment;
 }
 
 template <class T>
@@ -144,10 +179,11 @@ OwnField::Evaluation<T> OwnField::evaluate(const std::vector<Triple<T>>& x, cons
                                            Targets targets) const {
     const Geometry<T> at(*this, x);
     Evaluation<T> out;
-    out.edges.resize(edges_.size());
+    out.elements.resize(elements_.size());
     out.faces.resize(faces_.size());
-    add_edge_pairs(at, near, targets, out);
+    add_element_pairs(at, near, targets, out);
     if (has_sides(targets)) add_sides(at, near, targets, out);
+    add_dipoles(at, targets, out);
     collect(at, out);
     return out;
 }
@@ -170,7 +206,9 @@ OwnField::FaceGradient OwnField::vjp(const double* q, const double* lambda) cons
     const Index n_faces = static_cast<Index>(faces_.size());
     const Evaluation<Dual> found =
         evaluate(positions<Dual>(q, lambda), neighbours(q, Targets::all), Targets::all);
-    FaceGradient by{std::vector<Vec3>(faces_.size(), Vec3::Zero()), std::vector<double>(faces_.size(), 0.0)};
+    FaceGradient by{std::vector<Vec3>(faces_.size(), Vec3::Zero()), std::vector<double>(faces_.size(), 0.0),
+                    std::vector<Vec3>(n_tetrahedra_, Vec3::Zero()),
+                    std::vector<DipoleWeights>(dipoles_.size())};
     const std::vector<Triple<Dual>> x = positions<Dual>(q, lambda);
     const Geometry<Dual> at(*this, x);
     for (Index f = 0; f < n_faces; ++f) {
@@ -184,31 +222,59 @@ OwnField::FaceGradient OwnField::vjp(const double* q, const double* lambda) cons
         by.thickness[f] += along * by_rest_current + rate_of(adjoint.thickness);
         if (face.rotates) {
             const UnstretchedVector<Dual> unstretched = at.unstretched(face);
-            const std::array<Dual, 2> pull = unstretched(at.by_charges(face, found.edges));
+            const std::array<Dual, 2> pull = unstretched(at.by_charges(face, found.elements));
             for (int c = 0; c < 2; ++c) {
                 by.magnetization[f] += thickness_[f] * rate_of(pull[c]) * face.basis[c];
                 by.thickness[f] += magnetization_[f].dot(face.basis[c]) * rate_of(pull[c]);
             }
         }
         for (int i = 0; i < 3; ++i) {
-            const EdgeAdjoint<Dual>& edge = found.edges[face.edges[i]];
+            const ElementAdjoint<Dual>& element = found.elements[face.edges[i]];
             if (!face.rotates) {
-                by.magnetization[f] += thickness_[f] * rate_of(edge.charge) * face.conormals[i];
-                by.thickness[f] += magnetization_[f].dot(face.conormals[i]) * rate_of(edge.charge);
+                by.magnetization[f] += thickness_[f] * rate_of(element.charge) * face.conormals[i];
+                by.thickness[f] += magnetization_[f].dot(face.conormals[i]) * rate_of(element.charge);
             }
-            by.thickness[f] += (edges_[face.edges[i]].faces[1] < 0 ? 1.0 : 0.5) * rate_of(edge.thickness);
+            by.thickness[f] +=
+                (elements_[face.edges[i]].bodies[1] < 0 ? 1.0 : 0.5) * rate_of(element.thickness);
         }
     }
+    for (std::size_t e = 0; e < elements_.size(); ++e) {
+        const Element& element = elements_[e];
+        for (int side = 0; side < 2 && !element.is_edge(); ++side)
+            if (element.bodies[side] >= 0)
+                by.of_tetrahedra[element.bodies[side]] +=
+                    (element.turns[side] * rate_of(found.elements[e].charge)) * element.area;
+    }
+    for (std::size_t d = 0; d < dipoles_.size(); ++d)
+        for (int k = 0; k < 4; ++k) {
+            const Triple<Dual>& corner = at.x[dipoles_[d].nodes[k]];
+            by.of_dipoles[d].position[k] = rate_of(dot(found.dipoles[d].position, corner));
+            by.of_dipoles[d].moment[k] = rate_of(dot(found.dipoles[d].moment, corner));
+        }
     return by;
 }
 
-// B = mu_0/(4 pi) [ sum q r / r^3 + sum c x r / r^3 ],  r = p - p_j
+OwnField::DipoleActions OwnField::on_dipoles(const double* q) const {
+    const std::vector<Triple<double>> x = positions<double>(q, nullptr);
+    const Geometry<double> at(*this, x);
+    const Evaluation<double> found = evaluate(x, neighbours(q), Targets::sources);
+    DipoleActions on;
+    for (std::size_t d = 0; d < dipoles_.size(); ++d) {
+        const Vec3 moment = values_of(at.moment(dipoles_[d]));
+        on.positions.push_back(values_of(at.position(dipoles_[d])));
+        on.forces.push_back(-values_of(found.dipoles[d].position));
+        on.couples.push_back(values_of(found.dipoles[d].moment).cross(moment));  // m x B, B = - dE/dm
+    }
+    return on;
+}
+
+// B = mu_0/(4 pi) [ sum q r / r^3 + sum c x r / r^3 + sum 3 (m . r) r / r^5 - m / r^3 ],  r = p - p_j
 std::vector<Vec3> OwnField::flux_density(const double* q, const std::vector<Vec3>& points) const {
     const std::vector<Triple<double>> x = positions<double>(q, nullptr);
     const Geometry<double> at(*this, x);
     std::vector<SourcePoint<double>> sources;
-    for (Index k = 0; k < active_edges_; ++k)
-        at.each_point(edge_order_[k], fine, [&](const SourcePoint<double>& point, double, double, double) {
+    for (Index k = 0; k < active_elements_; ++k)
+        at.each_point(element_order_[k], fine, [&](const SourcePoint<double>& point, const SamplePoint&) {
             sources.push_back(point);
         });
     std::vector<Vec3> flux(points.size(), Vec3::Zero());
@@ -218,6 +284,11 @@ std::vector<Vec3> OwnField::flux_density(const double* q, const std::vector<Vec3
                 const Vec3 r = points[k] - values_of(source.at);
                 const double cubed = 1.0 / (r.squaredNorm() * r.norm());
                 flux[k] += cubed * (source.charge * r + values_of(source.current).cross(r));
+            }
+            for (const Dipole& dipole : dipoles_) {
+                const Vec3 r = points[k] - values_of(at.position(dipole)), m = values_of(at.moment(dipole));
+                const double squared = r.squaredNorm();
+                flux[k] += (3.0 * m.dot(r) / squared * r - m) / (squared * r.norm());
             }
             flux[k] *= strength;
         }

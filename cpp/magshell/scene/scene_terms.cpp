@@ -154,7 +154,7 @@ void Builder::add_terms(const SceneInput& input) {
     for (std::size_t k = 0; k < input.six_node_shells.size(); ++k)
         add_six_node_shell(k, input.six_node_shells[k].growth);
     add_magnetic_terms(input);
-    if (!input.own_field.shells.empty()) add_own_field(input);
+    if (input.own_field.acts()) add_own_field(input);
     add_solids(input);
     add_muscles(input);
     for (const FaceEnergyInput& given : input.face_energies) {
@@ -247,12 +247,18 @@ void Builder::add_magnetic_terms(const SceneInput& input) {
 }
 
 void Builder::add_own_field(const SceneInput& input) {
-    std::vector<OwnFieldTerm::Sheet> sheets;
-    for (const Index shell : input.own_field.shells)
-        sheets.push_back({bodies_.faces()[shell].surface, input.shells[shell].magnetization_law});
-    std::unique_ptr<OwnFieldTerm> term =
-        std::make_unique<OwnFieldTerm>(std::move(sheets), input.own_field.max_points,
-                                       input.own_field.accuracy, bodies_.nodes().n_dofs(), registry_);
+    const OwnFieldInput& given = input.own_field;
+    OwnFieldTerm::Sources sources;
+    for (const Index shell : given.shells)
+        sources.sheets.push_back({bodies_.faces()[shell].surface, input.shells[shell].magnetization_law});
+    for (const Index skin : given.skins)
+        sources.sheets.push_back({bodies_.faces()[input.shells.size() + input.solids.size() + skin].surface,
+                                  input.skins[skin].magnetization_law});
+    for (const Index solid : given.solids) sources.solids.push_back(bodies_.solids()[solid]);
+    for (const Index part : given.rigid)
+        sources.magnets.push_back({input.rigid[part].owner, bodies_.rigid_nodes()[part]});
+    std::unique_ptr<OwnFieldTerm> term = std::make_unique<OwnFieldTerm>(
+        std::move(sources), given.max_points, given.accuracy, bodies_.nodes(), registry_);
     out_.own_field = term.get();
     out_.operators.push_back(term.get());
     out_.energies.push_back(std::move(term));

@@ -122,3 +122,91 @@ def test_objects_without_a_magnetic_force_are_refused():
         rest.magnetic_torque(dipole)
     assert rest.magnetic_torque(dipole, center=(0, 0, 0)).shape == (3,)
     assert rest.magnetic_torque(source).shape == (3,)
+
+
+def lone_scene(*sources):
+    """Build a scene with sources and a sheet that has no magnetization."""
+    mesh = ms.meshes.rectangle(SIZE, SIZE, cells=(1, 1)).transformed(translation=(0.3, 0, 0))
+    sheet = ms.Shell(mesh, thickness=THICKNESS, young_modulus=1e9)
+    scene = ms.Scene(sheet, supports=[ms.Pin(np.arange(mesh.n_vertices))], field=list(sources))
+    uniform = any(isinstance(each, ms.UniformField) for each in sources)
+    options = {"applied_flux_density": (0.0, 0.02, 0.0)} if uniform else {}
+    return ms.field_of(ms.equilibrium(scene, remanent_magnetization=(0, 0, 0), **options))
+
+
+@pytest.mark.parametrize(
+    ("sizes", "offset", "polarization", "force"),
+    [
+        (((0.01,) * 3, (0.01,) * 3), (0, 0, 0.02), 1.0, (0, 0, -2.2510132358)),
+        (
+            ((0.02, 0.012, 0.006), (0.012, 0.02, 0.006)),
+            (0, -0.004, 0.008),
+            0.38,
+            (0, 0.637580444, -1.85337278),
+        ),
+        (((0.01,) * 3, (0.01,) * 3), (0, 0, 0.0101), 1.0, None),
+    ],
+)
+def test_forces_between_cuboid_magnets_equal_the_closed_form(sizes, offset, polarization, force):
+    magnetization = (0, 0, polarization / VACUUM_PERMEABILITY)
+    lower = ms.CuboidMagnet(sizes[0], magnetization)
+    upper = ms.CuboidMagnet(sizes[1], magnetization, center=offset)
+    exact = cuboid_force(*sizes, offset, 2, polarization)
+    if force is not None:
+        np.testing.assert_allclose(exact, force, rtol=0, atol=1e-9 * np.linalg.norm(force))
+    state = lone_scene(lower, upper)
+    found, back = state.magnetic_force(upper), state.magnetic_force(lower)
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-11 * np.linalg.norm(exact))
+    np.testing.assert_allclose(found, -back, rtol=0, atol=1e-14 * np.linalg.norm(exact))
+
+
+def test_forces_and_torques_of_magnets_of_every_kind_cancel():
+    sources = [
+        ms.CuboidMagnet(
+            (0.01, 0.02, 0.01), (3e5, 0, 8e5), center=(0.004, 0.003, 0.02), rotation=(0.1, 0.2, 0.3)
+        ),
+        ms.CylinderMagnet(0.005, 0.01, (1e5, 2e5, 8e5)),
+        ms.Dipoles([[0.03, 0.02, -0.01]], [[0.02, 0.05, 0.1]]),
+        ms.PlacedField(ms.Dipoles([[0.0, 0.0, 0.0]], [[0.05, 0.0, 0.1]]), center=(0.0, 0.02, -0.02)),
+    ]
+    state = lone_scene(*sources)
+    forces = np.array([state.magnetic_force(each) for each in sources])
+    torques = np.array([state.magnetic_torque(each, (0.001, 0.002, 0.003)) for each in sources])
+    np.testing.assert_allclose(forces.sum(axis=0), 0.0, atol=1e-11 * np.abs(forces).max())
+    np.testing.assert_allclose(torques.sum(axis=0), 0.0, atol=1e-11 * np.abs(torques).max())
+    assert (np.abs(forces).max(axis=1) > 0).all()
+
+
+def test_distant_magnets_attract_like_dipoles():
+    magnets = [
+        ms.CuboidMagnet((0.01,) * 3, (0, 0, 1e6)),
+        ms.CylinderMagnet(0.004, 0.01, (0, 0, 1e6), center=(0, 0, 0.4)),
+    ]
+    moments = 1e6 * 0.01**3, 1e6 * np.pi * 0.004**2 * 0.01
+    exact = 3 * VACUUM_PERMEABILITY * moments[0] * moments[1] / (2 * np.pi * 0.4**4)
+    assert lone_scene(*magnets).magnetic_force(magnets[0])[2] == pytest.approx(exact, rel=1e-3)
+
+
+def test_uniform_field_turns_a_magnet_by_its_moment():
+    for magnet, volume in (
+        (ms.CuboidMagnet((0.01, 0.02, 0.03), (0, 0, 1e6), rotation=(0.3, 0, 0)), 6e-6),
+        (ms.CylinderMagnet(0.01, 0.02, (0, 0, 1e6), rotation=(0.3, 0, 0)), 2e-6 * np.pi),
+    ):
+        state = lone_scene(magnet, ms.UniformField())
+        moment = 1e6 * volume * np.array([0, -np.sin(0.3), np.cos(0.3)])
+        np.testing.assert_allclose(
+            state.magnetic_torque(magnet), np.cross(moment, (0, 0.02, 0)), rtol=1e-12, atol=1e-15
+        )
+        np.testing.assert_allclose(state.magnetic_force(magnet), 0.0, atol=1e-15)
+
+
+def test_forces_between_overlapping_or_unknown_sources_are_refused():
+    magnets = [ms.CuboidMagnet((0.01,) * 3, (0, 0, 1e6), center=(0, 0, z)) for z in (0.0, 0.006)]
+    with pytest.raises(ValueError, match="overlap"):
+        lone_scene(*magnets).magnetic_force(magnets[0])
+    tables = [
+        ms.CustomField(lambda x, scale=scale: np.zeros_like(x) + scale, length_scale=0.1)
+        for scale in (0.0, 1.0)
+    ]
+    with pytest.raises(ValueError, match="one of them must be a magnet or Dipoles"):
+        lone_scene(*tables).magnetic_force(tables[0])

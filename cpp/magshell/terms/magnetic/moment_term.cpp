@@ -6,16 +6,14 @@ MomentTerm::MomentTerm(const std::vector<Magnet>& magnets, const Nodes& nodes, c
                        const SystemMatrix& matrix, Registry& registry)
     : field_(sources, registry) {
     for (const Magnet& magnet : magnets) {
-        ElementBlock& element_block = element_blocks_.emplace_back();
-        element_block.corners = magnet.corners;
+        ElementBlock& element_block =
+            element_blocks_.emplace_back(ElementBlock{.corners = magnet.corners,
+                                                      .weights = CornerWeights(magnet.corners, nodes),
+                                                      .moment = {},
+                                                      .center = {},
+                                                      .slots = {}});
         element_block.moment = registry.values.add(magnet.owner, "magnetic_moment", "A m2", 1, 3);
         element_block.center = registry.values.add(magnet.owner, "center", "m", 1, 3);
-        element_block.middle = Vec3::Zero();
-        for (const Index node : element_block.corners) element_block.middle += 0.25 * nodes.rest[node];
-        for (int k = 0; k < 4; ++k) {
-            const Vec3 rho = nodes.rest[element_block.corners[k]] - element_block.middle;
-            element_block.offsets[k] = rho * (3.0 / (4.0 * rho.squaredNorm()));  // |rho|^2 = 3 l^2
-        }
         for (int i = 0; i < 4; ++i)
             for (int j = 0; j < i; ++j)
                 element_block.slots[i][j] =
@@ -27,12 +25,8 @@ bool MomentTerm::set_values(const Values& values) {
     bool changed = false;
     for (ElementBlock& element_block : element_blocks_) {
         changed |= values.changed(element_block.moment, element_block.center);
-        const Vec3 moment = values.vector(element_block.moment),
-                   center = values.vector(element_block.center) - element_block.middle;
-        for (int k = 0; k < 4; ++k) {
-            element_block.alpha[k] = element_block.offsets[k].dot(moment);
-            element_block.b[k] = 0.25 + element_block.offsets[k].dot(center);
-        }
+        element_block.alpha = element_block.weights.of_vector(values.vector(element_block.moment));
+        element_block.b = element_block.weights.of_point(values.vector(element_block.center));
     }
     return changed;
 }
@@ -121,15 +115,14 @@ void MomentTerm::vjp(const double* q, const LoadParameters& load_parameters, con
         const Each x = at_corners(element_block, q), rate = at_corners(element_block, lambda);
         const Vec3 turn = sum(element_block.alpha, rate), v = sum(element_block.b, rate),
                    along = field.gradient[n] * v;
-        Vec3 by_moment = Vec3::Zero(), by_center = Vec3::Zero();
+        CornerWeights::Each by_alpha, by_b;
         for (int k = 0; k < 4; ++k) {
-            by_moment -= element_block.offsets[k] * (rate[k].dot(field.flux[n]) + x[k].dot(along));
-            by_center -= element_block.offsets[k] *
-                         (turn.dot(field.gradient[n] * x[k]) + moments[n].dot(field.gradient[n] * rate[k]) +
-                          x[k].dot(field.curvature[n] * v));
+            by_alpha[k] = -(rate[k].dot(field.flux[n]) + x[k].dot(along));
+            by_b[k] = -(turn.dot(field.gradient[n] * x[k]) + moments[n].dot(field.gradient[n] * rate[k]) +
+                        x[k].dot(field.curvature[n] * v));
         }
-        out.values.segment<3>(element_block.moment.first) += by_moment;
-        out.values.segment<3>(element_block.center.first) += by_center;
+        out.values.segment<3>(element_block.moment.first) += element_block.weights.gradient(by_alpha);
+        out.values.segment<3>(element_block.center.first) += element_block.weights.gradient(by_b);
         probe.flux.push_back(-turn);
         probe.moment.push_back(-moments[n]);
         probe.direction.push_back(v);

@@ -2,9 +2,7 @@
 //
 //   E = - mu . B(p),   mu = R m = sum alpha_k x_k,   p = c + R (center - c~) = sum b_k x_k                      [J]
 //
-// x_k are the four corners of the body's tetrahedron (assembly/, rigid bodies), rho_k their reference positions
-// relative to its middle. With sum rho_k rho_k^T = 4 l^2 I:  alpha_k = rho_k . m / 4 l^2,  b_k = 1/4 + rho_k .
-// (center - c~) / 4 l^2.
+// with the weights alpha_k, b_k of the corners (corner_weights.h).
 #pragma once
 
 #include <array>
@@ -13,6 +11,7 @@
 
 #include "magshell/body/nodes.h"
 #include "magshell/terms/magnetic/applied_field_term.h"
+#include "magshell/terms/magnetic/corner_weights.h"
 #include "magshell/terms/magnetic/total_applied_field.h"
 
 namespace magshell {
@@ -44,8 +43,7 @@ class MomentTerm final : public AppliedFieldTerm {
     using Each = std::array<Vec3, 4>;
     struct ElementBlock {
         std::array<Index, 4> corners;
-        Vec3 middle;   // in the reference configuration
-        Each offsets;  // rho_k / 4 l^2
+        CornerWeights weights;
         ParameterSlice moment, center;
         std::array<double, 4> alpha{}, b{};
         std::array<std::array<SystemMatrix::Slot, 4>, 4> slots;  // lower triangle

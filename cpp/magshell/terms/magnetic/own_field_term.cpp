@@ -3,6 +3,7 @@
 #include <string>
 
 #include "magshell/core/errors.h"
+#include "magshell/terms/magnetic/solid_triangles.h"
 
 namespace magshell {
 namespace {
@@ -39,15 +40,23 @@ OwnField::Faces faces_of(const std::vector<OwnFieldTerm::Sheet>& sheets) {
     return faces;
 }
 
+std::vector<OwnField::RigidNodes> rigid_nodes_of(const std::vector<OwnFieldTerm::Magnet>& magnets) {
+    std::vector<OwnField::RigidNodes> rigid;
+    for (const OwnFieldTerm::Magnet& magnet : magnets) rigid.push_back({magnet.nodes});
+    return rigid;
+}
+
 }  // namespace
 
-OwnFieldTerm::OwnFieldTerm(std::vector<Sheet> sheets, Index max_points, double accuracy, Index n_dofs,
+OwnFieldTerm::OwnFieldTerm(Sources sources, Index max_points, double accuracy, const Nodes& nodes,
                            Registry& registry)
-    : sheets_(std::move(sheets)),
+    : sheets_(std::move(sources.sheets)),
+      solids_(std::move(sources.solids)),
+      magnets_(std::move(sources.magnets)),
       max_points_(max_points),
-      n_dofs_(n_dofs),
+      n_dofs_(nodes.n_dofs()),
       factor_(registry.load_parameters.add("scene", "own_field_factor", "1", 1, 1)),
-      field_(faces_of(sheets_)),
+      field_(faces_of(sheets_), triangles_of(solids_), rigid_nodes_of(magnets_)),
       sources_(std::make_shared<const OwnField>(field_)) {
     field_.set_accuracy(accuracy);
     for (const Sheet& sheet : sheets_) {
@@ -57,12 +66,23 @@ OwnFieldTerm::OwnFieldTerm(std::vector<Sheet> sheets, Index max_points, double a
         thickness_.push_back(
             registry.values.add(surface->owner, "thickness", "m", surface->n_faces(), 1, &surface->faces));
     }
+    for (const Solid* solid : solids_)
+        of_solids_.push_back(registry.values.add(solid->owner, "remanent_magnetization", "A/m",
+                                                 solid->n_elements(), 3, &solid->elements));
+    for (const Magnet& magnet : magnets_) {
+        corners_.emplace_back(
+            std::array<Index, 4>{magnet.nodes[0], magnet.nodes[1], magnet.nodes[2], magnet.nodes[3]}, nodes);
+        moment_.push_back(registry.values.add(magnet.owner, "magnetic_moment", "A m2", 1, 3));
+        center_.push_back(registry.values.add(magnet.owner, "center", "m", 1, 3));
+    }
 }
 
 bool OwnFieldTerm::set_values(const Values& values) {
     bool changed = false;
     for (std::size_t k = 0; k < sheets_.size(); ++k)
         changed |= values.changed(magnetization_[k], thickness_[k]);
+    for (const ParameterSlice& magnetization : of_solids_) changed |= values.changed(magnetization);
+    for (std::size_t k = 0; k < magnets_.size(); ++k) changed |= values.changed(moment_[k], center_[k]);
     if (!changed) return false;
     magnetizations_.clear();
     thicknesses_.clear();
@@ -71,7 +91,16 @@ bool OwnFieldTerm::set_values(const Values& values) {
             magnetizations_.push_back(values.vector(magnetization_[k], f));
             thicknesses_.push_back(values.number(thickness_[k], f));
         }
-    field_.set(magnetizations_, thicknesses_);
+    of_tetrahedra_.clear();
+    for (std::size_t k = 0; k < solids_.size(); ++k)
+        for (Index t = 0; t < solids_[k]->n_elements(); ++t)
+            of_tetrahedra_.push_back(values.vector(of_solids_[k], t));
+    field_.set(magnetizations_, thicknesses_, of_tetrahedra_);
+    std::vector<OwnField::DipoleWeights> dipoles;
+    for (std::size_t k = 0; k < magnets_.size(); ++k)
+        dipoles.push_back({.position = corners_[k].of_point(values.vector(center_[k], 0)),
+                           .moment = corners_[k].of_vector(values.vector(moment_[k], 0))});
+    field_.set(dipoles);
     if (field_.n_points() > max_points_)
         throw InvalidInput("the own field has " + std::to_string(field_.n_points()) +
                            " source points, more than max_points = " + std::to_string(max_points_) +
@@ -108,15 +137,26 @@ std::shared_ptr<const HessianOperator> OwnFieldTerm::hessian_operator(
 
 std::vector<double> OwnFieldTerm::own_energies(const double* q) const {
     std::vector<double> energies;
-    std::ptrdiff_t first = 0;
-    for (const Sheet& sheet : sheets_) {
-        OwnField alone(faces_of({sheet}));
+    const auto add = [&](OwnField alone, const std::vector<Vec3>& magnetizations,
+                         const std::vector<double>& thicknesses, const std::vector<Vec3>& of_tetrahedra) {
         alone.set_accuracy(field_.accuracy());
-        const std::ptrdiff_t last = first + sheet.surface->n_faces();
-        alone.set({magnetizations_.begin() + first, magnetizations_.begin() + last},
-                  {thicknesses_.begin() + first, thicknesses_.begin() + last});
+        alone.set(magnetizations, thicknesses, of_tetrahedra);
         std::vector<Vec3> by_position;
         energies.push_back(alone.gradient(q, alone.neighbours(q), by_position));
+    };
+    std::ptrdiff_t first = 0;
+    for (const Sheet& sheet : sheets_) {
+        const std::ptrdiff_t last = first + sheet.surface->n_faces();
+        add(OwnField(faces_of({sheet}), {}, {}),
+            {magnetizations_.begin() + first, magnetizations_.begin() + last},
+            {thicknesses_.begin() + first, thicknesses_.begin() + last}, {});
+        first = last;
+    }
+    first = 0;
+    for (const Solid* solid : solids_) {
+        const std::ptrdiff_t last = first + solid->n_elements();
+        add(OwnField({}, triangles_of({solid}), {}), {}, {},
+            {of_tetrahedra_.begin() + first, of_tetrahedra_.begin() + last});
         first = last;
     }
     return energies;
@@ -132,6 +172,14 @@ void OwnFieldTerm::vjp(const double* q, const LoadParameters& load_parameters, c
             out.values.segment<3>(magnetization_[k].at(f)) += factor * by.magnetization[face];
             out.values[thickness_[k].at(f)] += factor * by.thickness[face];
         }
+    std::size_t tetrahedron = 0;
+    for (std::size_t k = 0; k < solids_.size(); ++k)
+        for (Index t = 0; t < solids_[k]->n_elements(); ++t)
+            out.values.segment<3>(of_solids_[k].at(t)) += factor * by.of_tetrahedra[tetrahedron++];
+    for (std::size_t k = 0; k < magnets_.size(); ++k) {
+        out.values.segment<3>(moment_[k].first) += factor * corners_[k].gradient(by.of_dipoles[k].moment);
+        out.values.segment<3>(center_[k].first) += factor * corners_[k].gradient(by.of_dipoles[k].position);
+    }
     if (!sources_->acts()) return;
     std::vector<Vec3> by_position;
     sources_->gradient(q, sources_->neighbours(q), by_position);

@@ -1,10 +1,13 @@
-// OwnFieldTerm: the energy of magnetized shells of linear triangles in the field that they make themselves (energy/own_field.h).
+// OwnFieldTerm: the energy of magnetized shells of linear triangles, solids and rigid bodies with a moment in the field that they make themselves
+// (energy/own_field.h).
 #pragma once
 
 #include "magshell/body/nodes.h"
+#include "magshell/body/solid.h"
 #include "magshell/body/surface.h"
 #include "magshell/energy/magnetization_law.h"
 #include "magshell/energy/own_field.h"
+#include "magshell/terms/magnetic/corner_weights.h"
 #include "magshell/terms/operator_term.h"
 
 namespace magshell {
@@ -16,10 +19,20 @@ class OwnFieldTerm final : public OperatorTerm {
         MagnetizationLaw law;
     };
 
+    /// A rigid body with a moment, and all of its nodes, first the corners of its tetrahedron.
+    struct Magnet {
+        std::string owner;
+        std::vector<Index> nodes;
+    };
+    struct Sources {
+        std::vector<Sheet> sheets;
+        std::vector<const Solid*> solids;
+        std::vector<Magnet> magnets;
+    };
+
     /// max_points: number of source points beyond which set_values() throws InvalidInput. accuracy: of the sums over many points, 0 if all
-    /// are direct. The surfaces must outlive the term.
-    OwnFieldTerm(std::vector<Sheet> sheets, Index max_points, double accuracy, Index n_dofs,
-                 Registry& registry);
+    /// are direct. The surfaces and solids must outlive the term.
+    OwnFieldTerm(Sources sources, Index max_points, double accuracy, const Nodes& nodes, Registry& registry);
 
     std::string_view name() const override { return "own field"; }
     bool set_values(const Values& values) override;
@@ -34,19 +47,25 @@ class OwnFieldTerm final : public OperatorTerm {
 
     /// Returns the own field of the present values.
     const OwnField& field() const { return *sources_; }
-    /// Returns the energy of each surface in its own field alone [J].
+    /// Returns the energy of each surface and of each solid in its own field alone [J].
     std::vector<double> own_energies(const double* q) const;
 
   private:
     const std::vector<Sheet> sheets_;
+    const std::vector<const Solid*> solids_;
+    const std::vector<Magnet> magnets_;
+    std::vector<CornerWeights> corners_;  // of the magnets
     const Index max_points_, n_dofs_;
     std::vector<ParameterSlice> magnetization_, thickness_;  // of each surface
+    std::vector<ParameterSlice> of_solids_;                  // magnetization of each solid
+    std::vector<ParameterSlice> moment_, center_;            // of each magnet
     ParameterSlice factor_;
     std::vector<Vec3> magnetizations_;  // of all faces [A/m]
     std::vector<double> thicknesses_;   // [m]
-    OwnField field_;                    // of all faces
+    std::vector<Vec3> of_tetrahedra_;   // magnetizations [A/m]
+    OwnField field_;                    // of all faces and tetrahedra
     std::shared_ptr<const OwnField>
-        sources_;  // of the edges with a source; shared with the Hessians of earlier solves, so it is replaced, never changed
+        sources_;  // of the elements with a source; shared with the Hessians of earlier solves, so it is replaced, never changed
 };
 
 }  // namespace magshell

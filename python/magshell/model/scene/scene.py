@@ -191,7 +191,7 @@ class Scene(PlotMixin):
         self._rigid = rigid_body_points(bodies)
         check_shapes(self._obstacle_contacts, self.rigid_parts, self._rigid)
         for k, part in enumerate(self.rigid_parts):
-            if part.magnetic_moment is not None and not self.fields:
+            if part.magnetic_moment is not None and not self.fields and not _has_own_field(self, part):
                 raise ValueError(
                     f"rigid part {k} has a magnetic_moment, but the scene has no field: Scene(..., field=...)"
                 )
@@ -221,6 +221,10 @@ class Scene(PlotMixin):
         self._warned_of_jumps = False
         self._warned_of_units: set[str] = set()
         self._cores = CoreModels(self._new_model(), self._new_model)
+        if self.own_field is not None and self._model.reduce(self._model.rest_state()).size == 0:
+            raise ValueError(
+                "the supports hold all vertices, so that nothing moves in the own field: leave at least one free"
+            )
         self._value_layout = Layout(self._model.parameters)
         self._control_layout = Layout(self._model.controls)
         self._values = Values(self)
@@ -445,6 +449,12 @@ def _refuse_support(parts, held: np.ndarray) -> None:
             )
 
 
+def _has_own_field(scene: Scene, body: Any) -> bool:
+    """Return whether the own field of a scene is about a body."""
+    given = scene.own_field
+    return given is not None and (given.bodies is None or any(body is each for each in given.bodies))
+
+
 def _refuse_idle_magnetization(scene: Scene) -> None:
     """Raise ValueError for a skin, a magnetized solid or a susceptible shell that has no effect because the scene has no
     field.
@@ -459,6 +469,8 @@ def _refuse_idle_magnetization(scene: Scene) -> None:
                 raise ValueError(
                     f"body {k} has a susceptibility, but the scene has no applied field: Scene(..., field=...)"
                 )
+            continue
+        if _has_own_field(scene, body):
             continue
         idle = body.skin is not None and (
             body.skin.mass_density is None or body.skin.remanent_magnetization is not None

@@ -59,7 +59,7 @@ def body_inputs(scene: Scene, directed_edges: np.ndarray) -> dict[str, list[dict
         "solids": _solids(scene),
         "skins": _skins(scene),
         "rigid": [
-            points.as_input(f"rigid {k}", part, bool(scene.fields) and part.magnetic_moment is not None)
+            points.as_input(f"rigid {k}", part, scene.is_magnetic and part.magnetic_moment is not None)
             for k, (part, points) in enumerate(zip(scene.rigid_parts, scene._rigid, strict=True))
         ],
     }
@@ -204,7 +204,7 @@ def _solids(scene) -> list[dict[Any, Any]]:
 
 def _skins(scene) -> list[dict[Any, Any]]:
     """Return the input of skins in a field; the mass of a skin is in the input of its solid."""
-    if not scene.fields:
+    if not scene.is_magnetic:
         return []
     bodies = scene._bodies
     skinned = [

@@ -12,7 +12,9 @@ from ..._input.quantity import quantity
 from ..._input.tensors import detached
 from ..._runtime.frozen import Frozen
 from ...model.fields.field import UniformField
+from ...model.fields.magnet_forces import Action, action_between, magnetic_moment_of
 from ...model.results.result_lookup import OfOneBody
+from ...model.scene.own_field import own_field_inputs
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
@@ -62,13 +64,13 @@ class MagneticState(Frozen):
     def flux_density(self, points: Numbers) -> np.ndarray:
         """Return the flux density of the applied and the own field at points outside of the bodies, (n, 3) T.
 
-        points: (n, 3) m. Only shells of the scene's OwnField contribute to the own field. Within a few edge lengths of a
+        points: (n, 3) m. Only bodies of the scene's OwnField contribute to the own field. Within a few edge lengths of a
         shell the points of its sources show.
         """
         return self.applied_flux_density(points) + self.own_flux_density(points)
 
     def own_flux_density(self, points: Numbers) -> np.ndarray:
-        """Return the flux density of the magnetized shells at points (n, 3) m outside of them, (n, 3) T; zero without an
+        """Return the flux density of the magnetized bodies at points (n, 3) m outside of them, (n, 3) T; zero without an
         OwnField. The magnetization that a field induces in susceptible shells makes none here.
         """
         at, result = _points(points), self.equilibrium
@@ -99,11 +101,12 @@ class MagneticState(Frozen):
         """Return the magnetic force on a body or on a magnet of the scene, (3,) N.
 
         body: a Shell or Solid, on which the applied field and the other bodies of an OwnField act; a RigidBody or Link with
-            a magnetic_moment, on which the applied field acts; or a field of the scene that has sources, such as a
-            CuboidMagnet, a PlacedField or Dipoles: the force of all bodies on these, opposite to theirs on the bodies.
-            Magnets do not act on each other here.
+            a magnetic_moment, on which they act likewise; or a field of the scene that has sources, such as a
+            CuboidMagnet, a PlacedField or Dipoles: the force of all bodies on these, opposite to theirs on the bodies, and
+            that of the other fields. Of two fields one must be a magnet or Dipoles.
 
-        Raises ValueError for what is not in the scene, for a RigidBody without a moment, and for a UniformField.
+        Raises ValueError for what is not in the scene, for a RigidBody without a moment, for a UniformField, and for magnets
+        that overlap.
 
         >>> import magshell as ms
         >>> meshes = [
@@ -135,8 +138,8 @@ class MagneticState(Frozen):
 
     @property
     def energies(self) -> dict[str, float]:
-        """The magnetic energies, J: "applied" in the applied fields, that of susceptible shells too, "own" of each shell in
-        its own field, "mutual" of the shells in the fields of each other.
+        """The magnetic energies, J: "applied" in the applied fields, that of susceptible shells too, "own" of each shell
+        and solid in its own field, "mutual" of the bodies in the fields of each other.
         """
         result = self.equilibrium
         with result._values.in_core():
@@ -149,12 +152,12 @@ class MagneticState(Frozen):
         if any(body is each for each in scene.bodies):
             return self._on_body(body)
         for k, part in enumerate(part for part in scene.rigid_parts if part.magnetic_moment is not None):
-            if part is body and scene.fields:
-                return self._on_moment(k)
+            if part is body:
+                return self._on_moment(k, body)
         if any(body is each for each in scene.fields) and not isinstance(body, UniformField):
             return self._on_source(body)
         raise ValueError(
-            "body must be a Shell or Solid of the scene, a RigidBody of it with a magnetic_moment in a field, or one of its "
+            "body must be a Shell or Solid of the scene, a RigidBody of it with a magnetic_moment, or one of its "
             f"fields with sources, got {body!r:.60}"
         )
 
@@ -168,20 +171,62 @@ class MagneticState(Frozen):
         positions = np.asarray(detached(result.positions))[rows]
         return _Actions(positions, -of_vertices[rows], np.zeros(3), positions.mean(axis=0))
 
-    def _on_moment(self, number: int) -> _Actions:
+    def _on_moment(self, number: int, part: RigidBody) -> _Actions:
         """Return the force and couple on the moment of a rigid part, by its number among those with a moment."""
+        result = self.equilibrium
         points, moments = (rows[number : number + 1] for rows in self._moments("moments"))
-        fields = [field for field in self.equilibrium.scene.fields if not isinstance(field, UniformField)]
+        fields = [field for field in result.scene.fields if not isinstance(field, UniformField)]
         forces, couples = self._on_moments(fields, points, moments)
-        return _Actions(points, forces, couples + np.cross(moments, self._uniform), points[0])
+        couples = couples + np.cross(moments, self._uniform)
+        of_own_field = own_field_inputs(result.scene)["own_field_rigid"]
+        place = result.scene.rigid_parts.index(part)
+        if place in of_own_field:
+            with result._values.in_core():
+                _, own_forces, own_couples = result.scene._model.own_field_on_moments(result._state)
+            row = of_own_field.index(place)
+            forces, couples = forces + own_forces[row], couples + own_couples[row]
+        return _Actions(points, forces, couples, points[0])
 
     def _on_source(self, field: AppliedField) -> _Actions:
-        """Return the forces and couples of all bodies on the sources of a field: minus those of the field on them."""
+        """Return the forces and couples on the sources of a field: of all bodies, minus those of the field on them, and of
+        the other fields.
+        """
         points, moments = self._moments("")
         forces, couples = self._on_moments([field], points, moments)
+        others = self._of_other_fields(field)
         return _Actions(
-            points, -forces, -couples, getattr(self.equilibrium._values.current(field), "center", None)
+            np.concatenate([points, np.zeros((1, 3))]),
+            np.concatenate([-forces, [others.force]]),
+            np.concatenate([-couples, [others.torque]]),
+            getattr(self.equilibrium._values.current(field), "center", None),
         )
+
+    def _of_other_fields(self, field: AppliedField) -> Action:
+        """Return the force and the torque about the origin of the other fields on the sources of one."""
+        result = self.equilibrium
+        fields = [each for each in result.scene.fields if not isinstance(each, UniformField)]
+        number = next(k for k, each in enumerate(fields) if each is field)
+        now = [result._values.current(each) for each in fields]
+        moment = magnetic_moment_of(now[number])
+        force, torque = np.zeros(3), np.zeros(3)
+        if moment is not None:
+            torque = torque + self._field_factor * np.cross(moment, self._uniform)
+        for k, other in enumerate(now):
+            if k == number:
+                continue
+            # The charges of the earlier field are those that are summed, so that both forces are opposite to round-off.
+            first, second = (now[number], other) if number < k else (other, now[number])
+            action, sign = action_between(first, second), 1.0 if number < k else -1.0
+            if action is None:
+                action, sign = action_between(second, first), -sign
+            if action is None:
+                raise ValueError(
+                    f"the force between {first!r:.80} and {second!r:.80} cannot be computed, because one of them must be a "
+                    "magnet or Dipoles"
+                )
+            force = force + sign * self._field_factor**2 * action.force
+            torque = torque + sign * self._field_factor**2 * action.torque
+        return Action(force, torque)
 
     def _on_moments(
         self, fields: Iterable[AppliedField], points: np.ndarray, moments: np.ndarray
