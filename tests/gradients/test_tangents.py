@@ -15,6 +15,8 @@ from torch.autograd import forward_ad  # noqa: E402
 LARGE = 1e-3  # m, of meshes of 0.1 m
 AT_REST = [name for name in MAKERS if kind(name).function is ms.equilibrium]
 PRECISION, ROUNDING = 1e-9, 1e-14  # of the tangent, and of the result itself
+# Tangents of a response about an equilibrium contain differences of its stiffness, whose errors bending amplifies.
+PRECISIONS = {"a bent sheet that responds by linear theory": 1e-8}
 MESH = ms.meshes.rectangle(0.04, 0.01, cells=(6, 2))
 SHEET = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, mass_density=2e3)
 CLAMP = ms.Clamp(MESH.edges_at(x=0.0))
@@ -68,7 +70,7 @@ def is_geometry(key) -> bool:
 @pytest.mark.parametrize("name", AT_REST)
 @pytest.mark.filterwarnings("ignore::magshell.FieldSamplingWarning")
 def test_tangents_agree_with_gradients_in_every_kind(name):
-    rng = np.random.default_rng(len(name))
+    rng, precision = np.random.default_rng(len(name)), PRECISIONS.get(name, PRECISION)
     start = kind(name).found({})
     start = start if isinstance(start, ms.Equilibrium | ms.EquilibriumSet) else None
     together = {key: value for key, value in kind(name).together.items() if not is_geometry(key)}
@@ -90,7 +92,7 @@ def test_tangents_agree_with_gradients_in_every_kind(name):
             float(w.norm() * r.detach().norm()) for w, r in zip(weights, results, strict=True)
         )
         told = ", ".join(label(kind(name), key) for key in given)
-        assert forward == pytest.approx(backward, rel=0.0, abs=PRECISION * size + rounding), told
+        assert forward == pytest.approx(backward, rel=0.0, abs=precision * size + rounding), told
 
 
 def direction(name, key, value, rng):

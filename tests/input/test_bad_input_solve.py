@@ -131,10 +131,6 @@ GRADIENTS = {
     "thickness": lambda t: shell(thickness=t((N_F,))),
     "young_modulus": lambda t: shell(young_modulus=t(())),
     "curvature_scale": lambda t: shell(curvature_scale=t((N_E,))),
-    "load_factor": lambda t: ms.linear_response(scene(), load_factor=t(())),
-    "applied_flux_density": lambda t: ms.linear_response(
-        scene(field=ms.UniformField()), remanent_magnetization=(1, 0, 0), applied_flux_density=t((3,))
-    ),
     "start": lambda t: solve(start=t((N_V, 3))),
     "force": lambda t: ms.PointLoad([0], t((3,))),
     "displacement": lambda t: ms.Pin([0], displacement=t((3,))),

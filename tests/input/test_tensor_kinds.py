@@ -7,6 +7,8 @@ import magshell as ms
 
 torch = pytest.importorskip("torch")
 
+from torch.autograd import forward_ad  # noqa: E402
+
 MESH = ms.meshes.rectangle(0.05, 0.01, cells=(3, 1))
 FIELD = (0.0, 0.0, 1e-3)
 STRENGTH = torch.tensor((4e3, 0.0, 256.0), dtype=torch.float64)  # exact in bfloat16, but for 4e3
@@ -34,7 +36,6 @@ def linear(scene, magnetization, field=FIELD):
 
 
 SOLVES = pytest.mark.parametrize("solve", [equilibrium, motion, linear], ids=lambda f: f.__name__)
-WITH_GRADIENT = pytest.mark.parametrize("solve", [equilibrium, motion], ids=lambda f: f.__name__)
 
 
 @SOLVES
@@ -56,7 +57,7 @@ def test_integers_are_no_dtype_for_results(scene, solve):
     assert solve(scene, STRENGTH.long(), torch.tensor(FIELD, dtype=torch.float32)).dtype == torch.float32
 
 
-@WITH_GRADIENT
+@SOLVES
 def test_a_gradient_beside_integers_and_in_bfloat16(scene, solve):
     field = torch.tensor(FIELD, dtype=torch.float64, requires_grad=True)
     solve(scene, STRENGTH.long(), field).pow(2).sum().backward()
@@ -113,21 +114,6 @@ def test_views_whose_sign_is_pending_are_taken(scene):
     assert torch.equal(equilibrium(scene, negative), equilibrium(scene, STRENGTH))
 
 
-def dual(function, tensor):
-    import torch.autograd.forward_ad as forward
-
-    with forward.dual_level():
-        return function(forward.make_dual(tensor, tensor))
-
-
-REVERSE = {
-    "grad": lambda f, t: torch.func.grad(lambda x: f(x).sum())(t),
-    "jacrev": lambda f, t: torch.func.jacrev(f)(t),
-    "vjp": lambda f, t: torch.func.vjp(f, t),
-}
-FORWARD = {"jvp": lambda f, t: torch.func.jvp(f, (t,), (t,)), "dual numbers": dual}
-
-
 @pytest.mark.parametrize("solve", [motion, linear])
 def test_batches_of_designs_are_refused_by_name(scene, solve):
     with pytest.raises(ValueError, match=r"remanent_magnetization \[A/m\] is inside torch\.vmap.*loop"):
@@ -144,19 +130,19 @@ def test_batches_of_values_are_refused_by_name(scene, name):
         torch.vmap(lambda value: ms.simulate(scene, values={sheet: {name: value}}, **field, **steps))(given)
 
 
-@pytest.mark.parametrize("name", FORWARD)
-def test_motions_have_no_tangents(scene, name):
-    with pytest.raises(ms.NoGradient, match="no tangents of a motion"):
-        FORWARD[name](lambda magnetization: motion(scene, magnetization), STRENGTH)
+@SOLVES
+def test_transforms_of_torch_agree_along_a_direction(scene, solve):
+    def total(magnetization):
+        return (1e3 * solve(scene, magnetization)).pow(2).sum()
+
+    slope = (torch.func.grad(total)(STRENGTH) * STRENGTH).sum()
+    torch.testing.assert_close(torch.func.jvp(total, (STRENGTH,), (STRENGTH,))[1], slope, rtol=1e-7, atol=0.0)
+    with forward_ad.dual_level():
+        tangent = forward_ad.unpack_dual(total(forward_ad.make_dual(STRENGTH, STRENGTH))).tangent
+    torch.testing.assert_close(tangent, slope, rtol=1e-7, atol=0.0)
 
 
-@pytest.mark.parametrize("name", [*FORWARD, *REVERSE])
-def test_linear_response_has_no_derivatives(scene, name):
-    with pytest.raises(ValueError, match="requires a gradient, and nothing passes one back"):
-        {**FORWARD, **REVERSE}[name](lambda magnetization: linear(scene, magnetization), STRENGTH)
-
-
-@WITH_GRADIENT
+@SOLVES
 def test_gradients_come_one_at_a_time(scene, solve):
     given = STRENGTH.clone().requires_grad_()
     found = solve(scene, given)
@@ -212,7 +198,7 @@ def test_files_take_bfloat16(tmp_path):
         ms.write_mesh(tmp_path / "a.ply", MESH, vertex_fields={"u": values.to("meta")})
 
 
-@WITH_GRADIENT
+@SOLVES
 def test_compiled_code_runs_solves_as_they_are(scene, solve):
     """Check torch.compile, which used to end in an AssertionError inside torch."""
 

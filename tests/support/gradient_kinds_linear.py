@@ -94,6 +94,32 @@ def buckling_about(scene, values, start=None, **given):
     return numbers(ms.linear_buckling(rest.scene, rest, **towards).factors)
 
 
+def response(scene, values, **given):
+    """Return the linear response to all loads."""
+    values, given = as_values(scene, values, given)
+    return deflection(ms.linear_response(scene, values=values, **given))
+
+
+def response_about(scene, values, start=None, **given):
+    """Return the linear response about an equilibrium at these loads, towards other ones."""
+    rest = ms.equilibrium(scene, values=values, start=start, **given)
+    towards = {name: 0.8 * as_tensor(given[name]) ** 2 for name in FACTORS}
+    field = {"applied_flux_density": 1.1 * as_tensor(given["applied_flux_density"])}
+    return deflection(ms.linear_response(rest.scene, rest, **towards, **field))
+
+
+def deflection(found) -> SimpleNamespace:
+    """Return displacements and edge rotations as results."""
+    return SimpleNamespace(displacements=found.displacements, numbers=as_tensor(found.edge_rotations))
+
+
+def responding_sheet(about: bool) -> Kind:
+    """Build the sheet on which everything acts; its rest shape or an equilibrium changes by linear theory."""
+    controls = {**DEFAULTS, **FACTORS}
+    solve = response_about if about else response
+    return Kind(everything(), controls, solve=solve, fixed=EXACT, reach=REACH, of_linear=True)
+
+
 def column(gravity=(-9.81, 1.0, 0)) -> ms.Scene:
     """Build a clamped strip that is pressed along its length, in its weight and a field."""
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
@@ -191,4 +217,6 @@ LINEAR_MAKERS = {
     "a beam that snaps at a limit point": snapping_beam,
     "a column that buckles by linear theory": buckling_column,
     "a bent column that buckles by linear theory": buckling_bent_column,
+    "a sheet that responds by linear theory": lambda: responding_sheet(False),
+    "a bent sheet that responds by linear theory": lambda: responding_sheet(True),
 }

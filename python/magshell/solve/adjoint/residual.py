@@ -46,6 +46,10 @@ class Slopes(NamedTuple):
         """Return the derivatives of the sum of this number and a multiple of another."""
         return Slopes(*(mine + factor * theirs for mine, theirs in zip(self, other, strict=True)))
 
+    def times(self, factor: float) -> Slopes:
+        """Return the derivatives of a multiple of this number."""
+        return Slopes(*(factor * each for each in self))
+
     def at_fixed_state(self) -> Slopes:
         """Return the same without the derivatives by unknowns."""
         return self._replace(by_state=np.zeros_like(self.by_state))
@@ -88,6 +92,17 @@ class Residual:
             raise NoGradient(f"no gradient here: {error}") from error
         columns, stiffnesses = self._model.low_rank()
         return triangle, ((columns, stiffnesses) if np.any(stiffnesses) else ())
+
+    def product(self, motion: np.ndarray) -> np.ndarray:
+        """Return H times a motion of all unknowns. Raises NoGradient if H is not symmetric."""
+        self._prepare()
+        return self._product(self.state, motion)
+
+    def slopes_at_fixed_state(self, motion: np.ndarray) -> Slopes:
+        """Return the derivatives of motion . g without those by unknowns, for which H need not be symmetric."""
+        self._prepare()
+        by_inputs = _core.vjp(self._model, self.state, self.controls, motion, self._with_rest)
+        return Slopes(np.zeros_like(self.state), *by_inputs)
 
     def slopes(self, motion: np.ndarray) -> Slopes:
         """Return the derivatives of motion . g at a fixed motion of all unknowns."""
@@ -165,8 +180,16 @@ class Residual:
         return Gradient(self.inputs.scene, by_values, by_controls, others, rest=rest)
 
     def _slopes(self, state: np.ndarray, motion: np.ndarray) -> Slopes:
-        product = self._model.hessian_product(state, self.controls, motion)
-        return Slopes(product, *_core.vjp(self._model, state, self.controls, motion, self._with_rest))
+        return Slopes(
+            self._product(state, motion),
+            *_core.vjp(self._model, state, self.controls, motion, self._with_rest),
+        )
+
+    def _product(self, state: np.ndarray, motion: np.ndarray) -> np.ndarray:
+        try:
+            return self._model.hessian_product(state, self.controls, motion)
+        except ValueError as error:
+            raise NoGradient(f"no gradient here: {error}") from error
 
     def _prepare(self) -> None:
         if self.inputs.scene.rigid_parts:

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ..._input.tensors import requires_gradient
 from ...model.scene.scene import Scene
-from ...model.scene.solve_inputs import Inputs, plain_inputs
+from ...model.scene.solve_inputs import Inputs, Leaf, plain_inputs
+from ..adjoint.buckling import AFTER, BEFORE
+from ..adjoint.residual import Residual
 from ..statics.equilibrium import Equilibrium
 from .stiffness import Stiffness
 
@@ -73,26 +74,32 @@ def inputs_about(
     return inputs.with_values(equilibrium._values)
 
 
-def asked_inputs(
-    function: str,
-    scene: Scene,
-    equilibrium: Equilibrium | None,
-    arguments: dict[str, Any],
-    differentiable: bool = False,
-) -> Inputs:
+def asked_inputs(scene: Scene, equilibrium: Equilibrium | None, arguments: dict[str, Any]) -> Inputs:
     """Return the inputs of a linear solve, at rest or about an equilibrium, from its keywords in the table.
 
-    Raises ValueError for what does not fit; unless `differentiable` is true, also for tensors that require a gradient.
+    Raises ValueError for what does not fit.
     """
     if equilibrium is None:
-        inputs = plain_inputs(scene, differentiable=differentiable, **arguments)
+        inputs = plain_inputs(scene, differentiable=True, **arguments)
         _refuse_own_field(scene)
         return inputs
-    inputs = inputs_about(scene, equilibrium, differentiable=differentiable, **arguments)
-    if not differentiable:
-        _refuse_gradient(function, equilibrium)
+    inputs = inputs_about(scene, equilibrium, differentiable=True, **arguments)
     refuse_what_cannot_be(equilibrium, inputs)
     return inputs
+
+
+def leaves_of(inputs: Inputs, equilibrium: Equilibrium | None) -> list[tuple[Leaf, int]]:
+    """Return the leaves of a linear solve, each with the load parameters that it may be one of, BEFORE or AFTER."""
+    own = [] if equilibrium is None or equilibrium._inputs is None else equilibrium._inputs.leaves
+    return [*((leaf, BEFORE) for leaf in own), *((leaf, AFTER) for leaf in inputs.leaves)]
+
+
+def residual_of(inputs: Inputs, equilibrium: Equilibrium | None) -> Residual:
+    """Return the gradient of the energy at the rest shape without loads, or at an equilibrium with its own inputs."""
+    if equilibrium is None:
+        return Residual(inputs, inputs.scene._model.rest_state(), [], inputs.scene._control_layout.zeros())
+    about = inputs if equilibrium._inputs is None else equilibrium._inputs
+    return Residual(about, equilibrium._state, equilibrium._angle_branches, equilibrium._controls)
 
 
 def set_state(equilibrium: Equilibrium) -> None:
@@ -127,16 +134,6 @@ class StiffnessAbout(Stiffness):
             return self.answer(0.5 * (behind - ahead), moved)
         forces = self.gradient - model.gradient(self.state, inputs.controls)
         return self.answer(forces, moved)
-
-
-def _refuse_gradient(function: str, equilibrium: Equilibrium) -> None:
-    """Raise ValueError if the equilibrium requires a gradient."""
-    for name in ("positions", "edge_rotations"):
-        if requires_gradient(getattr(equilibrium, name)):
-            raise ValueError(
-                f"the equilibrium requires a gradient, and ms.{function} passes none back: find it under "
-                "torch.no_grad(), or of detached tensors"
-            )
 
 
 def refuse_what_cannot_be(equilibrium: Equilibrium, inputs: Inputs) -> None:

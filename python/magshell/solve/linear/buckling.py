@@ -17,10 +17,9 @@ from ..._runtime.solver_entry_point import solve_entry
 from ...errors import NotConverged
 from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs
-from ..adjoint.buckling import AFTER, BEFORE, BucklingAdjoint
-from ..adjoint.residual import Residual
+from ..adjoint.buckling import BucklingAdjoint
 from ..statics.equilibrium import Equilibrium
-from .base_state import StiffnessAbout, asked_inputs
+from .base_state import StiffnessAbout, asked_inputs, leaves_of, residual_of
 from .mode_shapes import mode_shapes
 from .rest import RestStiffness, pulling_parts, refuse_springs
 from .stiffness import Stiffness
@@ -123,7 +122,7 @@ def linear_buckling(
     """
     arguments = given_to("linear_buckling", locals())
     modes = count("modes", modes)
-    inputs = asked_inputs("linear_buckling", scene, equilibrium, arguments, differentiable=True)
+    inputs = asked_inputs(scene, equilibrium, arguments)
     refuse_springs(inputs)
     if scene._body_contacts:
         raise ValueError(
@@ -156,7 +155,7 @@ def linear_buckling(
         if quadratic:
             _refuse_odd_loads(scene, stiffness, inputs)
         change = _stiffness_change(scene, stiffness, response, displacement, inputs, quadratic)
-    leaves = _leaves(inputs, equilibrium)
+    leaves = leaves_of(inputs, equilibrium)
     asked = modes + bool(leaves and modes + 1 < model.free_size)  # whether the last one is simple
     factors, vectors = _lowest(stiffness, change, asked, _LARGEST_DISPLACEMENT * _size(scene), displacement)
     if quadratic:
@@ -173,12 +172,6 @@ def linear_buckling(
     )
 
 
-def _leaves(inputs: Inputs, equilibrium: Equilibrium | None) -> list[tuple[Any, int]]:
-    """Return the tensors that gradients are asked by, each with the load parameters that it may be one of."""
-    own = [] if equilibrium is None or equilibrium._inputs is None else equilibrium._inputs.leaves
-    return [*((leaf, BEFORE) for leaf in own), *((leaf, AFTER) for leaf in inputs.leaves)]
-
-
 def _differentiable(
     inputs: Inputs,
     equilibrium: Equilibrium | None,
@@ -188,7 +181,7 @@ def _differentiable(
     modes: int,
 ) -> Any:
     """Return the factors as a tensor that is connected to the inputs, if some of these require a gradient."""
-    leaves, kept, model = _leaves(inputs, equilibrium), factors[:modes], inputs.scene._model
+    leaves, kept, model = leaves_of(inputs, equilibrium), factors[:modes], inputs.scene._model
     about = None if equilibrium is None else equilibrium._inputs
     given = [*inputs.given, *(() if about is None else about.given)]
     if not leaves:
@@ -196,18 +189,16 @@ def _differentiable(
     from ..adjoint.autograd import solved
 
     layout = inputs.scene._control_layout
-    at = (model.rest_state(), [], layout.zeros())
-    if equilibrium is not None:
-        at = (equilibrium._state, equilibrium._angle_branches, equilibrium._controls)
+    here = residual_of(inputs, equilibrium)
     with inputs.in_core():
-        rate = model.prescribed_rate(at[2])
-    further = layout.of(inputs.controls - at[2], "scene", "support_factor")
+        rate = model.prescribed_rate(here.controls)
+    further = layout.of(inputs.controls - here.controls, "scene", "support_factor")
     refusal = ""
     if inputs.scene.has_susceptible_shells:
         refusal = "no gradient of buckling factors with a susceptibility"
     moves = rate.any() and (further.any() or any(leaf.name == "support_factor" for leaf, _ in leaves))
     adjoint = BucklingAdjoint(
-        Residual(inputs if about is None else about, *at),
+        here,
         inputs.controls,
         response,
         factors,
