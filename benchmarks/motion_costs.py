@@ -1,4 +1,4 @@
-"""Time per step, cost of a gradient, memory stored for it, and long runs."""
+"""Time per step, costs of a gradient and a tangent, memory stored for them, and long runs."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 ALLOWED_STEP = 0.015  # [s] largest time of a step at 768 faces
 # Largest time of the gradient over that of the same motion without gradients, by adjoint storage.
 ALLOWED_SHARE = {"factors": 0.25, "stages": 0.5, "checkpoints": 1.2}
+ALLOWED_TANGENT = {"factors": 0.5, "stages": 0.5}  # the same of the tangent
 STEPS, TIME_STEP = 50, 1e-3
 KEPT_STEPS = (100, 1_000, 10_000)
 MOST_FACTORS = 1_000  # steps whose factorizations fit into memory: some 200 kB each
@@ -60,6 +61,7 @@ def measure(rounds: int, quick: bool, cells: tuple[int, int], memory: bool = Tru
     results = {
         "step": _steps(strip(cells), steps, rounds),
         "gradient": _gradients(strip(cells), steps, rounds),
+        "tangent": _tangents(strip(cells), steps, rounds),
     }
     if not memory:
         return results
@@ -129,14 +131,64 @@ def _gradients(scene: ms.Scene, steps: int, rounds: int) -> dict[str, Any]:
     return results
 
 
-def _forward_and_back(scene: ms.Scene, steps: int, integrator, storage: str) -> tuple[float, float, int]:
-    """Return the times of a motion and its gradient, s, and the bytes stored."""
+def _tangents(scene: ms.Scene, steps: int, rounds: int) -> dict[str, Any]:
+    """Measure what the tangent along the field of every step and the magnetization adds to a motion that is kept."""
+    results, rows = {}, []
+    for integrator in (ms.ImplicitEuler(), ms.TRBDF2()):
+        name = type(integrator).__name__
+        plain, by_storage = [], {storage: [] for storage in ALLOWED_TANGENT}
+        for _ in range(rounds):
+            began = time.process_time()
+            drive(scene, steps, integrator=integrator)
+            plain.append(time.process_time() - began)
+            for storage, runs in by_storage.items():
+                kept, _, _ = _forward_and_back(scene, steps, integrator, storage)
+                runs.append(_with_tangent(scene, steps, integrator, storage) - kept)
+        for storage, allowed in ALLOWED_TANGENT.items():
+            tangent = min(by_storage[storage])
+            share = tangent / min(plain)
+            results[f"{name}, {storage}"] = {"plain": min(plain), "tangent": tangent, "share": share}
+            missed = note("share", f"{name}, {storage}: tangent over motion", share, at_most=allowed)
+            rows.append(
+                [
+                    name,
+                    storage,
+                    f"{1e3 * min(plain):.0f}",
+                    f"{1e3 * tangent:.0f}",
+                    f"{share:.2f}{missed}",
+                    f"{allowed:g}",
+                ]
+            )
+    print_table(
+        f"The tangent of {steps} steps along the field of each and the magnetization, {scene.mesh.n_faces} faces",
+        ["integrator", "kept", "motion, ms", "tangent, ms", "share", "at most"],
+        rows,
+    )
+    return results
+
+
+def _with_tangent(scene: ms.Scene, steps: int, integrator, storage: str) -> float:
+    """Return the time of a motion with its tangent, s."""
+    from torch.autograd import forward_ad
+
+    magnetization, field = _inputs(steps)
+    with forward_ad.dual_level():
+        magnetization, field = (forward_ad.make_dual(each, 0.1 * each) for each in (magnetization, field))
+        began = time.process_time()
+        _kept(scene, steps, integrator, storage, magnetization, field)
+        return time.process_time() - began
+
+
+def _inputs(steps: int):
+    """Return the magnetization and the field as tensors."""
     import torch
 
-    magnetization = torch.tensor([2e4, 0.0, 0.0], dtype=torch.float64, requires_grad=True)
-    field = torch.tensor(turning(steps), requires_grad=True)
-    began = time.process_time()
-    move = drive(
+    return torch.tensor([2e4, 0.0, 0.0], dtype=torch.float64), torch.tensor(turning(steps))
+
+
+def _kept(scene: ms.Scene, steps: int, integrator, storage: str, magnetization, field) -> ms.Trajectory:
+    """Return a motion by tensors, with what derivatives need."""
+    return drive(
         scene,
         steps,
         integrator=integrator,
@@ -144,6 +196,13 @@ def _forward_and_back(scene: ms.Scene, steps: int, integrator, storage: str) -> 
         applied_flux_density=field,
         adjoint_storage=ms.AdjointStorage(storage, memory_budget=budget(scene, integrator, steps)),
     )
+
+
+def _forward_and_back(scene: ms.Scene, steps: int, integrator, storage: str) -> tuple[float, float, int]:
+    """Return the times of a motion and its gradient, s, and the bytes stored."""
+    magnetization, field = (each.requires_grad_() for each in _inputs(steps))
+    began = time.process_time()
+    move = _kept(scene, steps, integrator, storage, magnetization, field)
     done = time.process_time()
     (move.positions[-1] ** 2).sum().backward()
     return done - began, time.process_time() - done, move.bytes

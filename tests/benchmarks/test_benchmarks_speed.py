@@ -76,6 +76,10 @@ def test_dynamics_part_prints_and_writes(tmp_path, capsys) -> None:
     assert results["energies"].keys() == results["errors"].keys()
     assert results["energies"]["TR-BDF2"]["kept"]["0.001"] > 0.999
     assert 0 < results["memory"]["checkpoints, 100"]["bytes"] < 1e6
+    assert results["tangent"].keys() == {
+        f"{each}, {kept}" for each in ("ImplicitEuler", "TRBDF2") for kept in ("factors", "stages")
+    }
+    assert all(cost["plain"] > 0.0 for cost in results["tangent"].values())
     assert results["long run"]["TRBDF2"]["steps"] == 200
     assert "With contact and friction" in printed
     assert "A step of implicit Euler" in printed and results["solid steps"][0]["tetrahedra"] == 648
