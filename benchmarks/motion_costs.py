@@ -175,7 +175,7 @@ def _with_tangent(scene: ms.Scene, steps: int, integrator, storage: str) -> floa
     with forward_ad.dual_level():
         magnetization, field = (forward_ad.make_dual(each, 0.1 * each) for each in (magnetization, field))
         began = time.process_time()
-        _kept(scene, steps, integrator, storage, magnetization, field)
+        _recorded(scene, steps, integrator, storage, magnetization, field)
         return time.process_time() - began
 
 
@@ -186,7 +186,7 @@ def _inputs(steps: int):
     return torch.tensor([2e4, 0.0, 0.0], dtype=torch.float64), torch.tensor(turning(steps))
 
 
-def _kept(scene: ms.Scene, steps: int, integrator, storage: str, magnetization, field) -> ms.Trajectory:
+def _recorded(scene: ms.Scene, steps: int, integrator, storage: str, magnetization, field) -> ms.Trajectory:
     """Return a motion by tensors, with what derivatives need."""
     return drive(
         scene,
@@ -202,7 +202,7 @@ def _forward_and_back(scene: ms.Scene, steps: int, integrator, storage: str) -> 
     """Return the times of a motion and its gradient, s, and the bytes stored."""
     magnetization, field = (each.requires_grad_() for each in _inputs(steps))
     began = time.process_time()
-    move = _kept(scene, steps, integrator, storage, magnetization, field)
+    move = _recorded(scene, steps, integrator, storage, magnetization, field)
     done = time.process_time()
     (move.positions[-1] ** 2).sum().backward()
     return done - began, time.process_time() - done, move.bytes
