@@ -338,9 +338,11 @@ def test_rest_positions_of_another_shape_or_kind_are_refused():
                 batch=2,
                 values={sheet: {"rest_positions": np.stack([MOVED, MOVED])}},
             )
-    with pytest.raises(ms.NoGradient, match=r"only ms.equilibrium, ms.WarmStart and ms.simulate have one"):
+    with pytest.raises(
+        ms.NoGradient, match=r"only ms.equilibrium, ms.WarmStart, ms.simulate and ms.linear_response"
+    ):
         given = torch.tensor(MOVED, requires_grad=True)
-        ms.linear_response(scene, **DEFAULTS, values={sheet: {"rest_positions": given}})
+        ms.follow_path(scene, **DEFAULTS, values={sheet: {"rest_positions": given}}, progress=False)
 
 
 def test_a_motion_goes_on_from_a_state_at_the_same_rest_positions_only():

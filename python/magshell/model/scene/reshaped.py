@@ -51,7 +51,8 @@ def reshaped(scene: Scene, values: Any, no_gradient_with: Sequence[str] | None =
     if any(requires_gradient(value) for value in given.values()):
         if no_gradient_with is None:
             raise NoGradient(
-                f"no gradient by {REST} here: only ms.equilibrium, ms.WarmStart and ms.simulate have one. Detach them"
+                f"no gradient by {REST} here: only ms.equilibrium, ms.WarmStart, ms.simulate and ms.linear_response have "
+                "one. Detach them"
             )
         _refuse_without_gradient(there, no_gradient_with)
     return there, {there._own(owner): named for owner, named in values.items()}

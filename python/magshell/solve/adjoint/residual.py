@@ -50,6 +50,11 @@ class Slopes(NamedTuple):
         """Return the derivatives of a multiple of this number."""
         return Slopes(*(factor * each for each in self))
 
+    def with_state_at_rest(self) -> Slopes:
+        """Return the same for a state that is the rest shape: its nodes are those at rest, and its other unknowns zero."""
+        nodes = self.by_state[: self.by_rest.size]
+        return self.at_fixed_state()._replace(by_rest=self.by_rest + nodes)
+
     def at_fixed_state(self) -> Slopes:
         """Return the same without the derivatives by unknowns."""
         return self._replace(by_state=np.zeros_like(self.by_state))
@@ -58,8 +63,9 @@ class Slopes(NamedTuple):
 class Residual:
     """The gradient g of the energy at a state with load parameters, and derivatives of its products with motions.
 
-    angle_branches: the full turns of angles there, as Equilibrium has them. The core must hold the values of the inputs
-    while the methods run. These raise NoGradient in scenes of which the state is more than positions and edge rotations.
+    angle_branches: the full turns of angles there, as Equilibrium has them. with_rest: whether rest positions are inputs.
+    The core must hold the values of the inputs while the methods run. These raise NoGradient in scenes of which the state is
+    more than positions and edge rotations.
     """
 
     def __init__(
@@ -69,7 +75,7 @@ class Residual:
         self.state: np.ndarray = state
         self.controls: np.ndarray = controls
         self._model, self._angle_branches = inputs.scene._model, angle_branches
-        self._with_rest = any(leaf.name == REST and leaf.owner is not None for leaf in inputs.leaves)
+        self.with_rest: bool = any(leaf.name == REST and leaf.owner is not None for leaf in inputs.leaves)
 
     def at(self, state: np.ndarray, controls: np.ndarray) -> Residual:
         """Return the same at another state and other load parameters."""
@@ -101,7 +107,7 @@ class Residual:
     def slopes_at_fixed_state(self, motion: np.ndarray) -> Slopes:
         """Return the derivatives of motion . g without those by unknowns, for which H need not be symmetric."""
         self._prepare()
-        by_inputs = _core.vjp(self._model, self.state, self.controls, motion, self._with_rest)
+        by_inputs = _core.vjp(self._model, self.state, self.controls, motion, self.with_rest)
         return Slopes(np.zeros_like(self.state), *by_inputs)
 
     def slopes(self, motion: np.ndarray) -> Slopes:
@@ -172,7 +178,7 @@ class Residual:
         through = self.prescribed(slopes.by_state)
         others = {} if masses is None else {"mass": masses}
         rest = None
-        if self._with_rest:
+        if self.with_rest:
             model = self._model
             held = slopes.by_state - model.expand(model.reduce(slopes.by_state))
             rest = [_core.at_nodes(model, each) for each in (slopes.by_rest, held)]
@@ -182,7 +188,7 @@ class Residual:
     def _slopes(self, state: np.ndarray, motion: np.ndarray) -> Slopes:
         return Slopes(
             self._product(state, motion),
-            *_core.vjp(self._model, state, self.controls, motion, self._with_rest),
+            *_core.vjp(self._model, state, self.controls, motion, self.with_rest),
         )
 
     def _product(self, state: np.ndarray, motion: np.ndarray) -> np.ndarray:
@@ -209,7 +215,7 @@ class Residual:
                 of_key = layout.of(entries, *key).ravel()
                 parts.append(slice(of_key.min(initial=first), of_key.max(initial=first - 1) + 1))
             first += layout.size
-        if self._with_rest:
+        if self.with_rest:
             parts += [slice(first, first + vertices), slice(first + vertices, first + directions)]
         return [part for part in parts if part.stop > part.start]
 
@@ -218,7 +224,7 @@ class Residual:
         scene, values = self.inputs.scene, self.inputs.values
         state = np.ones(len(self.state))
         state[: 3 * scene._bodies.n_points] = scene.mesh.edge_lengths.min(initial=np.inf)
-        if self._with_rest:
+        if self.with_rest:
             lengths = state[: 3 * (scene._bodies.n_points + len(scene._constraints.directions))]
         else:
             lengths = np.zeros(0)

@@ -135,10 +135,14 @@ class ResponseAdjoint:
         for leaf in leaves:
             if leaf.refusal:
                 raise NoGradient(f"no derivative by {leaf.name}: {leaf.refusal}")
-            if leaf.name == REST and leaf.owner is not None and self._rate.any():
+            if leaf.name == REST and leaf.owner is not None and self._supports_rotate():
                 raise NoGradient(
-                    f"no derivative of a linear response by {REST} where supports move: let them stand, or detach it"
+                    f"no derivative of a linear response by {REST} where supports rotate: let them stand, or detach it"
                 )
+
+    def _supports_rotate(self) -> bool:
+        """Return whether supports rotate what they hold."""
+        return any(np.any(move.rotation) for move in self._here.inputs.values.constraints.moves)
 
     @property
     def _rate(self) -> np.ndarray:
@@ -169,19 +173,20 @@ class ResponseAdjoint:
     def _gradient(self, weights: np.ndarray) -> tuple[Gradient, Gradient]:
         """Return the gradients of y . u by the inputs of K, and by those of the response."""
         here, after = self._here, self._after.controls
+        fixed = self._at_rest and not here.with_rest
         multiplier = self._solved(self._model.reduce(weights))
         total, by_after = here.bent(multiplier, self._response).times(-1.0), np.zeros_like(after)
         for load in self._loads:
             there = here.at(here.state, load.controls(here.controls, after))
-            slopes = there.slopes_at_fixed_state(multiplier) if self._at_rest else there.slopes(multiplier)
+            slopes = there.slopes_at_fixed_state(multiplier) if fixed else there.slopes(multiplier)
             by_after = by_after + load.weight * load.after * slopes.by_controls
             total = total.plus(load.weight, slopes._replace(by_controls=load.before * slopes.by_controls))
         by_values, before, further = self._by_motion(weights - here.product(multiplier))
         total = total._replace(by_values=total.by_values + by_values, by_controls=total.by_controls + before)
-        if not self._at_rest:
-            total = total.plus(1.0, here.slopes(self._solved(-self._model.reduce(total.by_state))))
+        if self._at_rest:
+            total = total.with_state_at_rest()
         else:
-            total = total.at_fixed_state()
+            total = total.plus(1.0, here.slopes(self._solved(-self._model.reduce(total.by_state))))
         of_after = total.at_fixed_state()._replace(by_controls=by_after + further)
         return here.by_inputs(total), here.by_inputs(of_after)
 

@@ -44,6 +44,7 @@ class LinearResponse(PlotMixin):
     equilibrium: Equilibrium | None = None
     _values: Any = field(repr=False, default=None)
     _controls: Any = field(repr=False, default=None)
+    _rest: Any = field(repr=False, default=None)  # (n_v, 3) m, the rest positions, if a tensor was given
 
     def __getstate__(self) -> dict[Any, Any]:
         """Return the data of a copy or another process: tensors as arrays, without their gradients."""
@@ -58,9 +59,11 @@ class LinearResponse(PlotMixin):
     @property
     def positions(self) -> Computed:
         """The positions, (n_v, 3) m; accurate for small displacements only."""
-        from_, of = self.scene.mesh.rest_positions, self.displacements
+        from_, of = self._rest, self.displacements
         if self.equilibrium is not None:
             from_ = self.equilibrium.positions
+        elif from_ is None:
+            from_ = self.scene.mesh.rest_positions
         if is_tensor(of):
             return of + (from_ if is_tensor(from_) else of.new_tensor(np.array(from_)))
         return from_ + of
@@ -101,8 +104,7 @@ def linear_response(
     parameters that are tensors, and by the inputs of an equilibrium that was found with tensors, with the change of the
     equilibrium itself. A gradient costs ten to twenty evaluations of the stiffness for all inputs, a tangent as many for
     each, and at rest the first of them a factorization. There is none with rigid bodies or skeletons, where supports leave
-    any motion without stiffness, by rest_positions at rest, forwards by those of an equilibrium, and no second one:
-    NoGradient says so.
+    any motion without stiffness, by rest_positions forwards or where supports rotate, and no second one: NoGradient says so.
 
     Raises ValueError on bad input, about an equilibrium that is not stable, with its own load parameters, or under a
     pressure without a potential; and where the supports leave a motion without stiffness to what is loaded; Interrupted.
@@ -121,7 +123,7 @@ def linear_response(
     """
     arguments = given_to("linear_response", locals())
     began = time.perf_counter()
-    scene, arguments["values"] = reshaped(scene, arguments["values"], no_gradient_with=None)
+    scene, arguments["values"] = reshaped(scene, arguments["values"], no_gradient_with=())
     inputs = asked_inputs(scene, equilibrium, arguments)
     at_rest = forces_at_rest(inputs) if equilibrium is None else None
     with inputs.in_core():
@@ -141,6 +143,7 @@ def linear_response(
         equilibrium=equilibrium,
         _values=inputs.values,
         _controls=inputs.controls,
+        _rest=inputs.given_rest,
     )
 
 
