@@ -18,7 +18,7 @@ struct SolveStep {
     int factorizations = 0, iterations = 0;
     double energy = std::numeric_limits<double>::quiet_NaN();  // [J] at the end of an accepted step
     Index negative_pivots = 0;  // of the last factorization, with the shift of a descent
-    std::string failure;        // why the step was not accepted; empty if it was
+    std::string failure{};      // why the step was not accepted; empty if it was
 };
 
 /// Records the steps of a solve. The cost of a step is everything that was spent since the step before.

@@ -51,7 +51,7 @@ class Polygon(Border):
     """
 
     def __init__(self, points: Numbers):
-        self.start = _points(points, 3)
+        self.start: np.ndarray = _points(points, 3)
 
     def matrix(self, controls: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the corners; see `Border.matrix`."""
@@ -69,7 +69,7 @@ class ClosedSpline(Border):
     """
 
     def __init__(self, points: Numbers):
-        self.start = _points(points, LEAST_CONTROLS)
+        self.start: np.ndarray = _points(points, LEAST_CONTROLS)
 
     def matrix(self, controls: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
         """Return points at most `size` [m] from each other; see `Border.matrix`."""
@@ -96,7 +96,7 @@ class Circle(Border):
 
     def __init__(self, center: Numbers, radius: float):
         middle = quantity("center", "m", detached(center), (2,))
-        self.start = np.append(middle, quantity("radius", "m", detached(radius), ()))
+        self.start: np.ndarray = np.append(middle, quantity("radius", "m", detached(radius), ()))
 
     def matrix(self, controls: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the corners of the polygon; see `Border.matrix`."""
@@ -129,7 +129,7 @@ class Slit(Border):
     is_closed = False
 
     def __init__(self, points: Numbers):
-        self.start = _points(points, 2)
+        self.start: np.ndarray = _points(points, 2)
 
     def matrix(self, controls: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the points; see `Border.matrix`."""

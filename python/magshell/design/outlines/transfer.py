@@ -17,7 +17,8 @@ class FaceLocator:
     """Finds the faces of a flat mesh in which points lie. positions: (n_v, 2) m. faces: (n_f, 3)."""
 
     def __init__(self, positions: np.ndarray, faces: np.ndarray):
-        self.positions, self.faces = positions, faces
+        self.positions: np.ndarray = positions
+        self.faces: np.ndarray = faces
         corners = positions[faces]
         self._origins = corners[:, 2]
         self._to_coordinates = np.linalg.inv(np.swapaxes(corners[:, :2] - corners[:, 2:], 1, 2))

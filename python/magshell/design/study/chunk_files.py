@@ -71,7 +71,7 @@ class ChunkFiles:
                 raise ValueError(f"folder must be a folder, or not exist yet, got the file {str(folder)!r}")
             if any(self.folder.iterdir()) and not resume:
                 raise ValueError(
-                    f"{folder} is not empty: say resume=True to go on with the study that it holds, or name another folder"
+                    f"{folder} is not empty. resume=True continues the study in it; otherwise name another folder"
                 )
         if self._description.exists():
             _check_same(self._description, held)

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from ..._input.kinds import Numbers
 
 
-def is_polyline(points) -> bool:
+def is_polyline(points: object) -> bool:
     """Return whether the points are a single polyline, (n, 2), rather than a list of polylines."""
     try:
         shape = np.shape(points)
