@@ -60,7 +60,7 @@ class MeshedOutline(Frozen):
     are control numbers and values on the first mesh, so an optimizer keeps its state. `transferred` brings values of faces
     of the first mesh to the current one, with the material. An objective jumps by the difference in accuracy of two meshes.
 
-    borders: `Polygon`, `ClosedSpline` or `Circle`, the outer one first, then holes. slits: `Slit`s. They must not meet.
+    borders: `Polygon`, `ClosedSpline` or `Circle`, the outer one first, then holes. slits: a list of `Slit`. None may meet.
     size: the target length of edges, m. most_stretch: above 1. on_remesh: called with the mesh before, as it was stretched,
         and the new one, for pictures: `lambda before, after: ms.plot(after).save("outline.png")`.
 
