@@ -177,7 +177,7 @@ def test_bad_input_is_refused_before_any_work(tmp_path):
 def test_folder_of_another_study_is_refused(tmp_path):
     grid, folder = {"x": [1.0, 2.0]}, tmp_path / "s"
     quiet(root, grid, folder)
-    with pytest.raises(ValueError, match="is not empty. resume=True continues"):
+    with pytest.raises(ValueError, match="is not empty"):
         quiet(root, grid, folder)
     for function, parameters, chunk, message in (
         (other, grid, 100, "of another function"),

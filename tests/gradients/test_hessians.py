@@ -31,6 +31,9 @@ KINDS = [name for name in MAKERS if has_hessian(name) and name not in REFUSED]
 PRECISION = {
     "at rest on a MeshObstacle": 1e-3
 }  # [-] whose distances are sampled: third derivatives jump; else 1e-5
+STEP = {
+    "a grown six-node sheet at rest": 1e-3
+}  # [-] with steps of 1e-5, differences are off by 1e-5 through round-off
 
 
 def inputs_of(name):
@@ -75,7 +78,8 @@ def test_hessians_agree_with_differences_of_gradients(name):
     found = sum(float((p * s).sum()) for p, s in zip(products, sides, strict=True))
     size = sum(float(p.norm() * s.norm()) for p, s in zip(products, sides, strict=True))
     slopes = []
-    for step in (kind(name).step, 0.5 * kind(name).step):
+    longest = STEP.get(name, kind(name).step)
+    for step in (longest, 0.5 * longest):
         ends = []
         for sign in (1, -1):
             moved = {key: value + sign * step * along[key] for key, value in given.items()}
