@@ -305,3 +305,14 @@ def test_outlines_that_no_sheet_has_are_refused_with_their_names():
         outline.transferred(torch.zeros(3))
     with pytest.raises(ValueError, match="one mesh so far"):
         outline.from_last_mesh(np.zeros(3))
+
+
+def test_the_state_of_an_outline_of_another_size_is_refused():
+    def square(side):
+        corners = [(0, 0), (side, 0), (side, side), (0, side)]
+        return ms.parametrize.MeshedOutline([ms.parametrize.Polygon(corners)], size=side / 4)
+
+    small, large = square(0.01), square(0.02)
+    assert np.array_equal(small.first_mesh.faces, large.first_mesh.faces)
+    with pytest.raises(ValueError, match="another MeshedOutline"):
+        large.load_state_dict(small.state_dict())

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from gradient_kinds import MAKERS, kind
-from gradient_scenes import admissible, label
+from gradient_scenes import label
 
 import magshell as ms
 from magshell.solve.adjoint.differences import directional_derivative
 
 torch = pytest.importorskip("torch")
-
+from both_modes import by_both_modes, direction  # noqa: E402
 from torch.autograd import forward_ad  # noqa: E402
 
 LARGE = 1e-3  # m, of meshes of 0.1 m
@@ -79,25 +79,11 @@ def test_tangents_agree_with_gradients_in_every_kind(name):
         tensors = {key: torch.tensor(value, requires_grad=True) for key, value in given.items()}
         results = [each for each in results_of(kind(name).found(tensors, start)) if each.requires_grad]
         inputs = list(tensors.values())
-        zeros = [torch.zeros_like(each, requires_grad=True) for each in results]
-        transposed = torch.autograd.grad(results, inputs, zeros, create_graph=True)
         along = [direction(name, key, value, rng) for key, value in given.items()]
-        tangents = torch.autograd.grad(transposed, zeros, along)
-        weights = [torch.as_tensor(rng.standard_normal(each.shape)) for each in results]
-        gradients = torch.autograd.grad(results, inputs, weights)
-        forward = sum(float((w * t).sum()) for w, t in zip(weights, tangents, strict=True))
-        backward = sum(float((g * d).sum()) for g, d in zip(gradients, along, strict=True))
-        size = sum(float(w.norm() * t.norm()) for w, t in zip(weights, tangents, strict=True))
-        rounding = ROUNDING * sum(
-            float(w.norm() * r.detach().norm()) for w, r in zip(weights, results, strict=True)
-        )
+        found = by_both_modes(results, inputs, along, rng)
+        bound = precision * found.size + ROUNDING * found.size_of_results
         told = ", ".join(label(kind(name), key) for key in given)
-        assert forward == pytest.approx(backward, rel=0.0, abs=precision * size + rounding), told
-
-
-def direction(name, key, value, rng):
-    size = kind(name).reach.get(key[1], np.abs(value).max(initial=0.0) or 1.0)
-    return torch.as_tensor(np.asarray(size * admissible(key, rng.standard_normal(value.shape))))
+        assert found.forward == pytest.approx(found.backward, rel=0.0, abs=bound), told
 
 
 def test_geometry_of_joints_has_no_tangent():

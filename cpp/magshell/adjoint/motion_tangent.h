@@ -15,7 +15,7 @@
 
 namespace magshell {
 
-/// The derivatives of all inputs of a motion along one direction.
+/// Holds the derivatives of all inputs of a motion along one direction.
 struct MotionInputTangent {
     VectorXd values;  // of the scene, in the order of the caller
     /// Returns all values at a place along the direction, if they are no linear function of it; throws InvalidInput beyond their range.
@@ -24,12 +24,13 @@ struct MotionInputTangent {
     VectorXd positions, velocities;               // at the start, of all dofs
     VectorXd mass, damping;                       // of all dofs
     std::vector<double> time_steps;               // one number a step
-    Viscosity viscosity;                          // of the same branches
-    double first_step = 1.0;  // along the direction, over which values change by a small part of themselves
-    double length = 1.0;      // [m] of the shortest edge
+    Viscosity viscosity;                          // derivatives, with the branches of the motion
+    double first_step =
+        1.0;  // of differences along the direction; values change by a small part of themselves over it
+    double length = 1.0;  // [m] of the shortest edge
 };
 
-/// The tangents of the recorded states.
+/// Holds the tangents of the recorded states.
 struct MotionTangent {
     struct State {
         VectorXd q, v, motor_forces;

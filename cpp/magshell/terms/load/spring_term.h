@@ -2,9 +2,10 @@
 //
 //   E = 1/2 k (s - r)^2,     force k (s - r) + c s'                                                    [J], [N]
 //
-// along the spring, with a stiffness k [N/m], a length at rest r [m] and a damping c [N s/m]. t = sum_j w_j x_j - g is the vector along the
-// spring, between weighted sums of node positions or from the ground point g. s is its length |t|, or its component e . t along a fixed
-// direction e, where r = 0: a foundation (Winkler) has three such springs at each vertex, or one along its direction.
+// along the spring, with a stiffness k [N/m] (of a foundation: [N/m3] times the area that the spring stands for), a length at rest r [m] and
+// a damping c [N s/m]. t = sum_j w_j x_j - g is the vector along the spring, between weighted sums of node positions or from the ground point
+// g. s is its length |t|, rounded at zero, or its component e . t along a fixed direction e, where r = 0: a foundation (Winkler) has three
+// such springs at each vertex, or one along its direction.
 //
 // The load factor does not scale them.
 #pragma once
@@ -65,11 +66,12 @@ class SpringTerm final : public DampedTerm {
         bool has_direction;
         double share, softening, reach;  // [1 or m2], [m], [m] largest coordinate at rest
         Parameter stiffness_of, rest_length_of, damping_of, ground_of;
-        double stiffness = 0.0, rest_length = 0.0, damping = 0.0;  // share included
+        double stiffness = 0.0, rest_length = 0.0, damping = 0.0;  // stiffness and damping include the share
         Vec3 ground;
 
-        /// Returns the weighted sum of vectors of the nodes; the vector t along the spring.
+        /// Returns the weighted sum of vectors of the nodes.
         Vec3 weighted(const double* rows) const;
+        /// Returns the vector t along the spring.
         Vec3 along(const double* q) const { return weighted(q) - ground; }
     };
     /// The elongation of a spring with its first and second derivatives by t.
@@ -86,7 +88,7 @@ class SpringTerm final : public DampedTerm {
                    : 0.0;
     }
     double viscous_scale() const { return history_.shift ? history_.scale : 0.0; }
-    /// Return force [N] and stiffness [N/m] along the spring at the last evaluated state.
+    /// Returns the force [N] and stiffness [N/m] along the spring at the last evaluated state.
     double force(std::size_t k) const;
     double stiffness(std::size_t k) const {
         return springs_[k].stiffness + viscous_scale() * springs_[k].damping;

@@ -1,4 +1,4 @@
-"""A flat sheet whose borders and slits are moved by control points, and which is meshed anew where its mesh is worn."""
+"""Moves a flat sheet by control points of its borders and slits, and meshes it anew when faces are stretched too far."""
 
 from __future__ import annotations
 
@@ -52,13 +52,13 @@ _OF_MESH = (
 
 
 class MeshedOutline(Frozen):
-    """A flat sheet in the plane z = 0 whose borders and slits are moved by control points. Needs the extra `gmsh`.
+    """Moves the borders and slits of a flat sheet, in the plane z = 0, by control points. Needs the extra `gmsh`.
 
     `positions` gives rest positions for a solve, differentiable by the control numbers: borders and slits move with them,
     and the vertices inside follow harmonically. If a face becomes stretched or compressed by more than `most_stretch`, the
-    sheet is meshed anew at the control numbers given: `mesh` is another one then, for another scene. Variables of the design
-    are control numbers and values on the first mesh, so an optimizer keeps its state. `transferred` brings values of faces
-    of the first mesh to the current one, with the material. An objective jumps by the difference in accuracy of two meshes.
+    sheet is meshed anew at the control numbers given: `mesh` is then a new object, for which a new scene is made. Variables
+    of the design are control numbers and values on the first mesh, so an optimizer keeps its state. `transferred` brings
+    values of faces of the first mesh to the current one, with the material. An objective jumps by the discretization error.
 
     borders: `Polygon`, `ClosedSpline` or `Circle`, the outer one first, then holes. slits: a list of `Slit`. None may meet.
     size: the target length of edges, m. most_stretch: above 1. on_remesh: called with the mesh before, as it was stretched,
@@ -172,9 +172,11 @@ class MeshedOutline(Frozen):
         return means.reshape(self.mesh.n_faces, *given.shape[1:])
 
     def from_last_mesh(self, values: Numbers) -> np.ndarray:
-        """Return values at the vertices of the mesh before the current one, (n, ...), at the vertices of `mesh`.
+        """Return values at the vertices of the mesh before the last one, (n, ...), at the vertices of `mesh`.
 
-        Displacements on one mesh start a solve on the next: `start=rest_positions + outline.from_last_mesh(displacements)`.
+        The mesh before is that which the last call of `positions` that meshed anew began with.
+        Displacements on one mesh start a solve on the next:
+        `start=rest_positions.detach().numpy() + outline.from_last_mesh(displacements)`.
         """
         matrix = self._of_vertices
         if matrix is None:
@@ -196,11 +198,16 @@ class MeshedOutline(Frozen):
             "n_meshes": self.n_meshes,
             "of_vertices": parts,
             "first_faces": np.array(self.first_mesh.faces),
+            "first_positions": np.array(self.first_mesh.rest_positions),
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Continue from the state of an equal MeshedOutline. Raises ValueError if its first mesh was another."""
-        if not np.array_equal(state["first_faces"], self.first_mesh.faces):
+        first = self.first_mesh
+        if not (
+            np.array_equal(state["first_faces"], first.faces)
+            and np.array_equal(state["first_positions"], first.rest_positions)
+        ):
             raise ValueError("the state is that of another MeshedOutline: its first mesh is not the same")
         parts = state["of_vertices"]
         if state["n_meshes"] == 1:

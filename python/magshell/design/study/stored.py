@@ -16,9 +16,10 @@ from .chunk_files import Columns, chunk_path, form_of, read_chunk, read_descript
 @immutable
 @dataclass(frozen=True, eq=False, repr=False)
 class StoredStudy:
-    """The table of a streamed study on the disk, of which only the chunk that is read is in memory.
+    """Reads the table of a streamed study from the disk: `chunks` holds one chunk in memory, `[name]` one whole column.
 
-    folder: that of `ms.stream_study`, which may still run. n_points: of the whole study. chunk: points in a file.
+    folder: that of `ms.stream_study`, which may still run. n_points: of the whole study. chunk: points in a file; the last
+        may have fewer.
 
     Raises ValueError if the folder holds no streamed study, and OSError if it cannot be read.
 
@@ -54,7 +55,7 @@ class StoredStudy:
 
     @property
     def unfinished(self) -> tuple[int, ...]:
-        """The numbers of the other chunks, ascending."""
+        """The numbers of the chunks that are not written yet, ascending."""
         finished = set(self.finished)
         return tuple(k for k in range(self.n_chunks) if k not in finished)
 
@@ -76,7 +77,8 @@ class StoredStudy:
     def __getitem__(self, name: str) -> np.ndarray:
         """Return one column over all finished chunks: a parameter, an output, `number` or `error`.
 
-        Rows whose function failed have NaN, or an empty text. Raises ValueError for an unknown name.
+        Where the function failed, a row has NaN or an empty text. Raises ValueError for an unknown name; an output is known
+        once a point has succeeded.
         """
         parts: list[tuple[int, np.ndarray | None]] = []
         known: dict[str, None] = {}
@@ -85,6 +87,8 @@ class StoredStudy:
             known |= dict.fromkeys(short)
             parts.append((len(columns["error"]), short.get(name)))
         found = next((each for _, each in parts if each is not None), None)
+        if not parts:
+            raise ValueError("the study has no columns yet: no chunk is finished")
         if found is None:
             raise ValueError(f"the study has no column {name!r:.60}{nearest_names(name, list(known))}")
         text = found.dtype.kind == "U"

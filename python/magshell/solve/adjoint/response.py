@@ -1,10 +1,11 @@
-"""Derivatives of the response of linear theory, in both modes. Works on arrays; autograd.py has the tensors.
+"""Computes derivatives of a linear response, backwards (gradients) and forwards (tangents). autograd.py has the tensors.
 
     K u = f on the free unknowns,      u = m on those that supports hold
     f = g(q, c) - g(q, c1),            m = (s1 - s) dx/ds
 
-with the state q and the load parameters c of K, the load parameters c1 towards which these go, the factors s and s1 of the
-supports among them, and what supports prescribe there, x(s). For weights y of u:
+g is the gradient of the energy at the state q, c the load parameters of K, c1 those of the response. s and s1 are the
+factors of the supports among them, and x(s) are the positions that supports prescribe. With susceptible shells, whose energy
+is quadratic in the field, f = (g(q, 2 c - c1) - g(q, c1)) / 2. For weights y of u, and the adjoint a:
 
     gradient:      d(y . u) = a . (df - dK u) + (y - K a) . dm,      K a = y on the free unknowns, a = 0 elsewhere
     tangent:       K du = df - dK u on the free unknowns,            du = dm elsewhere
@@ -33,23 +34,23 @@ if TYPE_CHECKING:
     from ...model.scene.solve_inputs import Inputs, Leaf
     from ...model.scene.values import Gradient
 
-# Steps of the factor of supports (1), in which what they prescribe is a smooth function. Tested by
+# [-] Steps of differences by the support factor; the prescribed positions are smooth in it. Tested by
 # test_responses_to_supports_that_turn_have_the_derivatives_of_differences.
 _STEPS = (1 / 16, 1 / 64, 1e-3, 1e-4)
-# Largest part of the forces (1) that a solve with K may leave. One with a K that is singular up to round-off, and whose
-# pivots do not show it, leaves more. Tested by test_solves_that_leave_forces_have_no_derivatives.
+# [-] Largest residual of a solve with K over the largest force. A K that is singular up to round-off, and whose pivots do
+# not show it, leaves more. Tested by test_solves_that_leave_forces_have_no_derivatives.
 _LEFT = 1e-6
 
 
 class _Load(NamedTuple):
-    """A part of f: a weight of g(q, a c + b c1)."""
+    """Holds one term of f, weight g(q, before c + after c1)."""
 
     weight: float
     before: float
     after: float
 
     def controls(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-        """Return the load parameters a c + b c1."""
+        """Return the load parameters before c + after c1."""
         return self.before * before + self.after * after
 
 
@@ -58,11 +59,11 @@ _QUADRATIC = (_Load(0.5, 2.0, -1.0), _Load(-0.5, 0.0, 1.0))  # a central differe
 
 
 class ResponseAdjoint:
-    """The derivatives of the positions and edge rotations of a linear response.
+    """Differentiates the positions and edge rotations of a linear response.
 
-    residual: at the state of K. inputs: of the response, with c1. response: u of all unknowns. solve: with K, for the free
-    unknowns; raises ValueError if K is not positive definite. leaves: each with BEFORE or AFTER, the load parameters that it
-    may be one of. at_rest: the state does not depend on the inputs. quadratic: f is the central difference of g.
+    residual: at the state of K. inputs: those of the response, with c1. response: u of all unknowns. solve: with K, for the
+    free unknowns; raises ValueError if K is not positive definite. leaves: each with BEFORE or AFTER: whether it acts on c
+    or on c1. at_rest: the state does not depend on the inputs. quadratic: f is the central difference of g.
     refusal: why there are no derivatives, or "".
     """
 
