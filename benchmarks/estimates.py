@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -14,7 +15,7 @@ from .cases.outcome import order_of
 from .ratios import note
 from .report import print_table
 
-LEAST, MOST = 0.8, 1.25  # allowed effectivity where the error is below LARGE and above SMALL
+MOST = 1.25  # allowed effectivity, or its inverse, where the error is below LARGE and above SMALL
 LARGE, SMALL = 0.05, 1e-5  # [-] below SMALL references have too few digits
 BENDINGS = ("midedge", "midedge2")
 QUICK = ("A1", "B2", "C1-90, beta 1")
@@ -153,12 +154,11 @@ def _estimated(name: str, asked: Asked, cells: tuple[int, int], bending: str) ->
 
 def _row(of: dict[str, Any]) -> list[str]:
     counted = SMALL < abs(of["error"]) < LARGE
-    title = f"{of['case']}, {of['bending']}, {of['cells'][0]}x{of['cells'][1]}: effectivity"
+    title = f"{of['case']}, {of['bending']}, {of['cells'][0]}x{of['cells'][1]}: effectivity or its inverse"
     missed = ""
     if counted:
-        missed = note("error", title, of["effectivity"], at_least=LEAST) or note(
-            "error", title, of["effectivity"], at_most=MOST
-        )
+        ratio = of["effectivity"]
+        missed = note("error", title, max(ratio, 1.0 / ratio) if ratio > 0.0 else math.inf, at_most=MOST)
     return [
         of["case"],
         of["bending"],
