@@ -154,7 +154,7 @@ def _estimated(name: str, asked: Asked, cells: tuple[int, int], bending: str) ->
 
 def _row(of: dict[str, Any]) -> list[str]:
     counted = SMALL < abs(of["error"]) < LARGE
-    title = f"{of['case']}, {of['bending']}, {of['cells'][0]}x{of['cells'][1]}: effectivity or its inverse"
+    title = f"{of['case']}, {of['bending']}, {of['cells'][0]}x{of['cells'][1]}: effectivity"
     missed = ""
     if counted:
         ratio = of["effectivity"]
