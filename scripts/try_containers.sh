@@ -15,7 +15,7 @@ machine=$(uname -m)
 say() { printf 'containers: %s\n' "$*"; }
 
 work=$(mktemp -d)
-trap 'umount -q "$work"/*/root/try "$work"/*/root/proc 2>/dev/null || true; rm -rf --one-file-system "$work"' EXIT
+trap 'umount -q "$work"/*/system/try "$work"/*/system/proc 2>/dev/null || true; rm -rf --one-file-system "$work"' EXIT
 
 # The release that has a Python, its mirror and components, and a release that debootstrap unpacks alike, which it knows if it is old.
 release_of() {
@@ -42,13 +42,13 @@ in_container() {
     command -v debootstrap >/dev/null && [ "$(id -u)" -eq 0 ] || { say "neither docker, podman, nor debootstrap as root"; return 1; }
     read -r release mirror components like <<<"$(release_of "$version")" || { say "no release with Python $version is known"; return 1; }
     say "$version: $release from $mirror"
-    mkdir "$shared/../root"
-    debootstrap --variant=minbase --components="$components" --include=python3,python3-venv "$release" "$shared/../root" "$mirror" \
+    mkdir "$shared/../system"
+    debootstrap --variant=minbase --components="$components" --include=python3,python3-venv "$release" "$shared/../system" "$mirror" \
         "/usr/share/debootstrap/scripts/$like" >"$shared/../log" || { tail -n 3 "$shared/../log"; return 1; }
-    mkdir "$shared/../root/try"
-    mount --bind -o ro "$shared" "$shared/../root/try"
-    mount -t proc proc "$shared/../root/proc"
-    unshare --net chroot "$shared/../root" env -i PATH=/usr/bin:/bin HOME=/root sh /try/try.sh
+    mkdir "$shared/../system/try"
+    mount --bind -o ro "$shared" "$shared/../system/try"
+    mount -t proc proc "$shared/../system/proc"
+    unshare --net chroot "$shared/../system" env -i PATH=/usr/bin:/bin HOME=/tmp sh /try/try.sh
 }
 
 failed=()

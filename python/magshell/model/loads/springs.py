@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from ..bodies.bodies import Bodies
 
 
-class Springs(Owner):
+class Springs(Owner, ABC):
     """The base class of springs: linear elements of the structure, which the load factor does not scale.
 
     stiffness, damping: a number for all, or one for each.
@@ -32,8 +33,9 @@ class Springs(Owner):
         """Return the same springs with other values, of the same shapes."""
         return self._made({name: getattr(self, name) for name in self._replaceable} | values)
 
+    @abstractmethod
     def _made(self, values: dict[str, Any]) -> Any:
-        raise NotImplementedError  # each kind has its own arguments
+        """Return the same springs with these values; each kind has its own arguments."""
 
     def _check_shapes(self, changed: Springs) -> Springs:
         """Return replaced springs. Raises ValueError if one of their values has another shape."""
