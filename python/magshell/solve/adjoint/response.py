@@ -121,11 +121,9 @@ class ResponseAdjoint:
             for (leaf, part), change in zip(self._leaves, along, strict=True)
             if np.any(change)
         ]
-        motion = np.zeros(model.size)
-        if changes:
-            with here.inputs.in_core():
-                self._refuse([leaf for leaf, _, _ in changes])
-                motion = self._tangent(changes)
+        with here.inputs.in_core():
+            self._refuse([leaf for leaf, _, _ in changes])
+            motion = self._tangent(changes) if changes else np.zeros(model.size)
         return [np.ascontiguousarray(model.positions(motion)), model.edge_rotations(motion)]
 
     def _refuse(self, leaves: Sequence[Leaf]) -> None:
