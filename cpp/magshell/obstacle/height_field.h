@@ -53,9 +53,8 @@ class HeightField final : public Obstacle {
         double low, high;
     };
     double knot(int axis, Index i) const;
-    Range range(int axis, Index first,
-                // Returns the range of a coordinate between knots; infinite at the border.
-                Index last) const;
+    // Returns the range of a coordinate between two knots; infinite at the border.
+    Range range(int axis, Index first, Index last) const;
     // Returns a lower bound of the squared distance to a block.
     double squared_bound(const Block& block, const Vec3& point) const;
     void scan_block(const Block& block, const Vec3& point, double& least, Pair& best) const;

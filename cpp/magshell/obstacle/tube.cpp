@@ -12,8 +12,8 @@ namespace magshell {
 namespace {
 
 constexpr int samples_a_segment = 4;
-constexpr int transition =
-    3;  // [knots] after which an open end is straight and round: a spline coefficient acts over this range
+// [knots] Length beyond an open end after which the tube is straight and round: a spline coefficient acts over this range.
+constexpr int transition = 3;
 
 // Extends the radius of an open tube beyond its ends by constant values, so that its spline becomes constant
 // there.
@@ -108,7 +108,8 @@ Tube::Slope Tube::slope_at(const Section& at, const Vec3& point) {
 // Finds the minimum of psi between the neighbours of a sample that is lower than they are: psi_s = 0 by
 // Newton's method, safeguarded by bisection. At an end of the curve psi may still fall outwards.
 double Tube::nearest(const Vec3& point, Eigen::Index sample) const {
-    constexpr double close = 1e-8;  // [knots]; the next Newton step is far below round-off
+    // [knots] Length of the last step. Newton's method converges quadratically, so the next one is below round-off.
+    constexpr double close = 1e-8;
     const double spacing = 1.0 / samples_a_segment;
     double s = static_cast<double>(sample) * spacing;
     double low = std::max(s - spacing, 0.0), high = std::min(s + spacing, last_);
@@ -126,7 +127,7 @@ double Tube::nearest(const Vec3& point, Eigen::Index sample) const {
 }
 
 Distance Tube::distance_at(double s, const Vec3& point) const {
-    // lower bound of d psi_ss, which is zero at a center of curvature
+    // [-] Lower bound of d psi_ss / |c'|^2, which is zero at a center of curvature.
     constexpr double least_curvature = 1e-6;
     const Section at = section(s);
     const Vec3 offset = point - at.value.head<3>(), along = at.first.head<3>();

@@ -104,6 +104,9 @@ class Builder {
   private:
     void add_body_contacts(const SceneInput& input);
     void add_contacts(const SceneInput& input);
+    /// Adds the friction of a contact term, if any of its contacts has friction.
+    template <class Friction, class Inputs, class Contact>
+    void add_friction(const Inputs& inputs, Contact& contact);
     void add_edge_moments(const SceneInput& input);
     void add_joints(const SceneInput& input);
     void add_wrenches(const SceneInput& input);
@@ -392,21 +395,27 @@ void Builder::add_edge_moments(const SceneInput& input) {
         std::make_unique<EdgeMomentTerm>(bodies_.nodes(), matrix_, std::move(couples), row, registry_));
 }
 
+template <class Friction, class Inputs, class Contact>
+void Builder::add_friction(const Inputs& inputs, Contact& contact) {
+    std::vector<bool> has_friction, lagged;
+    for (const auto& each : inputs) {
+        has_friction.push_back(each.has_friction);
+        lagged.push_back(each.lagged);
+    }
+    if (std::find(has_friction.begin(), has_friction.end(), true) == has_friction.end()) return;
+    out_.forces.push_back(std::make_unique<Friction>(
+        contact,
+        FrictionContacts<typename Contact::ActiveContact>(std::move(has_friction), std::move(lagged))));
+    out_.contacts.add(out_.forces.back().get());
+}
+
 void Builder::add_contacts(const SceneInput& input) {
     std::unique_ptr<ContactTerm> contact =
         std::make_unique<ContactTerm>(bodies_.nodes(), matrix_, input.contacts, input.obstacles, registry_);
     const ContactTerm& touched = *contact;
     out_.contacts.add(contact.get());
     out_.energies.push_back(std::move(contact));
-    std::vector<bool> rubs, lagged;
-    for (const ContactInput& each : input.contacts) {
-        rubs.push_back(each.has_friction);
-        lagged.push_back(each.lagged);
-    }
-    if (std::find(rubs.begin(), rubs.end(), true) != rubs.end()) {
-        out_.forces.push_back(std::make_unique<FrictionTerm>(touched, std::move(rubs), std::move(lagged)));
-        out_.contacts.add(out_.forces.back().get());
-    }
+    add_friction<FrictionTerm>(input.contacts, touched);
 }
 
 void Builder::add_body_contacts(const SceneInput& input) {
@@ -416,16 +425,7 @@ void Builder::add_body_contacts(const SceneInput& input) {
     BodyContactTerm& touched = *contact;
     out_.contacts.add(contact.get());
     out_.energies.push_back(std::move(contact));
-    std::vector<bool> rubs, lagged;
-    for (const BodyContactInput& each : input.body_contacts) {
-        rubs.push_back(each.has_friction);
-        lagged.push_back(each.lagged);
-    }
-    if (std::find(rubs.begin(), rubs.end(), true) != rubs.end()) {
-        out_.forces.push_back(
-            std::make_unique<BodyFrictionTerm>(touched, std::move(rubs), std::move(lagged)));
-        out_.contacts.add(out_.forces.back().get());
-    }
+    add_friction<BodyFrictionTerm>(input.body_contacts, touched);
 }
 
 }  // namespace

@@ -285,9 +285,11 @@ def test_bad_scenes_are_refused(strip):
 def test_motion_too_large_for_the_memory_is_refused_at_once(strip, monkeypatch):
     with pytest.raises(MemoryError, match=r"2,000,000,000 steps need .* GB .*record_every.*start="):
         simulate(strip, steps=2 * 10**9)
-    monkeypatch.setattr("magshell._runtime.memory.physical_memory", lambda: 10**5)
+    monkeypatch.setattr("magshell.solve.dynamics.motion_inputs._physical_memory", lambda: 10**5)
     with pytest.raises(MemoryError, match="record fewer"):
         simulate(strip, steps=100)
     assert len(simulate(strip, steps=100, record_every=100)) == 2
-    monkeypatch.setattr("magshell._runtime.memory.physical_memory", lambda: None)  # the system does not tell
+    monkeypatch.setattr(
+        "magshell.solve.dynamics.motion_inputs._physical_memory", lambda: None
+    )  # the system does not tell
     assert len(simulate(strip, steps=100)) == 101

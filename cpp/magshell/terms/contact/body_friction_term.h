@@ -1,24 +1,26 @@
 // BodyFrictionTerm: friction between bodies in contact with each other or with themselves.
-// contact/pair_friction.h
-//
-// Exact friction uses the normal forces, normals and closest points at the end of the stage. Lagged friction
-// uses those at the beginning of the step, which leaves a symmetric matrix. [Li et al. 2020, IPC]
+// contact/pair_friction.h, terms/contact/friction_contacts.h
 #pragma once
 
-#include <memory>
+#include <utility>
 #include <vector>
 
 #include "magshell/contact/pair_friction.h"
 #include "magshell/terms/contact/body_contact_term.h"
+#include "magshell/terms/contact/friction_contacts.h"
 #include "magshell/terms/force_term.h"
 
 namespace magshell {
 
+inline Index index_of_contact(const BodyContactTerm::ActiveContact& active) {
+    return active.near.contact;
+}
+
 class BodyFrictionTerm final : public ForceTerm {
   public:
-    /// Creates friction for a contact term. Both lists have one flag per contact, as in FrictionTerm.
-    BodyFrictionTerm(BodyContactTerm& contact, std::vector<bool> has_friction, std::vector<bool> lagged)
-        : contact_(contact), has_friction_(std::move(has_friction)), lagged_(std::move(lagged)) {}
+    /// Creates friction for a contact term.
+    BodyFrictionTerm(BodyContactTerm& contact, FrictionContacts<BodyContactTerm::ActiveContact> contacts)
+        : contact_(contact), contacts_(std::move(contacts)) {}
 
     std::string_view name() const override { return "body friction"; }
     void set_values(const Values&) override {}  // the contact term reads them
@@ -42,10 +44,7 @@ class BodyFrictionTerm final : public ForceTerm {
     };
 
     BodyContactTerm& contact_;
-    std::vector<bool> has_friction_, lagged_;
-    std::vector<ActiveContact> before_;  // lagged contacts at the beginning of the step
-    std::vector<ActiveContact> frozen_contacts_, now_;
-    bool frozen_ = false;
+    FrictionContacts<ActiveContact> contacts_;
     std::vector<FrictionContact> friction_contacts_;  // at the last evaluated state
 };
 

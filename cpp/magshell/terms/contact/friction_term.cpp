@@ -1,7 +1,5 @@
 #include "magshell/terms/contact/friction_term.h"
 
-#include <algorithm>
-
 namespace magshell {
 namespace {
 
@@ -21,47 +19,37 @@ Mat3 by_position(const Friction& friction, const ContactTerm::ActiveContact& act
 }  // namespace
 
 void FrictionTerm::begin_step(const VectorXd& q, const LoadParameters& load_parameters) {
-    before_.clear();
     load_parameters_before_ = load_parameters;
-    if (std::none_of(lagged_.begin(), lagged_.end(), [](bool lagged) { return lagged; })) return;
-    for (const ContactTerm::ActiveContact& active : contact_.active_contacts(q.data(), load_parameters))
-        if (lagged_[active.contact]) before_.push_back(active);
+    contacts_.begin_step([&] { return contact_.active_contacts(q.data(), load_parameters); });
 }
 
 void FrictionTerm::evaluate(const Kinematics& at, const LoadParameters& load_parameters, Residual& out) {
     friction_contacts_.clear();
-    const auto add_friction = [&](const ContactTerm::ActiveContact& active, bool lagged) {
-        const ObstacleState obstacle =
-            contact_.obstacle_state(active.obstacle, lagged ? load_parameters_before_ : load_parameters);
-        const Vec3 velocity = contact_.at_point(active, at.v.data()) - obstacle.velocity(active.position);
-        const ContactLaw& law = contact_.law(active);
-        const double factor = lagged ? contact_.factor() : 1.0;
-        friction_contacts_.push_back(
-            {active, lagged, factor, obstacle,
-             Friction(active.force, active.at.normal, velocity, law.sticking_speed)});
-        contact_.distribute(active, -factor * law.friction * friction_contacts_.back().friction.force, out);
-    };
-    for (const ContactTerm::ActiveContact& active :
-         frozen_ ? frozen_contacts_ : contact_.evaluated_contacts())
-        if (has_friction_[active.contact] && !lagged_[active.contact]) add_friction(active, false);
-    for (const ContactTerm::ActiveContact& active : before_)
-        if (has_friction_[active.contact]) add_friction(active, true);
-}
-
-void FrictionTerm::set_frozen(bool frozen) {
-    if (frozen) frozen_contacts_ = contact_.evaluated_contacts();
-    frozen_ = frozen;
+    contacts_.select(contact_.evaluated_contacts(), contact_.factor(),
+                     [&](const ContactTerm::ActiveContact& active, bool lagged, double factor) {
+                         const ObstacleState obstacle = contact_.obstacle_state(
+                             active.obstacle, lagged ? load_parameters_before_ : load_parameters);
+                         const Vec3 velocity =
+                             contact_.at_point(active, at.v.data()) - obstacle.velocity(active.position);
+                         const ContactLaw& law = contact_.law(active);
+                         friction_contacts_.push_back(
+                             {&active, lagged, factor, obstacle,
+                              Friction(active.force, active.at.normal, velocity, law.sticking_speed)});
+                         contact_.distribute(
+                             active, -factor * law.friction * friction_contacts_.back().friction.force, out);
+                     });
 }
 
 void FrictionTerm::assemble(const Kinematics& at, const LoadParameters&, bool positive_definite,
                             SystemMatrix& out, NonsymmetricTangent& rest) const {
     for (const FrictionContact& each : friction_contacts_) {
-        const double coefficient = each.factor * contact_.law(each.active).friction;
+        const ContactTerm::ActiveContact& active = *each.active;
+        const double coefficient = each.factor * contact_.law(active).friction;
         const Mat3& by_velocity = positive_definite ? each.friction.secant : each.friction.by_velocity;
-        contact_.add_block(each.active, -coefficient * at.rate * by_velocity, out);
-        if (each.lagged || frozen_) continue;
-        const Mat3 block = -coefficient * by_position(each.friction, each.active, each.obstacle.spin());
-        const ContactPoint& point = contact_.point(each.active);
+        contact_.add_block(active, -coefficient * at.rate * by_velocity, out);
+        if (each.lagged || contacts_.frozen()) continue;
+        const Mat3 block = -coefficient * by_position(each.friction, active, each.obstacle.spin());
+        const ContactPoint& point = contact_.point(active);
         if (point.nodes[1] < 0) {
             rest.add(point.nodes[0], block);
             continue;
@@ -75,7 +63,7 @@ void FrictionTerm::assemble(const Kinematics& at, const LoadParameters&, bool po
 void FrictionTerm::vjp(const Kinematics&, const LoadParameters&, const VectorXd& lambda,
                        KinematicsGradient& by, Gradient& out) const {
     for (const FrictionContact& each : friction_contacts_) {
-        const ContactTerm::ActiveContact& active = each.active;
+        const ContactTerm::ActiveContact& active = *each.active;
         const Friction& friction = each.friction;
         const double coefficient = each.factor * contact_.law(active).friction;
         const Vec3 along = contact_.at_point(active, lambda.data());
@@ -97,13 +85,11 @@ void FrictionTerm::vjp(const Kinematics&, const LoadParameters&, const VectorXd&
     }
 }
 
-// Bounds round-off: a velocity is the difference of two positions over a stage, and in a sticking contact a
-// small velocity causes a large force.
 void FrictionTerm::add_cancelling_forces(const Kinematics& at, VectorXd& out) const {
     for (const FrictionContact& each : friction_contacts_) {
         const double stiffness = at.rate * each.friction.by_velocity.norm();
-        contact_.add_cancelling_force(each.active,
-                                      each.factor * contact_.law(each.active).friction * stiffness, out);
+        contact_.add_cancelling_force(*each.active,
+                                      each.factor * contact_.law(*each.active).friction * stiffness, out);
     }
 }
 

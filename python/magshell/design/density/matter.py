@@ -11,8 +11,9 @@ from ..._input.arrays import number
 from ..._input.quantity import quantity
 from ..._input.tensors import detached, real_tensor, require_torch
 from ..._runtime.frozen import Frozen
+from ...mesh.groups import renumbered
 from ...mesh.topology import groups
-from ...mesh.triangles.part_of_mesh import part_of_mesh
+from ...mesh.triangles.fans import corner_vertices, opened
 from ...mesh.triangles.triangle_mesh import TriangleMesh, checked_mesh
 from .cells import cells_of, checked_density, laplacian
 from .interpolation import fraction, interpolated
@@ -82,7 +83,7 @@ class Matter(Frozen):
         self.left_out: int = int(np.count_nonzero(dense & ~remains))
         self.faces = np.flatnonzero(remains)
         self.density: torch.Tensor = density[torch.tensor(self.faces)]
-        self.mesh, self.vertices = part_of_mesh(mesh, self.faces)
+        self.mesh, self.vertices = _part_of_mesh(mesh, self.faces)
 
     def __repr__(self) -> str:
         left_out = f", {self.left_out} left out" if self.left_out else ""
@@ -185,3 +186,21 @@ class Matter(Frozen):
         if tuple(given.shape) == shapes[0]:
             return given.expand(len(self.faces), 3) if vectors else given
         return given[torch.tensor(self.faces)]
+
+
+def _part_of_mesh(mesh: TriangleMesh, faces: np.ndarray) -> tuple[TriangleMesh, np.ndarray]:
+    """Return the mesh of the chosen faces, in ascending order, and the number in `mesh` of each of its vertices.
+
+    Faces that touch at a vertex, and not along an edge, get separate vertices there. Groups are kept as far as their
+    members are.
+
+    faces: indices, ascending, at least one.
+    """
+    corners = mesh.faces[faces]
+    used = np.unique(corners)
+    numbers = np.full(mesh.n_vertices, -1)
+    numbers[used] = np.arange(len(used))
+    made = TriangleMesh(mesh.rest_positions[used], numbers[corners])
+    made = made._with_members(made._existing(renumbered(mesh._groups, numbers)))
+    made, origin = opened(made, corner_vertices(made, made.interior_edges))
+    return made, used[origin]

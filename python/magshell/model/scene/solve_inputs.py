@@ -151,12 +151,8 @@ class Inputs:
         return values
 
     def _flux_density(self, given) -> np.ndarray:
-        if given is None:
-            if self.scene.has_uniform_field:
-                raise ValueError("the scene has a UniformField, so applied_flux_density [T] is needed")
+        if check_flux_density(self.scene, given) is None:
             return np.zeros(3)
-        if not self.scene.has_uniform_field:
-            raise ValueError("applied_flux_density was given, but the scene has no UniformField")
         flux_density = self.keyword("applied_flux_density", given)
         warn_of_field(self.scene, flux_density)
         return flux_density
@@ -181,6 +177,15 @@ class Inputs:
         """
         with self.values.in_core():
             yield
+
+
+def check_flux_density(scene: Scene, given: Any) -> Any:
+    """Return the flux density that was given. Raises ValueError if it is missing, or if there is no uniform field to set."""
+    if scene.has_uniform_field and given is None:
+        raise ValueError("the scene has a UniformField, so applied_flux_density [T] is needed")
+    if given is not None and not scene.has_uniform_field:
+        raise ValueError("applied_flux_density was given, but the scene has no UniformField")
+    return given
 
 
 def plain_inputs(

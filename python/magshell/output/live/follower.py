@@ -19,11 +19,13 @@ if TYPE_CHECKING:
     from ..._input.kinds import Starting
 
 _RECENT = 20  # frames over which the rate is averaged
-_IDLE = 0.5  # [s] between two frames, from which on the controls rested
+_IDLE = 0.5  # [s] longest time between two frames that count for the same rate; after a longer one the controls rested
 
 
 class Follower:
-    """Finds the equilibrium of the newest design only, each from the last one; designs in between are left out.
+    """Finds the equilibrium of the newest design, starting from the last equilibrium.
+
+    Designs that are asked for while one is solved wait; only the newest of them is solved afterwards.
 
     found: called in the thread with each equilibrium and a note about it. failed: called with the error of a solve; the last
     equilibrium stays the one to start from.
@@ -53,7 +55,10 @@ class Follower:
         self._thread.start()
 
     def ask(self, design: dict[str, Any]) -> Future[Equilibrium]:
-        """Ask for the equilibrium of a design. The future has it, or that of a later design, or the error."""
+        """Ask for the equilibrium of a design.
+
+        The future returns it, or that of a later design if one was asked for meanwhile, or raises the error of the solve.
+        """
         future: Future[Equilibrium] = Future()
         with self._changed:
             if self._closed:
@@ -65,7 +70,7 @@ class Follower:
 
     @property
     def frames_per_second(self) -> float:
-        """The equilibria per second while the controls moved without a rest, over the last 20; 0 before there were two."""
+        """The equilibria per second, over the last 20 at most since the controls last rested; 0 before there were two."""
         ends = list(self._ends)
         return (len(ends) - 1) / (ends[-1] - ends[0]) if len(ends) > 1 and ends[-1] > ends[0] else 0.0
 

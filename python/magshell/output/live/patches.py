@@ -13,7 +13,11 @@ LEVELS = 24  # colours of a scale
 
 
 class Patch(NamedTuple):
-    """The faces (m, 3) of one colour, "#rrggbb" as three bytes, and the numbers (n,) of the vertices that they count."""
+    """The faces of one colour, with their own numbering of vertices.
+
+    color: red, green and blue from 0 to 255. vertices: the number of each of its vertices in the surface, (n,).
+    faces: (m, 3), indices into `vertices`.
+    """
 
     name: str
     color: tuple[int, int, int]

@@ -1,4 +1,7 @@
-"""Surfaces of the magnets and wires of fields, magpylib's as well: vertices (n, 3) m, faces (m, 3) each."""
+"""Surfaces of magnets and wires, for pictures: vertices (n, 3) m and faces (m, 3) each.
+
+The sources of magpylib are drawn as well.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,6 @@ from ... import _core
 from ..._input.arrays import count
 from ..._input.quantity import quantity
 from ..._input.tensors import detached, is_tensor, requires_gradient
-from ..._runtime.memory import check_memory
 from ..._runtime.solve_keywords import SOLVE_KEYWORDS
 from ...model.contact.contacts_to_core import check_outside, poses
 from ...model.contact.watched_obstacles import watched_obstacles
@@ -19,7 +19,7 @@ from ...model.fields.field import AppliedField
 from ...model.rigid.equimomental_points import check_joints, check_rigid, own_velocities
 from ...model.scene.fine_faces import having_fine_faces, keeping_fine_faces, with_fine_faces
 from ...model.scene.plausible import warn_of_field
-from ...model.scene.solve_inputs import Inputs
+from ...model.scene.solve_inputs import Inputs, check_flux_density
 from ..options import Adaptive, Clock, Integrator, Newton, clock_of
 from ..statics.equilibrium import Equilibrium
 from ..statics.start import check_faces
@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 # Times at which sources that move are looked at, for the faces that come near them.
 _TIMES_OF_MOVING_SOURCES = 8
+
+_BYTES_PER_TIME_POINT = 200  # of the load parameters at one time, in Python and in the core
 
 
 class MotionInputs:
@@ -79,7 +81,7 @@ class MotionInputs:
         _check_contact_method(inputs, integrator)
         given = arguments["time_step"]
         adaptive = given if isinstance(given, Adaptive) else None
-        check_memory(self.steps, self.record_every, len(integrator._times) + 1, inputs.scene._model.size)
+        _check_memory(self.steps, self.record_every, len(integrator._times) + 1, inputs.scene._model.size)
         self.keep, self.memory_budget = (
             getattr(_core.Keep, adjoint_storage.what or "nothing"),
             int(adjoint_storage.memory_budget),
@@ -233,12 +235,8 @@ class MotionInputs:
 
     def _schedule_of_keyword(self, name: str, value: Any) -> Schedule:
         unit, (row,) = SOLVE_KEYWORDS[name].unit, SOLVE_KEYWORDS[name].shapes
-        if name == "applied_flux_density" and value is None:
-            if self.inputs.scene.has_uniform_field:
-                raise ValueError("the scene has a UniformField, so applied_flux_density [T] is needed")
+        if name == "applied_flux_density" and check_flux_density(self.inputs.scene, value) is None:
             value = np.zeros(3)
-        elif name == "applied_flux_density" and not self.inputs.scene.has_uniform_field:
-            raise ValueError("applied_flux_density was given, but the scene has no UniformField")
         return Schedule(self.inputs.scene, name, unit, row, value)
 
     def _controls(self, schedule: Schedule) -> np.ndarray:
@@ -384,6 +382,29 @@ class MotionInputs:
             state = model.state(positions, np.zeros(inputs.scene._bodies.n_rotations))
         check_rigid(inputs.scene, positions, model.positions(state), "start [m]", mesh.size)
         return MotionState(0.0, state, still, rotations_known=False)
+
+
+def _check_memory(steps: int, record_every: int, times_per_step: int, unknowns: int) -> None:
+    """Raise MemoryError if the load parameters and the recorded states of a motion exceed the physical memory.
+
+    times_per_step: time points of a step at which load parameters are needed; unknowns: degrees of freedom.
+    """
+    controls = _BYTES_PER_TIME_POINT * times_per_step * steps
+    states = 32 * unknowns * (steps // record_every)  # positions and velocities, in the core and handed out
+    if (there := _physical_memory()) is not None and controls + states > there:
+        raise MemoryError(
+            f"{steps:,} steps need {controls / 1e9:.3g} GB for their controls and {states / 1e9:.3g} GB for the "
+            f"recorded states, and this computer has {there / 1e9:.3g} GB: record fewer (record_every), or take the "
+            "motion in parts, each with start= the one before"
+        )
+
+
+def _physical_memory() -> int | None:
+    """Return the physical memory in bytes, or None if the system does not say."""
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        return None
 
 
 def _checked_state(start: MotionState, size: int, n_strains: int) -> MotionState:
