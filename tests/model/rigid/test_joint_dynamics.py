@@ -190,6 +190,3 @@ def test_bad_arguments_are_refused():
     massless = ms.Skeleton([bob], [ms.Revolute(bob, origin=(0, 0, 0), axis=(0, 1, 0))])
     with pytest.raises(ValueError, match=r"mass matrix is singular"):
         ms.forward_dynamics(massless, [0.0], [0.0], [0.0])
-    torch = pytest.importorskip("torch")
-    with pytest.raises(ms.NoGradient, match=r"rates is a tensor"):
-        ms.bias_forces(skeleton, zero, torch.zeros(10, dtype=torch.float64, requires_grad=True))

@@ -1,26 +1,29 @@
 """Rigid-body dynamics of skeletons in joint coordinates: inverse and forward dynamics, mass matrix and bias forces.
 
 With the coordinates q of the joints, their rates z and the generalized forces tau, M(q) dz/dt + b(q, z) = tau
-(Featherstone, Rigid Body Dynamics Algorithms, 2008). Motions are spatial: an angular velocity and the velocity of the point
-of the link that is at the origin of the world.
+(Featherstone, Rigid Body Dynamics Algorithms, 2008); `joint_recursion` computes them. Where an argument is a tensor of
+torch, so is the result, in its graph.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import scipy
 
 from ..._input.quantity import quantity
-from ..._input.tensors import requires_gradient
-from ...errors import NoGradient
-from .joints import Joint, LoopClosure
-from .rigid import RigidBody
+from ..._input.tensor_kinds import is_tensor
+from ..._input.tensors import detached, dtype_like, require_torch
+from .joint_recursion import Configuration, JointNumbers, LinkNumbers, to_numbers
+from .joints import Fixed, Joint, LoopClosure
+from .rigid import RigidBody, or_zero
 from .skeleton import Skeleton
 
 if TYPE_CHECKING:
-    from ..._input.kinds import Numbers
+    from ..._input.kinds import Computed, Numbers
+
+    Replaced = Mapping[Any, Mapping[str, Numbers]]
 
 _SINGULAR = 1e-14  # [-] smallest eigenvalue of the mass matrix scaled to a diagonal of ones
 
@@ -64,17 +67,21 @@ def inverse_dynamics(
     accelerations: Numbers,
     *,
     gravity: Numbers = (0.0, 0.0, 0.0),
-) -> np.ndarray:
+    values: Replaced | None = None,
+) -> Computed:
     """Return the generalized forces that a motion needs, (n,) N m or N: Pinocchio's rnea, recursive Newton-Euler.
 
     skeleton: the Skeleton, at rest where all coordinates are zero.
     coordinates, rates, accelerations: (n,), in the order and units of `coordinate_slices`; accelerations are the derivatives
         of the rates.
     gravity: (3,) m/s2.
+    values: other numbers of links and joints than those of the skeleton, {link: {"mass": ...}, joint: {"origin": ...}}: the
+        mass, inertia and center of links; the origin, axis and pitch of joints.
 
     The forces are those of all that acts in the joints together. Springs, dampers, torques, limits and motors of the
-    joints, forces on links and loop closures are not subtracted. Raises ValueError for links with vertices, whose masses
-    belong to a scene; NoGradient for tensors that need a gradient.
+    joints, forces on links and loop closures are not subtracted. If an argument or a value is a tensor, the result is one
+    in its graph, with derivatives of every order by all of them. Raises ValueError for links with vertices, whose masses
+    belong to a scene, and for values that have no effect.
 
     >>> import magshell as ms
     >>> bob = ms.Link(mass=2.0, center=(1.0, 0, 0))
@@ -82,16 +89,24 @@ def inverse_dynamics(
     >>> ms.inverse_dynamics(arm, [0.0], [0.0], [0.5], gravity=(0, 0, -10.0)).round(9)  # m L^2 a + m g L
     array([21.])
     """
-    given = _Given(skeleton, coordinates, rates=rates, accelerations=accelerations, gravity=gravity)
-    return _Configuration(skeleton, given.coordinates).forces(given.rates, given.accelerations, given.gravity)
+    given = _Given(
+        skeleton, values, coordinates=coordinates, rates=rates, accelerations=accelerations, gravity=gravity
+    )
+    return given.result(given.configuration.forces(given.rates, given.accelerations, given.gravity))
 
 
 def bias_forces(
-    skeleton: Skeleton, coordinates: Numbers, rates: Numbers, *, gravity: Numbers = (0.0, 0.0, 0.0)
-) -> np.ndarray:
+    skeleton: Skeleton,
+    coordinates: Numbers,
+    rates: Numbers,
+    *,
+    gravity: Numbers = (0.0, 0.0, 0.0),
+    values: Replaced | None = None,
+) -> Computed:
     """Return the forces at zero accelerations, (n,) N m or N: Coriolis and centrifugal forces, and the weight.
 
-    Pinocchio calls it nonLinearEffects. skeleton, coordinates, rates, gravity and errors: as in `inverse_dynamics`.
+    Pinocchio calls it nonLinearEffects. skeleton, coordinates, rates, gravity, values, derivatives and errors: as in
+    `inverse_dynamics`.
 
     >>> import magshell as ms
     >>> bob = ms.Link(mass=2.0, center=(1.0, 0, 0))
@@ -99,16 +114,15 @@ def bias_forces(
     >>> ms.bias_forces(arm, [0.0], [3.0], gravity=(0, 0, -10.0)).round(9)
     array([20.])
     """
-    given = _Given(skeleton, coordinates, rates=rates, gravity=gravity)
-    return _Configuration(skeleton, given.coordinates).forces(
-        given.rates, np.zeros_like(given.rates), given.gravity
-    )
+    given = _Given(skeleton, values, coordinates=coordinates, rates=rates, gravity=gravity)
+    return given.result(given.configuration.forces(given.rates, 0.0 * given.rates, given.gravity))
 
 
-def mass_matrix(skeleton: Skeleton, coordinates: Numbers) -> np.ndarray:
+def mass_matrix(skeleton: Skeleton, coordinates: Numbers, *, values: Replaced | None = None) -> Computed:
     """Return the mass matrix M of a configuration, (n, n), symmetric, in SI units: Pinocchio's crba.
 
-    z . M z / 2 is the kinetic energy at the rates z. skeleton, coordinates and errors: as in `inverse_dynamics`.
+    z . M z / 2 is the kinetic energy at the rates z. skeleton, coordinates, values, derivatives and errors: as in
+    `inverse_dynamics`.
 
     >>> import magshell as ms
     >>> bob = ms.Link(mass=2.0, center=(1.0, 0, 0))
@@ -116,7 +130,8 @@ def mass_matrix(skeleton: Skeleton, coordinates: Numbers) -> np.ndarray:
     >>> ms.mass_matrix(arm, [0.3]).round(9)
     array([[2.]])
     """
-    return _Configuration(skeleton, _Given(skeleton, coordinates).coordinates).mass_matrix()
+    given = _Given(skeleton, values, coordinates=coordinates)
+    return given.result(given.configuration.mass_matrix())
 
 
 def forward_dynamics(
@@ -126,12 +141,14 @@ def forward_dynamics(
     forces: Numbers,
     *,
     gravity: Numbers = (0.0, 0.0, 0.0),
-) -> np.ndarray:
+    values: Replaced | None = None,
+) -> Computed:
     """Return the accelerations under generalized forces, (n,) rad/s2 or m/s2: M dz/dt = forces - bias_forces.
 
     Pinocchio calls it aba. forces: (n,) of all that acts in the joints and on free links, in the order and units of
     `coordinate_slices`. Springs and the like of the joints act only as far as they are in `forces`. skeleton, coordinates,
-    rates, gravity and errors: as in `inverse_dynamics`; raises ValueError also if a motion has no inertia.
+    rates, gravity, values, derivatives and errors: as in `inverse_dynamics`; raises ValueError also if a motion has no
+    inertia.
 
     >>> import magshell as ms
     >>> bob = ms.Link(mass=2.0, center=(1.0, 0, 0))
@@ -139,167 +156,116 @@ def forward_dynamics(
     >>> ms.forward_dynamics(arm, [0.0], [0.0], [21.0], gravity=(0, 0, -10.0)).round(9)
     array([0.5])
     """
-    given = _Given(skeleton, coordinates, rates=rates, forces=forces, gravity=gravity)
-    at = _Configuration(skeleton, given.coordinates)
-    mass = at.mass_matrix()
-    scale = np.sqrt(np.diag(mass))
-    if not (scale > 0).all() or np.linalg.eigvalsh(mass / np.outer(scale, scale))[0] < _SINGULAR:
+    given = _Given(skeleton, values, coordinates=coordinates, rates=rates, forces=forces, gravity=gravity)
+    matrix = given.configuration.mass_matrix()
+    numbers = detached(matrix)
+    scale = np.sqrt(np.diag(numbers))
+    if not (scale > 0).all() or np.linalg.eigvalsh(numbers / np.outer(scale, scale))[0] < _SINGULAR:
         raise ValueError(
             "the mass matrix is singular: some motion of the joints moves no mass; give the links masses and inertias"
         )
-    bias = at.forces(given.rates, np.zeros_like(given.rates), given.gravity)
-    return np.linalg.solve(mass, given.forces - bias)
+    bias = given.configuration.forces(given.rates, 0.0 * given.rates, given.gravity)
+    return given.result(given.xp.linalg.solve(matrix, given.forces - bias))
 
 
 class _Given:
-    """The checked arguments of a function: vectors of one number per coordinate, and gravity."""
+    """The checked arguments of a function, all arrays of numpy or all tensors of torch, and the configuration."""
 
-    def __init__(self, skeleton: Skeleton, coordinates: Numbers, **others: Numbers):
-        n = max((each.stop for each in coordinate_slices(skeleton).values()), default=0)
+    def __init__(self, skeleton: Skeleton, values: Replaced | None, **arguments: Numbers):
+        slices = coordinate_slices(skeleton)
+        n = max((each.stop for each in slices.values()), default=0)
         for k, link in enumerate(skeleton.links):
             if link.vertices is not None:
                 raise ValueError(
                     f"link {k} has vertices, whose masses belong to a scene: dynamics in joint coordinates need links with "
                     "all of their mass"
                 )
-        for name, value in {"coordinates": coordinates, **others}.items():
-            if requires_gradient(value):
-                raise NoGradient(f"{name} is a tensor that needs a gradient, and this function has none")
+        others = _checked_values(skeleton, values)
+        given = [*arguments.values(), *(each for named in others.values() for each in named.values())]
+        self._dtype = dtype_like(*given) if any(map(is_tensor, given)) else None
+        self.xp: Any = np if self._dtype is None else require_torch("a tensor")
+        for name, value in arguments.items():
             unit, shape = ("m/s2", (3,)) if name == "gravity" else ("SI", (n,))
-            setattr(self, name, quantity(name, unit, value, shape))
+            checked = quantity(name, unit, detached(value), shape)
+            setattr(self, name, self._converted(value if is_tensor(value) else checked))
+        links = skeleton._links_in_order
+        joints = [skeleton._joint_to(link) for link in links]
+        own = [
+            slices.get(link if joint is None else joint, slice(0, 0))
+            for link, joint in zip(links, joints, strict=True)
+        ]
+        self.configuration = Configuration(
+            skeleton,
+            [self._link(each, others.get(id(each), {})) for each in links],
+            [None if each is None else self._joint(each, others.get(id(each), {})) for each in joints],
+            own,
+            self.coordinates,
+            self.xp,
+        )
 
-    coordinates: np.ndarray
-    rates: np.ndarray
-    accelerations: np.ndarray
-    forces: np.ndarray
-    gravity: np.ndarray
+    coordinates: Computed
+    rates: Computed
+    accelerations: Computed
+    forces: Computed
+    gravity: Computed
+
+    def result(self, found: Computed) -> Computed:
+        """Return what was found, as a tensor in the dtype of the arguments."""
+        return found if self._dtype is None else found.to(self._dtype)
+
+    def _link(self, link: RigidBody, values: Mapping[str, Numbers]) -> LinkNumbers:
+        own = {"mass": link.mass or 0.0, "inertia": link.inertia_tensor, "center": or_zero(link.center)}
+        found = LinkNumbers(**{name: self._converted(each) for name, each in {**own, **values}.items()})
+        inertia = found.inertia
+        if inertia.ndim < 2:
+            inertia = inertia * self.xp.eye(3, dtype=self.xp.float64)
+        return found._replace(inertia=0.5 * (inertia + inertia.T))
+
+    def _joint(self, joint: Joint, values: Mapping[str, Numbers]) -> JointNumbers:
+        own = {"origin": joint.origin, "axis": joint.axis, "pitch": joint._pitch}
+        found = JointNumbers(**{name: self._converted(each) for name, each in {**own, **values}.items()})
+        if "axis" not in values:
+            return found
+        return found._replace(axis=found.axis / self.xp.sqrt(found.axis @ found.axis))
+
+    def _converted(self, value: Numbers) -> Computed:
+        """Return checked numbers as float64 in the module xp, a tensor in its graph."""
+        if is_tensor(value):
+            return value.to("cpu", self.xp.float64)
+        return to_numbers(np.asarray(value, np.float64), self.xp)
 
 
-class _PosedLink(NamedTuple):
-    """A link in a configuration: the number of its parent, or -1, its center [m] and rotation, its mass and inertia in the
-    world's axes, and the spatial motions (k, 6) by its own coordinates. Rotations of balls and free links are about the
-    world's axes through a point that moves; axes of other joints ride on the parent.
-    """
-
-    parent: int
-    center: np.ndarray
-    rotation: np.ndarray
-    mass: float
-    inertia: np.ndarray
-    own: slice
-    columns: np.ndarray
-    origin: np.ndarray
-    kind: str
-
-
-class _Configuration:
-    """The links of a skeleton at given coordinates, parents first."""
-
-    def __init__(self, skeleton: Skeleton, coordinates: np.ndarray):
-        self._n = len(coordinates)
-        slices, links = coordinate_slices(skeleton), skeleton._links_in_order
-        number = {id(link): k for k, link in enumerate(links)}
-        self._links: list[_PosedLink] = []
-        for link in links:
-            joint = skeleton._joint_to(link)
-            own = slices.get(link if joint is None else joint, slice(0, 0))
-            parent = -1 if joint is None or joint.parent is None else number[id(joint.parent)]
-            self._links.append(self._posed(link, joint, parent, own, coordinates[own], links))
-
-    def _posed(self, link, joint, parent: int, own: slice, q: np.ndarray, links) -> _PosedLink:
-        rest, axes = _center(link), np.eye(3)
-        base, before = np.zeros(3), np.eye(3)
-        if parent >= 0:
-            base, before = self._links[parent].center, self._links[parent].rotation
-        kind = "free" if joint is None else joint._kind
-        if joint is None:
-            origin = center = rest + q[:3]
-            turn = _rotation(q[3:])
-            columns = np.concatenate([_translations_along(axes), _rotations_about(axes, origin)])
-        else:
-            arm = joint.origin - (_center(links[parent]) if parent >= 0 else 0.0)
-            origin, axis, turn = base + before @ arm, before @ joint.axis, before
-            columns = np.zeros((0, 6))
-            if kind == "ball":
-                turn, columns = before @ _rotation(q), _rotations_about(axes, origin)
-            elif joint._spec.slides:
-                origin, columns = origin + q[0] * axis, _translations_along(axis[None])
-            elif joint._spec.freedoms:
-                turn = before @ _rotation(q[0] * joint.axis)
-                columns = _rotations_about(axis[None], origin) + _translations_along(
-                    joint._pitch * axis[None]
-                )
-                origin = origin + joint._pitch * q[0] * axis
-            center = origin + turn @ (rest - joint.origin)
-        inertia = turn @ link.inertia_tensor @ turn.T
-        return _PosedLink(parent, center, turn, link.mass or 0.0, inertia, own, columns, origin, kind)
-
-    def mass_matrix(self) -> np.ndarray:
-        """Return the sum of J^T m J over the links, with the Jacobians J of their motions."""
-        mass, motions = np.zeros((self._n, self._n)), []
-        for link in self._links:
-            motion = np.zeros((self._n, 6)) if link.parent < 0 else motions[link.parent].copy()
-            motion[link.own] += link.columns
-            motions.append(motion)
-            turning = motion[:, :3]
-            moving = motion[:, 3:] + np.cross(turning, link.center)
-            mass += link.mass * moving @ moving.T + turning @ link.inertia @ turning.T
-        return 0.5 * (mass + mass.T)
-
-    def forces(self, rates: np.ndarray, accelerations: np.ndarray, gravity: np.ndarray) -> np.ndarray:
-        """Return the generalized forces by the Newton-Euler recursion."""
-        velocities, rising, wrenches = [], [], []
-        for link in self._links:
-            root = link.parent < 0
-            velocity = np.zeros(6) if root else velocities[link.parent]
-            before = np.concatenate([np.zeros(3), -gravity]) if root else rising[link.parent]
-            own = rates[link.own] @ link.columns
-            velocities.append(velocity + own)
-            rising.append(
-                before + accelerations[link.own] @ link.columns + _velocity_product(link, velocity, own)
+def _checked_values(skeleton: Skeleton, values: Replaced | None) -> dict[int, dict[str, Numbers]]:
+    """Return the values by the id of their link or joint. Raises ValueError for those that have no effect or are wrong."""
+    if values is not None and not isinstance(values, Mapping):
+        raise ValueError(
+            f"values must be a dictionary {{link or joint: {{name: number}}}}, got {values!r:.60}"
+        )
+    found: dict[int, dict[str, Numbers]] = {}
+    for owner, named in (values or {}).items():
+        if not any(owner is each for each in (*skeleton.links, *skeleton.joints)):
+            raise ValueError(f"values: {owner!r:.60} is neither a link nor a joint of the skeleton")
+        if not isinstance(named, Mapping):
+            raise ValueError(
+                f"values of {owner!r:.60} must be a dictionary {{name: number}}, got {named!r:.60}"
             )
-            spin, up = velocities[-1][:3], rising[-1][:3]
-            moving = velocities[-1][3:] + np.cross(spin, link.center)
-            force = link.mass * (rising[-1][3:] + np.cross(up, link.center) + np.cross(spin, moving))
-            moment = link.inertia @ up + np.cross(spin, link.inertia @ spin) + np.cross(link.center, force)
-            wrenches.append(np.concatenate([moment, force]))
-        found = np.zeros(self._n)
-        for k in range(len(self._links) - 1, -1, -1):
-            link = self._links[k]
-            found[link.own] = link.columns @ wrenches[k]
-            if link.parent >= 0:
-                wrenches[link.parent] = wrenches[link.parent] + wrenches[k]
-        return found
+        for name in named:
+            if name not in _names_of(owner):
+                known = ", ".join(_names_of(owner)) or "nothing"
+                raise ValueError(
+                    f"{name} of {owner!r:.60} has no effect on dynamics in joint coordinates, which read {known} of it"
+                )
+        owner.replaced(**{name: detached(value) for name, value in named.items()})  # checks the numbers
+        found[id(owner)] = dict(named)
+    return found
 
 
-def _velocity_product(link: _PosedLink, before: np.ndarray, own: np.ndarray) -> np.ndarray:
-    """Return the spatial acceleration of a link at constant rates, relative to its parent.
-
-    before: the spatial velocity of the parent; own: that of the link relative to it.
-    """
-    if link.kind in ("ball", "free"):  # the origin moves, the axes do not
-        point = own[3:] + np.cross(own[:3], link.origin) if link.kind == "free" else 0.0
-        point = point + before[3:] + np.cross(before[:3], link.origin)
-        return np.concatenate([np.zeros(3), np.cross(point, own[:3])])
-    turned = np.cross(before[:3], own[:3])
-    return np.concatenate([turned, np.cross(before[:3], own[3:]) + np.cross(before[3:], own[:3])])
-
-
-def _rotation(vector: np.ndarray) -> np.ndarray:
-    return scipy.spatial.transform.Rotation.from_rotvec(
-        np.array(vector)
-    ).as_matrix()  # a copy, as scipy takes no read-only arrays
-
-
-def _rotations_about(axes: np.ndarray, origin: np.ndarray) -> np.ndarray:
-    """Return the spatial motions of rotations about axes (k, 3) through a point, (k, 6)."""
-    return np.concatenate([axes, np.cross(origin, axes)], axis=1)
-
-
-def _translations_along(axes: np.ndarray) -> np.ndarray:
-    """Return the spatial motions of translations along axes (k, 3), (k, 6)."""
-    return np.concatenate([np.zeros_like(axes), axes], axis=1)
-
-
-def _center(link: RigidBody) -> np.ndarray:
-    return np.zeros(3) if link.center is None else link.center
+def _names_of(owner: RigidBody | Joint) -> tuple[str, ...]:
+    """Return the names of the numbers of a link or a joint that its dynamics depend on."""
+    if isinstance(owner, RigidBody):
+        return "mass", "inertia", "center"
+    if isinstance(owner, LoopClosure | Fixed):
+        return ()
+    if owner._spec.slides:
+        return ("axis",)
+    return ("origin", *(("axis",) if owner._spec.axis == "required" else ()), *owner._spec.numbers)
