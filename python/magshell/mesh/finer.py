@@ -33,6 +33,9 @@ class FinerMesh:
     lies on, -1 inside elements. new_edges: (n_new,), the coarse edge that each new vertex lies on, -1 inside elements.
     new_elements: (n_new,), the coarse element that each new vertex lies inside, -1 on edges.
     interpolation: sparse (n_v, n_v of the coarse mesh), which maps values at coarse vertices to values at all vertices.
+
+    Of solids besides: new_sides: (n_new,), the outer side of a coarse element that each new vertex lies inside, else -1.
+    side_parents: (n,), the coarse outer side that each outer side of an element lies in.
     """
 
     coarse: Any
@@ -42,6 +45,13 @@ class FinerMesh:
     new_edges: np.ndarray
     new_elements: np.ndarray
     interpolation: Any
+    new_sides: np.ndarray | None = None
+    side_parents: np.ndarray | None = None
+
+    @property
+    def of_sides(self) -> np.ndarray:
+        """The coarse element of a sheet, or the outer side of one of a solid, that each of the finer mesh lies in."""
+        return self.element_parents if self.side_parents is None else self.side_parents
 
 
 def second_order(mesh: TriangleMesh, project: Project | None, planes: Any = ()) -> FinerMesh:
@@ -59,7 +69,7 @@ def second_order(mesh: TriangleMesh, project: Project | None, planes: Any = ()) 
     fine = QuadraticTriangleMesh._without_warning(positions, np.concatenate([mesh.faces, nodes], axis=1))
     edges = np.arange(mesh.n_edges)
     of_edges = row_numbers(mesh.edges, fine.edges)
-    means = _rows(mesh.n_vertices, mesh.edges, np.full(mesh.edges.shape, 0.5))
+    means = interpolation_rows(mesh.n_vertices, mesh.edges, np.full(mesh.edges.shape, 0.5))
     inside = np.full(mesh.n_edges, -1)
     return FinerMesh(mesh, fine, np.arange(mesh.n_faces), of_edges, edges, inside, means)
 
@@ -74,9 +84,9 @@ def divided(mesh: QuadraticTriangleMesh, project: Project | None) -> FinerMesh:
     on_edges = np.repeat(np.arange(mesh.n_edges), 2)
     new_edges = np.concatenate([on_edges, np.full(3 * mesh.n_elements, -1)])
     quarters = np.concatenate([ends, middle[:, None], ends[:, ::-1], middle[:, None]], axis=1).reshape(-1, 3)
-    weights = _rows(mesh.n_vertices, quarters, np.broadcast_to(_AT_QUARTER, quarters.shape))
+    weights = interpolation_rows(mesh.n_vertices, quarters, np.broadcast_to(_AT_QUARTER, quarters.shape))
     inner = np.tile(inner_weights(), (mesh.n_elements, 1))
-    inside = _rows(mesh.n_vertices, np.repeat(mesh.elements, 3, axis=0), inner)
+    inside = interpolation_rows(mesh.n_vertices, np.repeat(mesh.elements, 3, axis=0), inner)
     inside = inside[mesh.n_vertices :]
     parents = np.where(of_halves < 0, -1, of_halves // 2)
     interpolation = scipy.sparse.vstack([weights, inside]).tocsr()
@@ -101,7 +111,7 @@ def bisected(mesh: Sheet, marked: np.ndarray, project: Project | None, planes: A
     new[split_edges] = mesh.n_vertices + np.arange(len(split_edges))
     fine = fine._with_members(_groups(mesh, split_edges, new, fine, parents))
     ends = mesh.edges[split_edges]
-    means = _rows(mesh.n_vertices, ends, np.full(ends.shape, 0.5))
+    means = interpolation_rows(mesh.n_vertices, ends, np.full(ends.shape, 0.5))
     inside = np.full(len(split_edges), -1)
     of_edges = _edge_parents(mesh, split_edges, new, fine)
     return FinerMesh(mesh, fine, parents, of_edges, split_edges, inside, means)
@@ -127,7 +137,7 @@ def _bisected_six(mesh: QuadraticTriangleMesh, marked: np.ndarray, project: Proj
     is_new = whole < 0
     nodes = np.where(is_new, mesh.n_vertices - 1 + np.cumsum(is_new), mesh.edge_nodes[whole])
     weights = weights_between(local[is_new])
-    interpolation = _rows(mesh.n_vertices, mesh.elements[owners[is_new]], weights)
+    interpolation = interpolation_rows(mesh.n_vertices, mesh.elements[owners[is_new]], weights)
     placed = interpolation @ mesh.rest_positions
     if project is not None:
         placed[mesh.n_vertices :] = projected("project(points)", "n", project, placed[mesh.n_vertices :])
@@ -189,7 +199,7 @@ def children(parents: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.nd
     return rows, order[first[rows] + within]
 
 
-def _rows(n_vertices: int, columns: np.ndarray, weights: np.ndarray) -> Any:
+def interpolation_rows(n_vertices: int, columns: np.ndarray, weights: np.ndarray) -> Any:
     """Return the identity of the coarse vertices, followed by a row of weights for each new vertex; sparse."""
     n, m = columns.shape
     rows = np.concatenate([np.arange(n_vertices), n_vertices + np.repeat(np.arange(n), m)])

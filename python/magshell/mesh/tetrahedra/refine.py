@@ -93,12 +93,12 @@ _CHILDREN = np.array(
         (6, 5, 8, 9),
     ]
 )
-_BARYCENTRIC = np.concatenate([np.eye(4), 0.5 * (np.eye(4)[EDGES[:, 0]] + np.eye(4)[EDGES[:, 1]])])
+BARYCENTRIC = np.concatenate([np.eye(4), 0.5 * (np.eye(4)[EDGES[:, 0]] + np.eye(4)[EDGES[:, 1]])])
 
 
 def _oriented(children: np.ndarray) -> np.ndarray:
     """Return the same tetrahedra (8, 4) with their nodes reordered where needed, so that all volumes are positive."""
-    corners = _BARYCENTRIC[children][:, :, 1:]
+    corners = BARYCENTRIC[children][:, :, 1:]
     inverted = straight_volumes(corners) < 0
     return np.where(inverted[:, None], children[:, MIRRORED[:4]], children)
 
@@ -120,7 +120,7 @@ def refined(mesh: TetMesh, surface: Projection | None = None) -> TetMesh:
     corners = mesh.tetrahedra[:, CHILDREN].reshape(-1, 4)
     table = edge_table(corners)
     # the new midside nodes lie on the curved parent; its neighbours give the same positions up to round-off
-    middles = 0.5 * (_BARYCENTRIC[CHILDREN[:, EDGES[:, 0]]] + _BARYCENTRIC[CHILDREN[:, EDGES[:, 1]]])
+    middles = 0.5 * (BARYCENTRIC[CHILDREN[:, EDGES[:, 0]]] + BARYCENTRIC[CHILDREN[:, EDGES[:, 1]]])
     values = shape_values(middles.reshape(-1, 4)).reshape(8, 6, 10)
     on_edges = np.einsum("cen,tni->tcei", values, mesh.rest_positions[mesh.tetrahedra]).reshape(-1, 3)
     first = np.unique(table.tetrahedron_edges.ravel(), return_index=True)[1]

@@ -1,18 +1,22 @@
-"""A scene on finer meshes of its sheets: materials, supports, loads and fields go over from the coarse ones."""
+"""A scene on finer meshes of its bodies: materials, supports, loads and fields go over from the coarse ones."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..._input.selections import indices
+from ...errors import MeshQualityWarning
+from ...mesh.face_shapes import sides
 from ...mesh.finer import FinerMesh, children
-from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
+from ...mesh.tetrahedra.tet_mesh import TetMesh
 from ..loads.loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
 from ..loads.pressure import Pressure
 from ..shells.shell import Shell
+from ..solids.solid import Solid
 from ..supports.supports import Clamp, Pin, SymmetryPlane
 from .scene import Scene
 
@@ -27,7 +31,7 @@ _OF_ELEMENTS = ("thickness", "young_modulus", "poisson_ratio", "mass_density", "
 def refuse_what_stays(scene: Scene) -> None:
     """Raise ValueError, with its name, for anything in a scene that does not go over to a finer mesh."""
     has = {
-        "a Solid": scene._bodies.solids,
+        "a Skin": [solid for solid in scene._bodies.solids if solid.skin is not None],
         "rigid bodies": scene.rigid_parts,
         "ties": scene.ties,
         "actuators": scene.actuators,
@@ -39,8 +43,8 @@ def refuse_what_stays(scene: Scene) -> None:
     found = [name for name, some in has.items() if some]
     if found:
         raise ValueError(
-            f"{', '.join(found)} cannot go over to a finer mesh yet: only Shells, Pins, Clamps, SymmetryPlanes, applied "
-            f"fields, gravity and the loads {', '.join(kind.__name__ for kind in _LOADS)} can"
+            f"{', '.join(found)} cannot go over to a finer mesh yet: only Shells, Solids, Pins, Clamps, SymmetryPlanes, "
+            f"applied fields, gravity and the loads {', '.join(kind.__name__ for kind in _LOADS)} can"
         )
 
 
@@ -52,9 +56,7 @@ def finer_scene(scene: Scene, values: Values, finer: Finer) -> Scene:
     Raises ValueError for what cannot go over, with its name.
     """
     refuse_what_stays(scene)
-    bodies = {
-        id(body): _finer_shell(scene, values, k, finer[id(body)]) for k, body in enumerate(scene.bodies)
-    }
+    bodies = {id(body): _finer_body(scene, values, k, finer[id(body)]) for k, body in enumerate(scene.bodies)}
 
     def finer_item(item: Any) -> Any:
         of_body = scene.bodies[0] if item.body is None else item.body
@@ -91,6 +93,8 @@ def held_vertices(finer: FinerMesh, vertices: np.ndarray) -> np.ndarray:
     mesh = finer.coarse
     held = np.zeros(mesh.n_vertices, dtype=bool)
     held[vertices] = True
+    if isinstance(mesh, TetMesh):
+        return np.flatnonzero(np.concatenate([held, _held_in_solid(finer, held)]))
     of_edges = held[mesh.nodes_of_edges].all(axis=1)
     of_elements = held[mesh.elements].all(axis=1)
     if mesh.order == 1:
@@ -101,6 +105,58 @@ def held_vertices(finer: FinerMesh, vertices: np.ndarray) -> np.ndarray:
     if mesh.order == 2:
         new |= (finer.new_elements >= 0) & of_elements[finer.new_elements]
     return np.flatnonzero(np.concatenate([held, new]))
+
+
+def _held_in_solid(finer: FinerMesh, held: np.ndarray) -> np.ndarray:
+    """Return whether a Pin of the coarse vertices marked in `held` holds each new vertex of a solid, (n_new,) bool.
+
+    A new vertex is held if all nodes of the edge, the outer side or the tetrahedron are that it lies inside. On an edge
+    within four-node tetrahedra all corners of one of these must be held, too: else an edge across the corner between two
+    held sides would be.
+    """
+    mesh = finer.coarse
+    of_elements = held[mesh.tetrahedra].all(axis=1)
+    of_edges = held[mesh.edges].all(axis=1)
+    if mesh.order == 2:
+        of_edges &= held[mesh.edge_nodes]
+    else:
+        around = np.zeros(mesh.n_edges, dtype=bool)
+        around[mesh.boundary_edges] = True
+        around[mesh.tetrahedron_edges[of_elements]] = True
+        of_edges &= around
+    of_sides = held[mesh.nodes_of_sides].all(axis=1)
+    new = np.zeros(len(finer.new_edges), dtype=bool)
+    for places, of in (
+        (finer.new_edges, of_edges),
+        (finer.new_sides, of_sides),
+        (finer.new_elements, of_elements),
+    ):
+        new |= (places >= 0) & of[places]
+    return new
+
+
+def _finer_body(scene: Scene, values: Values, k: int, finer: FinerMesh) -> Shell | Solid:
+    solid = isinstance(scene.bodies[k], Solid)
+    return (_finer_solid if solid else _finer_shell)(scene, values, k, finer)
+
+
+def _finer_solid(scene: Scene, values: Values, k: int, finer: FinerMesh) -> Solid:
+    solid, parents = values.current(scene.bodies[k]), finer.element_parents
+    rows = {name: solid.material.rows(name, solid.mesh.n_tetrahedra) for name in solid.material.names}
+    differ = {name: each[parents] for name, each in rows.items() if (each != each[:1]).any()}
+    of_elements = {
+        name: None if (given := getattr(solid, name)) is None else given[parents]
+        for name in ("mass_density", "remanent_magnetization")
+    }
+    with warnings.catch_warnings():  # the solid itself has warned of its free modes
+        warnings.simplefilter("ignore", MeshQualityWarning)
+        return Solid(
+            finer.mesh,
+            material=solid.material.replaced(**differ) if differ else solid.material,
+            mean_volume=None if solid.element == "linear" else solid.mean_volume,
+            magnetization_law=solid.magnetization_law,
+            **of_elements,
+        )
 
 
 def _finer_shell(scene: Scene, values: Values, k: int, finer: FinerMesh) -> Shell:
@@ -134,7 +190,7 @@ def _for_each_body(scene: Scene, load: Any, finer_item: Callable[[Any], Any]) ->
     return [finer_item(load)]
 
 
-def _finer_plane(plane: SymmetryPlane, bodies: dict[int, Shell]) -> SymmetryPlane:
+def _finer_plane(plane: SymmetryPlane, bodies: dict[int, Shell | Solid]) -> SymmetryPlane:
     body = bodies.get(id(plane.body))
     return SymmetryPlane(plane.normal, plane.point, tolerance=plane.tolerance, body=body)
 
@@ -146,6 +202,8 @@ def _check_planes(scene: Scene, supports: list[Any], finer: Finer) -> None:
             continue
         for body in scene.bodies if old.body is None else [old.body]:
             fine = finer[id(body)]
+            if isinstance(fine.mesh, TetMesh):  # new vertices lie on the coarse sides
+                continue
             before, after = (
                 np.isin(mesh.nodes_of_edges, each._vertices(mesh)).all(axis=1)
                 for each, mesh in ((old, fine.coarse), (new, fine.mesh))
@@ -160,7 +218,7 @@ def _check_planes(scene: Scene, supports: list[Any], finer: Finer) -> None:
                 )
 
 
-def _vertex_loads(scene: Scene, values: Values, bodies: dict[int, Shell]) -> list[PointLoad]:
+def _vertex_loads(scene: Scene, values: Values, bodies: dict[int, Shell | Solid]) -> list[PointLoad]:
     """Return the vertex_loads of a solve, which replace all dead loads, as PointLoads."""
     given = values.replaced.get(scene, {})
     if "vertex_loads" in given:
@@ -171,14 +229,14 @@ def _vertex_loads(scene: Scene, values: Values, bodies: dict[int, Shell]) -> lis
     return []
 
 
-def _pin(pin: Pin, finer: FinerMesh, body: Shell | None) -> Pin:
+def _pin(pin: Pin, finer: FinerMesh, body: Shell | Solid | None) -> Pin:
     vertices = indices("Pin vertices", pin.vertices, finer.coarse.n_vertices)
     return Pin(
         held_vertices(finer, vertices), pin.components, body=body, **_move(pin, finer.coarse, vertices)
     )
 
 
-def _clamp(clamp: Clamp, finer: FinerMesh, body: Shell | None) -> Clamp:
+def _clamp(clamp: Clamp, finer: FinerMesh, body: Shell | Solid | None) -> Clamp:
     edges = clamp._checked(finer.coarse)
     _, parts = children(finer.edge_parents, edges)
     nodes = np.unique(finer.coarse.nodes_of_edges[edges])
@@ -193,27 +251,27 @@ def _move(support: Pin | Clamp, mesh: Any, vertices: np.ndarray) -> dict[str, An
     return move
 
 
-def _point_load(load: PointLoad, finer: FinerMesh, body: Shell | None) -> PointLoad:
+def _point_load(load: PointLoad, finer: FinerMesh, body: Shell | Solid | None) -> PointLoad:
     return PointLoad(load.vertices, load.force, body)
 
 
-def _edge_load(load: EdgeLoad, finer: FinerMesh, body: Shell | None) -> EdgeLoad:
+def _edge_load(load: EdgeLoad, finer: FinerMesh, body: Shell | Solid | None) -> EdgeLoad:
     rows, parts = children(finer.edge_parents, indices("EdgeLoad edges", load.edges, finer.coarse.n_edges))
     force = load.force_per_length
     return EdgeLoad(parts, force if force.ndim == 1 else force[rows], body)
 
 
-def _finer_moment(load: EdgeCouple, finer: FinerMesh, body: Shell | None) -> EdgeCouple:
+def _finer_moment(load: EdgeCouple, finer: FinerMesh, body: Shell | Solid | None) -> EdgeCouple:
     _, parts = children(finer.edge_parents, indices("EdgeCouple edges", load.edges, finer.coarse.n_edges))
     return EdgeCouple(parts, load.couple_per_length, body)
 
 
-def _area_load(load: AreaLoad, finer: FinerMesh, body: Shell | None) -> AreaLoad:
+def _area_load(load: AreaLoad, finer: FinerMesh, body: Shell | Solid | None) -> AreaLoad:
     faces, force = _finer_faces("AreaLoad", load.faces, load.force_per_area, 2, finer)
     return AreaLoad(force, faces, body)
 
 
-def _pressure(load: Pressure, finer: FinerMesh, body: Shell | None) -> Pressure:
+def _pressure(load: Pressure, finer: FinerMesh, body: Shell | Solid | None) -> Pressure:
     faces, pressure = _finer_faces("Pressure", load.faces, load.pressure, 1, finer)
     return Pressure(pressure, faces=faces, body=body)
 
@@ -230,25 +288,33 @@ def _finer_faces(
     mesh = finer.coarse
     chosen = np.arange(mesh.n_faces) if faces is None else indices(f"{kind} faces", faces, mesh.n_faces)
     values = np.broadcast_to(given, (len(chosen), *given.shape[1:])) if given.ndim == ndim else None
-    if isinstance(mesh, QuadraticTriangleMesh):
+    parts_before, parts_after = sides(mesh)[1], sides(finer.mesh)[1]
+    if parts_before > 1:
         order = np.argsort(chosen, kind="stable")
         chosen, values = chosen[order], None if values is None else values[order]
         whole = (
-            len(chosen) % 4 == 0
-            and (chosen.reshape(-1, 4) == chosen[::4, None] // 4 * 4 + np.arange(4)).all()
+            len(chosen) % parts_before == 0
+            and (
+                chosen.reshape(-1, parts_before)
+                == chosen[::parts_before, None] // parts_before * parts_before + np.arange(parts_before)
+            ).all()
         )
         alike = values is None or (
             whole
-            and np.ptp(values.reshape(-1, 4, *values.shape[1:]), axis=1).max() <= _SAME * np.abs(values).max()
+            and np.ptp(values.reshape(-1, parts_before, *values.shape[1:]), axis=1).max()
+            <= _SAME * np.abs(values).max()
         )
         if not (whole and alike):
             raise ValueError(
-                f"a {kind} on parts of six-node elements cannot go over to a finer mesh: load whole elements"
+                f"a {kind} on parts of the sides of elements cannot go over to a finer mesh: load whole sides"
             )
-        chosen, values = chosen[::4] // 4, None if values is None else values[::4]
-    rows, parts = children(finer.element_parents, chosen)
-    if finer.mesh.order == 2:
-        rows, parts = np.repeat(rows, 4), (4 * parts[:, None] + np.arange(4)).ravel()
+        chosen, values = (
+            chosen[::parts_before] // parts_before,
+            None if values is None else values[::parts_before],
+        )
+    rows, parts = children(finer.of_sides, chosen)
+    rows = np.repeat(rows, parts_after)
+    parts = (parts_after * parts[:, None] + np.arange(parts_after)).ravel()
     return parts, given if values is None else values[rows]
 
 

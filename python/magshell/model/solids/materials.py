@@ -71,6 +71,11 @@ class SolidMaterial(Frozen):
         """The name of its energy in the core."""
         return self._energy
 
+    @property
+    def _moduli(self) -> tuple[str, ...]:
+        """The names of the constants in Pa, to all of which together its energy is proportional."""
+        return tuple(name for name in self.names if self._ranges[name][0] == "Pa")
+
     def replaced(self, **values: Any) -> SolidMaterial:
         """Return the same material with other values of some constants. Raises ValueError as the constructor does."""
         for name in values:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
 
 from ... import _core
+from ...mesh.tetrahedra.tet_mesh import TetMesh
+from ...model.solids.solid import Solid
 from ..adjoint.factorized import Factorized
 
 if TYPE_CHECKING:
@@ -26,28 +28,36 @@ def contributions(solution: FinerSolution, adjoint: np.ndarray, positions: np.nd
 
         z . r = z . K e = sum over elements T of z . K_T e
 
-    The elastic energy of an element is proportional to its Young's modulus, and its energy in the applied field to its
-    magnetization. So modulus or magnetization times the derivative of z . K e by it is z . K_T e. Other energies, such as
-    those of loads, are left out.
+    The elastic energy of an element is proportional to its moduli in Pa, all together, and its energy in the applied field
+    to its magnetization. So moduli or magnetization times the derivatives of z . K e by them are z . K_T e. Other energies,
+    such as those of loads, are left out.
     """
     scene, model = solution.scene, solution.scene._model
     with solution.inputs.in_core():
         difference = _relaxed(solution, positions - solution.positions)
         largest = np.abs(model.positions(difference)).max()
         if largest == 0.0:
-            return [np.zeros(each.coarse.n_elements) for each in solution.finer]
+            return [np.zeros(_count(each.coarse)) for each in solution.finer]
         step = _STEP * min(body.mesh.edge_lengths.min() for body in scene.bodies) / largest
         ahead, behind = (_by_values(solution, sign * step * difference, adjoint) for sign in (1.0, -1.0))
     change = (ahead - behind) / (2.0 * step)
     found = []
     for body, each in zip(scene.bodies, solution.finer, strict=True):
         label = next(label for owner, label in scene._labels if owner is body)
-        of_elements = scene._value_layout.of(change, label, "young_modulus").ravel() * body.young_modulus
+        moduli = body.material._moduli if isinstance(body, Solid) else ("young_modulus",)
+        of_elements = sum(
+            scene._value_layout.of(change, label, name).ravel() * getattr(body, name) for name in moduli
+        )
         if (label, "remanent_magnetization") in scene._value_layout:
             by_magnetization = scene._value_layout.of(change, label, "remanent_magnetization").reshape(-1, 3)
             of_elements = of_elements + (by_magnetization * body.remanent_magnetization).sum(axis=1)
-        found.append(-np.bincount(each.element_parents, of_elements, minlength=each.coarse.n_elements))
+        found.append(-np.bincount(each.element_parents, of_elements, minlength=_count(each.coarse)))
     return found
+
+
+def _count(mesh: Any) -> int:
+    """Return the number of elements of a mesh."""
+    return mesh.n_tetrahedra if isinstance(mesh, TetMesh) else mesh.n_elements
 
 
 def summing_to(parts: list[np.ndarray], total: float) -> list[np.ndarray]:

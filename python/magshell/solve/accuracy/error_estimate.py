@@ -13,8 +13,9 @@ from ..._input.scalars import flag
 from ..._runtime.frozen import immutable
 from ..._runtime.solver_entry_point import solve_entry
 from ...mesh.finer import FinerMesh, divided, second_order
-from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
+from ...mesh.finer_solid import finer_solid
 from ...model.scene.finer_scene import refuse_what_stays
+from ...model.solids.solid import Solid
 from ...model.supports.supports import SymmetryPlane
 from ..linear.response import LinearResponse
 from ..statics.equilibrium import Equilibrium
@@ -38,8 +39,8 @@ class ErrorEstimate:
     """The estimated discretization error of one output of a result.
 
     value: the output on the mesh of the result. error: what the limit of ever finer meshes has more than that, with its
-        sign, in the unit of the output. by_face: (n,), the contribution of each face, or six-node element, to `error`,
-        one body after another; it sums to `error`. None without them.
+        sign, in the unit of the output. by_face: (n,), the contribution of each face, six-node element or tetrahedron to
+        `error`, one body after another; it sums to `error`. None without them.
     factorizations, wall_time [s]: of the estimate. n_dofs: the unknowns of the finer mesh.
     """
 
@@ -83,28 +84,29 @@ def error_estimate(
     project: Callable[[np.ndarray], np.ndarray] | None = None,
     by_face: bool = True,
 ) -> ErrorEstimate:
-    """Estimate the error that the mesh causes in an output of a result, with its sign, and the faces it comes from.
+    """Estimate the error that the mesh causes in an output of a result, with its sign, and the elements it comes from.
 
     The scene is solved with better elements from the solution given: sheets of three-node faces with six-node elements of
-    second order on the same faces (three times the unknowns), sheets of six-node elements with each divided into four. The
-    difference of the outputs is the estimate; for six-node elements it is divided by 1 - 2^-p with the order p = 3. The
-    contributions of faces are those of dual-weighted residuals (Becker and Rannacher 2001): the residual of the given
-    solution on the finer mesh, times the adjoint of the output there.
+    second order on the same faces (three times the unknowns), sheets of six-node elements with each divided into four;
+    solids of four-node tetrahedra with ten-node ones, those of ten-node tetrahedra with each divided into eight (seven times
+    the unknowns). The difference of the outputs is the estimate; for elements of second order it is divided by 1 - 2^-p with
+    the order p = 3. The contributions of faces, or of tetrahedra, are those of dual-weighted residuals (Becker and Rannacher
+    2001): the residual of the given solution on the finer mesh, times the adjoint of the output there.
 
-    result: of ms.equilibrium or ms.linear_response, of Shells alone, without contacts, ties and actuators.
+    result: of ms.equilibrium or ms.linear_response, of Shells and Solids, without contacts, ties, actuators and skins.
     output: a function of the result that returns a scalar tensor, such as `lambda rest: rest.positions[tip, 2].mean()`. It
         gets `positions`, `displacements`, `scene` and `[body]`. It stays a function of the vertices of this mesh, so that
         errors of sums over vertices in it are not estimated.
     project: maps points (n, 3) m near a curved sheet to the surface, on which new vertices are put. By default a smooth
-        surface is fitted to the vertices of three-node faces; six-node elements keep their shape, which is then taken as
-        exact.
+        surface is fitted to the vertices of three-node faces; six-node elements and solids keep their shape, which is then
+        taken as exact.
     by_face: False leaves out the contributions of faces, a quarter to a half of the time.
 
-    The estimate takes longer than the solve given: there are three or four times as many unknowns, and the finer scene is
-    made anew, which alone takes one to three solves. Of a cantilever of 400 to 6400 faces, whose solve takes 5
-    factorizations, it takes 11 to 16 solves, and 8 to 12 without the contributions of faces. `factorizations` and
-    `wall_time` have what it took. It tells errors of the mesh only, not of the model, the loads or the time steps. Errors
-    below the tolerance of the solver (1e-8) cannot be told.
+    The estimate takes longer than the solve given: there are three to seven times as many unknowns, and the finer scene is
+    made anew, which alone takes one to three solves. Of a cantilever of 640 to 5760 faces, whose solve takes 9
+    factorizations, it takes 8 to 10 solves, and 6 to 8 without the contributions of faces; of solids it takes 20 to 60.
+    `factorizations` and `wall_time` have what it took. It tells errors of the mesh only, not of the model, the loads or the
+    time steps. Errors below the tolerance of the solver (1e-8) cannot be told.
 
     Raises ValueError for outputs that are not smooth scalar functions of positions, and for results and objects of the scene
     that do not go over to a finer mesh, with their names; NotConverged if the finer mesh finds no equilibrium near this one.
@@ -153,12 +155,15 @@ def error_estimate(
 def finer_meshes(scene: Scene, project: Callable[[np.ndarray], np.ndarray] | None) -> tuple[FinerMesh, ...]:
     """Return the meshes of better elements on which the errors of the bodies are estimated."""
     refuse_what_stays(scene)
-    return tuple(
-        divided(body.mesh, project)
-        if isinstance(body.mesh, QuadraticTriangleMesh)
-        else second_order(body.mesh, project, planes_of(scene, body))
-        for body in scene.bodies
-    )
+    return tuple(_finer(scene, body, project) for body in scene.bodies)
+
+
+def _finer(scene: Scene, body: Any, project: Callable[[np.ndarray], np.ndarray] | None) -> FinerMesh:
+    if isinstance(body, Solid):
+        return finer_solid(body.mesh)
+    if body.mesh.order == 2:
+        return divided(body.mesh, project)
+    return second_order(body.mesh, project, planes_of(scene, body))
 
 
 def planes_of(scene: Scene, body: Any) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -173,14 +178,14 @@ def _solved(
     """Return the solution on the finer mesh, the derivative of the output, and the factor of the difference of outputs."""
     positions = positions_of(result)
     slope = output.gradient(positions)
-    kinds = {isinstance(body.mesh, QuadraticTriangleMesh) for body in result.scene.bodies}
-    if len(kinds) > 1:
+    orders = {body.mesh.order for body in result.scene.bodies}
+    if len(orders) > 1:
         raise ValueError(
-            "the bodies have three-node and six-node meshes: give all bodies the same kind for an estimate"
+            "the bodies have meshes of first and of second order: give all bodies the same order for an estimate"
         )
     solution = finer_solution(result, finer_meshes(result.scene, project))
     output.check_smooth(positions, slope, solution.positions - positions)
-    scale = 1.0 / (1.0 - 2.0**-ORDER_OF_SIX_NODES) if kinds == {True} else 1.0
+    scale = 1.0 / (1.0 - 2.0**-ORDER_OF_SIX_NODES) if orders == {2} else 1.0
     return solution, slope, scale
 
 
@@ -202,5 +207,10 @@ def check_result(result: Any) -> None:
 
 
 def _described(result: Equilibrium | LinearResponse) -> str:
-    six = isinstance(result.scene.bodies[0].mesh, QuadraticTriangleMesh)
-    return "six-node elements divided into four" if six else "six-node elements on the same faces"
+    body = result.scene.bodies[0]
+    solid = isinstance(body, Solid)
+    if body.mesh.order == 2:
+        return "ten-node tetrahedra divided into eight" if solid else "six-node elements divided into four"
+    return (
+        "ten-node tetrahedra on the same four-node ones" if solid else "six-node elements on the same faces"
+    )

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...mesh.triangles.triangle_mesh import TriangleMesh
+
 if TYPE_CHECKING:
     from ...mesh.finer import FinerMesh
-    from ...mesh.triangles.triangle_mesh import TriangleMesh
 
 
 def positions_on(finer: FinerMesh, positions: np.ndarray) -> np.ndarray:
@@ -16,12 +17,14 @@ def positions_on(finer: FinerMesh, positions: np.ndarray) -> np.ndarray:
 
     The offset of a new vertex from the straight edge of three-node faces at rest turns with the faces beside the edge. Thus
     the finer mesh is stretched as the coarse one. Vertices on a smooth curve through the deformed ones would stretch the
-    edges by a fraction of their curvature, which buckles thin sheets. Six-node elements keep their curved shape.
+    edges by a fraction of their curvature, which buckles thin sheets. Six-node elements and
+    solids keep their curved shape.
     """
     mesh, new = finer.coarse, slice(finer.coarse.n_vertices, None)
     found = finer.interpolation @ positions
     offsets = (finer.mesh.rest_positions - finer.interpolation @ mesh.rest_positions)[new]
-    found[new] += _turned(offsets, mesh, positions, finer.new_edges) if mesh.order == 1 else offsets
+    turns = isinstance(mesh, TriangleMesh)
+    found[new] += _turned(offsets, mesh, positions, finer.new_edges) if turns else offsets
     return found
 
 

@@ -108,6 +108,10 @@ def refined_for(
     max_unknowns = count("max_unknowns", max_unknowns)
     max_rounds = count("max_rounds", max_rounds, 0)
     refuse_what_stays(result.scene)
+    if result.scene._bodies.solids:
+        raise ValueError(
+            "ms.refined_for refines sheets only, and the scene has a Solid: take a finer mesh of it, mesh.refined()"
+        )
     given = result.scene
     before = Output(output, given)  # refuses what is no function
     _refuse_round_off(tolerance, before, result)
