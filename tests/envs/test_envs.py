@@ -322,6 +322,10 @@ def test_answers_that_change_are_refused():
             "lower of an Action must be below",
         ),
         (
+            lambda hinge: ms.envs.Action(hinge, "torque", lower=2, upper=1),
+            "lower of an Action must be below",
+        ),
+        (
             lambda hinge: ms.envs.Action(hinge, "torque", lower=[0, 0], upper=1),
             r"must be a number or have shape \(\)",
         ),

@@ -146,15 +146,19 @@ def test_a_detached_state_ends_gradients():
     assert first.grad is None and second.grad.abs().max() > 0
 
 
-def test_a_parametric_action_has_gradients_by_its_numbers():
+@pytest.mark.parametrize(
+    "field",
+    [
+        lambda numbers, time, before: 0.5 * before + 2e-3 * numbers,
+        lambda numbers, time, before: [0.0, 1e-3 * numbers[0], 2e-3 * numbers[0] + 0.5 * before[2]],
+    ],
+    ids=["tensor", "list"],
+)
+def test_a_parametric_action_has_gradients_by_its_numbers(field):
     scene = robots.magnetic_strip().scene
     environment = ms.envs.Environment(
         scene,
-        actuators=[
-            ms.envs.ParametricAction(
-                scene, "applied_flux_density", 1, lambda numbers, time, before: 0.5 * before + 2e-3 * numbers
-            )
-        ],
+        actuators=[ms.envs.ParametricAction(scene, "applied_flux_density", 1, field)],
         observation=lambda now: [now.positions[-1, 2] * 100],
         reward=lambda now: now.positions[-1, 2] * 100,
         time_step=1e-2,
@@ -162,12 +166,23 @@ def test_a_parametric_action_has_gradients_by_its_numbers():
         simulate={"integrator": ms.ImplicitEuler()},
     )
     environment.reset(seed=0)
+    environment.step([0.1])  # in arrays
+    environment.reset(seed=0)
     state = environment.differentiable_state()
     actions = np.array([[0.3], [-0.2], [0.5]])
     given = torch.tensor(actions, requires_grad=True)
     rolled(environment, state, given)[0].backward()
     expected = differences(lambda each: rolled(environment, state, each)[0], actions, 1e-4)
     assert_close(given.grad.numpy(), expected, 1e-5)
+
+
+def test_entries_with_equal_bounds_are_fixed():
+    """Compare a field along one axis, whose action is one number, with a function of that number, to the bit."""
+    scene = robots.magnetic_strip().scene
+    along = ms.envs.Action(scene, "applied_flux_density", lower=(1e-3, 0, -4e-3), upper=(1e-3, 0, 2e-3))
+    assert along.size == 1
+    for number in (np.array([0.3]), torch.tensor([0.3], dtype=torch.float64)):
+        assert along.value(number, 0.0, None).tolist() == [1e-3, 0.0, -4e-3 + 0.5 * 1.3 * 6e-3]
 
 
 def test_functions_that_leave_torch_are_refused():

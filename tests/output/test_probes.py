@@ -130,6 +130,10 @@ def test_curves_against_time_and_each_other(results):
         assert lower.get_ylabel() == "hold.z [N]" and len(upper.lines) == 2
         lines[against] = lower.lines[0].get_xdata()
     np.testing.assert_array_equal(lines[None], results["move"].times)
+    times = ms.plot_history(results["move"], "time", against="tip.z", probes=probes).figure.axes[0].lines[0]
+    np.testing.assert_array_equal(times.get_ydata(), results["move"].times)
+    with pytest.raises(ValueError, match=r"'name\.z' is a column of an ms\.Probe"):
+        ms.plot_history(results["move"], "tip.z")
     with pytest.raises(ValueError, match=r"no column 'tip\.w'; the nearest names are"):
         ms.plot_history(results["move"], "tip.w", probes=probes)
     with pytest.raises(ValueError, match="several states"):

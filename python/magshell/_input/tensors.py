@@ -35,12 +35,23 @@ def real_tensor(name: str, values: Any, shape: tuple[int | str, ...]):
         if values.is_complex() or values.dtype == torch.bool:
             raise ValueError(f"{name} must hold real numbers, got {values.dtype}")
         tensor = values if values.is_floating_point() else values.to(torch.float64)
+    elif isinstance(values, list | tuple) and any(map(is_tensor, values)):
+        tensor = joined_tensor(values)
     else:
         tensor = torch.from_numpy(real_numbers(name, values))
     if not fits(tuple(tensor.shape), shape):
         wanted = ", ".join(map(str, shape))
         raise ValueError(f"{name} must have shape ({wanted}), got {tuple(tensor.shape)}")
     return tensor
+
+
+def joined_tensor(value: Any):
+    """Return numbers, tensors and lists of them as one tensor of float64, in the graphs of the tensors."""
+    import torch
+
+    if isinstance(value, list | tuple):
+        return torch.stack([joined_tensor(each) for each in value])
+    return torch.as_tensor(value).to(torch.float64)
 
 
 def positive_number(name: str, unit: str, value: Any):

@@ -104,10 +104,13 @@ def meant(name: str, there: Iterable[str]) -> str:
 
 
 def nearest_first(name, names) -> str:
-    """Return the names as text, the most similar to `name` first."""
+    """Return the names as text: those that begin with `name` first, then the most similar to it."""
     from difflib import SequenceMatcher  # for errors alone
 
-    return ", ".join(sorted(sorted(names), key=lambda each: -SequenceMatcher(None, str(name), each).ratio()))
+    def distance(each: str) -> tuple[bool, float]:
+        return not each.startswith(str(name)), -SequenceMatcher(None, str(name), each).ratio()
+
+    return ", ".join(sorted(sorted(names), key=distance))
 
 
 def _fields(scene) -> tuple[Any, ...]:

@@ -22,7 +22,8 @@ class Action(Frozen):
 
     owner: the scene, for applied_flux_density [T] and the factors of ms.simulate; or one of its objects, for values that
         may change during a motion: the torque of a joint, the displacement of a clamp, the moments of Dipoles, ...
-    lower, upper: bounds in the value's own unit, numbers or of its shape.
+    lower, upper: bounds in the value's own unit, numbers or of its shape. An entry whose bounds are equal stays there and
+        takes no number: lower=(0, 0, -0.01), upper=(0, 0, 0.01) is a field along z.
 
     Fields and joint torques are constant while an action lasts. Values that move something (supports, obstacles, sources)
     change linearly from the value of the action before, at first from the value in the scene.
@@ -63,8 +64,11 @@ class Action(Frozen):
         )
         if not self._of_scene and self._of_owner is None:
             raise ValueError(f"the {type(owner).__name__} was made without {name}: give it one, zero will do")
-        if not (self.lower < self.upper).all():
-            raise ValueError(f"lower of an Action must be below upper, got {lower} and {upper}")
+        if (self.lower > self.upper).any() or not (self.lower < self.upper).any():
+            raise ValueError(
+                f"lower of an Action must be below upper (an entry with equal bounds stays there), got {lower} and {upper}"
+            )
+        self._free = np.flatnonzero(np.reshape(self.lower < self.upper, -1))
 
     def _refuse(self, which: str, value):
         """Raise ValueError: a bound has the wrong shape."""
@@ -79,8 +83,8 @@ class Action(Frozen):
 
     @property
     def size(self) -> int:
-        """The number of entries of the action that the value takes."""
-        return int(np.prod(self.shape))
+        """The number of entries of the action that the value takes: one for each entry whose bounds differ."""
+        return self._free.size
 
     @property
     def _at_start(self) -> np.ndarray:
@@ -104,11 +108,19 @@ class Action(Frozen):
     def value(self, action: Any, time: float, before: Any) -> Any:
         """Return the value for its entries of an action, (size,) in -1 to 1, which begins at a time [s] with the
         value `before`. A tensor gives a tensor."""
-        fraction = 0.5 * (action.reshape(self.shape) + 1.0)
+        fraction = 0.5 * (self._all_entries(action).reshape(self.shape) + 1.0)
         lower, reach = self.lower, self.upper - self.lower
         if is_tensor(action):
             lower, reach = fraction.new_tensor(lower), fraction.new_tensor(reach)
         return lower + fraction * reach
+
+    def _all_entries(self, action: Any) -> Any:
+        """Return the action with zeros for the entries that are fixed."""
+        entries = int(np.prod(self.shape))
+        if self.size == entries:
+            return action
+        rows = np.eye(entries)[:, self._free]
+        return (action.new_tensor(rows) if is_tensor(action) else rows) @ action
 
     def _all_time_series(self, before: Any, now: Any, steps: int) -> list[Any]:
         """Return the values of each owner during an action, as ms.simulate takes them.

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .._input.tensors import detached, is_tensor, require_torch, stacked
+from .._input.tensors import detached, is_tensor, joined_tensor, require_torch, stacked
 from .._runtime.frozen import immutable
 from ..errors import NoGradient
 from ..solve.dynamics.differentiable_state import DifferentiableState
@@ -99,7 +99,7 @@ def as_result(
     """
     torch = require_torch("Environment.differentiable_step")
     try:
-        tensor = _tensor(torch, function(now))
+        tensor = joined_tensor(function(now))
     except RuntimeError as error:
         if "numpy()" not in str(error):  # not torch's refusal to convert a tensor that requires a gradient
             raise
@@ -118,10 +118,3 @@ def _advice(name: str) -> str:
         f"no gradient of the {name}: its function must compute with the tensors of its snapshot by torch, without float(), "
         "item() and functions of numpy"
     )
-
-
-def _tensor(torch: Any, value: Any) -> Any:
-    """Return numbers, tensors and lists of them as one tensor of float64."""
-    if isinstance(value, list | tuple):
-        return torch.stack([_tensor(torch, each) for each in value])
-    return torch.as_tensor(value).to(torch.float64)

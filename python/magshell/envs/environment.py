@@ -187,6 +187,12 @@ class Environment(gymnasium.Env):
         )
         self._now = None
 
+    def __repr__(self) -> str:
+        return (
+            f"Environment({self.action_space.shape[0]} numbers of action by {list(self.actuators)}, observations of shape "
+            f"{self._shape}, {self.actions_per_episode} actions of {self.time_step * self.steps_per_action:g} s per episode)"
+        )
+
     def reset(
         self, *, seed: int | None = None, options: dict[Any, Any] | None = None
     ) -> tuple[np.ndarray, dict[Any, Any]]:

@@ -223,7 +223,9 @@ def test_motion_has_strains_in_each_state(dtype):
 
 def test_large_strain_is_warned_of_at_the_callers_line():
     """Check a strip at 1000 T, which is "stable" at several times its length."""
-    with pytest.warns(ms.LargeStrainWarning, match=r"40 of 40 faces are, the first of them \d") as caught:
+    with pytest.warns(
+        ms.LargeStrainWarning, match=r"^mT for T.*40 of 40 faces are, the first of them \d"
+    ) as caught:
         found = in_field(1000.0, strip(cells=(10, 2), field=ms.UniformField()))
     assert found.stable and found.largest_membrane_strain > 2.0
     assert "BEYOND THE MODEL" in repr(found)
@@ -244,6 +246,12 @@ def test_small_strains_give_no_warning():
     with warnings.catch_warnings():
         warnings.simplefilter("error", ms.LargeStrainWarning)
         in_field(2e-3)
+
+
+def test_moderately_large_strain_is_no_mistaken_unit():
+    with pytest.warns(ms.LargeStrainWarning, match=r"^(?!mT for T)"):
+        found = in_field(25.0, strip(cells=(10, 2), field=ms.UniformField()))
+    assert 0.2 < found.largest_membrane_strain < 1.0
 
 
 def test_strain_warning_as_an_error_contains_the_result():

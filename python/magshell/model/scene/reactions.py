@@ -61,7 +61,9 @@ def reaction_in(scene: Scene, support: Support, state: np.ndarray, held: np.ndar
     """
     support = scene._own(support)
     if not any(each is support for each in scene.supports):
-        raise ValueError(f"support must be one of scene.supports, got {support!r:.80}")
+        raise ValueError(
+            f"support must be one of scene.supports itself, not another one with equal values, got {support!r:.80}"
+        )
     constraints = scene._constraints
     rows = {node: k for k, node in enumerate(constraints.held_nodes[:, 0].tolist())}
     mine = [(v, along) for s, v, along in held_directions(scene._bodies, scene.supports) if s is support]

@@ -29,7 +29,8 @@ def plot_history(
 
     columns: names of columns of ms.to_pandas(result, probes=probes), with or without their units: "tip.z". Those of
         different units get axes below each other.
-    against: the column along the horizontal axis; by default the time, the path's parameter or the number of the case.
+    against: the column along the horizontal axis; by default the time, the path's parameter or the number of the case,
+        which are columns as well: "time", "parameter", "case".
 
     Raises ValueError if there is no such column, or if the result has one state only.
 
@@ -43,23 +44,25 @@ def plot_history(
     """
     from matplotlib.figure import Figure
 
-    table = to_pandas(result, probes=probes)
+    table = to_pandas(
+        result, probes=probes
+    ).reset_index()  # the time, the parameter or the case becomes a column
     if len(table) < 2:
         raise ValueError("result must have several states: a motion, a path or load cases")
     wanted = [columns] if isinstance(columns, str) else columns
     if not isinstance(wanted, list | tuple) or not wanted:
         raise ValueError(f"columns must be the name of a column or a list of names, got {columns!r:.60}")
     names = [_column(table, each) for each in wanted]
-    along = table.index.name if against is None else _column(table, against)
-    x = table.index.to_numpy() if against is None else table[along].to_numpy()
+    along = table.columns[0] if against is None else _column(table, against)
+    x = table[along].to_numpy()
     by_unit: dict[str, list[str]] = {}
     for name in names:
-        by_unit.setdefault(name.rpartition(" [")[2].rstrip("]"), []).append(name)
+        by_unit.setdefault(name.partition(" [")[2].rstrip("]"), []).append(name)
     figure = Figure(figsize=(6.4, 0.4 + 2.8 * len(by_unit)), layout="constrained")
     rows = figure.subplots(len(by_unit), 1, sharex=True, squeeze=False)[:, 0]
     for axes, (unit, group) in zip(rows, by_unit.items(), strict=True):
         for name in group:
-            axes.plot(x, table[name], marker="." if len(x) < 50 else "", label=name.rpartition(" [")[0])
+            axes.plot(x, table[name], marker="." if len(x) < 50 else "", label=name.partition(" [")[0])
         axes.set_ylabel(f"{group[0]}" if len(group) == 1 else f"[{unit}]")
         if len(group) > 1:
             axes.legend(frameon=False)
@@ -70,8 +73,10 @@ def plot_history(
 
 def _column(table: pandas.DataFrame, name: Any) -> str:
     """Return the column of this name, with or without its unit. Raises ValueError with the nearest names."""
-    for column in table.columns:
-        if name in (column, column.rpartition(" [")[0]):
-            return column
-    names = [column.rpartition(" [")[0] for column in table.columns]
-    raise ValueError(f"the table has no column {name!r:.60}{nearest_names(name, names)}")
+    names = {column.partition(" [")[0]: column for column in table.columns}
+    if name in names:
+        return names[name]
+    if name in table.columns:
+        return name
+    probes = "; 'name.z' is a column of an ms.Probe in probes=" if "." in str(name) else ""
+    raise ValueError(f"the table has no column {name!r:.60}{nearest_names(name, names)}{probes}")
