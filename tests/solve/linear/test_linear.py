@@ -115,7 +115,7 @@ def test_buckling_in_a_field(direction) -> None:
 
 
 def test_a_pulled_strip_does_not_buckle() -> None:
-    with pytest.raises(ValueError, match="nothing buckles under these controls"):
+    with pytest.raises(ValueError, match="nothing buckles under these load parameters"):
         ms.linear_buckling(compressed(-EULER))
 
 

@@ -120,7 +120,7 @@ def test_buckling_is_where_the_path_branches(case) -> None:
     assert branch.kind == "bifurcation"
     found = ms.linear_buckling(scene, about, **towards)
     assert found.factors[0] == pytest.approx(branch.parameter, rel=2e-3)
-    assert 0.05 < found.factors[0] < 0.95 and "of the way to the new controls" in repr(found)
+    assert 0.05 < found.factors[0] < 0.95 and "of the way to the new load parameters" in repr(found)
     along = np.vdot(found.modes[0], branch.mode)
     assert abs(along) == pytest.approx(np.linalg.norm(found.modes[0]) * np.linalg.norm(branch.mode), rel=1e-3)
 
@@ -156,7 +156,9 @@ def test_bad_input_is_refused(function) -> None:
         function(scene, about, values={sheet: {"growth": 1.1}})
     with pytest.raises(ValueError, match="remanent_magnetization is that of the equilibrium: give it to"):
         function(scene, about, remanent_magnetization=(1e4, 0, 0))
-    with pytest.raises(ValueError, match="controls are those of the equilibrium, so that nothing changes"):
+    with pytest.raises(
+        ValueError, match="load parameters are those of the equilibrium, so that nothing changes"
+    ):
         function(scene, about, load_factor=0.5)
     with pytest.raises(ValueError, match="no UniformField"):
         function(scene, about, applied_flux_density=(0, 0, 1.0))
@@ -172,5 +174,5 @@ def test_buckling_with_unsuitable_loads_is_refused() -> None:
     with pytest.raises(ValueError, match="is a spring"):
         ms.linear_buckling(scene, about)
     column = held(shell(), (EULER, 0, 0))
-    with pytest.raises(ValueError, match="nothing buckles under these controls"):
+    with pytest.raises(ValueError, match="nothing buckles under these load parameters"):
         ms.linear_buckling(column, ms.equilibrium(column, load_factor=0.5))

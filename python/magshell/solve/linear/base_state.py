@@ -144,6 +144,6 @@ def refuse_what_cannot_be(equilibrium: Equilibrium, inputs: Inputs) -> None:
         )
     if np.array_equal(inputs.controls, equilibrium._controls):
         raise ValueError(
-            "the controls are those of the equilibrium, so that nothing changes: give the load_factor, "
+            "the load parameters are those of the equilibrium, so that nothing changes: give the load_factor, "
             "applied_flux_density, ... towards which they go, as to ms.follow_path"
         )

@@ -55,7 +55,11 @@ class Buckling:
 
     def __repr__(self) -> str:
         factors = ", ".join(f"{factor:.6g}" for factor in detached(self.factors))
-        of = "times the controls" if self.equilibrium is None else "of the way to the new controls"
+        of = (
+            "times the load parameters"
+            if self.equilibrium is None
+            else "of the way to the new load parameters"
+        )
         return f"Buckling: at {factors} {of}; {self.wall_time:.3g} s"
 
 
@@ -133,7 +137,8 @@ def linear_buckling(
     driven = [joint for joint in map(inputs.values.current, scene.joints) if joint._driven]
     if equilibrium is None and (acting := [*pulling_parts(inputs), *driven]):
         raise ValueError(
-            f"linear buckling multiplies the controls, and {acting[0]!r:.80} acts whatever they are: ms.follow_path has it"
+            f"linear buckling multiplies the load parameters, and {acting[0]!r:.80} acts whatever they are: "
+            "take ms.follow_path"
         )
     quadratic = scene.has_susceptible_shells
     if quadratic and equilibrium is not None:
@@ -249,7 +254,7 @@ def _stiffness_change(
 
     quadratic: forces and stiffness are proportional to the square of the load parameters; dK is by that square.
     """
-    # Where nothing moves before buckling, K is linear in the controls and any step is exact.
+    # Where nothing moves before buckling, K is linear in the load parameters and any step is exact.
     edges = scene.mesh.edge_lengths
     length = float(edges.mean()) if len(edges) else _size(scene)
     moves = displacement > _ROUND_OFF * length
@@ -264,11 +269,13 @@ def _stiffness_change(
     else:
         change = (values(step, step) - values(-step, -step)) / (2.0 * step)
     if not change.any():
-        raise ValueError("the controls neither load the scene nor change its stiffness: nothing buckles")
+        raise ValueError(
+            "the load parameters neither load the scene nor change its stiffness: nothing buckles"
+        )
     largest = np.abs(change).max()
     if not largest < _LARGEST_CHANGE * abs(stiffness.matrix).max():  # NaN too
         raise ValueError(
-            f"the controls change the stiffness by {largest:g} N/m, beyond what numbers hold: are their units right?"
+            f"the load parameters change the stiffness by {largest:g} N/m, beyond what numbers hold: are their units right?"
         )
     return change
 
@@ -296,7 +303,7 @@ def _lowest(
         available = stiffness.negative_directions(largest * change)
         if available == 0:
             raise ValueError(
-                "nothing buckles under these controls, as far as linear theory reaches; under reversed ones it may"
+                "nothing buckles under these load parameters, as far as linear theory reaches; under reversed ones it may"
             )
         inverses, vectors = scipy.sparse.linalg.eigsh(k=min(count, available), which="LA", **pencil)
     except scipy.sparse.linalg.ArpackError as error:

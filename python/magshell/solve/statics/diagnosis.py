@@ -32,10 +32,10 @@ def why_not(inputs: Inputs, found: _core.StaticsResult, at_rest: bool) -> str:
     scene, failed = inputs.scene, found.failed
     whole = found.load_fraction >= 1.0
     head = (
-        f"no stable equilibrium was found at the new controls, in {found.iterations} iterations"
+        f"no stable equilibrium was found at the new load parameters, in {found.iterations} iterations"
         if whole
-        else f"the solve stopped at {found.load_fraction:.3g} of the way to the new controls, after {found.iterations} "
-        "iterations"
+        else f"the solve stopped at {found.load_fraction:.3g} of the way to the new load parameters, "
+        f"after {found.iterations} iterations"
     )
     kept = (
         "The unstable one is in `error.last_good`; require_stable=False accepts it."
@@ -95,7 +95,7 @@ def _still_moves(failed, size: float) -> bool:
 
 def _unbalanced_vertices(inputs, found) -> tuple[list[str], np.ndarray]:
     """Find where forces are out of balance and where the energy still falls; return sentences and the vertices."""
-    if found.relaxation_steps == 0:  # the forces are still those that the new controls began with
+    if found.relaxation_steps == 0:  # the forces are still those that the new load parameters began with
         return [], np.zeros(0, dtype=int)
     model, failed = inputs.scene._model, found.failed
     with inputs.in_core():

@@ -184,7 +184,9 @@ def solve(
         result.wall_time,
     )
     if found.outcome == _core.Outcome.interrupted or energies is None:
-        raise Interrupted(f"interrupted at {found.load_fraction:.3g} of the way to the new controls", result)
+        raise Interrupted(
+            f"interrupted at {found.load_fraction:.3g} of the way to the new load parameters", result
+        )
     if found.outcome == _core.Outcome.failed:
         raise NotConverged(why_not(inputs, found, options.start_at_rest), result)
     if stopped is not None:

@@ -28,7 +28,7 @@ _COLUMNS = (
 class SolveStep(NamedTuple):
     """One step of a solve.
 
-    load_fraction: of the way from the old controls to the new ones, at the end of the step.
+    load_fraction: of the way from the old load parameters to the new ones, at the end of the step.
     method: in words: "load step" and "standard Newton" change the loads; "L-BFGS", "proximal Newton", "Newton", "best
         state of the failed step" and "along the lowest mode of a saddle" descend at fixed loads, and "descent" is the
         end of a descent that failed; "deflated Newton" searches for another equilibrium; "stability" is a
