@@ -278,10 +278,7 @@ py::dict back(Model& model, const MotionInput& input, const MotionResult& motion
     return result;
 }
 
-// Returns the tangents of positions, edge rotations, velocities and motor forces of all recorded states, from those of all inputs.
-py::tuple forward(Model& model, const MotionInput& input, const MotionResult& motion, const VectorXd& values,
-                  const py::dict& given, const py::object& progress) {
-    const Watch watch(progress);
+MotionInputTangent input_tangent_of(const Model& model, const MotionInput& input, const py::dict& given) {
     const auto array = [&](const char* name) { return given[name].cast<Array>(); };
     MotionInputTangent along;
     along.values = to_vector(array("values"));
@@ -292,6 +289,13 @@ py::tuple forward(Model& model, const MotionInput& input, const MotionResult& mo
             if (found.is_none()) throw InvalidInput("beyond the range of a value");
             return to_vector(found.cast<Array>());
         };
+    if (const py::object function = given["model_at"]; !function.is_none())
+        along.model_at = [function](double t) -> Model& {
+            const py::gil_scoped_acquire locked;
+            const py::object found = call_python(function, t);
+            if (found.is_none()) throw InvalidInput("beyond the range of a value");
+            return found.cast<Model&>();
+        };
     along.load_parameters = load_parameters_of(model, input.varying, array("controls"));
     along.positions = to_vector(array("state"));
     along.velocities = to_vector(array("velocity"));
@@ -301,13 +305,11 @@ py::tuple forward(Model& model, const MotionInput& input, const MotionResult& mo
     along.viscosity = viscosity_of(given);
     along.first_step = given["first_step"].cast<double>();
     along.length = given["length"].cast<double>();
-    MotionTangent found;
-    {
-        const py::gil_scoped_release unlocked;
-        const std::lock_guard lock(model.in_use());
-        found = motion_jvp(model, input, motion, values, along,
-                           [&](double at, double residual) { watch(at, residual); });
-    }
+    return along;
+}
+
+// Returns the tangents of positions, edge rotations, velocities and motor forces of all recorded states, and the number of factorizations.
+py::tuple tangents_of(const Model& model, const MotionResult& motion, const MotionTangent& found) {
     const py::ssize_t n = static_cast<py::ssize_t>(found.states.size()),
                       n_v = model.nodes().n_user_vertices(), n_e = model.bodies().n_edges();
     Array points({n, n_v, py::ssize_t{3}}), velocities({n, n_v, py::ssize_t{3}}), rotations({n, n_e});
@@ -320,6 +322,38 @@ py::tuple forward(Model& model, const MotionInput& input, const MotionResult& mo
         driving.row(k) = each.motor_forces.transpose();
     }
     return py::make_tuple(points, rotations, velocities, driving, found.factorizations);
+}
+
+py::tuple forward(Model& model, const MotionInput& input, const MotionResult& motion, const VectorXd& values,
+                  const py::dict& given, const py::object& progress) {
+    const Watch watch(progress);
+    const MotionInputTangent along = input_tangent_of(model, input, given);
+    MotionTangent found;
+    {
+        const py::gil_scoped_release unlocked;
+        const std::lock_guard lock(model.in_use());
+        found = motion_jvp(model, input, motion, values, along,
+                           [&](double at, double residual) { watch(at, residual); });
+    }
+    return tangents_of(model, motion, found);
+}
+
+// Returns a motion; its tangents as tangents_of does, or None; and why there are none.
+py::tuple run_with_tangent(Model& model, const MotionInput& input, std::size_t budget, AdjointStorage keep,
+                           const VectorXd& values, const py::dict& given, const py::object& progress) {
+    const Watch watch(progress);
+    const MotionInputTangent along = input_tangent_of(model, input, given);
+    MotionWithTangent found;
+    {
+        const py::gil_scoped_release unlocked;
+        const std::lock_guard lock(model.in_use());
+        found = simulate_with_tangent(model, input, {true, budget, keep}, values, along,
+                                      [&](double at, double residual) { watch(at, residual); });
+    }
+    const bool known = found.refusal.empty() && found.motion.outcome == Outcome::converged;
+    const py::object tangents =
+        known ? py::object(tangents_of(model, found.motion, found.tangent)) : py::object(py::none());
+    return py::make_tuple(std::move(found.motion), tangents, found.refusal);
 }
 
 }  // namespace
@@ -394,6 +428,11 @@ void register_dynamics(py::module_& module) {
 
     module.def("simulate", &run, py::arg("model"), py::arg("input"), py::arg("gradients"), py::arg("budget"),
                py::arg("keep"), py::arg("progress") = py::none());
+    module.def("simulate_with_tangent", &run_with_tangent, py::arg("model"), py::arg("input"),
+               py::arg("budget"), py::arg("keep"), py::arg("values"), py::arg("along"),
+               py::arg("progress") = py::none(),
+               "A motion in given steps; what push_forward_motion returns of it, or None; and why there is "
+               "none.");
     module.def("pull_back_motion", &back, py::arg("model"), py::arg("input"), py::arg("motion"),
                py::arg("by_positions"), py::arg("by_edge_rotations"), py::arg("by_velocities"),
                py::arg("by_driving") = Knots(), py::arg("by_rest") = false, py::arg("progress") = py::none());

@@ -10,6 +10,7 @@
 #include "bindings/scene_input.h"
 #include "bindings/strains.h"
 #include "magshell/core/errors.h"
+#include "magshell/mesh/space_filling_order.h"
 #include "magshell/solve/linear_response.h"
 #include "magshell/terms/magnetic/applied_field_term.h"
 #include "magshell/terms/magnetic/own_field_term.h"
@@ -17,8 +18,26 @@
 namespace magshell::bindings {
 namespace {
 
+// Returns the orders of the elements of all bodies, in the order in which a scene numbers them.
+std::vector<Renumbering> element_orders(const Bodies& bodies) {
+    std::vector<Renumbering> orders;
+    for (const Shell* shell : bodies.shells()) orders.push_back(shell->faces);
+    for (const Solid* solid : bodies.solids()) {
+        orders.push_back(solid->elements);
+        if (solid->surface()) orders.push_back(solid->surface()->faces);
+    }
+    for (const SixNodeShell* shell : bodies.six_node_shells()) orders.push_back(shell->faces);
+    for (std::size_t k = bodies.shells().size() + bodies.solids().size(); k < bodies.faces().size(); ++k)
+        if (const Surface* surface = bodies.faces()[k].surface) orders.push_back(surface->faces);
+    return orders;
+}
+
+// numbered_like: a model of the same scene in another rest shape, whose numbering the new one gets.
 std::unique_ptr<Model> make_model(const py::kwargs& given) {
     const SceneInput input = scene_input(given);
+    std::optional<ScopedOrders> orders;
+    if (given.contains("numbered_like"))
+        orders.emplace(element_orders(given["numbered_like"].cast<const Model&>().bodies()));
     const py::gil_scoped_release unlocked;
     return std::make_unique<Model>(input);
 }

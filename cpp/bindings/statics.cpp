@@ -51,10 +51,21 @@ VectorXd change(Model& model, const StaticsResult& equilibrium, const LoadParame
 }
 
 VectorXd change_along(Model& model, const StaticsResult& equilibrium, const VectorXd& gradient_change,
-                      const VectorXd& prescribed_change) {
+                      const VectorXd& prescribed_change, const VectorXd& moved, const VectorXd& forces) {
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());
-    return equilibrium_jvp(model, equilibrium, gradient_change, prescribed_change);
+    return equilibrium_jvp(model, equilibrium, {gradient_change, prescribed_change, moved, forces});
+}
+
+py::tuple carried(Model& model, const VectorXd& q, const LoadParameters& load_parameters,
+                  const VectorXd& forces) {
+    StateOnJoints found;
+    {
+        const py::gil_scoped_release unlocked;
+        const std::lock_guard lock(model.in_use());
+        found = state_on_joints(model, q, load_parameters, forces);
+    }
+    return py::make_tuple(found.moved, found.driven, found.forces);
 }
 
 // Returns the lowest eigenmodes of all degrees of freedom about an equilibrium, their eigenvalues [N/m3], and
@@ -187,9 +198,15 @@ void register_statics(py::module_& module) {
                "controls and the values that the model holds now.");
     module.def(
         "push_forward", &change_along, py::arg("model"), py::arg("equilibrium"), py::arg("gradient_change"),
-        py::arg("prescribed_change"),
+        py::arg("prescribed_change"), py::arg("moved") = VectorXd(), py::arg("forces") = VectorXd(),
         "The derivative of the state along a direction of the inputs of a solve, along which the gradient "
-        "and what supports and motors prescribe change so. The model must hold the values of that solve.");
+        "and what supports and motors prescribe change so; if joints change, also a state that stays on "
+        "them, and "
+        "the fixed gradient on the free unknowns there. The model must hold the values of that solve.");
+    module.def(
+        "state_on_joints", &carried, py::arg("model"), py::arg("q"), py::arg("controls"), py::arg("forces"),
+        "A state with its rigid parts on their joints as the values are now, the increments from there to "
+        "what motors and supports prescribe, and forces of all unknowns on the free ones there.");
 }
 
 }  // namespace magshell::bindings

@@ -47,14 +47,18 @@ __all__: list[str] = [
     "WatchedObstacle",
     "Water",
     "analyze",
+    "at_nodes",
     "build_info",
     "distances",
     "drag_faces",
     "drag_gradients",
+    "element_energies",
+    "elimination_fronts",
     "factor_backends",
     "factor_orderings",
     "fibre_states",
     "find_equilibrium",
+    "fine_face_points",
     "first_order_change",
     "follow_path",
     "lane_logarithms",
@@ -73,15 +77,19 @@ __all__: list[str] = [
     "pull_back",
     "pull_back_motion",
     "push_forward",
+    "push_forward_motion",
     "sample_fields",
     "set_num_threads",
     "shell_stresses",
     "simulate",
+    "simulate_with_tangent",
     "solid_point_states",
     "solve_with_operator",
+    "state_on_joints",
     "touching_pairs",
     "vacuum_permeability",
     "vjp",
+    "without_rest_gradient",
 ]
 
 class FactorReport:
@@ -503,6 +511,12 @@ class Model:
         """
         Points [m] and magnetic moments [A m2] of the terms of one name, or of all of them, in the applied field, (n, 3) each.
         """
+    def own_energies(
+        self, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
+    ) -> list[float]:
+        """
+        The energy of each shell of the own field in its own field alone, (n,) [J].
+        """
     def own_field_on_moments(
         self, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> tuple[
@@ -512,12 +526,6 @@ class Model:
     ]:
         """
         Of each rigid body with a moment in the own field: the place of the moment [m], the force [N] and the couple [N m] on it, (n, 3) each.
-        """
-    def own_energies(
-        self, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
-    ) -> list[float]:
-        """
-        The energy of each shell of the own field in its own field alone, (n,) [J].
         """
     def own_flux_density(
         self,
@@ -1336,6 +1344,18 @@ def pull_back_motion(
     by_rest: bool = False,
     progress: typing.Any = None,
 ) -> dict[str, typing.Any]: ...
+def push_forward(
+    model: Model,
+    equilibrium: StaticsResult,
+    gradient_change: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    prescribed_change: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    moved: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ...,
+    forces: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ...,
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    """
+    The derivative of the state along a direction of the inputs of a solve, along which the gradient and what supports and motors prescribe change so; if joints change, also a state that stays on them, and the fixed gradient on the free unknowns there. The model must hold the values of that solve.
+    """
+
 def push_forward_motion(
     model: Model,
     input: MotionInput,
@@ -1346,16 +1366,6 @@ def push_forward_motion(
 ) -> tuple[typing.Any, ...]:
     """
     The derivatives of positions, edge rotations, velocities and motor forces of recorded states along a direction of the inputs, and the number of factorizations that they took.
-    """
-
-def push_forward(
-    model: Model,
-    equilibrium: StaticsResult,
-    gradient_change: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-    prescribed_change: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
-    """
-    The derivative of the state along a direction of the inputs of a solve, along which the gradient and what supports and motors prescribe change so. The model must hold the values of that solve.
     """
 
 def sample_fields(
@@ -1387,6 +1397,19 @@ def simulate(
     keep: Keep,
     progress: typing.Any = None,
 ) -> MotionResult: ...
+def simulate_with_tangent(
+    model: Model,
+    input: MotionInput,
+    budget: typing.SupportsInt | typing.SupportsIndex,
+    keep: Keep,
+    values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    along: dict[str, typing.Any],
+    progress: typing.Any = None,
+) -> tuple[typing.Any, ...]:
+    """
+    A motion in given steps; what push_forward_motion returns of it, or None; and why there is none.
+    """
+
 def solid_point_states(
     model: Model,
     solid: typing.SupportsInt | typing.SupportsIndex,
@@ -1404,6 +1427,16 @@ def solve_with_operator(
     added: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
     rhs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
 ) -> tuple[typing.Any, ...]: ...
+def state_on_joints(
+    model: Model,
+    q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    forces: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+) -> tuple[typing.Any, ...]:
+    """
+    A state with its rigid parts on their joints as the values are now, the increments from there to what motors and supports prescribe, and forces of all unknowns on the free ones there.
+    """
+
 def touching_pairs(
     model: Model,
     q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],

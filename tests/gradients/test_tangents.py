@@ -63,19 +63,14 @@ def results_of(found):
         yield torch.as_tensor(each._own_points) / LARGE
 
 
-def is_geometry(key) -> bool:
-    return isinstance(key[0], ms.Joint) and key[1] in key[0]._geometry
-
-
 @pytest.mark.parametrize("name", AT_REST)
 @pytest.mark.filterwarnings("ignore::magshell.FieldSamplingWarning")
 def test_tangents_agree_with_gradients_in_every_kind(name):
     rng, precision = np.random.default_rng(len(name)), PRECISIONS.get(name, PRECISION)
     start = kind(name).found({})
     start = start if isinstance(start, ms.Equilibrium | ms.EquilibriumSet) else None
-    together = {key: value for key, value in kind(name).together.items() if not is_geometry(key)}
-    alone = [{key: value} for key, value in kind(name).entries.items() if not is_geometry(key)]
-    for given in (*alone, together):
+    alone = [{key: value} for key, value in kind(name).entries.items()]
+    for given in (*alone, kind(name).together):
         tensors = {key: torch.tensor(value, requires_grad=True) for key, value in given.items()}
         results = [each for each in results_of(kind(name).found(tensors, start)) if each.requires_grad]
         inputs = list(tensors.values())
@@ -84,17 +79,6 @@ def test_tangents_agree_with_gradients_in_every_kind(name):
         bound = precision * found.size + ROUNDING * found.size_of_results
         told = ", ".join(label(kind(name), key) for key in given)
         assert found.forward == pytest.approx(found.backward, rel=0.0, abs=bound), told
-
-
-def test_geometry_of_joints_has_no_tangent():
-    name = next(name for name in AT_REST if any(map(is_geometry, kind(name).together)))
-    key = next(filter(is_geometry, kind(name).entries))
-    value = torch.tensor(kind(name).entries[key])
-    with (
-        forward_ad.dual_level(),
-        pytest.raises(ms.NoGradient, match=f"no tangent by the {key[1]} of a {type(key[0]).__name__}"),
-    ):
-        kind(name).found({key: forward_ad.make_dual(value, torch.ones_like(value))})
 
 
 def test_dual_numbers_give_the_tangent_of_differences():

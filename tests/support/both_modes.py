@@ -15,6 +15,7 @@ class BothModes(NamedTuple):
     backward: float
     size: float  # sum over results of |w| |J d|
     size_of_results: float  # sum of |w| |result|
+    tangents: tuple[torch.Tensor, ...]  # J d of each result
 
 
 def direction(name, key, value, rng):
@@ -35,4 +36,5 @@ def by_both_modes(results, inputs, along, rng) -> BothModes:
         sum(float((g * d).sum()) for g, d in zip(gradients, along, strict=True)),
         sum(float(w.norm() * t.norm()) for w, t in zip(weights, tangents, strict=True)),
         sum(float(w.norm() * r.detach().norm()) for w, r in zip(weights, results, strict=True)),
+        tangents,
     )

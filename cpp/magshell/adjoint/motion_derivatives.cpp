@@ -4,6 +4,9 @@
 #include <array>
 #include <cmath>
 
+#include "magshell/core/errors.h"
+#include "magshell/solve/linear_response.h"
+
 namespace magshell {
 namespace {
 
@@ -44,22 +47,60 @@ double largest(const VectorXd& of) {
     return of.size() > 0 ? of.lpNorm<Eigen::Infinity>() : 0.0;
 }
 
-MotionDerivatives::MotionDerivatives(Model& model, const VectorXd& values, const MotionInputTangent& along)
+MotionDerivatives::MotionDerivatives(Model& model, const VectorXd& values,
+                                     const TimeVaryingParameters& varying, const MotionInputTangent& along)
     : model_(model),
       values_(values),
+      varying_(varying),
       along_(along),
-      values_change_(!along.values.isZero(0.0)),
+      reshapes_(static_cast<bool>(along.model_at)),
+      values_change_(reshapes_ || !along.values.isZero(0.0)),
       unit_(VectorXd::Ones(model.size())) {
     unit_.tail(model.size() - model.n_coordinates()).setConstant(1.0 / along.length);
+    find_changing_forces();
 }
 
-void MotionDerivatives::set(double t, const LoadParameters& load_parameters) {
-    if (values_change_) model_.parameters().set_values(values_at(t));
-    model_.parameters().set_time_varying(load_parameters);
+void MotionDerivatives::find_changing_forces() {
+    if (reshapes_) return;
+    try {
+        changing_.emplace(model_, values_, values_change_ ? values_at(along_.first_step) : values_);
+    } catch (const InvalidInput&) {  // beyond the range of a value: all may change
+    }
+}
+
+Model& MotionDerivatives::set(double t, const LoadParameters& load_parameters) {
+    Model& there = reshaped_at(t);
+    if (&there != &model_) {
+        there.set_angle_branches(model_.angle_branches());
+        there.elastic().set_history(model_.elastic().scale(), shift_);
+    } else if (values_change_) {
+        model_.parameters().set_values(values_at(t));
+    }
+    there.parameters().set_time_varying(load_parameters);
+    return there;
+}
+
+Model& MotionDerivatives::reshaped_at(double t) {
+    if (t == 0.0 || !reshapes_) return model_;
+    Reshaped& there = reshaped_[t];
+    if (!there.model) {
+        there.model = &along_.model_at(t);
+        there.varying = std::make_unique<ScopedTimeVarying>(there.model->parameters(), varying_);
+    }
+    return *there.model;
+}
+
+// Positions grow little during a motion: twice the reach of a state serves many.
+double MotionDerivatives::cancelling(const VectorXd& q) {
+    const double reach = largest(q.head(model_.n_coordinates()));
+    if (reach <= reach_) return cancelling_;
+    reach_ = 2.0 * reach;
+    return cancelling_ = largest(unit_.cwiseProduct(model_.cancelling_forces(q)));
 }
 
 VectorXd MotionDerivatives::values_at(double t) {
-    if (t == 0.0 || !along_.values_at) return values_ + t * along_.values;
+    if (t == 0.0) return values_;
+    if (!along_.values_at) return values_ + t * along_.values;
     const auto known = known_values_.find(t);
     return known != known_values_.end() ? known->second : known_values_[t] = along_.values_at(t);
 }
@@ -76,10 +117,10 @@ VectorXd MotionDerivatives::energy_gradient(const VectorXd& q, const LoadParamet
     if (!values_change_ && tangent.isZero(0.0)) return VectorXd::Zero(q.size());
     const VectorXd found = energy_.of(
         [&](double t) {
-            const LoadParameters there = load_parameters + t * tangent;
-            set(t, there);
-            model_.evaluate(q, there);
-            return VectorXd(unit_.cwiseProduct(model_.residual().gradient));
+            const LoadParameters at = load_parameters + t * tangent;
+            Model& there = set(t, at);
+            there.evaluate(q, at);
+            return VectorXd(unit_.cwiseProduct(there.residual().gradient));
         },
         along_.first_step, 0.0, "the force on the start");
     set(0.0, load_parameters);
@@ -94,8 +135,8 @@ StrainSet MotionDerivatives::strains(ViscousTerms& terms, const VectorXd& q, con
     if (!values_change_ && tangent.tail(varying).isZero(0.0)) return found;
     const VectorXd by_inputs = strains_.of(
         [&](double t) {
-            set(t, load_parameters + t * tangent);
-            return numbers_of(terms.strains(q));
+            Model& there = set(t, load_parameters + t * tangent);
+            return numbers_of(&there == &model_ ? terms.strains(q) : there.elastic().strains(q));
         },
         along_.first_step, 1.0, "a strain");
     set(0.0, load_parameters);
@@ -106,15 +147,14 @@ StrainSet MotionDerivatives::strains(ViscousTerms& terms, const VectorXd& q, con
 void MotionDerivatives::set_stage(const StageTangent& stage) {
     model_.parameters().set_time_varying(stage.load_parameters);
     model_.set_angle_branches(stage.angle_branches);
-    begin_step(stage, 0.0);
+    begin_step(model_, stage, 0.0);
 }
 
 // Begins the step again, with the contact forces of its beginning, which have no factor.
-void MotionDerivatives::begin_step(const StageTangent& stage, double t) {
-    model_.contacts().set_factor(1.0);
-    model_.begin_step(stage.record.begin.q + t * stage.q_begin_tangent,
-                      stage.begin + t * stage.begin_tangent);
-    model_.contacts().set_factor(stage.contact_factor);
+void MotionDerivatives::begin_step(Model& model, const StageTangent& stage, double t) {
+    model.contacts().set_factor(1.0);
+    model.begin_step(stage.record.begin.q + t * stage.q_begin_tangent, stage.begin + t * stage.begin_tangent);
+    model.contacts().set_factor(stage.contact_factor);
 }
 
 ForceTangent MotionDerivatives::forces(const StageTangent& stage, const VectorXd& q, bool with_contact) {
@@ -123,18 +163,24 @@ ForceTangent MotionDerivatives::forces(const StageTangent& stage, const VectorXd
     ForceTangent found{VectorXd::Zero(size), with_contact ? VectorXd::Zero(size) : VectorXd()};
     if (!moving && !values_change_ && stage.tangent.isZero(0.0)) return found;
     const auto forces = [&](double t) {
-        const LoadParameters there = stage.load_parameters + t * stage.tangent;
-        set(t, there);
-        model_.set_angle_branches(stage.angle_branches);
-        if (moving) begin_step(stage, t);
+        const LoadParameters at = stage.load_parameters + t * stage.tangent;
+        Model& there = set(t, at);
+        there.set_angle_branches(stage.angle_branches);
+        if (moving) begin_step(there, stage, t);
+        there.contacts().set_factor(stage.contact_factor);
         const VectorXd x_hat = stage.x_hat + t * stage.x_hat_tangent,
                        v_hat = stage.v_hat + t * stage.v_hat_tangent;
         const StageMotion motion{&x_hat, &v_hat, stage.T + t * stage.T_tangent};
-        model_.evaluate(q, there);
-        model_.evaluate_forces(q, there, motion);
-        const VectorXd gradient = unit_.cwiseProduct(model_.residual().gradient);
-        return with_contact ? joined({gradient, unit_.cwiseProduct(model_.contact_forces(q, there))})
-                            : gradient;
+        VectorXd gradient;
+        if (changing_ && !moving) {
+            gradient = changing_->at(q, at);
+        } else {
+            there.evaluate(q, at);
+            there.evaluate_forces(q, at, motion);
+            gradient = there.residual().gradient;
+        }
+        gradient.array() *= unit_.array();
+        return with_contact ? joined({gradient, unit_.cwiseProduct(there.contact_forces(q, at))}) : gradient;
     };
     double step = along_.first_step;
     if (moving)
@@ -142,11 +188,13 @@ ForceTangent MotionDerivatives::forces(const StageTangent& stage, const VectorXd
                            {along_.length, largest(stage.x_hat_tangent)},
                            {along_.length / stage.T, largest(stage.v_hat_tangent)},
                            {stage.T, std::abs(stage.T_tangent)}});
-    const double cancelling = values_change_ ? largest(unit_.cwiseProduct(model_.cancelling_forces(q))) : 0.0;
+    // Each step makes models in other rest shapes: powers of two let many stages share them.
+    if (reshapes_) step = std::exp2(std::floor(std::log2(step)));
+    const double noise = values_change_ ? cancelling(q) : 0.0;
     const std::array<Index, 1> ends{size};
     const VectorXd all =
         forces_.of(forces, with_contact ? std::span<const Index>(ends) : std::span<const Index>(), step,
-                   std::array{cancelling, cancelling}, "a force");
+                   std::array{noise, noise}, "a force");
     found.gradient = all.head(size).cwiseQuotient(unit_);
     if (with_contact) found.contact = all.tail(size).cwiseQuotient(unit_);
     set(0.0, stage.load_parameters);
@@ -158,17 +206,14 @@ PrescribedTangent MotionDerivatives::prescribed(const StageTangent& stage, const
                                                 const VectorXd& gradient) {
     const DofMap& dof_map = model_.dof_map();
     const bool changes = values_change_ || !stage.tangent.isZero(0.0);
-    if (!changes || !dof_map.has_values()) return {};
+    if (!changes || !(dof_map.has_values() || reshapes_)) return {};
     const bool joints = dof_map.has_reduced_coordinates() && values_change_;
     const auto target = [&](double t) {
-        const LoadParameters there = stage.load_parameters + t * stage.tangent;
-        set(t, there);
-        VectorXd moved = q;
-        if (joints) dof_map.project_state(moved, nullptr);
-        const VectorXd driven = dof_map.prescribed_increment(moved, there);
-        if (!joints) return driven;
-        model_.linearize(moved);
-        return joined({moved, driven, dof_map.vector(gradient)});
+        const LoadParameters at = stage.load_parameters + t * stage.tangent;
+        const Model& there = set(t, at);
+        if (!joints) return there.dof_map().prescribed_increment(q, at);
+        const StateOnJoints carried = state_on_joints(model_, q, at, gradient);
+        return joined({carried.moved, carried.driven, carried.forces});
     };
     const Index n = q.size();
     const std::array<Index, 2> ends{n, 2 * n};

@@ -2,10 +2,13 @@
 #pragma once
 
 #include <map>
+#include <memory>
+#include <optional>
 #include <utility>
 
 #include "magshell/adjoint/directional_derivative.h"
 #include "magshell/adjoint/motion_tangent.h"
+#include "magshell/scene/changing_forces.h"
 
 namespace magshell {
 
@@ -34,14 +37,18 @@ struct PrescribedTangent {
 
 class MotionDerivatives {
   public:
-    /// values: of the scene, in the order of the caller.
-    MotionDerivatives(Model& model, const VectorXd& values, const MotionInputTangent& along);
+    /// values: of the scene, in the order of the caller. varying: the values that vary in time.
+    MotionDerivatives(Model& model, const VectorXd& values, const TimeVaryingParameters& varying,
+                      const MotionInputTangent& along);
 
     bool values_change() const { return values_change_; }
-    /// Gives the scene its values, and those that vary in time, at a place along the direction.
-    void set(double t, const LoadParameters& load_parameters);
+    /// Gives the scene its values, and those that vary in time, at a place along the direction. Returns its model there, which is
+    /// another one if the rest shape changes: with the branches of angles, the strain history and the contact factor of this one.
+    Model& set(double t, const LoadParameters& load_parameters);
     /// Sets the model to the conditions of a stage.
     void set_stage(const StageTangent& stage);
+    /// Says the strain history that was set in the elastic terms of the model; or nullptr.
+    void set_history(const StrainSet* shift) { shift_ = shift; }
     /// Returns a step of differences over which the inputs change little, and so do numbers of these sizes at these rates.
     double step_along(std::initializer_list<std::pair<double, double>> sizes_and_rates) const;
 
@@ -60,12 +67,27 @@ class MotionDerivatives {
 
   private:
     VectorXd values_at(double t);
-    void begin_step(const StageTangent& stage, double t);
+    Model& reshaped_at(double t);
+    void begin_step(Model& model, const StageTangent& stage, double t);
+    void find_changing_forces();
+    /// Returns the largest force on any dof that cancels in the residual at q, or at states before that reached as far.
+    double cancelling(const VectorXd& q);
+
+    // The model of the scene in another rest shape, while the values vary in time.
+    struct Reshaped {
+        Model* model;
+        std::unique_ptr<ScopedTimeVarying> varying;
+    };
 
     Model& model_;
     const VectorXd& values_;
+    const TimeVaryingParameters& varying_;
     const MotionInputTangent& along_;
-    const bool values_change_;
+    const bool reshapes_, values_change_;
+    const StrainSet* shift_ = nullptr;
+    std::optional<ChangingForces> changing_;   // all may change without it
+    double cancelling_ = 0.0, reach_ = 0.0;    // [N], [m] up to which it holds
+    std::map<double, Reshaped> reshaped_;      // by their place along the direction
     VectorXd unit_;                            // of forces on all dofs: moments count over the shortest edge
     std::map<double, VectorXd> known_values_;  // by their place along the direction
     DirectionalDerivative forces_, energy_, strains_, prescribed_, dampers_;

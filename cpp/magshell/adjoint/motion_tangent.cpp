@@ -32,36 +32,53 @@ class ScopedValues {
 
 class Forward {
   public:
-    Forward(Newton& newton, const MotionInput& input, const MotionResult& motion, const VectorXd& values,
-            const MotionInputTangent& along)
+    Forward(Newton& newton, const MotionInput& input, const VectorXd& values, const MotionInputTangent& along)
         : newton_(newton),
           model_(newton.model()),
           input_(input),
-          motion_(motion),
           along_(along),
           stepper_(newton, input.tableau, input.inertia, input.viscosity, input.projective),
-          derivatives_(model_, values, along) {}
+          derivatives_(model_, values, input.varying, along) {}
 
-    MotionTangent run() {
-        begin();
+    // Begins with the tangent of the start, which is recorded too.
+    void begin(const MotionState& start) {
+        find_start(start);
         record(0, {});
-        const Index stored = motion_.steps_done - static_cast<Index>(motion_.steps.size());
-        MotionState state = motion_.start;
-        for (Index step = 0; step < motion_.steps_done; ++step) {
-            progress_ = static_cast<double>(step) / static_cast<double>(motion_.steps_done);
-            const Substeps substeps = substeps_of(motion_.substeps, step);
+    }
+
+    // Continues the tangent through a step.
+    void follow(Index step, const Substeps& substeps, const std::vector<SubstepRecord>& records) {
+        progress_ = static_cast<double>(step) / static_cast<double>(input_.steps());
+        const bool recorded = input_.recorded_after(step + 1) >= 0;
+        VectorXd motor_forces;
+        for (std::size_t k = 0; k < substeps.size(); ++k)
+            motor_forces = take(step, substeps[k], records[k], recorded && k + 1 == substeps.size());
+        record(step + 1, std::move(motor_forces));
+    }
+
+    MotionTangent run(const MotionResult& motion) {
+        begin(motion.start);
+        const Index stored = motion.steps_done - static_cast<Index>(motion.steps.size());
+        MotionState state = motion.start;
+        for (Index step = 0; step < motion.steps_done; ++step) {
+            const Substeps substeps = substeps_of(motion.substeps, step);
             std::vector<SubstepRecord> repeated;
             if (step < stored) repeat_step(stepper_, input_, step, substeps, state, &repeated);
-            const std::vector<SubstepRecord>& records =
-                step < stored ? repeated : motion_.steps[step - stored];
-            const bool recorded = input_.recorded_after(step + 1) >= 0;
-            VectorXd motor_forces;
-            for (std::size_t k = 0; k < substeps.size(); ++k)
-                motor_forces = take(step, substeps[k], records[k], recorded && k + 1 == substeps.size());
-            record(step + 1, std::move(motor_forces));
+            follow(step, substeps, step < stored ? repeated : motion.steps[step - stored]);
         }
+        return finish(motion);
+    }
+
+    // Returns the tangents of all recorded states of the motion that ends here.
+    MotionTangent finish(const MotionResult& motion) {
+        for (MotionTangent::State& state : states_)
+            if (state.motor_forces.size() == 0)
+                state.motor_forces = VectorXd::Zero(motion.last.motor_forces.size());
         return {std::move(states_), newton_.factorizations()};
     }
+
+    // Sets the values of the scene again, after a difference that failed.
+    void restore_values() { derivatives_.set(0.0, input_.load_parameters_at(0, 0.0)); }
 
     double progress() const { return progress_; }
 
@@ -73,14 +90,13 @@ class Forward {
 
     void record(Index steps, VectorXd motor_forces) {
         if (input_.recorded_after(steps) < 0) return;
-        if (motor_forces.size() == 0) motor_forces = VectorXd::Zero(motion_.last.motor_forces.size());
         states_.push_back({now_.q, now_.v, std::move(motor_forces)});
     }
 
     // The tangent of the start: it is made consistent, edge rotations are in equilibrium, Maxwell branches are without stress.
-    void begin() {
+    void find_start(const MotionState& start) {
         const DofMap& dof_map = model_.dof_map();
-        const VectorXd &q = motion_.start.q, &v = motion_.start.v;
+        const VectorXd &q = start.q, &v = start.v;
         const LoadParameters load_parameters = input_.load_parameters_at(0, 0.0),
                              tangent = load_tangent(0, 0.0);
         now_.q = along_.positions;
@@ -122,7 +138,7 @@ class Forward {
         }
         if (!explicit_first) return;
         now_.rates.w = VectorXd::Zero(q.size());
-        if (motion_.start.rates.c.size() > 0) now_.rates.c = VectorXd::Zero(q.size());
+        if (start.rates.c.size() > 0) now_.rates.c = VectorXd::Zero(q.size());
         now_.rates.elastic.d = model_.elastic().zeros();
         now_.rates.elastic.e.assign(input_.viscosity.branches.size(), model_.elastic().zeros());
     }
@@ -196,6 +212,7 @@ class Forward {
 
     // Returns the change of the state that cancels a change of the residual of a stage, while what is prescribed changes; and that
     // change of the residual. The model was evaluated last at q.
+    // nearby: a factorization made near q, or nullptr.
     VectorXd solve(const VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
                    const PrescribedTangent& change, VectorXd residual, const Factor* nearby) {
         newton_.watch(0.0);
@@ -224,6 +241,7 @@ class Forward {
         const FactorReport factor = newton_.factorize(q, load_parameters, false, proximal, no_moves);
         if (!factor.succeeded)
             throw InvalidInput("the tangent of a time step cannot be computed: " + factor.reason);
+        factorized_here_ = true;
         if (newton_.is_unsymmetric()) {
             const GmresReport report =
                 solve_unsymmetric(model_, *newton_.factor(), false, to_round_off, reduced);
@@ -236,6 +254,15 @@ class Forward {
             newton_.factor()->solve_approximately(reduced, to_round_off.tolerance);
         }
         return all + dof_map.expand(reduced);
+    }
+
+    // Returns a factorization that was made near stage i: that of its last Newton iteration, or that of the stage before, whose inertia is
+    // the same and whose stiffness is nearly so without contact; nullptr if there is none.
+    const Factor* nearby_factor(const SubstepRecord& record, int i, const LoadParameters& load_parameters) {
+        const StageState& stage = record.stages[i];
+        if (stage.factor) return stage.factor.get();
+        const bool serves = i > 0 && factorized_here_ && !model_.contacts().acts(stage.q, load_parameters);
+        return serves ? newton_.factor().get() : nullptr;
     }
 
     // Returns the derivative of M (v - v^)/T + Gamma v at a fixed state q, with v = (q - x^)/T. rates: v, and w = (v - v^)/T.
@@ -282,6 +309,8 @@ class Forward {
         const Index size = model_.size(), coordinates = model_.n_coordinates();
         const ScopedStrainHistory elastic_afterwards(model_);
         const ScopedContactFactor usual_contact_afterwards(model_);
+        factorized_here_ = false;
+        derivatives_.set_history(nullptr);
         const LoadParameters begin = input_.load_parameters_at(step, part.begin),
                              begin_tangent = load_tangent(step, part.begin);
         derivatives_.set(0.0, begin);
@@ -350,13 +379,14 @@ class Forward {
             derivatives_.set_stage(stage);
             strains.set_history(i);
             joints.set_history(i);
+            derivatives_.set_history(strains.shift());
             const ForceTangent forces = derivatives_.forces(stage, q, tableau.implicit_contact);
             newton_.evaluate(q, stage.load_parameters, proximal);
             const VectorXd residual = forces.gradient + inertia_tangent(stage, v, w) +
                                       strains.forces(q, size) + joints.forces(q, size);
             const PrescribedTangent change = derivatives_.prescribed(stage, q, newton_.gradient(q, proximal));
-            q_tangent =
-                solve(q, stage.load_parameters, proximal, change, residual, record.stages[i].factor.get());
+            q_tangent = solve(q, stage.load_parameters, proximal, change, residual,
+                              nearby_factor(record, i, stage.load_parameters));
             StageRates& now = tangents.emplace_back();
             now.v = VectorXd::Zero(size);
             now.v.head(coordinates) = (q_tangent - x_hat_tangent - T_tangent * v).head(coordinates) / T;
@@ -461,7 +491,6 @@ class Forward {
     Newton& newton_;
     Model& model_;
     const MotionInput& input_;
-    const MotionResult& motion_;
     const MotionInputTangent& along_;
     Stepper stepper_;
     MotionDerivatives derivatives_;
@@ -472,6 +501,35 @@ class Forward {
     std::vector<MotionTangent::State> states_;
     DirectionalDerivative at_start_, flights_, landings_, turns_, motors_;
     double progress_ = 0.0;
+    bool factorized_here_ = false;  // whether the factorization of newton_ is of this substep
+};
+
+// Follows a motion with its tangent until that cannot be computed. The motion goes on in any case.
+class Following final : public MotionFollower {
+  public:
+    Following(Forward& forward, std::string& refusal) : forward_(forward), refusal_(refusal) {}
+
+    void begin(const MotionState& start) override {
+        attempt([&] { forward_.begin(start); });
+    }
+    void follow(Index step, const Substeps& substeps, const std::vector<SubstepRecord>& records) override {
+        attempt([&] { forward_.follow(step, substeps, records); });
+    }
+
+  private:
+    template <class Part>
+    void attempt(const Part& part) {
+        if (!refusal_.empty()) return;
+        try {
+            part();
+        } catch (const InvalidInput& error) {
+            refusal_ = error.what();
+            forward_.restore_values();
+        }
+    }
+
+    Forward& forward_;
+    std::string& refusal_;
 };
 
 }  // namespace
@@ -486,9 +544,27 @@ MotionTangent motion_jvp(Model& model, const MotionInput& input, const MotionRes
     Newton newton(model, input.newton, [&](double residual) {
         if (watch) watch(running ? running->progress() : 0.0, residual);
     });
-    Forward forward(newton, input, motion, values, along);
+    Forward forward(newton, input, values, along);
     running = &forward;
-    return forward.run();
+    return forward.run(motion);
+}
+
+MotionWithTangent simulate_with_tangent(Model& model, const MotionInput& input,
+                                        const AdjointStorageOptions& keep, const VectorXd& values,
+                                        const MotionInputTangent& along, const MotionWatch& watch) {
+    const ScopedValues values_afterwards(model.parameters(), values);
+    const Forward* running = nullptr;
+    Newton newton(model, input.newton, [&](double residual) {
+        if (watch) watch(running ? running->progress() : 0.0, residual);
+    });
+    Forward forward(newton, input, values, along);
+    running = &forward;
+    MotionWithTangent found;
+    Following following(forward, found.refusal);
+    found.motion = simulate(model, input, keep, watch, &following);
+    if (found.refusal.empty() && found.motion.outcome == Outcome::converged)
+        found.tangent = forward.finish(found.motion);
+    return found;
 }
 
 }  // namespace magshell

@@ -8,7 +8,8 @@
 //   dv_i = d((x_i - x^_i)/(a dt)),  dw_i = d((v_i - v^_i)/(a dt))
 //
 // The change of the forces by the inputs is a central difference along the direction (directional_derivative.h), so that it costs the same
-// for any number of inputs; inertia and strain history are differentiated exactly. One factorization and one back-substitution a stage.
+// for any number of inputs; inertia and strain history are differentiated exactly. A stage is solved with the factorization of its last
+// Newton iteration if that is at hand, else with a new one; later stages of a step with that of an earlier one.
 #pragma once
 
 #include "magshell/solve/motion/dynamics.h"
@@ -20,6 +21,9 @@ struct MotionInputTangent {
     VectorXd values;  // of the scene, in the order of the caller
     /// Returns all values at a place along the direction, if they are no linear function of it; throws InvalidInput beyond their range.
     std::function<VectorXd(double)> values_at;
+    /// Returns the model of the scene at a place along the direction, with its values there, if the rest shape changes: in the same
+    /// numbering, for as long as the direction is used. Throws InvalidInput beyond the range.
+    std::function<Model&(double)> model_at;
     std::vector<LoadParameters> load_parameters;  // as MotionInput::load_parameters
     VectorXd positions, velocities;               // at the start, of all dofs
     VectorXd mass, damping;                       // of all dofs
@@ -38,6 +42,18 @@ struct MotionTangent {
     std::vector<State> states;
     int factorizations = 0;  // including those of repeated steps
 };
+
+/// A motion, with its tangent; or without one, and why.
+struct MotionWithTangent {
+    MotionResult motion;
+    MotionTangent tangent;
+    std::string refusal;
+};
+
+/// Computes a motion in given steps and its tangent at once: each stage is differentiated while its factorization is at hand.
+MotionWithTangent simulate_with_tangent(Model& model, const MotionInput& input,
+                                        const AdjointStorageOptions& keep, const VectorXd& values,
+                                        const MotionInputTangent& along, const MotionWatch& watch = {});
 
 /// Returns the tangents of all recorded states. values: of the scene, in the order of the caller, as the motion was computed with.
 /// Throws InvalidInput if the motion was not stored for gradients, and where forces are not smooth.

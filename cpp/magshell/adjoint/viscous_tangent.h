@@ -24,6 +24,9 @@ class ViscousTangent {
     /// Ends the stage whose history was set last, with its strains and their tangent.
     void finish(StrainSet d, const StrainSet& d_tangent);
 
+    /// The history that was set last, or nullptr.
+    const StrainSet* shift() const { return acts_ ? &now_.shift : nullptr; }
+
     bool idle() const { return !acts_; }
     const MaxwellStrains& e_tangent() const { return stage_.e; }
     const StrainRates& rates_tangent() const { return rate_tangents_.back().*kind_; }

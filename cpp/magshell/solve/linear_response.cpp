@@ -88,19 +88,23 @@ VectorXd stiffness_times(const VectorXd& motion, Model& model, const VectorXd& q
 // Returns the change of all dofs that cancels a change of the gradient, to first order, while prescribed dofs change. The model was
 // evaluated last at the state of the equilibrium.
 VectorXd state_change(Model& model, const StaticsResult& equilibrium, const LoadParameters& load_parameters,
-                      VectorXd gradient, VectorXd change) {
+                      ChangeAlong along) {
     const VectorXd& q = equilibrium.state;
     const DofMap& dof_map = model.dof_map();
+    VectorXd& gradient = along.gradient;
+    VectorXd change = along.prescribed;
+    if (along.moved.size() > 0) change += along.moved;
     const bool moves = !change.isZero(0.0);
     if (moves || model.capabilities().has_unsymmetric_tangent) model.assemble(q, load_parameters, false);
     if (moves) {
         VectorXd pull(q.size());
         model.multiply(change, pull);
         model.nonsymmetric_tangent().add_product(change, false, pull);
-        dof_map.add_motor_increment_forces(model.residual().gradient, change, pull);
+        dof_map.add_motor_increment_forces(model.residual().gradient, along.prescribed, pull);
         gradient += pull;
     }
     VectorXd reduced = -dof_map.vector(gradient);
+    if (along.forces.size() > 0) reduced -= along.forces;
     solve_at_equilibrium(model, *equilibrium.factor, false, reduced);
     change += dof_map.expand(reduced);
     return change;
@@ -145,17 +149,27 @@ VectorXd first_order_change(Model& model, const StaticsResult& equilibrium, cons
         throw InvalidInput("the equilibrium has no factorization: it was solved without gradients");
     model.set_angle_branches(equilibrium.angle_branches);
     model.evaluate(equilibrium.state, to);
-    return state_change(model, equilibrium, to, model.residual().gradient,
-                        model.dof_map().prescribed_increment(equilibrium.state, to));
+    return state_change(model, equilibrium, to,
+                        {.gradient = model.residual().gradient,
+                         .prescribed = model.dof_map().prescribed_increment(equilibrium.state, to)});
 }
 
-VectorXd equilibrium_jvp(Model& model, const StaticsResult& equilibrium, const VectorXd& gradient_change,
-                         const VectorXd& prescribed_change) {
+StateOnJoints state_on_joints(Model& model, const VectorXd& q, const LoadParameters& load_parameters,
+                              const VectorXd& forces) {
+    StateOnJoints carried{.moved = q, .driven = {}, .forces = {}};
+    model.dof_map().project_state(carried.moved, nullptr);
+    carried.driven = model.dof_map().prescribed_increment(carried.moved, load_parameters);
+    model.linearize(carried.moved);
+    carried.forces = model.dof_map().vector(forces);
+    return carried;
+}
+
+VectorXd equilibrium_jvp(Model& model, const StaticsResult& equilibrium, ChangeAlong change) {
     if (!equilibrium.factor)
         throw InvalidInput("the equilibrium has no factorization: it was solved without gradients");
     model.set_angle_branches(equilibrium.angle_branches);
     model.evaluate(equilibrium.state, equilibrium.load_parameters);
-    return state_change(model, equilibrium, equilibrium.load_parameters, gradient_change, prescribed_change);
+    return state_change(model, equilibrium, equilibrium.load_parameters, std::move(change));
 }
 
 }  // namespace magshell

@@ -26,10 +26,26 @@ SmallDeflection small_deflection(Model& model, const VectorXd& q, const LoadPara
 /// that the model has now: the first Newton step with the old Hessian. Throws InvalidInput if no factorization was stored.
 VectorXd first_order_change(Model& model, const StaticsResult& equilibrium, const LoadParameters& to);
 
-/// Returns the derivative of all dofs along a direction of the parameters, along which the gradient at the fixed state changes by
-/// gradient_change and prescribed dofs by prescribed_change, both of all dofs: H dq_f = -(dg + H_fh dq_h). The model must have the
-/// parameters of the equilibrium. Throws InvalidInput if no factorization was stored.
-VectorXd equilibrium_jvp(Model& model, const StaticsResult& equilibrium, const VectorXd& gradient_change,
-                         const VectorXd& prescribed_change);
+/// A state q, and forces on all dofs, after the parameters of joints have changed.
+struct StateOnJoints {
+    VectorXd moved;   // q, with rigid bodies on their joints again
+    VectorXd driven;  // the increments of all dofs from there to the targets of supports and motors
+    VectorXd forces;  // on the free dofs there
+};
+
+/// Computes it with the parameters that the model has now. Linearizes the reduced coordinates there.
+StateOnJoints state_on_joints(Model& model, const VectorXd& q, const LoadParameters& load_parameters,
+                              const VectorXd& forces);
+
+/// The derivatives along a direction of the parameters: of the gradient at the fixed state and of what supports and motors
+/// prescribe, of all dofs; and of a state that stays on its joints and of the forces of the fixed gradient on the free dofs there, both
+/// empty if no joint changes.
+struct ChangeAlong {
+    VectorXd gradient, prescribed, moved = {}, forces = {};
+};
+
+/// Returns the derivative of all dofs: H dq_f = -(dg + H_fh dq_h). The model must have the parameters of the equilibrium. Throws
+/// InvalidInput if no factorization was stored.
+VectorXd equilibrium_jvp(Model& model, const StaticsResult& equilibrium, ChangeAlong change);
 
 }  // namespace magshell

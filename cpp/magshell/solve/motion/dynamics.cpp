@@ -58,13 +58,14 @@ void record_state(const Model& model, const MotionInput& input, MotionResult& re
 
 class Run {
   public:
-    // grown: the input itself if the steps are to be chosen; it receives those that are accepted. Else nullptr.
+    // grown: the input itself if the steps are to be chosen; it receives those that are accepted. Else nullptr. follower: or nullptr.
     Run(Newton& newton, const MotionInput& input, MotionInput* grown, const AdjointStorageOptions& keep,
-        MotionResult& result)
+        MotionFollower* follower, MotionResult& result)
         : newton_(newton),
           model_(newton.model()),
           input_(input),
           grown_(grown),
+          follower_(follower),
           result_(result),
           stepper_(newton, input.tableau, input.inertia, input.viscosity, input.projective),
           balance_(model_, input.inertia, stepper_.free_bodies(), input.tableau) {
@@ -72,6 +73,7 @@ class Run {
         result_.start = result_.last = beginning(newton.model(), input);
         result_.begun = true;
         if (keep.gradients) plan(keep);
+        if (follower_) follower_->begin(result_.start);
     }
 
     bool run() {
@@ -147,6 +149,7 @@ class Run {
         if (attempt.substeps.size() > 1 || attempt.substeps.front().dissipative)
             result_.substeps[step] = std::move(attempt.substeps);
         if (attempt.divided) result_.divided.push_back(step);
+        if (follower_) be_followed(step, attempt.records);
         if (!attempt.records.empty()) {
             for (const SubstepRecord& substep : attempt.records) result_.bytes += bytes_of(substep);
             result_.steps.push_back(std::move(attempt.records));
@@ -157,6 +160,19 @@ class Run {
         before_last_ = std::move(state);
         ++result_.steps_done;
         if (input_.recorded_after(result_.steps_done) >= 0) record();
+    }
+
+    // Shows a step to the follower, and then drops what is not to be stored.
+    void be_followed(Index step, std::vector<SubstepRecord>& records) {
+        follower_->follow(step, substeps_of(result_.substeps, step), records);
+        if (result_.keep == AdjointStorage::factors) return;
+        for (SubstepRecord& substep : records)
+            for (StageState& stage : substep.stages)
+                if (stage.factor.use_count() == 1)
+                    model_.store_spare_factor(std::const_pointer_cast<Factor>(std::move(stage.factor)));
+                else
+                    stage.factor.reset();
+        if (!stores_stages(step)) records.clear();
     }
 
     // Decides what is stored: all stages, if the budget allows it. Otherwise a third of the budget is for the stages of the last
@@ -243,7 +259,7 @@ class Run {
     // Takes a step: the given fraction of an interval. If the whole step fails, takes it in substeps if it is divisible; the attempt fails
     // if the shortest substep fails.
     Attempt take(Index step, double fraction, bool divisible, MotionState& state) {
-        const bool keep = stores_stages(step);
+        const bool keep = stores_stages(step) || follower_;
         Attempt attempt;
         Substeps ahead = needs_short_start(state) ? short_start_substeps() : Substeps{Substep{}};
         while (!ahead.empty()) {
@@ -258,7 +274,7 @@ class Run {
                        shortest = fraction * substep.fraction() <= smallest_part;
             const bool taken =
                 stepper_.step(state, dt, substep.dissipative, load_parameters, recorded ? &record : nullptr,
-                              result_.keep == AdjointStorage::factors, result_.reason);
+                              result_.keep == AdjointStorage::factors || follower_, result_.reason);
             const bool calm = substep.dissipative || input_.tableau.stages == 1;  // implicit Euler already
             const bool gains_energy =
                 taken && balance_.applies() && !(calm && shortest) &&
@@ -304,6 +320,7 @@ class Run {
     Model& model_;
     const MotionInput& input_;
     MotionInput* grown_;
+    MotionFollower* follower_;
     MotionResult& result_;
     Stepper stepper_;
     EnergyBalance balance_;
@@ -377,7 +394,7 @@ Index next_checkpoint(Index steps, Index leaf, Index slots) {
 }
 
 MotionResult simulate(Model& model, const MotionInput& input, const AdjointStorageOptions& keep,
-                      const MotionWatch& watch) {
+                      const MotionWatch& watch, MotionFollower* follower) {
     MotionResult result;
     result.last = input.start;
     model.contacts().forget();
@@ -391,7 +408,7 @@ MotionResult simulate(Model& model, const MotionInput& input, const AdjointStora
     if (chooses) grown = input;
     const MotionInput& used = chooses ? grown : input;
     try {
-        Run run(newton, used, chooses ? &grown : nullptr, keep, result);
+        Run run(newton, used, chooses ? &grown : nullptr, keep, follower, result);
         result.outcome = run.run() ? Outcome::converged : Outcome::failed;
     } catch (const Interrupted&) {
         result.outcome = Outcome::interrupted;

@@ -106,9 +106,18 @@ struct MotionResult {
 /// Called once per iteration; throws Interrupted to stop the motion.
 using MotionWatch = std::function<void(double progress, double residual)>;
 
-/// Computes a motion. If it fails or is interrupted, the result holds the steps done until then.
+/// Follows a motion step by step while the factorizations of its stages are at hand; the model is the motion's.
+class MotionFollower {
+  public:
+    virtual ~MotionFollower() = default;
+    virtual void begin(const MotionState& start) = 0;
+    /// Called with the substeps of each step and their stages.
+    virtual void follow(Index step, const Substeps& substeps, const std::vector<SubstepRecord>& records) = 0;
+};
+
+/// Computes a motion. If it fails or is interrupted, the result holds the steps done until then. follower: of given steps; or nullptr.
 MotionResult simulate(Model& model, const MotionInput& input, const AdjointStorageOptions& keep,
-                      const MotionWatch& watch = {});
+                      const MotionWatch& watch = {}, MotionFollower* follower = nullptr);
 
 /// Returns the substeps in which a step was taken.
 Substeps substeps_of(const std::map<Index, Substeps>& substeps, Index step);

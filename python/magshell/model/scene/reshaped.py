@@ -115,6 +115,32 @@ def _made(scene: Scene, numbers: dict[Any, np.ndarray]) -> ReshapedScene:
     if before is not None and before[0].keys() == numbers.keys():
         if all(np.array_equal(before[0][body], x) for body, x in numbers.items()):
             return before[1]
+    there = _with_rest(scene, numbers)
+    remember(
+        there,
+        _origin=scene,
+        _family=scene._family,
+        _allow_rigid_motions=scene._allow_rigid_motions,
+    )
+    _check_same_supports(scene, there)
+    remember(scene, _reshaped=({body: x.copy() for body, x in numbers.items()}, there))
+    return there
+
+
+def neighbour(scene: Scene, numbers: dict[Any, np.ndarray]) -> ReshapedScene:
+    """Return a scene with these rest positions in the numbering of this one, for differences along a change of them.
+
+    Raises ValueError for rest positions that do not fit.
+    """
+    there = _with_rest(scene, numbers, numbered_like=scene)
+    _check_same_supports(scene, there)
+    return there
+
+
+def _with_rest(
+    scene: Scene, numbers: dict[Any, np.ndarray], numbered_like: Scene | None = None
+) -> ReshapedScene:
+    """Make the scene with these rest positions, which knows what stands in for the objects of the given one."""
     now = {id(body): body.replaced(rest_positions=x) for body, x in numbers.items()}
     own: dict[int, Any] = {}
 
@@ -131,18 +157,12 @@ def _made(scene: Scene, numbers: dict[Any, np.ndarray]) -> ReshapedScene:
         name: tuple(map(stand_in, each)) if isinstance(each, tuple) else each
         for name, each in Scene.__getstate__(scene).items()
     }
-    there = ReshapedScene(**{**arguments, "allow_rigid_motions": True})
+    there = ReshapedScene.__new__(ReshapedScene)
+    remember(there, _numbered_like=numbered_like)
+    there.__init__(**{**arguments, "allow_rigid_motions": True})
     own[id(scene)] = there
     own |= {id(body.skin): now[id(body)].skin for body in numbers if getattr(body, "skin", None) is not None}
-    remember(
-        there,
-        _origin=scene,
-        _stand_ins=own,
-        _family=scene._family,
-        _allow_rigid_motions=scene._allow_rigid_motions,
-    )
-    _check_same_supports(scene, there)
-    remember(scene, _reshaped=({body: x.copy() for body, x in numbers.items()}, there))
+    remember(there, _stand_ins=own)
     return there
 
 

@@ -112,6 +112,7 @@ class Scene(PlotMixin):
 
     _replaceable = ("gravity", "vertex_loads")
     _shares_directions = True  # whether edges with equal directions across them share one
+    _numbered_like: Scene | None = None  # the scene whose numbering of elements and unknowns this one has
     _stand_ins: dict[int, Any] = {}  # noqa: RUF012 - of a reshaped scene, its objects by the ids of those they stand for
 
     @grouped()
@@ -263,6 +264,7 @@ class Scene(PlotMixin):
             obstacles=[each._core for each in self.obstacles],
             water=None if self.water is None else self.water._core,
             **own_field_inputs(self),
+            **({} if self._numbered_like is None else {"numbered_like": self._numbered_like._model}),
         )
 
     def _grounded_vertices(self) -> np.ndarray:

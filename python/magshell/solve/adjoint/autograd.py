@@ -295,6 +295,62 @@ class _Once(torch.autograd.Function):
         return torch.zeros((), dtype=torch.float64), None
 
 
+class _Notes:
+    """The tangents of leaves as arrays; none until they are noted."""
+
+    numbers: Sequence[np.ndarray] = ()
+
+
+class _Asked(torch.autograd.Function):
+    """A zero connected to leaves: forward mode asks for its tangent with those of the leaves, which _Noted notes."""
+
+    @staticmethod
+    def forward(noted: _Notes, *leaves: torch.Tensor) -> torch.Tensor:
+        return torch.zeros((), dtype=torch.float64)
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: torch.Tensor) -> None:
+        ctx.noted, *ctx.leaves = inputs
+
+    @staticmethod
+    def jvp(ctx: Any, _: None, *tangents: torch.Tensor | None) -> torch.Tensor:
+        pairs = zip(tangents, ctx.leaves, strict=True)
+        along = [torch.zeros_like(_primal(leaf)) if each is None else each for each, leaf in pairs]
+        return _Noted.apply(ctx.noted, *along)
+
+    @staticmethod
+    def vmap(info: Any, in_dims: tuple[Any, ...], *inputs: Any) -> tuple[torch.Tensor, None]:
+        return torch.zeros((), dtype=torch.float64), None
+
+
+class _Noted(torch.autograd.Function):
+    """A zero that notes the numbers of tensors, except inside torch.func.vmap."""
+
+    @staticmethod
+    def forward(noted: _Notes, *tensors: torch.Tensor) -> torch.Tensor:
+        noted.numbers = [numbers_of(each) for each in tensors]
+        return torch.zeros((), dtype=torch.float64)
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: torch.Tensor) -> None:
+        pass
+
+    @staticmethod
+    def jvp(ctx: Any, *_: torch.Tensor | None) -> torch.Tensor:
+        return torch.zeros((), dtype=torch.float64)
+
+    @staticmethod
+    def vmap(info: Any, in_dims: tuple[Any, ...], *inputs: Any) -> tuple[torch.Tensor, None]:
+        return torch.zeros((), dtype=torch.float64), None
+
+
+def tangents_of(leaves: Sequence[torch.Tensor]) -> Sequence[np.ndarray] | None:
+    """Return the tangents of leaves for which forward mode asks now; None if it does not, or they are no plain numbers."""
+    noted = _Notes()
+    _Asked.apply(noted, *leaves)
+    return noted.numbers if any(map(np.any, noted.numbers)) else None
+
+
 _SECOND = (
     "no second derivatives of this solve, in this order: equilibria have those of gradients (create_graph=True, "
     "torch.func.hessian), other solves and tangents have none. Take differences of gradients: "

@@ -6,7 +6,7 @@ start, masses, damping, lengths of steps and the viscous law. These are collecte
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,12 +15,13 @@ from ... import _core
 from ..._runtime.log import log
 from ...errors import NoGradient
 from ...model.rigid.equimomental_points import own_velocities
-from ...model.scene.reshaped import REST
+from ...model.scene.reshaped import REST, neighbour
 from ...model.scene.values import Values
 from .differences import directional_derivative
-from .tangent import changed_values, steps_along
+from .tangent import changed_values, steps_along, steps_by_rest, values_in_neighbour
 
 if TYPE_CHECKING:
+    from ...model.scene.scene import Scene
     from ...model.scene.solve_inputs import Leaf
     from ..dynamics.motion_inputs import MotionInputs
 
@@ -39,18 +40,57 @@ def motion_tangents(
 
     along: the changes of all leaves of the inputs. Raises NoGradient where there are none.
     """
-    inputs, model = asked.inputs, asked.inputs.scene._model
-    direction = _Direction(asked)
-    for leaf, change in zip(inputs.leaves, along, strict=True):
-        if np.any(change):
-            direction.add(leaf, change)
+    inputs, direction = asked.inputs, _direction(asked, along)
     with inputs.in_core():
         try:
-            *tangents, factorizations = _core.push_forward_motion(
-                model, asked.core, found, inputs.values.numbers, direction.to_core()
+            found_along = _core.push_forward_motion(
+                inputs.scene._model, asked.core, found, inputs.values.numbers, direction.to_core()
             )
         except ValueError as error:
-            raise NoGradient(f"no tangent of this motion: {error}; {_ADVICE}") from error
+            raise _refusal(error) from error
+    return _arrays(found_along)
+
+
+def motion_with_tangents(
+    asked: MotionInputs, along: Sequence[np.ndarray], progress: Callable[[float, float], Any]
+) -> tuple[_core.MotionResult, list[np.ndarray] | NoGradient]:
+    """Compute a motion in given steps, and at once the same derivatives; or why there are none.
+
+    Each stage is differentiated while its factorization is at hand. The core must hold the inputs.
+    """
+    try:
+        direction = _direction(asked, along).to_core()
+    except NoGradient as refusal:
+        found = _core.simulate(
+            asked.inputs.scene._model, asked.core, True, asked.memory_budget, asked.keep, progress
+        )
+        return found, refusal
+    found, tangents, refusal = _core.simulate_with_tangent(
+        asked.inputs.scene._model,
+        asked.core,
+        asked.memory_budget,
+        asked.keep,
+        asked.inputs.values.numbers,
+        direction,
+        progress,
+    )
+    return found, _refusal(refusal) if tangents is None else _arrays(tangents)
+
+
+def _direction(asked: MotionInputs, along: Sequence[np.ndarray]) -> _Direction:
+    direction = _Direction(asked)
+    for leaf, change in zip(asked.inputs.leaves, along, strict=True):
+        if np.any(change):
+            direction.add(leaf, change)
+    return direction
+
+
+def _refusal(why: object) -> NoGradient:
+    return NoGradient(f"no tangent of this motion: {why}; {_ADVICE}")
+
+
+def _arrays(found_along: tuple[Any, ...]) -> list[np.ndarray]:
+    *tangents, factorizations = found_along
     log.debug("tangent of a motion: %d factorizations", factorizations)
     return [np.ascontiguousarray(each) for each in tangents]
 
@@ -63,6 +103,8 @@ class _Direction:
         model, law = self._inputs.scene._model, asked._law
         self._values = np.zeros(len(self._inputs.values.numbers))
         self._changed: list[tuple[Leaf, np.ndarray]] = []  # of the values
+        self._reshapes: list[tuple[Leaf, np.ndarray]] = []  # of rest positions
+        self._models: dict[float, _core.Model] = {}  # by their place along the direction
         self._rows = np.zeros_like(asked._rows)
         self._state, self._velocity = np.zeros(model.size), np.zeros(model.size)
         self._mass, self._damping = np.zeros(len(asked._mass)), np.zeros(len(asked._damping))
@@ -74,8 +116,8 @@ class _Direction:
         if leaf.refusal:
             raise NoGradient(f"no tangent by {leaf.name}: {leaf.refusal}")
         if leaf.owner is not None and leaf.name == REST:
-            raise NoGradient(f"no tangent of a motion by {REST}: {_ADVICE}")
-        if hasattr(leaf.owner, "columns"):
+            self._add_rest(leaf, change)
+        elif hasattr(leaf.owner, "columns"):
             for columns in leaf.owner.columns():
                 self._rows[:, columns] += change.reshape(len(self._rows), -1)
         elif leaf.owner is not None or leaf.name == "remanent_magnetization":
@@ -93,7 +135,8 @@ class _Direction:
         shortest = float(scene.mesh.edge_lengths.min(initial=np.inf))
         return {
             "values": self._values,
-            "values_at": None if self._is_linear() else self._values_at,
+            "values_at": None if self._reshapes or self._is_linear() else self._values_at,
+            "model_at": self._model_at if self._reshapes else None,
             "controls": self._rows,
             "state": self._state,
             "velocity": self._velocity,
@@ -129,21 +172,60 @@ class _Direction:
         if asked._begins_anew and own.size:
             self._velocity += self._vector(np.zeros((inputs.scene.mesh.n_vertices, 3)), own)
 
+    def _add_rest(self, leaf: Leaf, change: np.ndarray) -> None:
+        """Add a change of rest positions: of masses, and of the start where that is the rest shape."""
+        model = self._inputs.scene._model
+        n_coordinates = 3 * self._inputs.scene._bodies.n_points
+
+        def at(step: float) -> np.ndarray:
+            values = values_in_neighbour(self._inputs, leaf, step * change)
+            start = values.scene._model.rest_state()
+            return np.stack([np.pad(values.masses, (0, len(start) - len(values.masses))), start])
+
+        rates = directional_derivative(at, steps_by_rest(leaf, change))
+        if rates is None:
+            raise NoGradient(f"no tangent by {REST}: masses are not smooth in it; {_ADVICE}")
+        self._reshapes.append((leaf, change))
+        self._mass += rates[0, : len(self._mass)]
+        if not self._asked.starts_at_rest:
+            rates[1, :n_coordinates] = 0.0  # directions across held edges are those at rest
+        self._state += rates[1, : model.size]
+
     def _values_at(self, step: float) -> np.ndarray | None:
         """Return the values of the scene at a step along the direction; None beyond the range of one."""
+        try:
+            return self._in_scene(self._inputs.scene, step).numbers
+        except ValueError:
+            return None
+
+    def _model_at(self, step: float) -> _core.Model | None:
+        """Return the model of the scene at a step along the direction, with its values; None beyond the range of one."""
+        scene = self._inputs.scene
+        if step not in self._models:
+            shapes = {
+                leaf.owner: leaf.owner.mesh.rest_positions + step * change for leaf, change in self._reshapes
+            }
+            try:
+                values = self._in_scene(neighbour(scene, shapes), step)
+            except ValueError:
+                return None
+            with values.in_core():
+                self._models[step] = values.scene._model
+        return self._models[step]
+
+    def _in_scene(self, there: Scene, step: float) -> Values:
+        """Return the values at a step along the direction in the scene, or in one with other rest positions."""
         values = self._inputs.values
         replaced = {owner: dict(named) for owner, named in values.replaced.items()}
         magnetization = self._inputs.magnetization
-        try:
-            for leaf, change in self._changed:
-                if leaf.owner is None:
-                    magnetization = magnetization + np.broadcast_to(step * change, magnetization.shape)
-                    continue
-                before = np.asarray(replaced[leaf.owner][leaf.name], dtype=np.float64)
-                replaced[leaf.owner][leaf.name] = before + np.broadcast_to(step * change, before.shape)
-            return Values(values.scene, replaced, magnetization, sampling_of=values).numbers
-        except ValueError:
-            return None
+        for leaf, change in self._changed:
+            if leaf.owner is None:
+                magnetization = magnetization + np.broadcast_to(step * change, magnetization.shape)
+                continue
+            before = np.asarray(replaced[leaf.owner][leaf.name], dtype=np.float64)
+            replaced[leaf.owner][leaf.name] = before + np.broadcast_to(step * change, before.shape)
+        own = {there._own(owner): named for owner, named in replaced.items()}
+        return Values(there, own, magnetization, sampling_of=values)
 
     def _is_linear(self) -> bool:
         """Return whether the values are linear along the direction, to round-off: unit vectors and products are not."""
@@ -160,7 +242,9 @@ class _Direction:
         return True
 
     def _first_step(self) -> float:
-        return min((_step(size, rate) for size, rate in self._sizes_and_rates()), default=_STEP)
+        steps = [_step(size, rate) for size, rate in self._sizes_and_rates()]
+        steps += [steps_by_rest(leaf, change)[0] for leaf, change in self._reshapes]
+        return min(steps, default=_STEP)
 
     def _own_velocities(self, values: Values) -> np.ndarray:
         """Return the starting velocities of the points of rigid bodies that values say."""

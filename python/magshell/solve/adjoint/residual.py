@@ -74,12 +74,13 @@ class Residual:
         self.inputs: Inputs = inputs
         self.state: np.ndarray = state
         self.controls: np.ndarray = controls
-        self._model, self._angle_branches = inputs.scene._model, angle_branches
+        self.angle_branches: list[list[float]] = angle_branches
+        self._model = inputs.scene._model
         self.with_rest: bool = any(leaf.name == REST and leaf.owner is not None for leaf in inputs.leaves)
 
     def at(self, state: np.ndarray, controls: np.ndarray) -> Residual:
         """Return the same at another state and other load parameters."""
-        return Residual(self.inputs, state, self._angle_branches, controls)
+        return Residual(self.inputs, state, self.angle_branches, controls)
 
     def gradient(self) -> np.ndarray:
         """Return g of all unknowns."""
@@ -200,7 +201,7 @@ class Residual:
     def _prepare(self) -> None:
         if self.inputs.scene.rigid_parts:
             raise NoGradient("no gradient here: the scene has rigid bodies or skeletons")
-        self._model.term_energies(self.state, self._angle_branches, self.controls)
+        self._model.term_energies(self.state, self.angle_branches, self.controls)
 
     @property
     def _parts(self) -> list[slice]:

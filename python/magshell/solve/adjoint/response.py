@@ -28,9 +28,10 @@ from .differences import directional_derivative
 from .energy import Unknowns
 from .leaf_gradient import by_leaf
 from .residual import Residual
-from .tangent import changed, steps_along
+from .tangent import changed, steps_along, steps_by_rest, values_in_neighbour
 
 if TYPE_CHECKING:
+    from ... import _core
     from ...model.scene.solve_inputs import Inputs, Leaf
     from ...model.scene.values import Gradient
 
@@ -227,30 +228,15 @@ class ResponseAdjoint:
 
         The last two are zero at rest, where q stays.
         """
-        if leaf.name == REST and leaf.owner is not None:
-            raise NoGradient(
-                f"no tangent of a linear response by {REST}: take gradients with backward(), torch.func.vjp or jacrev"
-            )
         here, model = self._here, self._model
-        inputs = self._inputs_of(part)
-
-        def at(step: float) -> np.ndarray:
-            numbers, controls = changed(inputs, leaf, step * change)
-            model.set_values(numbers)
-            before, after = (controls, self._after.controls) if part == BEFORE else (here.controls, controls)
-            forces = -model.hessian_product(here.state, before, self._response)
-            for load in self._loads:
-                forces += load.weight * model.gradient(here.state, load.controls(before, after))
-            further = after[self._support_factor] - before[self._support_factor]
-            found = [forces, further * model.prescribed_rate(before)]
-            if self._at_rest:
-                return np.stack([*found, *map(np.zeros_like, found)])
-            gradient = model.gradient(here.state, before)
-            return np.stack([*found, gradient, model.driven_increment(here.state, before)])
-
+        if leaf.name == REST and leaf.owner is not None:
+            at, steps = self._rows_by_rest(leaf, change), steps_by_rest(leaf, change)
+        else:
+            inputs = self._inputs_of(part)
+            at, steps = self._rows_by_value(inputs, leaf, part, change), steps_along(inputs, leaf, change)
         here.gradient()  # sets the turns of angles
         try:
-            rates = directional_derivative(at, steps_along(inputs, leaf, change))
+            rates = directional_derivative(at, steps)
         finally:
             model.set_values(here.inputs.values.numbers)
         if rates is None:
@@ -259,6 +245,45 @@ class ResponseAdjoint:
                 "gradients with backward(), torch.func.vjp or jacrev"
             )
         return rates
+
+    def _rows_by_value(
+        self, inputs: Inputs, leaf: Leaf, part: int, change: np.ndarray
+    ) -> Callable[[float], np.ndarray]:
+        here, model = self._here, self._model
+
+        def at(step: float) -> np.ndarray:
+            numbers, controls = changed(inputs, leaf, step * change)
+            model.set_values(numbers)
+            before, after = (controls, self._after.controls) if part == BEFORE else (here.controls, controls)
+            return self._rows(model, here.state, before, after)
+
+        return at
+
+    def _rows_by_rest(self, leaf: Leaf, change: np.ndarray) -> Callable[[float], np.ndarray]:
+        here, after = self._here, self._after.controls
+
+        def at(step: float) -> np.ndarray:
+            values = values_in_neighbour(here.inputs, leaf, step * change)
+            with values.in_core():
+                model = values.scene._model
+                state = model.rest_state() if self._at_rest else here.state
+                model.term_energies(state, here.angle_branches, here.controls)
+                return self._rows(model, state, here.controls, after)
+
+        return at
+
+    def _rows(
+        self, model: _core.Model, state: np.ndarray, before: np.ndarray, after: np.ndarray
+    ) -> np.ndarray:
+        """Return f - K u, m, g(q, c) and what supports prescribe in a model, (4, n)."""
+        forces = -model.hessian_product(state, before, self._response)
+        for load in self._loads:
+            forces += load.weight * model.gradient(state, load.controls(before, after))
+        further = after[self._support_factor] - before[self._support_factor]
+        found = [forces, further * model.prescribed_rate(before)]
+        if self._at_rest:
+            return np.stack([*found, *map(np.zeros_like, found)])
+        return np.stack([*found, model.gradient(state, before), model.driven_increment(state, before)])
 
     def _inputs_of(self, part: int) -> Inputs:
         return self._after if part == AFTER else self._here.inputs

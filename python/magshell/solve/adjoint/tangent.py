@@ -4,20 +4,20 @@
 
 dg is the change of the gradient of the energy at the fixed state, and dq_h that of what supports and motors prescribe. Both
 are differences along the direction, so that the cost does not grow with the number of inputs: at most eight evaluations of
-the gradient, four where it is linear, and one back-substitution with the stored factorization.
+the gradient, four where it is linear, and one back-substitution with the stored factorization. Where joints move, rigid
+bodies stay on them, and the forces of the gradient on the free unknowns change with these.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
 from ... import _core
 from ...errors import NoGradient
 from ...model.rigid.joints import Joint
-from ...model.scene.reshaped import REST, reshaped
-from ...model.scene.reshaped_states import directions_of, renumbered_state, renumbered_vector
+from ...model.scene.reshaped import REST, neighbour
 from ...model.scene.values import Values
 from .differences import directional_derivative
 
@@ -37,16 +37,20 @@ def state_tangent(inputs: Inputs, found: _core.StaticsResult, along: list[np.nda
     Raises NoGradient where there is none.
     """
     model = inputs.scene._model
-    total = np.zeros((2, model.size))  # of the gradient, and of what is prescribed
+    total = np.zeros((4, model.size))  # of the gradient, of what is prescribed, and of what joints carry
     with inputs.in_core():
         try:
             model.term_energies(found.state, found.turns, inputs.controls)  # sets the turns of angles
             for leaf, change in zip(inputs.leaves, along, strict=True):
                 if np.any(change):
-                    total += _rates(inputs, found, leaf, change)
+                    rates = _rates(inputs, found, leaf, change)
+                    total[: len(rates)] += rates
         finally:
             model.set_values(inputs.values.numbers)
-        return _core.push_forward(model, found, *total)
+        gradient, prescribed, moved, free = total
+        if not (np.any(moved) or np.any(free)):
+            return _core.push_forward(model, found, gradient, prescribed)
+        return _core.push_forward(model, found, gradient, prescribed, moved, free[: model.free_size])
 
 
 def motor_tangent(
@@ -114,59 +118,65 @@ def _added(value, change: np.ndarray) -> np.ndarray:
 
 
 def _rates(inputs: Inputs, found: _core.StaticsResult, leaf: Leaf, change: np.ndarray) -> np.ndarray:
-    """Return the derivatives of the gradient at the fixed state, and of the increments to what is prescribed, (2, n)."""
-    advice = "take gradients with backward(), torch.func.vjp or jacrev"
+    """Return the derivatives of the gradient at the fixed state, and of the increments to what is prescribed, (2, n).
+
+    By a joint, (4, n): also of the state that stays on it, and of the gradient on the free unknowns there, zeros after that.
+    """
     if leaf.refusal:
         raise NoGradient(f"no tangent by {leaf.name}: {leaf.refusal}")
-    if isinstance(leaf.owner, Joint) and leaf.name in leaf.owner._geometry:
-        raise NoGradient(f"no tangent by the {leaf.name} of a {type(leaf.owner).__name__}: {advice}")
+    model, state, controls = inputs.scene._model, found.state, inputs.controls
     if leaf.name == REST and leaf.owner is not None:
-        return _rates_by_rest(inputs, found, leaf, change)
-    model, state = inputs.scene._model, found.state
+
+        def at(step: float) -> np.ndarray:
+            values = values_in_neighbour(inputs, leaf, step * change)
+            with values.in_core():
+                there = values.scene._model
+                there.term_energies(state, found.turns, controls)
+                return np.stack([there.gradient(state, controls), there.driven_increment(state, controls)])
+
+        rates = directional_derivative(at, steps_by_rest(leaf, change))
+        return rates if rates is not None else _refuse_kink(leaf)
+    moves = isinstance(leaf.owner, Joint) and leaf.name in leaf.owner._geometry
+    gradient = model.gradient(state, controls) if moves else np.zeros(0)
+    # The gradient on the free unknowns and the increments of motors vanish by cancellation: of all forces, and of places.
+    forces_and_places = np.abs(gradient).max(initial=0.0), np.abs(state).max(initial=0.0)
+    sizes = np.array([1.0 / each if each > 0.0 else 0.0 for each in forces_and_places])[[0, 1, 1, 0]]
 
     def at(step: float) -> np.ndarray:
         numbers, controls = changed(inputs, leaf, step * change)
         model.set_values(numbers)
-        return np.stack([model.gradient(state, controls), model.driven_increment(state, controls)])
+        forces = model.gradient(state, controls)
+        if not moves:
+            return np.stack([forces, model.driven_increment(state, controls)])
+        moved, driven, free = _core.state_on_joints(model, state, controls, gradient)
+        return np.stack([forces, driven, moved, np.pad(free, (0, len(state) - len(free)))])
 
-    rates = directional_derivative(at, steps_along(inputs, leaf, change))
-    if rates is None:
-        raise NoGradient(
-            f"no tangent by {leaf.name}: the forces are not smooth in it, or it is at the end of its range; {advice}"
-        )
-    return rates
+    rates = directional_derivative(at, steps_along(inputs, leaf, change), sizes=sizes if moves else None)
+    return rates if rates is not None else _refuse_kink(leaf)
 
 
-def _rates_by_rest(inputs: Inputs, found: _core.StaticsResult, leaf: Leaf, change: np.ndarray) -> np.ndarray:
-    """Return the same along a change of rest positions, from scenes that are made with others."""
-    scene, body, held = inputs.scene, leaf.owner, directions_of(inputs.scene)
-    if any(np.abs(angles).max(initial=0.0) > np.pi for angles in map(np.asarray, found.turns)):
-        raise NoGradient(
-            f"no tangent by {REST} where an angle is larger than half a turn: take gradients with backward()"
-        )
-    turns = [[0.0] * len(angles) for angles in found.turns]
+def _refuse_kink(leaf: Leaf) -> NoReturn:
+    raise NoGradient(
+        f"no tangent by {leaf.name}: the forces are not smooth in it, or it is at the end of its range; take gradients with "
+        "backward(), torch.func.vjp or jacrev"
+    )
 
-    def at(step: float) -> np.ndarray:
-        there, _ = reshaped(scene, {body: {REST: body.mesh.rest_positions + step * change}})
-        replaced = {there._own(owner): named for owner, named in inputs.values.replaced.items()}
-        values = Values(there, replaced, inputs.magnetization, sampling_of=inputs.values)
-        state, model = renumbered_state(there, scene, found.state), there._model
-        with values.in_core():
-            model.term_energies(state, turns, inputs.controls)
-            forces = model.gradient(state, inputs.controls)
-            increment = model.driven_increment(state, inputs.controls)
-        rows = np.stack([renumbered_vector(scene, there, each) for each in (forces, increment)])
-        rows[1, held] = increment[directions_of(there)]
-        return rows
 
-    shortest = float(body.mesh.edge_lengths.min())
-    steps = [_STEP * shortest * factor / np.abs(change).max() for factor in _SHORTER]
-    rates = directional_derivative(at, steps)
-    if rates is None:
-        raise NoGradient(
-            f"no tangent by {REST}: the forces are not smooth in it; take gradients with backward()"
-        )
-    return rates
+def values_in_neighbour(inputs: Inputs, leaf: Leaf, change: np.ndarray) -> Values:
+    """Return the values in a scene with other rest positions, which has the numbering of the inputs' scene.
+
+    leaf: rest positions of a body. Raises ValueError for some that do not fit.
+    """
+    body = leaf.owner
+    there = neighbour(inputs.scene, {body: body.mesh.rest_positions + change})
+    replaced = {there._own(owner): named for owner, named in inputs.values.replaced.items()}
+    return Values(there, replaced, inputs.magnetization, sampling_of=inputs.values)
+
+
+def steps_by_rest(leaf: Leaf, change: np.ndarray) -> list[float]:
+    """Return the steps along a change of rest positions that are tried one after another."""
+    shortest = float(leaf.owner.mesh.edge_lengths.min())
+    return [_STEP * shortest * factor / np.abs(change).max() for factor in _SHORTER]
 
 
 def steps_along(inputs: Inputs, leaf: Leaf, change: np.ndarray) -> list[float]:

@@ -156,8 +156,9 @@ def simulate(
     product of the Hessian with v is (g(x + h v) - g(x - h v)) / 2h.
 
     Tangents (forward mode: torch.autograd.forward_ad, torch.func.jvp and jacfwd) follow a change of the inputs through the
-    stored stages: one factorization and four or eight evaluations of forces for each stage, half a motion to a whole one.
-    Steps of which only checkpoints are stored are repeated. By rest positions there are gradients, but no tangents.
+    stages. One that is asked for with the motion (dual numbers, torch.func.jvp) is computed step by step with the
+    factorizations of the motion; others, such as those of jacfwd, from the stored stages with new ones. Along rest
+    positions four or eight scenes are made for all steps.
 
     Gradients are exact where the motion is differentiable, which includes impact, stick and slip on smooth obstacles. It is
     not differentiable where a point touches a kink of an obstacle (Trajectory.nonsmooth_vertices), where a small change

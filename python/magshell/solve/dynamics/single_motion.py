@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -29,6 +29,7 @@ from ...model.shells.shell import Shell
 from ...model.shells.strains import StrainHistory, warn_if_large
 from ...model.supports.supports import Clamp, Pin
 from ..adjoint.dynamic import MotionAdjoint
+from ..adjoint.motion_tangent import motion_with_tangents
 from ..options import (
     DEFAULT_SOLVER,
     SDIRK2,
@@ -147,19 +148,20 @@ def run(
     asked = prepared(None)
     scene = asked.inputs.scene  # with other rest positions than the given one, perhaps
     began = time.perf_counter()
+    watch = stop_at_once if asked.interrupted else lambda fraction, residual: progress(fraction)
+    along = None if isinstance(time_step, Adaptive) else _asked_tangents(asked)
+    known = None
     with asked.inputs.in_core():
         check_apart(scene, asked.start.state)
-        found = _core.simulate(
-            scene._model,
-            asked.core,
-            bool(asked.inputs.leaves),
-            asked.memory_budget,
-            asked.keep,
-            stop_at_once if asked.interrupted else lambda fraction, residual: progress(fraction),
-        )
+        if along is None:
+            leaves = bool(asked.inputs.leaves)
+            found = _core.simulate(scene._model, asked.core, leaves, asked.memory_budget, asked.keep, watch)
+        else:
+            found, tangents = motion_with_tangents(asked, along, watch)
+            known = along, tangents
     if isinstance(time_step, Adaptive):
         asked = prepared(found.time_steps, asked.inputs.values)
-    result = _with_strains(_trajectory(asked, found, time.perf_counter() - began))
+    result = _with_strains(_trajectory(asked, found, time.perf_counter() - began, known))
     log.debug(
         "simulate: %s, %d of %d steps, %d in parts, %d iterations, %d factorizations, %.3g s",
         found.outcome.name,
@@ -260,9 +262,18 @@ def _warn_of_fields(result: Trajectory) -> None:
     )
 
 
-def _trajectory(asked: MotionInputs, found, wall_time: float) -> Trajectory:
+def _asked_tangents(asked: MotionInputs) -> Sequence[np.ndarray] | None:
+    """Return the changes of all leaves along which forward mode asks for tangents now; None if it does not."""
+    if not asked.inputs.leaves:
+        return None
+    from ..adjoint.autograd import tangents_of
+
+    return tangents_of(asked.inputs.tensors)
+
+
+def _trajectory(asked: MotionInputs, found, wall_time: float, known=None) -> Trajectory:
     scene, model, values = asked.inputs.scene, asked.inputs.scene._model, asked.inputs.values
-    points, edge_rotations, velocities, driving = _outputs(asked, found)
+    points, edge_rotations, velocities, driving = _outputs(asked, found, known)
     rigid, n_v = bool(scene.rigid_parts), scene.mesh.n_vertices
     recorded = len(found.kinetic_energy)
     grid, after = asked.time_steps, np.array(found.steps_recorded, dtype=np.int64)
@@ -341,11 +352,11 @@ def arrays_of(asked: MotionInputs, found: _core.MotionResult) -> tuple[np.ndarra
     return found.positions(model), found.edge_rotations(model), found.velocities(model), found.driving()
 
 
-def _outputs(asked: MotionInputs, found):
+def _outputs(asked: MotionInputs, found, known):
     """Return the arrays as tensors if an input is a tensor, connected to those that require a gradient."""
     inputs, arrays = asked.inputs, arrays_of(asked, found)
     if not inputs.leaves:
         return tuple(like(array, *inputs.given) for array in arrays)
     from ..adjoint.autograd import solved
 
-    return solved(MotionAdjoint(asked, found), arrays, dtype_like(*inputs.given), inputs.tensors)
+    return solved(MotionAdjoint(asked, found, known), arrays, dtype_like(*inputs.given), inputs.tensors)

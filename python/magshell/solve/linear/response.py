@@ -104,7 +104,7 @@ def linear_response(
     parameters that are tensors, and by the inputs of an equilibrium that was found with tensors, with the change of the
     equilibrium itself. A gradient costs ten to twenty evaluations of the stiffness for all inputs, a tangent as many for
     each, and at rest the first of them a factorization. There is none with rigid bodies or skeletons, where supports leave
-    any motion without stiffness, by rest_positions forwards or where supports rotate, and no second one: NoGradient says so.
+    any motion without stiffness, by rest_positions where supports rotate, and no second one: NoGradient says so.
 
     Raises ValueError on bad input, about an equilibrium that is not stable, with its own load parameters, or under a
     pressure without a potential; and where the supports leave a motion without stiffness to what is loaded; Interrupted.

@@ -143,7 +143,7 @@ def equilibrium(
 
     Tangents (forward mode) along a change of the inputs cost one back-substitution, too, and four or eight evaluations of
     forces: torch.autograd.forward_ad, torch.func.jvp and jacfwd. torch.func.grad, vjp, jacrev and functional_call work as
-    well; torch.func.vmap solves a batch. By the origins, axes and pitches of joints there are gradients, but no tangents.
+    well; torch.func.vmap solves a batch.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
