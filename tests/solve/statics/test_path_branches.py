@@ -57,11 +57,17 @@ def test_a_path_lists_contacts_that_are_made_and_lost(straight):
     pressed = ms.follow_path(down, progress=False)
     (made,) = pressed.events
     assert made.kind == "contact made" and made.contact is down.contacts[0]
-    assert made.parameter == pressed.parameters[made.after_point + 1]
     heights = pressed.positions[:, :, 2].min(axis=1)
+    assert pressed.parameters[made.after_point] < made.parameter < pressed.parameters[made.after_point + 1]
+    touching = ms.equilibrium(down, load_factor=made.parameter).positions[:, 2].min()
+    assert touching == pytest.approx(-0.01, abs=1e-8 * LENGTH)
     assert heights[made.after_point] > -0.01 > heights[made.after_point + 1]
     lifted = ms.follow_path(down, start=pressed.equilibrium(-1), load_factor=0.0, progress=False)
-    assert [event.kind for event in lifted.events] == ["contact lost"]
+    (lost,) = lifted.events
+    assert lost.kind == "contact lost"
+    assert 1.0 - lost.parameter == pytest.approx(
+        made.parameter, abs=1e-5
+    )  # the same load, from the other side
     assert [event.kind for event in straight.events] == ["bifurcation"]
     assert "contact made at" in repr(pressed)
 

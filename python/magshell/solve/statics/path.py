@@ -141,7 +141,8 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
         """The events along the path, in order: its critical points, and contacts that are made and lost.
 
         The contact of each pair of a body and an obstacle, or of two bodies, is made where the first of its points touch and
-        lost where the last ones part.
+        lost where the last ones part. Where it changes between two points, equilibria between them are solved for until its
+        parameter is known to a millionth of the step.
         """
         return events_along(self)
 
@@ -154,6 +155,18 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
         point = self._points[index]
         inputs = self._inputs.with_values(self._moving.values(self.parameters[index])).without_tensors()
         return solve(inputs, point.state, point.turns, controls, controls, options).equilibrium
+
+    def _solved_from(self, point: Any, parameter: float) -> Any:
+        """Return the core's equilibrium at another parameter, searched from a point nearby; None if none is found."""
+        controls = (1.0 - parameter) * self._from + parameter * self._to
+        options = MixedNewton()._options()
+        options.newton, options.require_stable, options.start_at_rest = self._options.newton, False, False
+        inputs = self._inputs.with_values(self._moving.values(parameter)).without_tensors()
+        with inputs.in_core():
+            found = _core.find_equilibrium(
+                self.scene._model, point.state, point.turns, controls, controls, options, None, []
+            )
+        return found if found.outcome == _core.Outcome.converged else None
 
     def strains(self, index: int = -1) -> Any:
         """Return the principal strains of all faces of the shells at one of the points, by default the last, as Strains.
