@@ -3,7 +3,9 @@
 //   N = a_1 x a_2,   n = N / |N|,   P = (b - n (n . b)) / |N|,   [v] w = v x w
 //   d(n . b)/da_1 = a_2 x P          d(n . b)/da_2 = - a_1 x P
 //   K = (3 (n . b) n n^T - n b^T - b n^T - (n . b) I) / |N|^2
-//   H_11 = - [a_2] K [a_2]     H_22 = - [a_1] K [a_1]     H_12 = [a_2] K [a_1] - [P]          of n . b for a fixed b
+//   H_11 = - [a_2] K [a_2]     H_22 = - [a_1] K [a_1]     H_12 = [a_2] K [a_1] - [P]
+//
+// for a fixed b. K is the Hessian of n . b by N, and H_ij = d2(n . b)/da_i da_j.
 #pragma once
 
 #include "magshell/core/vector3.h"
@@ -13,7 +15,7 @@ namespace magshell {
 
 struct FaceFrame {
     SimdVec3 a1, a2, normal;
-    SimdDouble inverse_area2;  // 1 / |a_1 x a_2|
+    SimdDouble inverse_area2;  // 1 / |N|, where |N| is twice the area
 
     explicit FaceFrame(const SimdVec3 x[3]) : a1(x[1] - x[0]), a2(x[2] - x[0]) {
         const SimdVec3 across = cross(a1, a2);

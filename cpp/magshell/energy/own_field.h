@@ -1,6 +1,7 @@
 // OwnField: the magnetostatic energy of magnetized sheets and solids in the field that they make themselves, mutual and self parts.
 //
-// Sheets. // With a magnetization M~ that is constant on each face and carried along by the deformation (F M~), the sources lie on the edges:
+// Sheets. With a magnetization M~ that is constant on each face and carried along by the deformation (F M~), the sources lie
+// on the edges:
 //
 //   tangential  charge Q_e = sum over faces f at e of h_f l~_e (M~_f . nu~_fe),  nu~ the outward conormal at rest; a constant of the motion
 //               a face whose magnetization rotates without stretching, R M~, has U^-1 M~ instead of M~ (energy/unstretched_vector.h)

@@ -4,8 +4,10 @@ namespace magshell {
 
 using namespace own_field;
 
-// E = - mu_0/(4 pi) sum_j m . (q_j r + c_j x r) / r^3,  r = p - p_j, over the fine points of all elements but those of the same rigid
-// body, whose distances do not change.
+// E = - mu_0/(4 pi) sum_j m . (q_j r + cross(c_j, r)) / |r|^3,  r = p - p_j, for a dipole m at p and the fine points p_j of
+// the target elements, with charges q_j and currents c_j. The elements of the dipole's own rigid body are left out: their
+// energy does not change. The charged sides of faces are left out too: the currents already contain the normal
+// magnetization, and only charges Q_e feel the sides.
 template <class T>
 void OwnField::add_dipole(const Geometry<T>& at, std::size_t number, Targets targets,
                           Evaluation<T>& out) const {
@@ -34,7 +36,7 @@ void OwnField::add_dipole(const Geometry<T>& at, std::size_t number, Targets tar
     }
 }
 
-// E = mu_0/(4 pi) [ m . m' / r^3 - 3 (m . r)(m' . r) / r^5 ]
+// E = mu_0/(4 pi) [ m . m' / |r|^3 - 3 (m . r)(m' . r) / |r|^5 ] for two dipoles m and m' (`other`) at the distance r.
 template <class T>
 void OwnField::add_dipole_pair(const Geometry<T>& at, std::size_t first, std::size_t second,
                                Evaluation<T>& out) const {

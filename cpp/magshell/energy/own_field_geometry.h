@@ -39,14 +39,17 @@ inline constexpr FacePoint triangle_points[4] = {{{1.0 / 3.0, 1.0 / 3.0, 1.0 / 3
                                                  {{0.2, 0.6, 0.2}, 0.0, 25.0 / 48.0},
                                                  {{0.2, 0.2, 0.6}, 0.0, 25.0 / 48.0}};
 
-// Distances of midpoints over the length of the longer element, or the size of the face, up to which a pair is near, and from which on it
-// is far [-]; see test_force_between_plates_equals_the_closed_form.
+// The relative distance t of a pair up to which it is near, and from which on it is far [-]; between these its two values
+// are blended. t is the distance of the midpoints over the larger size: of two elements, or of an element and the face whose
+// sides are meant; a size is the length of an edge, or the longest side of a triangle. See
+// test_force_between_plates_equals_the_closed_form.
 struct Blend {
     double near, far;
 };
 inline constexpr Blend of_elements{1.5, 2.0}, of_sides{2.5, 3.5};
 
-// The weight of the near value and its derivatives by t: 1 below near, 0 above far, with continuous second derivatives.
+// The weight of the near value and its derivatives by t: 1 up to `near`, 0 from `far` on, with continuous second
+// derivatives.
 struct BlendWeight {
     double value, slope, curvature;
 };
@@ -123,7 +126,9 @@ struct OwnField::Geometry {
         const Triple<T>& origin = x[face.nodes[0]];
         return {{x[face.nodes[1]] - origin, x[face.nodes[2]] - origin}, face.inverse};
     }
-    // Returns sum l~_e nu~_e dE/dQ_e over the edges of a face, in the basis of its plane.
+    // Returns sum l~_e nu~_e dE/dQ_e over the edges of a face, in the basis of its plane: the gradient by h M~, or by
+    // h U^-1 M~ of a face that rotates, in which Q_e is linear. l~_e: length at rest, nu~_e: outward conormal at rest,
+    // Q_e: charge of the edge.
     std::array<T, 2> by_charges(const Face& face, const std::vector<ElementAdjoint<T>>& edges) const {
         std::array<T, 2> sum{};
         for (int i = 0; i < 3; ++i)
@@ -138,7 +143,7 @@ struct OwnField::Geometry {
         sum += x[element.nodes[2]];
         return T(1.0 / 3.0) * sum;
     }
-    // Carries the derivative by middle(element) on to its nodes.
+    // Adds the derivative by middle(element) to those by its nodes.
     void add_by_middle(const Element& element, const Triple<T>& by_middle, ElementAdjoint<T>& out) const {
         const T share = T(element.is_edge() ? 0.5 : 1.0 / 3.0);
         for (int k = 0; k < element.n_nodes(); ++k) out.nodes[k] += share * by_middle;
@@ -184,12 +189,13 @@ struct OwnField::Geometry {
         };
         if (&rule == &own_field::coarse)
             for (const FacePoint& point : own_field::triangle_points) add(point, point.weight);
-        else  // the points of both levels through a thickness, of which there is none here
+        else  // `fine` lists each point twice, on two levels through a thickness, which a triangle does not have
             for (std::size_t k = 0; k < face_points::fine.size(); k += 2)
                 add(face_points::fine[k], 2.0 * face_points::fine[k].weight);
     }
 
-    // Calls body(point, barycentric, zeta, weight) for the points of the charged sides of a face.
+    // Calls body(point, barycentric, zeta, weight) for the three points of each charged side of a face: zeta = 1/2 and
+    // weight 1/3 on the side of the normal, zeta = -1/2 and weight -1/3 on the other.
     template <class Body>
     void each_side_point(Index f, const Body& body) const {
         const Face& face = field.faces_[f];
@@ -204,7 +210,7 @@ struct OwnField::Geometry {
             }
     }
 
-    // Adds the derivatives of the sums at a point of an element by the values of that element.
+    // Adds the derivatives of the energy by the values of an element, given the sums over all sources at one of its points.
     void add(Index e, const SourceSums<T>& sums, const SamplePoint& sample, ElementAdjoint<T>& out) const {
         const Triple<T> pull = T(-own_field::strength) * sums.pull;
         const Element& element = field.elements_[e];
@@ -219,7 +225,7 @@ struct OwnField::Geometry {
         out.current += dot(by_element, along(element));
     }
 
-    // Does the same at a point of a charged side.
+    // Adds the derivatives by the values of a face, given the sums at a point of one of its charged sides.
     void add(Index f, const SourceSums<T>& sums, const double* weights, double zeta, double weight,
              FaceAdjoint<T>& out) const {
         const Triple<T> pull = T(-own_field::strength) * sums.pull;

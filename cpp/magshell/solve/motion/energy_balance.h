@@ -6,9 +6,11 @@
 //
 //   W = dt sum_j b_j v_j . (M w_j + dE/dx_j)  +  change of the energy with the load parameters
 //
-// It comprises supports, friction, drag and viscosity. Where contact is implicit (tableau.h), w and E of the sum are without contact, whose
-// impulse dt C acts at the mean velocity: dt (v_begin + v_end)/2 . (M C + dE_C/dx) is added. With follower loads the test does
-// not apply: their work cannot be told from a gain.
+// with the weights b_j of the last stage, and velocities v_j and accelerations w_j of the stages (StageRates). M w_j +
+// dE/dx_j is the force that is not the gradient of the energy: of supports, friction, drag and viscosity. Where contact is
+// implicit (tableau.h), w and E of the sum are without contact, and dt (v_begin + v_end)/2 . (M C + dE_C/dx) is added: the
+// acceleration C by contact and friction acts at the mean velocity, E_C is the energy of contact. With follower loads the
+// test does not apply: it could not distinguish their work from a gain.
 #pragma once
 
 #include <span>
@@ -24,7 +26,8 @@ class EnergyBalance {
                   const Tableau& tableau)
         : model_(model), mass_(inertia.mass), free_bodies_(free_bodies), euler_(tableau.stages == 1) {}
 
-    /// Returns true if the test applies: there is contact, and no load without potential. Implicit Euler gains no energy from obstacles.
+    /// Returns true if the test applies: there is contact, and no load without potential. For implicit Euler it applies only
+    /// to contact between bodies, because that method gains no energy from obstacles.
     bool applies() const {
         const bool contact = euler_ ? model_.capabilities().has_barrier : model_.contacts().any();
         return contact && !model_.capabilities().has_unsymmetric_tangent;

@@ -14,7 +14,7 @@ Vec3 row(const VectorXd& rows, Index node) {
     return rows.segment<3>(3 * node);
 }
 
-// Adds the gradient by a mass, which all three dofs of a node have.
+// Adds the gradient by the mass of a node, a third to each of its three dofs, which have the same mass.
 void add_to_mass(double gradient, Index node, VectorXd& by_masses) {
     by_masses.segment<3>(3 * node).array() += gradient / 3.0;
 }
@@ -63,6 +63,7 @@ void FreeBody::motion_vjp(const RigidMotion& motion, const VectorXd& q, const Ve
         const Index node = nodes()[k];
         const double m = masses_[k], share = m / mass_;
         const Vec3 arm = row(q, node) - motion.center, along = row(v, node) - motion.velocity;
+        // The momentum does not depend on the center and its velocity: the sums of m arm and of m along are zero.
         by_q.segment<3>(3 * node) += m * along.cross(by_momentum) + share * by.center;
         by_v.segment<3>(3 * node) += m * by_momentum.cross(arm) + share * by.velocity;
         add_to_mass(by_momentum.dot(arm.cross(along)) + (by.center.dot(arm) + by.velocity.dot(along)) / mass_,
@@ -74,6 +75,7 @@ void FreeBody::motion_vjp(const RigidMotion& motion, const VectorXd& q, const Ve
 
 void FreeBody::inertia_vjp(const Mat3& by_inverse_inertia, const Vec3& by_arms, VectorXd& by_masses) const {
     const Mat3 by_inertia = -inverse_inertia_ * by_inverse_inertia * inverse_inertia_;
+    // A mass also moves the center, and so all arms by -arm / mass_; the inertia does not change by that.
     for (std::size_t k = 0; k < arms_.size(); ++k) {
         const Vec3& arm = arms_[k];
         add_to_mass(

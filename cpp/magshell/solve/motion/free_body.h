@@ -3,7 +3,9 @@
 // A body has the masses m of its points and of the vertices that belong to it. With their positions rho from the center of mass in the
 // reference configuration, and their positions x and velocities v in a motion,
 //
-//   J = sum m (|rho|^2 I - rho rho^T),   c = sum m x / sum m,   Pi = R^T sum m (x - c) x v                [kg m2, m, kg m2/s]
+//   J  = sum m (|rho|^2 I - rho rho^T)                  inertia about the center of mass [kg m2]
+//   c  = sum m x / sum m                                center of mass [m]
+//   Pi = R^T sum m (x - c) cross (v - dc/dt)            angular momentum in the axes of the body, R: its rotation [kg m2/s]
 #pragma once
 
 #include <vector>
@@ -39,7 +41,8 @@ class FreeBody {
     void make_rigid(const VectorXd& predicted, VectorXd& q) const {
         nodes_->set_positions(nodes_->pose(predicted), q);
     }
-    /// Adds the gradients by positions, velocities and masses of all dofs, given those by motion(q, v), which it returned.
+    /// Adds the gradients by positions, velocities and masses of all dofs. motion: what motion(q, v) returned; by: the
+    /// gradients by it.
     void motion_vjp(const RigidMotion& motion, const VectorXd& q, const VectorXd& v, const RigidMotion& by,
                     VectorXd& by_q, VectorXd& by_v, VectorXd& by_masses) const;
     /// Adds the gradients by the masses of all dofs, given those by the inverse inertia and by a displacement of all arms.

@@ -19,7 +19,7 @@ constexpr int iterations_between_checks = 5;
 // [-] Change of a diagonal entry, over its size, that is left to L-BFGS; see test_free_bodies_and_obstacles_by_penalty.
 constexpr double max_diagonal_change = 0.5;
 
-// Returns what contact pairs add to the diagonal, by node [N/m].
+// Returns what contact pairs add to the diagonal of each node, summed over its three dofs [N/m].
 VectorXd diagonal_of(const std::vector<PairStiffness>& pairs, Index nodes) {
     VectorXd of_nodes = VectorXd::Zero(nodes);
     for (const PairStiffness& pair : pairs)
@@ -80,10 +80,12 @@ NewtonReport ProjectiveSolver::solve_smooth(VectorXd& q, const LoadParameters& l
     if (std::string reason = model_.capabilities().invalid_state_reason(q); !reason.empty())
         return fail(std::move(reason));
     const DofMap& dof_map = model_.dof_map();
+    // The part of the prescribed motion of supports and motors that is still to be made.
     VectorXd move = dof_map.prescribed_increment(q, load_parameters);
     newton_.evaluate(q, load_parameters, proximal);
     prepare(q, proximal, scale);
     LbfgsHistory lbfgs(options_.history);
+    // Contact stiffness in the matrix: of obstacles, and of pairs between bodies; the latter is empty until it is set.
     VectorXd touched = model_.contact_stiffness_diagonal(), between;
     // Updates the contact pairs in the matrix if they have changed by much: a dense matrix of many pairs costs more than an iteration.
     const auto take_pairs = [&] {

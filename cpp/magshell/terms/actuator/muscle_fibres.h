@@ -2,8 +2,11 @@
 // term of a muscle share them.
 //
 // Parameters: "fibres" (unit vector of each element in the reference configuration), "strength" w [Pa] of each
-// element, and "activation" a of each segment, which its elements share. A muscle with a force-velocity curve
-// also has "shortening_rate" [1/s], the rate at which a shortening fibre has no active tension.
+// element, and "activation" a of each segment, which its elements share. For a muscle with a force-velocity curve,
+// make_muscle also adds "shortening_rate" [1/s], the rate at which a shortening fibre has no active tension.
+//
+// With the gradients g_k of the shape functions and the direction m of the fibres, alpha_k = g_k . m, so that
+// F m = sum_k alpha_k x_k for the nodes x_k of an element (PushForward).
 #pragma once
 
 #include <algorithm>
@@ -28,7 +31,7 @@ struct MuscleInput {
     FibreLaw law;
 };
 
-/// Stores (first) or adds the nodal forces alpha_k pull of an integration point.
+/// Adds the nodal forces alpha_k pull of an integration point to g, or stores them there if it is the first point.
 template <int N>
 inline void add_pulls(const PushForward<N>& m, const SimdVec3& pull, bool first, SimdVec3 g[N]) {
     for (int k = 0; k < N; ++k) {
@@ -117,8 +120,8 @@ class MuscleFibres {
 
     std::size_t bytes() const { return loop.bytes() + bytes_of(pieces_) + bytes_of(segments_); }
 
-    /// Gradients of an element by its parameters. `pulled` holds F^T b of every point by nodes: F^T b = sum_k
-    /// g_k pulled_k.
+    /// Gradients of an element by its parameters. `pulled` is the part of each node in the gradient by m, sum_k g_k pulled_k
+    /// = F^T b, at each point, where b is the gradient by F m.
     struct Found {
         SimdDouble strength{0.0}, activation{0.0};
         SimdDouble pulled[points][N];
@@ -126,7 +129,7 @@ class MuscleFibres {
         Found() {
             for (SimdDouble(&of_point)[N] : pulled) std::fill_n(of_point, N, SimdDouble(0.0));
         }
-        /// Adds the gradient by the F m of a point, where F is the deformation gradient of the nodes x.
+        /// Adds b = `by`, the gradient by F m at a point; F is the deformation gradient of the nodes x.
         void add(int p, const SimdVec3 x[N], const SimdVec3& by) {
             for (int k = 0; k < N; ++k) pulled[p][k] += dot(x[k], by);
         }

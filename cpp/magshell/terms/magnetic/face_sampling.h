@@ -35,13 +35,16 @@ class FaceSampling {
     Index first(Index face) const { return any_fine() ? first_[face] : face; }
     std::span<const FacePoint> points(Index face) const;
 
-    /// Returns the moments of the samples of those SIMD vectors in which a face samples finely, in their order; see at().
+    /// Returns the moments B, G_a and C_ab of energy/magnetic_face_fine.h, for those SIMD vectors in which a face samples
+    /// finely, in their order; see at(). order: of the highest derivative of the field, 0 to 2. everywhere: a uniform field
+    /// that is added to B [T].
     std::vector<FieldOverFace> moments(const FieldSamples& samples, int order, const Vec3& everywhere,
                                        const std::vector<double>& thicknesses) const;
     /// Returns the place of a SIMD vector in moments().
     Index at(Index group) const { return groups_[group]; }
 
-    /// Adds the magnetic moment of each point [A m2] from the volumes of the faces [m3] and the magnetizations at the points [A/m].
+    /// Appends the magnetic moment of each point [A m2] from the volumes of the faces [m3] and the magnetizations at the
+    /// points [A/m].
     void add_moments(const std::vector<double>& volumes, const std::vector<Vec3>& magnetizations,
                      std::vector<Vec3>& moments) const;
 

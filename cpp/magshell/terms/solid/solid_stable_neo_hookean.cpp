@@ -1,10 +1,13 @@
 // Stable neo-Hookean laws, which stay finite for flat and inverted elements and restore them.
 //
-//   Smith, de Goes, Kim 2018, without the barrier, split into w + U with all of lam in U:
+// I1 = |F|^2, J = det F. Each law is split into w(I1, J) + U(J), as energy/invariant_solid.h requires; U is the last
+// summand, with lam.
+//
+//   Smith, de Goes, Kim 2018, without the barrier:
 //       mu/2 (I1 - 3) - mu (J - 1) + mu/2 (J - 1)^2     + lam/2 (J - 1)^2
 //   with their logarithmic barrier (14), reparametrized so that small strains have the moduli lam and mu:
 //       m/2 (I1 - 3) + l/2 (J - a)^2 - m/2 ln(I1 + 1),   m = 4/3 mu,  l = lam + 5/6 mu,  a = 1 + m/l - m/(4 l)
-//   minus its reference value, and with l (J - a) = l (J - 1) - mu:
+//   minus its value in the reference configuration, and with l (J - a) = l (J - 1) - mu:
 //       m/2 (I1 - 3) - m/2 ln((I1 + 1)/4) - mu (J - 1) + 5/12 mu (J - 1)^2     + lam/2 (J - 1)^2
 #include "magshell/core/simd_functions.h"
 #include "magshell/energy/invariant_solid.h"

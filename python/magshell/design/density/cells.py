@@ -14,11 +14,15 @@ from ...mesh.triangles.triangle_mesh import TriangleMesh
 if TYPE_CHECKING:
     import torch
 
-_ROUNDING = 1e-9  # [-] by which a density may leave [0, 1]
+_ROUNDING = 1e-9  # [-] by which a density may lie outside [0, 1]
 
 
 class Cells(NamedTuple):
-    """The cells of a mesh: nodes (n, 3) or (n, 4), sizes (n,) in m2 or m3, and barycenters (n, 3) m."""
+    """The cells of a mesh, triangles or tetrahedra.
+
+    positions: of all nodes, (n_v, 3) m. nodes: of each cell, (n, k) with k = 3 or 4. sizes: areas m2 or volumes m3, (n,).
+    centers: barycenters, (n, 3) m.
+    """
 
     positions: np.ndarray
     nodes: np.ndarray
@@ -27,7 +31,7 @@ class Cells(NamedTuple):
 
     @property
     def slopes(self) -> np.ndarray:
-        """The products of the gradients of linear shape functions, (n, k, k) 1/m2."""
+        """The scalar products of the gradients of the k linear shape functions of each cell, (n, k, k) 1/m2."""
         corners = self.positions[self.nodes]
         sides = corners[:, 1:] - corners[:, :1]
         inverse = np.linalg.inv(sides @ np.swapaxes(sides, 1, 2))
@@ -43,7 +47,7 @@ class Cells(NamedTuple):
 
     @property
     def node_sizes(self) -> np.ndarray:
-        """The share of each node in the sizes of its cells, (n_v,)."""
+        """The share of each node in the sizes of its cells, (n_v,) m2 or m3."""
         shares = np.repeat(self.sizes / self.nodes.shape[1], self.nodes.shape[1])
         return np.bincount(self.nodes.ravel(), shares, minlength=len(self.positions))
 
@@ -60,7 +64,7 @@ def cells_of(mesh: Any) -> Cells:
 
 
 def checked_density(name: str, values: Any, count: int | str) -> torch.Tensor:
-    """Return densities (count,) as a tensor of doubles. Raises ValueError if one is not within [0, 1]."""
+    """Return densities (count,) as a tensor of doubles. Raises ValueError if one is outside [0, 1]; round-off is allowed."""
     density = real_tensor(f"{name} [1]", values, (count,)).double()
     numbers = density.detach()
     outside = ~((numbers >= -_ROUNDING) & (numbers <= 1.0 + _ROUNDING))
@@ -71,7 +75,11 @@ def checked_density(name: str, values: Any, count: int | str) -> torch.Tensor:
 
 
 def laplacian(cells: Cells) -> scipy.sparse.csr_array:
-    """Return the matrix of a Laplacian by linear elements, (n_v, n_v), without its positive entries beside the diagonal."""
+    """Return the stiffness matrix of the negative Laplacian by linear elements, (n_v, n_v).
+
+    Positive entries beside the diagonal, which obtuse angles cause, are set to zero. The diagonal then makes the sum of each
+    row zero. So the matrix is positive semidefinite, and solutions obey a maximum principle.
+    """
     count = cells.nodes.shape[1]
     rows, columns = np.repeat(cells.nodes, count, axis=1).ravel(), np.tile(cells.nodes, (1, count)).ravel()
     products = (cells.sizes[:, None, None] * cells.slopes).ravel()

@@ -18,8 +18,8 @@ _MOST_SHOWN = 5  # starts in a printed MultistartResult
 class FinishedStart:
     """A start that has finished.
 
-    number: its position in the list of starts. result: the return value of run; objective, violation: its
-    objective, and by how much constraints are broken. seconds: its duration.
+    number: its position in the list of starts. result: the return value of run. objective, violation: those of the result;
+    the violation is the amount by which constraints are broken, 0 if none is. seconds: its duration.
     """
 
     _as_given: ClassVar = ("start", "result")
@@ -54,9 +54,10 @@ class FailedStart:
 @immutable
 @dataclass(frozen=True, eq=False, repr=False)
 class MultistartResult(Sequence[Any]):
-    """The finished starts as a sequence, best first.
+    """The finished starts as a sequence, best first: feasible ones by objective, then the others by violation.
 
-    failed: FailedStarts, by number. unfinished: numbers of the starts that an interruption left. seconds: in all.
+    finished: the sequence. failed: FailedStarts, by number. unfinished: numbers of the starts that have neither finished
+    nor failed, because of an interruption or error. seconds: duration of the call.
     resumed: numbers of the starts whose results came from the checkpoint.
     """
 

@@ -30,14 +30,15 @@ class NewtonCG(TrustRegionOptimizer):
 
     lower, upper: bounds of a group: a number, a tensor that fits each parameter, or a list with one of these each.
     scale: the typical size of a variable, in the same forms; by default upper - lower where both are finite, else 1.
-    max_products: with the Hessian in the conjugate gradients of one step; two to four more find where they begin.
-    first_step: first radius of the trust region: the root mean square of the steps of all variables, in sizes. Choose a
-        small one, such as 0.01, if a solve from the last design gets lost far from it.
+    max_products: products with the Hessian that the conjugate gradients of one step may take. A step takes at least three
+        more: two for the point at which they begin, and one at their end.
+    first_step: first radius of the trust region: the root mean square of the steps of all variables, in units of `scale`.
+        Choose a small one, such as 0.01, if a solve from the last design gets lost far from it.
     max_evaluations: of the closure in one step; after as many without a lower design the search ends.
     max_backtracks: how often a step to a design that the closure rejects is shortened, each time to a quarter.
 
     An objective without second derivatives raises NoGradient: motions have none, nor have scenes with rigid bodies, own
-    fields or friction. `hessian_products` says how many were taken so far.
+    fields or friction. `hessian_products` is the number of products taken so far; that of a copy begins at 0.
 
     S. G. Nash, A survey of truncated-Newton methods, J. Comput. Appl. Math. 124 (2000); T. Steihaug, SIAM J. Numer. Anal. 20
     (1983); bounds as C.-J. Lin, J. J. More, SIAM J. Optim. 9 (1999).
@@ -96,7 +97,10 @@ class NewtonCG(TrustRegionOptimizer):
 
 
 class HessianModel(QuadraticModel):
-    """A quadratic model by a function that multiplies its Hessian (n, n)."""
+    """A quadratic model whose Hessian H (n, n) is given by products.
+
+    times: returns H s of a step s, which is its image. gradient: (n,). max_products: that conjugate gradients take at most.
+    """
 
     def __init__(self, times: Callable[[np.ndarray], np.ndarray], gradient: np.ndarray, max_products: int):
         super().__init__(gradient, max_products)

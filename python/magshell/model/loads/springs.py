@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 class Springs(Owner, ABC):
     """The base class of springs: linear elements of the structure, which the load factor does not scale.
 
-    stiffness, damping: a number for all, or one for each.
+    stiffness, damping: a number for all springs, or one for each. `_replaceable` names the values that can be replaced.
     """
 
-    _for_all = False
+    _for_all = False  # springs name their bodies: none acts on all bodies of a scene
     stiffness: np.ndarray
     damping: np.ndarray | None
 
@@ -47,6 +47,7 @@ class Springs(Owner, ABC):
 
     def _check_in_time(self, name: str, rows: np.ndarray) -> None:
         """Raise ValueError if values over time, (n, ...), contain one that springs cannot have."""
+        # The numbers that springs can have are intervals, so the extremes of each entry suffice.
         least, most = rows.min(axis=0), rows.max(axis=0)
         for extreme in (least,) if np.array_equal(least, most) else (least, most):
             self.replaced(**{name: extreme})
@@ -60,6 +61,7 @@ class Springs(Owner, ABC):
         if name not in self._replaceable:
             return 0
         shape = getattr(self, name).shape
+        # A point of the ground is a row of three numbers; every other value is a number. One for all has a dimension less.
         return shape[0] if len(shape) > (name == "ground") else 1
 
 
@@ -90,9 +92,9 @@ class SpringsResult(Frozen):
 
 
 def numbers_of_springs(name: str, unit: str, value: Numbers, count: int | None, each: str) -> np.ndarray:
-    """Return finite numbers of at least zero, () for all or (count,); count None: any length. Raises ValueError.
+    """Return finite numbers of at least zero, () for all or (count,). Raises ValueError.
 
-    each: the word for one of the count.
+    count: None accepts any length. each: what there are `count` of, in the singular, for the message.
     """
     array = real_numbers(f"{name} [{unit}]", value)
     if array.ndim > 1 or (array.ndim == 1 and count is not None and len(array) != count):

@@ -17,13 +17,16 @@ if TYPE_CHECKING:
 def read_urdf(
     path: FilePath, *, fixed_base: bool, limits: bool, limit_stiffness: Numbers, limit_smoothing: Numbers
 ) -> tuple[list[Link], list[Joint], dict[str, Link | Joint]]:
-    """Read a URDF file: its links, its joints, and both by their names in the file. See Skeleton.from_urdf."""
+    """Read a URDF file: its links, its joints, and both by their names in the file. See Skeleton.from_urdf.
+
+    A root without mass is the world if the base is fixed: it is no link then, and its joints have no parent.
+    """
     robot = _parsed(Path(path))
     frames = _link_frames(robot)
     links = {each.name: _link(each, frames[each.name]) for each in robot.links}
     (root,) = {each.name for each in robot.links} - {each.child for each in robot.joints}
     base = None
-    if fixed_base and not links[root].mass:  # it is the world
+    if fixed_base and not links[root].mass:
         del links[root]
     elif fixed_base:
         base = Fixed(links[root])
@@ -49,6 +52,7 @@ def read_urdf(
 
 
 def _parsed(path: Path):
+    """Return yourdfpy's Robot of a file. Raises ValueError if the file is broken or has no links."""
     try:
         import yourdfpy
         from lxml import etree
@@ -100,6 +104,7 @@ def _link_frames(robot) -> dict[str, np.ndarray]:
 
 
 def _link(given, frame: np.ndarray) -> Link:
+    """Return a link of the file, whose frame is (4, 4), with its center and inertia in the axes of the world."""
     inertial = given.inertial
     if inertial is None or not inertial.mass:
         return Link(center=frame[:3, 3])
@@ -114,6 +119,11 @@ def _link(given, frame: np.ndarray) -> Link:
 
 
 def _joint(given, links: dict[str, Link], frame: np.ndarray, limits: dict[Any, Any] | None) -> Joint | None:
+    """Return a joint of the file, or None if it is a floating one. Raises ValueError for what joints here do not have.
+
+    frame: (4, 4), that of its child, which is also that of the joint. limits: stiffness and smoothing of limits; None leaves
+    limits out. A bound that the file does not give is no limit.
+    """
     if given.mimic is not None:
         raise ValueError("it mimics another joint, which no joint here does: take the mimic element out")
     ends = {"child": links[given.child], "parent": links.get(given.parent)}

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..._input.kinds import Numbers
 
 _BACK = -0.98  # [-] smallest cosine between successive pieces of a line; below, it turns back on itself
-_LEAST = 1e-3  # [-] smallest weight of a tetrahedron that gets fibres: at a distance of 6.9 times the reach
+_LEAST = 1e-3  # [-] smallest weight of a tetrahedron that gets fibres, which is exp(-6.9): 6.9 times the reach away
 
 
 @immutable
@@ -27,9 +27,10 @@ _LEAST = 1e-3  # [-] smallest weight of a tetrahedron that gets fibres: at a dis
 class Fibres:
     """Fibres of some of a solid's tetrahedra, found by ms.fibres_along or made by hand.
 
-    elements: (k,), the tetrahedra, each once. directions: (k, 3), at rest, of any length except zero. weights: (k,),
-    the density of a muscle's fibres there, 1 by default. coordinates: (k,) m, of each tetrahedron along its fibre, or
-    None.
+    elements: the tetrahedra, each once, (k,), or a mask of all tetrahedra, of which k are True. directions: (k, 3), in the
+        reference configuration, of any length except zero.
+    weights: (k,), factors of a muscle's strength in the tetrahedra, 1 by default.
+    coordinates: (k,) m, of each tetrahedron along its fibre, or None.
     length: m, of the fibres, by default the range of the coordinates.
 
     >>> import magshell as ms
@@ -99,10 +100,10 @@ def fibres_along(
 
     line: (n, 3) m, the corners of a polyline, n > 1. Its direction is interpolated between the midpoints of its pieces,
         so that fibres have no kinks.
-    body: Solid or TetMesh. reach: m. elements: the tetrahedra that may get fibres, by default all; those with a weight
-        of 0.001 and more do.
+    body: Solid or TetMesh. reach: m.
+    elements: the tetrahedra that may get fibres, by default all; those with a weight of 0.001 or more get them.
 
-    Raises ValueError if no tetrahedron does: the line misses the solid.
+    Raises ValueError if the line misses these tetrahedra, if none has such a weight, and if the line turns back on itself.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.box((0.1, 0.02, 0.02), cells=(10, 2, 2))
@@ -146,9 +147,7 @@ def fibres_along(
 
 
 def _nearest(points, line, pieces, lengths) -> tuple[np.ndarray, np.ndarray]:
-    """Return for each point (n, 3) its distance from the line, and the coordinate of the nearest point along the line,
-    m.
-    """
+    """Return the distance of each point (n, 3) from the line, and the coordinate of the nearest point along the line, m."""
     best = np.full(len(points), np.inf)
     where = np.zeros(len(points))
     starts = np.concatenate([[0.0], np.cumsum(lengths)])
@@ -183,7 +182,7 @@ def fibres_of(
 ) -> Fibres:
     """Return the `fibres` argument of a Muscle as Fibres. Raises ValueError.
 
-    It may be Fibres, one vector, one per tetrahedron, or a function of the position.
+    It may be Fibres, one vector, one per tetrahedron of `elements`, or a function of their centers (k, 3) m.
     """
     n = mesh.n_tetrahedra
     if isinstance(fibres, Fibres):

@@ -56,10 +56,12 @@ def plot(
     """Draw a picture of bodies with their magnetization and the field; several states side by side or over each other.
 
     what: a mesh, a Shell, a Solid, a Scene, a result, or a list of those. Of solids, the surface is drawn.
-    positions, remanent_magnetization, applied_flux_density, field: (n_v, 3) m, (n_f, 3) A/m, (3,) T and fields that vary in
-        space: for a mesh, which has none, or instead of those of a result.
+    positions, remanent_magnetization, applied_flux_density: (n_v, 3) m, (n_f, 3) A/m and (3,) T, for a mesh, which has none
+        of them, or instead of those of a result.
+    field: fields that vary in space, in the same way.
     obstacles: obstacles around the bodies, drawn transparent; by default those of a scene's contacts.
-    states: numbers of the states to draw, of a path or a motion; by default all, or nine evenly spaced ones.
+    states: numbers of the states to draw, of a path or a motion, negative ones from the end; by default all, or nine evenly
+        spaced ones if there are more.
     color: the quantity that colours the bodies.
         "magnetization": the component of M_r along its axis if all of it is parallel, else its angle or magnitude.
         "displacement".
@@ -72,7 +74,8 @@ def plot(
         An array with a number per face or vertex, or a list of such arrays, one per state. None for uniform colours.
         "auto": magnetization if it varies, else displacement.
         An ms.Color adds a text for the colour bar, its limits and its scale.
-    titles: one per state. If a shell passes through itself, this is added, for at most 20,000 faces.
+    titles: one per state. A note is added where a shell passes through itself, if the states together have at most 20,000
+        faces.
     overlay: draw all states in one panel, each with its title next to it. A title that finds no room is left out.
     fade: as `overlay`, with earlier states paler.
     columns: the number of columns of panels, by default the one that fits best.
@@ -143,7 +146,7 @@ def checked_titles(titles: str | Sequence[str] | None, states: list[State]) -> l
 def noted_crossings(titles: list[str], states: list[State]) -> list[str]:
     """Return the titles, with a note for states in which a shell passes through itself.
 
-    Meshes with many faces are not checked, because this would take long.
+    States with more than AFFORDABLE_FACES faces together are not checked, because this would take long.
     """
     if sum(state.mesh.n_faces for state in states) > AFFORDABLE_FACES:
         return titles

@@ -17,8 +17,9 @@ _RIGID = 1e-6  # [-] largest error of a rigid motion between two surfaces, relat
 class PageSurroundings:
     """Obstacles, magnets and free rigid bodies in the states of one page.
 
-    surfaces: those that differ by more than a rigid motion. poses: for each state (number of the surface, motion) each. The
-    motion (4, 3) has the rows of a rotation matrix, then the displacement; it is None if the surface has not moved.
+    surfaces: those that differ by more than a rigid motion. poses: a list per state, of (number of the surface, motion) for
+    each surface that the state shows. The motion (4, 3) has the rows of a rotation matrix, then the displacement; it is None
+    if the surface is where it was when it was stored.
     """
 
     def __init__(self, states: list[State], size: float):
@@ -39,6 +40,7 @@ class PageSurroundings:
 
         likely: the number of the surface that it was in the last state, or None.
         """
+        # A surface of the surroundings has one colour.
         key = solid.positions.tobytes() + solid.faces.tobytes() + solid.colors[0].tobytes()
         if key in self._known:
             return self._known[key], None
@@ -59,10 +61,10 @@ class PageSurroundings:
         ]
 
     def window(self, states: list[State], view: View) -> tuple[np.ndarray, np.ndarray, float] | None:
-        """Return the window in which a page begins, or None if there are no surroundings.
+        """Return the window that a page shows when it is opened, or None if there are no surroundings.
 
-        Returns its center (3,) m, half its width and height (2,) m, and the largest distance of any point from its center,
-        m.
+        The window is its center (3,) m, half its width and height (2,) m, and the largest distance of any point of any state
+        from its center, m.
         """
         if not self.surfaces:
             return None

@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from .panels import Drawing
 
 _TEXT = 6.5  # points
-_MOST = 7  # ticks along an edge
+_MOST = 7  # intervals between the ticks along an edge
 _LENGTH, _GAP = 4.0, 3.0  # [points] length of a tick, and distance of its number from it
 _ALONG = 1.0 - 1e-9  # [-] cosine from which a direction is that of an axis
 
 
 def check_ticks(view: View) -> None:
-    """Raise ValueError if the window of a view does not lie along two axes."""
+    """Raise ValueError if the edges of a view's window are not parallel to two coordinate axes."""
     if min(np.abs(view.axes[0]).max(), np.abs(view.axes[1]).max()) < _ALONG:
         raise ValueError('ticks need a view along an axis: view="front", "side" or "top"')
 
@@ -29,7 +29,8 @@ def check_ticks(view: View) -> None:
 def write_ticks(axes: Axes, drawing: Drawing, window: Any) -> None:
     """Write ticks along the lower and the left edge of a panel, inside of it, in the unit of the scale bar.
 
-    window: (left, right, bottom, top) m.
+    The largest number of an edge has the unit. window: (left, right, bottom, top) m; where the view looks along an axis from
+    behind, coordinates decrease to the right or upwards.
     """
     from matplotlib.patheffects import withStroke
     from matplotlib.ticker import MaxNLocator
