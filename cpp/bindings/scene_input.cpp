@@ -1,6 +1,8 @@
 #include "bindings/scene_input.h"
 
 #include <string>
+#include <tuple>
+#include <utility>
 
 #include "bindings/arrays.h"
 #include "bindings/group_energy.h"
@@ -26,6 +28,20 @@ std::vector<PrescribedNode> held_nodes(const IndexArray& nodes, const Array& fra
             {nodes.at(k, 0), nodes.at(k, 1), frame, {nodes.at(k, 2), nodes.at(k, 3), nodes.at(k, 4)}});
     }
     return held;
+}
+
+std::vector<TiedDof> tied_of(const py::list& given) {
+    std::vector<TiedDof> tied;
+    for (const py::handle each : given) {
+        TiedDof& dof = tied.emplace_back();
+        dof.dof = each["dof"].cast<Index>();
+        for (const auto& [part, weight] : each["parts"].cast<std::vector<std::pair<Index, double>>>())
+            dof.parts.push_back({part, weight});
+        for (const auto& [move, axis, weight] :
+             each["moves"].cast<std::vector<std::tuple<Index, int, double>>>())
+            dof.moves.push_back({move, axis, weight});
+    }
+    return tied;
 }
 
 std::vector<ContactInput> contacts_of(const py::list& given) {
@@ -181,6 +197,7 @@ SceneInput scene_input(const py::kwargs& given) {
     input.closures = closures_of(given["closures"]);
     input.directions = to_rows3(array("directions"));
     input.held = held_nodes(indices("held_nodes"), array("held_frames"));
+    input.tied = tied_of(given["tied"]);
     input.moves = given["moves"].cast<Index>();
     const IndexArray couples = indices("couples");
     for (py::ssize_t k = 0; k < couples.shape(0); ++k)

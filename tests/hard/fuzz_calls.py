@@ -137,6 +137,28 @@ def _scenes(s: Sample) -> Iterator[Call]:
     yield Call(
         "Tie", lambda **a: ms.Scene([s.shell, coating], ties=[ms.Tie(**a)], allow_rigid_motions=True), tie
     )
+    yield Call(
+        "EqualDisplacement",
+        lambda **a: scene(supports=[s.clamp, ms.EqualDisplacement(**a)]),
+        {
+            "vertices": mesh.vertices_at(x=mesh.rest_positions[:, 0].max()),
+            "direction": (0.6, 0, 0.8),
+            "body": None,
+        },
+    )
+    left, right = (mesh.vertices_at(x=each(mesh.rest_positions[:, 0])) for each in (np.min, np.max))
+    yield Call(
+        "Periodic",
+        lambda **a: scene(supports=[ms.Periodic(**a)], allow_rigid_motions=True),
+        {
+            "vertices": left,
+            "images": right,
+            "components": "xyz",
+            "displacement": (0, 0, 1e-3),
+            "tolerance": 1e-9,
+            "body": None,
+        },
+    )
     plane = {"normal": (1, 0, 0), "point": (0, 0, 0), "tolerance": 1e-9}
     yield Call(
         "SymmetryPlane", lambda **a: scene(supports=[ms.SymmetryPlane(**a)], allow_rigid_motions=True), plane

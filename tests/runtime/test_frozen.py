@@ -196,7 +196,7 @@ TWICE = {
             "foundation",
         )
     },
-    **{name: ("supports", name) for name in ("pin", "clamp", "symmetry")},
+    **{name: ("supports", name) for name in ("pin", "clamp", "symmetry", "equal displacement", "periodic")},
     **{
         name: ("field", name)
         for name in ("uniform", "dipoles", "sampled", "custom", "placed", "cuboid", "cylinder")

@@ -47,6 +47,7 @@ from gradient_kinds_springs import (
 )
 from gradient_kinds_steps import step_makers
 from gradient_kinds_susceptibility import susceptible_shells
+from gradient_kinds_ties import TIE_MAKERS
 from gradient_scenes import Kind
 from gradient_world import (
     BEGIN,
@@ -304,6 +305,7 @@ MAKERS = {
     "from an equilibrium": let_go,
     "actuated at rest": actuated_at_rest,
     "actuated in motion": lambda: actuated_in_motion(ms.TRBDF2(), adjoint_storage="factors"),
+    **TIE_MAKERS,
     "creased at rest": creased_at_rest,
     "creased in motion": creased_in_motion,
     "on springs at rest": on_springs_at_rest,

@@ -156,7 +156,7 @@ def admissible(key: tuple, direction: np.ndarray) -> np.ndarray:
 def free(key: tuple) -> np.ndarray | float:
     """Return 1 for the components of a value that may change at all, and 0 for the others."""
     owner, name = key
-    if isinstance(owner, ms.Pin) and name == "displacement":
+    if isinstance(owner, ms.Pin | ms.Periodic) and name == "displacement":
         return np.array([float(axis in owner.components) for axis in "xyz"])
     return 1.0
 
@@ -244,6 +244,9 @@ def _values_of(scene: ms.Scene, owner, moving: bool) -> dict[str, object]:
         motion = owner._held(scene._bodies.of(owner).mesh)[0].move
         values = {} if motion is None else {**motion._asdict(), "displacement": motion.translation}
         absent = set(names) if motion is None else set()
+    elif isinstance(owner, ms.Periodic):
+        values = {"displacement": owner.displacement}
+        absent = set(names) if owner.displacement is None else set()
     elif isinstance(owner, ms.PlacedField):
         values, absent = {**owner.field._made_from, **owner._made_from}, set()
     elif isinstance(owner, ms.SampledField):

@@ -150,6 +150,10 @@ def _around(given: Arrays, bodies: dict[str, object]) -> dict[str, object]:
         "clamp": ms.Clamp(flat.edges_at(x=0.0).copy(), displacement=given([0, 0, 1e-3])),
         "clamp by numbers": ms.Clamp(given(flat.edges_at(x=0.0), np.int64)),
         "symmetry": ms.SymmetryPlane(given([1.0, 0, 0]), given([0.0, 0, 0])),
+        "equal displacement": ms.EqualDisplacement(given.numbers(4, 5), given([1.0, 0, 0])),
+        "periodic": ms.Periodic(
+            given.numbers(0, 3), given.numbers(2, 5), "x", displacement=given([1e-3, 0, 0])
+        ),
         "point load": ms.PointLoad(given.numbers(4, 5), given([[0, 0, 1e-3], [0, 0, 2e-3]])),
         "point load by mask": ms.PointLoad(given([0, 0, 0, 0, 1, 1], bool), given([0, 0, 1e-3])),
         "edge load": ms.EdgeLoad(given(flat.edges_at(x=0.04), np.int64), given([0, 0, 1e-3])),

@@ -85,6 +85,7 @@ class SolidModel:
             ],
             directions=np.zeros((0, 3)),
             held_nodes=np.stack([held, np.full_like(held, 3), *[np.full_like(held, -1)] * 3], axis=1),
+            tied=[],
             held_frames=np.broadcast_to(np.eye(3), (len(held), 3, 3)),
             moves=0,
             couples=np.zeros((0, 3), dtype=np.int32),

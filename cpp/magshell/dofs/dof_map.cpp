@@ -1,11 +1,53 @@
 #include "magshell/dofs/dof_map.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
 #include <string>
+#include <utility>
 
+#include "magshell/core/errors.h"
+#include "magshell/dofs/linear_ties.h"
 #include "magshell/dofs/reduced_assembly.h"
 
 namespace magshell {
+namespace {
+
+// The frames of rotated nodes, and those of all others, which are the world axes.
+struct Frames {
+    const std::vector<Index>& frame_of;
+    const std::vector<PrescribedNode>& held;
+
+    // Returns a vector of all dofs with the rotated nodes along their frames, and back.
+    VectorXd into(const VectorXd& full) const {
+        VectorXd local = full;
+        for (Index node = 0; node < static_cast<Index>(frame_of.size()); ++node)
+            if (frame_of[node] >= 0)
+                local.segment<3>(3 * node) =
+                    held[frame_of[node]].frame.transpose() * full.segment<3>(3 * node);
+        return local;
+    }
+    void out_of(VectorXd& local) const {
+        for (Index node = 0; node < static_cast<Index>(frame_of.size()); ++node)
+            if (frame_of[node] >= 0) {
+                const Vec3 own = local.segment<3>(3 * node);
+                local.segment<3>(3 * node) = held[frame_of[node]].frame * own;
+            }
+    }
+    // Returns the direction along which a dof of a node counts.
+    Vec3 direction(Index dof) const {
+        const Index node = dof / 3;
+        const bool rotated = !frame_of.empty() && frame_of[node] >= 0;
+        return rotated ? Vec3(held[frame_of[node]].frame.col(dof % 3)) : Vec3(Vec3::Unit(dof % 3));
+    }
+};
+
+const LinearTies* ties_of(const std::unique_ptr<ReducedAssembly>& reduced) {
+    return reduced ? reduced->ties() : nullptr;
+}
+
+}  // namespace
 
 DofMap::DofMap(const SystemMatrix& matrix, std::vector<PrescribedNode> held, const Nodes& nodes, Index moves,
                Registry& registry, ReducedCoordinatesList reduced)
@@ -36,6 +78,9 @@ DofMap::DofMap(const SystemMatrix& matrix, std::vector<PrescribedNode> held, con
     }
 
     if (!reduced.empty()) reduced_ = std::make_unique<ReducedAssembly>(std::move(reduced), matrix);
+    if (const LinearTies* ties = ties_of(reduced_))
+        for (const TiedDof& each : ties->tied())
+            if (is_held[each.dof]) throw InvalidInput("a dof is tied that a support holds");
     for (Index u = 0; u < matrix.size(); ++u)
         if (!is_held[u] && !(reduced_ && reduced_->is_reduced(u))) free_unknowns_.push_back(u);
     if (reduced_) reduced_->linearize(rest_state(nodes));
@@ -63,14 +108,22 @@ void DofMap::set_pattern(const SystemMatrix& matrix, const SystemMatrix* layer) 
     pattern.column_starts.reserve(pattern.size + 1);
     pattern.rows.reserve(matrix.rows().size() + (layer ? layer->rows().size() : 0));
     pattern.column_starts.push_back(0);
+    const LinearTies* ties = ties_of(reduced_);
+    const std::set<Index> none;
     for (const Index u : free_unknowns_) {
+        const std::set<Index>& of_ties = ties ? ties->rows_of(reduced[u], none) : none;
+        auto next = of_ties.begin();
         each_entry(matrix, layer, u, [&](Index unknown, Index k, Index l) {
-            const Index row = reduced[unknown], to = static_cast<Index>(pattern.rows.size());
+            const Index row = reduced[unknown];
             if (row < 0) return;
+            for (; next != of_ties.end() && *next <= row; ++next)
+                if (*next < row) pattern.rows.push_back(*next);
+            const Index to = static_cast<Index>(pattern.rows.size());
             if (k >= 0) pieces_.add(k, to);
             if (l >= 0) layer_pieces_.add(l, to);
             pattern.rows.push_back(row);
         });
+        pattern.rows.insert(pattern.rows.end(), next, of_ties.end());
         if (reduced_) reduced_->append_rows(reduced[u], pattern.rows);
         pattern.column_starts.push_back(static_cast<Index>(pattern.rows.size()));
     }
@@ -91,9 +144,7 @@ VectorXd DofMap::rest_state(const Nodes& nodes) {
 }
 
 bool DofMap::axis_aligned(const PrescribedNode& h) const {
-    for (int axis = 0; axis < h.n_prescribed; ++axis)
-        if (h.frame.col(axis).cwiseAbs().maxCoeff() != 1.0) return false;
-    return true;
+    return (h.frame.cwiseAbs().colwise().maxCoeff().array() == 1.0).all();
 }
 
 void DofMap::set_values(const Values& values) {
@@ -110,14 +161,49 @@ VectorXd DofMap::prescribed_increment(const VectorXd& q, const LoadParameters& l
         increment.segment<3>(3 * h.node) = held_part(
             h, [&](Index move) -> Vec3 { return position(h.node, move, t) - q.segment<3>(3 * h.node); });
     if (has_motors()) reduced_->add_motor_increment(q, increment);
-    return increment;
+    const LinearTies* ties = ties_of(reduced_);
+    if (!ties) return increment;
+
+    // A displacement is known to the round-off of the coordinates that it is a difference of.
+    const auto round_off = [&](Index dof) {
+        const Index node = dof / 3;
+        return 2.0 * std::numeric_limits<double>::epsilon() *
+               (q.segment<3>(3 * node).norm() + nodes_.rest[node].norm());
+    };
+    const Frames frames{frame_of_, held_};
+    const VectorXd motion = frames.into(q + increment - rest_state(nodes_));
+    VectorXd gaps = VectorXd::Zero(q.size());
+    for (const TiedDof& each : ties->tied()) {
+        double gap = -motion[each.dof], known = round_off(each.dof);
+        for (const TiedDof::Part& part : each.parts) {
+            gap += part.weight * motion[part.dof];
+            known += std::abs(part.weight) * round_off(part.dof);
+        }
+        for (const TiedDof::Move& move : each.moves)
+            gap += t * move.weight * moves_[move.move].translation[move.axis];
+        if (std::abs(gap) > known) gaps[each.dof] = gap;
+    }
+    frames.out_of(gaps);
+    return increment + gaps;
 }
 
 VectorXd DofMap::along_supports(const VectorXd& full) const {
-    VectorXd parts(3 * held_.size());
+    const LinearTies* ties = ties_of(reduced_);
+    VectorXd parts(3 * (held_.size() + (ties ? ties->tied().size() : 0))), passed_on = full;
+    if (ties) {
+        const Frames frames{frame_of_, held_};
+        passed_on = frames.into(full);
+        Index row = 3 * static_cast<Index>(held_.size());
+        for (const TiedDof& each : ties->tied()) {
+            parts.segment<3>(row) = frames.direction(each.dof) * passed_on[each.dof];
+            row += 3;
+        }
+        ties->gather(passed_on);
+        frames.out_of(passed_on);
+    }
     for (std::size_t k = 0; k < held_.size(); ++k)
         parts.segment<3>(3 * static_cast<Index>(k)) =
-            held_part(held_[k], [&](Index) -> Vec3 { return full.segment<3>(3 * held_[k].node); });
+            held_part(held_[k], [&](Index) -> Vec3 { return passed_on.segment<3>(3 * held_[k].node); });
     return parts;
 }
 
@@ -144,6 +230,15 @@ VectorXd DofMap::prescribed_rate(const LoadParameters& load_parameters) const {
     const double t = support_factor(load_parameters);
     for (const PrescribedNode& h : held_)
         out.segment<3>(3 * h.node) = held_part(h, [&](Index move) { return rate(h.node, move, t); });
+    if (const LinearTies* ties = ties_of(reduced_)) {
+        const Frames frames{frame_of_, held_};
+        out = frames.into(out);
+        ties->extend(out);
+        for (const TiedDof& each : ties->tied())
+            for (const TiedDof::Move& move : each.moves)
+                out[each.dof] += move.weight * moves_[move.move].translation[move.axis];
+        frames.out_of(out);
+    }
     return out;
 }
 
@@ -167,12 +262,26 @@ void DofMap::vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorX
     if (reduced_) reduced_->vjp(by_state, lambda, gradient, by_motor_forces, out);
     const double t = support_factor(load_parameters);
     std::vector<SupportMove> by_move(moves_.size());
+    VectorXd by_held = by_state;
+    if (const LinearTies* ties = ties_of(reduced_)) {
+        const Frames frames{frame_of_, held_};
+        by_held = frames.into(by_state);
+        for (const TiedDof& each : ties->tied())
+            for (const TiedDof::Move& move : each.moves) {
+                const double by_displacement = move.weight * by_held[each.dof];
+                by_move[move.move].translation[move.axis] += t * by_displacement;
+                out.load_parameters[support_factor_.first] +=
+                    moves_[move.move].translation[move.axis] * by_displacement;
+            }
+        ties->gather(by_held);
+        frames.out_of(by_held);
+    }
     for (const PrescribedNode& h : held_)
         for (int axis = 0; axis < h.n_prescribed; ++axis) {
             const Index move = h.moves[axis];
             if (move < 0) continue;
             const Vec3 along = h.frame.col(axis),
-                       by_position = along * along.dot(by_state.segment<3>(3 * h.node));
+                       by_position = along * along.dot(by_held.segment<3>(3 * h.node));
             const Vec3& rest = nodes_.rest[h.node];
             if (h.node < nodes_.n_vertices())
                 moves_[move].point_vjp(rest, t, by_position, by_move[move]);
@@ -260,13 +369,7 @@ void DofMap::add_weights(const VectorXd& full, LargeVector<double>& values) cons
 }
 
 VectorXd DofMap::vector(const VectorXd& full) const {
-    if (frame_of_.empty()) return gathered(full);
-    VectorXd turned = full;
-    for (Index node = 0; node < static_cast<Index>(frame_of_.size()); ++node)
-        if (frame_of_[node] >= 0)
-            turned.segment<3>(3 * node) =
-                held_[frame_of_[node]].frame.transpose() * full.segment<3>(3 * node);
-    return gathered(turned);
+    return frame_of_.empty() ? gathered(full) : gathered(Frames{frame_of_, held_}.into(full));
 }
 
 VectorXd DofMap::gathered(const VectorXd& full) const {
@@ -277,7 +380,13 @@ VectorXd DofMap::gathered(const VectorXd& full) const {
 }
 
 VectorXd DofMap::project(const VectorXd& full) const {
-    VectorXd own = expand(vector(full));
+    VectorXd reduced = vector(full);
+    if (const LinearTies* ties = ties_of(reduced_)) {
+        const VectorXd forces = reduced;
+        ties->solve(VectorXd::Ones(full_size_), forces, reduced);
+        return expand(reduced);
+    }
+    VectorXd own = expand(reduced);
     if (!reduced_) return own;
     VectorXd carried = full;
     reduced_->project(carried);
@@ -286,12 +395,14 @@ VectorXd DofMap::project(const VectorXd& full) const {
 }
 
 VectorXd DofMap::acceleration(const VectorXd& mass, const VectorXd& force) const {
-    VectorXd reduced = vector(force);
+    const VectorXd forces = vector(force);
+    VectorXd reduced = forces;
     for (std::size_t k = 0; k < free_unknowns_.size(); ++k) {
         const double m = mass[free_unknowns_[k]];
         reduced[static_cast<Index>(k)] = m != 0.0 ? reduced[static_cast<Index>(k)] / m : 0.0;
     }
     reduced.tail(reduced.size() - static_cast<Index>(free_unknowns_.size())).setZero();
+    if (const LinearTies* ties = ties_of(reduced_)) ties->solve(mass, forces, reduced);
     VectorXd full = expand(reduced);
     if (reduced_) reduced_->accelerate(mass, force, full);
     return full;
@@ -323,11 +434,7 @@ VectorXd DofMap::expand(const VectorXd& reduced) const {
     VectorXd full = VectorXd::Zero(full_size_);
     for (std::size_t k = 0; k < free_unknowns_.size(); ++k) full[free_unknowns_[k]] = reduced[k];
     if (reduced_) reduced_->push_forward(reduced, full);
-    for (Index node = 0; node < static_cast<Index>(frame_of_.size()); ++node)
-        if (frame_of_[node] >= 0) {
-            const Vec3 local = full.segment<3>(3 * node);
-            full.segment<3>(3 * node) = held_[frame_of_[node]].frame * local;
-        }
+    if (!frame_of_.empty()) Frames{frame_of_, held_}.out_of(full);
     return full;
 }
 

@@ -4,6 +4,8 @@
 #include <tuple>
 #include <utility>
 
+#include "magshell/core/errors.h"
+
 namespace magshell {
 
 using Eigen::MatrixXd;
@@ -11,6 +13,12 @@ using Eigen::MatrixXd;
 ReducedAssembly::ReducedAssembly(ReducedCoordinatesList maps, const SystemMatrix& matrix)
     : system_of_(matrix.size(), -1), row_of_(matrix.size(), -1) {
     for (std::unique_ptr<ReducedCoordinates>& map : maps) {
+        if (LinearTies* ties = dynamic_cast<LinearTies*>(map.get())) {
+            if (maps.size() > 1)
+                throw InvalidInput("ties of displacements cannot be combined with rigid bodies yet");
+            ties_ = std::make_unique<LinearTies>(std::move(*ties));
+            continue;
+        }
         System& system = systems_.emplace_back();
         system.map = std::move(map);
         system.first = coordinates_;
@@ -29,6 +37,7 @@ ReducedAssembly::ReducedAssembly(ReducedCoordinatesList maps, const SystemMatrix
 void ReducedAssembly::collect_couplings(const std::vector<const SystemMatrix*>& matrices,
                                         const std::vector<Index>& reduced, Index free) {
     free_ = free;
+    if (ties_) return ties_->collect_couplings(matrices, reduced);
     for (System& system : systems_) system.later.clear();
     for (const SystemMatrix* matrix : matrices)
         for (Index column = 0; column < matrix->size(); ++column)
@@ -83,6 +92,7 @@ VectorXd all_of(const LinkTwists& b, const VectorXd& rows) {
 
 void ReducedAssembly::find_entries(const std::vector<const SystemMatrix*>& matrices,
                                    const std::vector<Index>& reduced, const SparsePattern& pattern) {
+    if (ties_) return ties_->find_entries(matrices, pattern);
     for (System& system : systems_) {
         system.own.clear();
         system.across_rows.clear();
@@ -154,6 +164,7 @@ void ReducedAssembly::add_lower(const System& system, const MatrixXd& block, dou
 }
 
 void ReducedAssembly::add_matrix(std::size_t which, const SystemMatrix& full, double* values) const {
+    if (ties_) return ties_->add_matrix(which, full, values);
     const double* entries = full.values().data();
     for (const System& system : systems_) {
         const Entries& of = system.entries[which];
@@ -177,6 +188,7 @@ void ReducedAssembly::add_matrix(std::size_t which, const SystemMatrix& full, do
 }
 
 void ReducedAssembly::add_weights(const VectorXd& weights, double* values) const {
+    if (ties_) ties_->add_weights(weights, values);
     for (const System& system : systems_) {
         const Index n = system.map->coordinates();
         add_lower(system, system.twists.product(system.map->gather(weights)).topLeftCorner(n, n), values);
@@ -320,12 +332,14 @@ VectorXd ReducedAssembly::motor_forces(const VectorXd& gradient) const {
 }
 
 void ReducedAssembly::pull_back(const VectorXd& full, VectorXd& reduced) const {
+    if (ties_) ties_->gather(full, reduced);
     for (const System& system : systems_)
         reduced.segment(free_ + system.first, system.map->coordinates()) =
             pull_back_free(system, system.map->gather(full));
 }
 
 void ReducedAssembly::diagonal(const VectorXd& weights, VectorXd& reduced) const {
+    if (ties_) ties_->add_diagonal(weights, reduced);
     for (const System& system : systems_) {
         const Index n = system.map->coordinates();
         if (n == 0) continue;  // an empty matrix has no diagonal to point to
@@ -335,6 +349,7 @@ void ReducedAssembly::diagonal(const VectorXd& weights, VectorXd& reduced) const
 }
 
 void ReducedAssembly::push_forward(const VectorXd& reduced, VectorXd& full) const {
+    if (ties_) ties_->extend(full);
     for (const System& system : systems_)
         system.map->scatter(
             system.twists.motion(reduced.segment(free_ + system.first, system.map->coordinates())), full);
@@ -408,7 +423,8 @@ void ReducedAssembly::append_points(const std::vector<Vec3>& full, std::vector<V
 }
 
 std::size_t ReducedAssembly::bytes() const {
-    std::size_t total = (system_of_.capacity() + row_of_.capacity()) * sizeof(Index);
+    std::size_t total = ties_ ? ties_->bytes() : 0;
+    total += (system_of_.capacity() + row_of_.capacity()) * sizeof(Index);
     for (const System& system : systems_) {
         for (const Entries& entries : system.entries) {
             total += entries.mixed.bytes() + entries.inner.bytes();

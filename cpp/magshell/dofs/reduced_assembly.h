@@ -1,6 +1,7 @@
 // Assembly in reduced coordinates: computes B^T H B, with its curvature terms, and transforms vectors, for all rigid bodies and skeletons.
 //
 // Their generalized coordinates are the last of the free dofs, one body or skeleton after another. A scene without any does not use this.
+// It holds the ties of displacements as well, which reduce single dofs and have no coordinates here.
 #pragma once
 
 #include <Eigen/Cholesky>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "magshell/assembly/system_matrix.h"
+#include "magshell/dofs/linear_ties.h"
 #include "magshell/dofs/link_coupling.h"
 #include "magshell/dofs/reduced_coordinates.h"
 #include "magshell/linalg/factor.h"
@@ -24,8 +26,10 @@ class ReducedAssembly {
     ReducedAssembly(ReducedCoordinatesList maps, const SystemMatrix& matrix);
 
     Index coordinates() const { return coordinates_; }
-    /// Returns true if a dof belongs to a node with reduced coordinates.
-    bool is_reduced(Index dof) const { return system_of_[dof] >= 0; }
+    /// Returns true if a dof belongs to a node with reduced coordinates, or is tied.
+    bool is_reduced(Index dof) const { return system_of_[dof] >= 0 || (ties_ && ties_->is_tied(dof)); }
+    /// Returns the ties of displacements, null if there are none.
+    LinearTies* ties() const { return ties_.get(); }
 
     /// Build the reduced pattern, called in this order. The matrix is the sum of `matrices`. reduced: index of each dof among the
     /// free ones, negative if it is prescribed or reduced; free: number of the free ones.
@@ -130,6 +134,7 @@ class ReducedAssembly {
     void add_lower(const System& system, const Eigen::MatrixXd& block, double* values) const;
 
     std::vector<System> systems_;
+    std::unique_ptr<LinearTies> ties_;
     Index coordinates_ = 0, free_ = 0;
     bool has_motors_ = false, has_joint_parameters_ = false;
     VectorXd at_;                               // the state q of the linearization

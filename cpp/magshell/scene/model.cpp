@@ -25,16 +25,24 @@ std::vector<PrescribedNode> renumbered(std::vector<PrescribedNode> held, const B
     return held;
 }
 
-// Returns the reduced coordinates of skeletons, then of rigid bodies that belong to none.
-ReducedCoordinatesList reduced_coordinates_of(const Bodies& bodies,
-                                              const std::vector<SkeletonInput>& skeletons,
+std::vector<TiedDof> renumbered(std::vector<TiedDof> tied, const Nodes& nodes) {
+    const auto core = [&](Index dof) { return 3 * nodes.vertices.core[dof / 3] + dof % 3; };
+    for (TiedDof& each : tied) {
+        each.dof = core(each.dof);
+        for (TiedDof::Part& part : each.parts) part.dof = core(part.dof);
+    }
+    return tied;
+}
+
+// Returns the reduced coordinates of skeletons, then of rigid bodies that belong to none, then ties of displacements.
+ReducedCoordinatesList reduced_coordinates_of(const Bodies& bodies, const SceneInput& input,
                                               Registry& registry) {
     const auto link = [&](Index part) {
         return RigidNodes(bodies.rigid_nodes()[part], bodies.n_own(part), bodies.nodes().rest);
     };
     std::vector<char> joined(bodies.rigid_nodes().size(), 0);
     ReducedCoordinatesList all;
-    for (const SkeletonInput& skeleton : skeletons) {
+    for (const SkeletonInput& skeleton : input.skeletons) {
         std::vector<RigidNodes> links;
         for (const Index part : skeleton.links) {
             links.push_back(link(part));
@@ -60,6 +68,9 @@ ReducedCoordinatesList reduced_coordinates_of(const Bodies& bodies,
         if (!joined[part])
             all.push_back(
                 std::make_unique<SkeletonCoordinates>(std::vector{link(part)}, std::vector<Joint>(1)));
+    if (!input.tied.empty())
+        all.push_back(
+            std::make_unique<LinearTies>(renumbered(input.tied, bodies.nodes()), bodies.nodes().n_dofs()));
     return all;
 }
 
@@ -69,7 +80,7 @@ Model::Model(const SceneInput& input)
     : bodies_(input),
       matrix_(nodes().n_nodes(), nodes().scalars, bodies_.stencils(input), bodies_.cliques()),
       dof_map_(matrix_, renumbered(input.held, bodies_), nodes(), input.moves, registry_,
-               reduced_coordinates_of(bodies_, input.skeletons, registry_)),
+               reduced_coordinates_of(bodies_, input, registry_)),
       terms_(input, bodies_, matrix_, registry_),
       parameters_(registry_, bodies_, dof_map_, terms_),
       capabilities_(terms_, dof_map_, nodes(), low_rank_),

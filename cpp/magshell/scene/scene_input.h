@@ -10,6 +10,7 @@
 #include "magshell/body/solid.h"
 #include "magshell/dofs/dof_map.h"
 #include "magshell/dofs/joint.h"
+#include "magshell/dofs/linear_ties.h"
 #include "magshell/energy/magnetization_law.h"
 #include "magshell/field/applied_field.h"
 #include "magshell/force/drag.h"
@@ -137,7 +138,8 @@ struct SceneInput {
     std::vector<ClosureInput> closures;
     Rows3 directions;  // (n_d, 3), of clamped edges and edge moments
     std::vector<PrescribedNode> held;
-    Index moves = 0;  // number of support moves that `held` refers to
+    std::vector<TiedDof> tied;  // a dof is three times its vertex, plus an axis of the vertex' frame
+    Index moves = 0;            // number of support moves that `held` and `tied` refer to
     std::vector<EdgeMomentInput> couples;
     std::vector<FaceEnergyInput> face_energies;
     std::vector<PressureInput> pressures;

@@ -17,6 +17,7 @@ from ..loads.loads import AreaLoad, EdgeCouple, EdgeLoad, PointLoad
 from ..loads.pressure import Pressure
 from ..shells.shell import Shell
 from ..solids.solid import Solid
+from ..supports.displacement_ties import DisplacementTie
 from ..supports.supports import Clamp, Pin, SymmetryPlane
 from .scene import Scene
 
@@ -34,6 +35,7 @@ def refuse_what_stays(scene: Scene) -> None:
         "a Skin": [solid for solid in scene._bodies.solids if solid.skin is not None],
         "rigid bodies": scene.rigid_parts,
         "ties": scene.ties,
+        "EqualDisplacement or Periodic": [s for s in scene.supports if isinstance(s, DisplacementTie)],
         "actuators": scene.actuators,
         "contacts": scene.contacts,
         "an OwnField": scene.own_field,

@@ -10,6 +10,7 @@ import numpy as np
 from ..._input.quantity import quantity
 from ..._runtime.frozen import immutable
 from ..supports.constraints import held_directions
+from ..supports.displacement_ties import DisplacementTie
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
@@ -23,7 +24,8 @@ class Reaction:
     """The forces and the torque of one support on the bodies in one state. They are NaN in a state that no time step
     led to.
 
-    vertices: (k,), the scene's vertices that it holds. forces: (k, 3) N, on them. force: (3,) N, their sum.
+    vertices: (k,), the scene's vertices that it holds, or the images of a Periodic with a displacement.
+    forces: (k, 3) N, on them. force: (3,) N, their sum.
     positions: (k, 3) m, of these vertices.
 
     If several supports hold a vertex along one direction, the force along it is counted for the first of them in
@@ -56,14 +58,16 @@ class Reaction:
 def reaction_in(scene: Scene, support: Support, state: np.ndarray, held: np.ndarray) -> Reaction:
     """Return the reaction of one support in a state.
 
-    held: (m, 3) N, the forces on the nodes that the constraints hold. Raises ValueError if the scene has no such
-    support.
+    held: (m, 3) N, the forces on the nodes that the constraints hold, then on the tied degrees of freedom. Raises
+    ValueError if the scene has no such support, or if it is a tie without a displacement.
     """
     support = scene._own(support)
     if not any(each is support for each in scene.supports):
         raise ValueError(
             f"support must be one of scene.supports itself, not another one with equal values, got {support!r:.80}"
         )
+    if isinstance(support, DisplacementTie):
+        return _reaction_of_tie(scene, support, state, held)
     constraints = scene._constraints
     rows = {node: k for k, node in enumerate(constraints.held_nodes[:, 0].tolist())}
     mine = [(v, along) for s, v, along in held_directions(scene._bodies, scene.supports) if s is support]
@@ -76,3 +80,21 @@ def reaction_in(scene: Scene, support: Support, state: np.ndarray, held: np.ndar
             direction = state[before + 3 * k : before + 3 * k + 3]
             couple = couple + np.cross(direction, held[rows[scene.mesh.n_vertices + k]])
     return Reaction(vertices, forces, scene._model.positions(state)[vertices], couple)
+
+
+def _reaction_of_tie(scene: Scene, tie: DisplacementTie, state: np.ndarray, held: np.ndarray) -> Reaction:
+    """Return the forces that a prescribed displacement between vertices and their images exerts on the images."""
+    if getattr(tie, "displacement", None) is None:
+        raise ValueError(
+            f"{tie!r} has no reaction: its forces on the vertices cancel, as it prescribes nothing"
+        )
+    constraints, forces = scene._constraints, {}
+    own = {k for k, move in enumerate(constraints.moves) if move.support is tie}
+    rows = held[len(constraints.held_nodes) :]
+    for tied, force in zip(constraints.tied, rows, strict=True):
+        for move, axis, weight in tied.moves:
+            if move in own:
+                forces.setdefault(tied.dof // 3, np.zeros(3))[axis] += weight * force[axis]
+    vertices = np.array(sorted(forces), dtype=np.int64)
+    rows = np.array([forces[vertex] for vertex in vertices]).reshape(-1, 3)
+    return Reaction(vertices, rows, scene._model.positions(state)[vertices], np.zeros(3))

@@ -13,6 +13,7 @@ from ..._runtime.frozen import remember, variant
 from ...errors import NoGradient
 from ..loads.custom_energy import CustomEnergy
 from ..loads.springs import Springs
+from ..supports.displacement_ties import DisplacementTie
 from .rest_gradient import without_rest_gradient
 from .scene import Scene
 
@@ -184,6 +185,7 @@ def _refuse_what_cannot_follow(scene: Scene) -> None:
     has = (
         ("ties", scene.ties),
         ("rigid bodies", scene.rigid_parts),
+        ("EqualDisplacement or Periodic", [s for s in scene.supports if isinstance(s, DisplacementTie)]),
         ("actuators", scene.actuators),
         ("contact between bodies", scene._body_contacts),
         ("an OwnField", scene.own_field),

@@ -44,6 +44,7 @@ from ..shells.obtuse_faces import ObtuseFaces
 from ..shells.shell import Shell
 from ..solids.solid import Solid
 from ..supports.constraints import free_rigid_motions, gather
+from ..supports.displacement_ties import DisplacementTie, EqualDisplacement, Periodic
 from ..supports.supports import Clamp, Pin, SymmetryPlane
 from .core_models import CoreModels
 from .new_scene_checks import check_new_scene
@@ -66,7 +67,7 @@ if TYPE_CHECKING:
     from ..supports.supports import Support
 
 _LOADS = (PointLoad, EdgeLoad, AreaLoad, EdgeCouple, FaceEnergy, Pressure, CustomEnergy, Springs)
-_SUPPORTS = (Pin, Clamp, SymmetryPlane)
+_SUPPORTS = (Pin, Clamp, SymmetryPlane, EqualDisplacement, Periodic)
 _ACTUATORS = "Muscle, Cavity, PneumaticCells and Tendon objects"
 
 
@@ -79,7 +80,8 @@ class Scene(PlotMixin):
     bodies: a Shell or a Solid, or several of them, rigid bodies and Skeletons; bodies interact through ties and contacts
         only. Positions and faces of a result are those of one body after another, `result[body]` has those of one.
     ties: Tie objects: bodies that are welded to each other.
-    supports: Pin, Clamp and SymmetryPlane objects; with several bodies `body=` says which one a support holds.
+    supports: Pin, Clamp and SymmetryPlane objects, and the ties EqualDisplacement and Periodic; with several bodies `body=`
+        says which one a support holds.
     loads: PointLoad, EdgeLoad, AreaLoad, EdgeCouple, Pressure, SurfaceTension, CustomEnergy, Spring and ElasticFoundation
         objects; with several bodies likewise.
     actuators: Muscle, Cavity, PneumaticCells and Tendon objects.
@@ -137,7 +139,9 @@ class Scene(PlotMixin):
         self._obstacle_contacts, self._body_contacts = split_contacts(self.contacts)
         self._bodies = Bodies(bodies, ties)
         self._bodies.add_surface_nodes(rigid_bodies_in_contact(self._body_contacts))
-        self.supports: tuple[Pin | Clamp | SymmetryPlane, ...] = checked_list("supports", supports, _SUPPORTS)
+        self.supports: tuple[Pin | Clamp | SymmetryPlane | EqualDisplacement | Periodic, ...] = checked_list(
+            "supports", supports, _SUPPORTS
+        )
         self.loads: tuple[Any, ...] = checked_list("loads", loads, _LOADS)
         self.actuators: tuple[Actuator, ...] = checked_list("actuators", actuators, (Actuator,), _ACTUATORS)
         self.fields: tuple[AppliedField, ...] = (
@@ -197,6 +201,7 @@ class Scene(PlotMixin):
                     f"rigid part {k} has a magnetic_moment, but the scene has no field: Scene(..., field=...)"
                 )
         _refuse_support(self._rigid, constraints.held_nodes[:, 0])
+        _refuse_ties(self)
         held = np.intersect1d(edges, constraints.directed_edges[:, 0])
         if held.size:
             raise ValueError(f"an EdgeCouple acts on edge {held[0]}, whose direction a support holds")
@@ -246,6 +251,7 @@ class Scene(PlotMixin):
             directions=constraints.directions,
             held_nodes=constraints.held_nodes,
             held_frames=constraints.held_frames,
+            tied=[each._asdict() for each in constraints.tied],
             moves=len(constraints.moves),
             couples=np.stack(
                 [*bodies.sheets_of(edges), n_directions - n_moments + np.arange(n_moments)], axis=1
@@ -449,6 +455,13 @@ def _refuse_support(parts, held: np.ndarray) -> None:
                 f"a support holds vertex {both[0]}, which rigid part {k} carries: leave it out of the part's vertices; for "
                 "vertices that do not move at all a support is enough, without a RigidBody"
             )
+
+
+def _refuse_ties(scene: Scene) -> None:
+    """Raise ValueError if displacements are tied in a scene with rigid bodies."""
+    ties = [each for each in scene.supports if isinstance(each, DisplacementTie)]
+    if ties and scene.rigid_parts:
+        raise ValueError(f"{ties[0]!r} cannot be in a scene with rigid bodies or skeletons yet")
 
 
 def _has_own_field(scene: Scene, body: Any) -> bool:

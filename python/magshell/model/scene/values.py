@@ -278,7 +278,8 @@ class Values:
         scene = self.scene
         supports = [self.current(support) for support in scene.supports]
         moved = gather(scene._bodies, supports, scene._moment_directions, scene._shares_directions)
-        if not np.array_equal(moved.held_nodes, scene._constraints.held_nodes):
+        before = scene._constraints
+        if not np.array_equal(moved.held_nodes, before.held_nodes) or moved.tied != before.tied:
             raise ValueError(
                 "a support that stays cannot be moved by a solve: "
                 "give it a displacement in the scene, zero will do"

@@ -10,6 +10,9 @@ import numpy as np
 
 from ..bodies.bodies import Bodies
 from ..bodies.body_ranges import Span
+from ..bodies.ties import joined_components
+from .displacement_ties import DisplacementTie, Equations
+from .elimination import Frames, TiedDof, eliminated
 from .supports import DirectedEdges, Held, RigidMove
 
 if TYPE_CHECKING:
@@ -35,7 +38,12 @@ class Constraints:
     directed_edges: np.ndarray  # (k, 2): the scene's edge, direction
     directions: np.ndarray  # (n_d, 3)
     held_nodes: np.ndarray  # (m, 5): node, number of held directions, number of the move of each or -1
-    held_frames: np.ndarray  # (m, 3, 3): columns, the held directions first
+    held_frames: (
+        np.ndarray
+    )  # (m, 3, 3): columns, the held directions first, then those along which it is tied
+    equations: tuple[Equations, ...]  # of all ties of displacements, with the scene's vertices
+    tied: tuple[TiedDof, ...]  # what follows from them
+    bound: list[Any]  # ties whose displacements must not change in time, as supports prescribe the same
     moves: tuple[RigidMove, ...]
     direction_owners: tuple[Any, ...]  # (n_d,), the support that holds each direction, or None
 
@@ -51,7 +59,10 @@ def gather(
     moves: list[RigidMove] = []
     mesh, pairs_of = bodies.mesh, [(s, bodies.of(s)) for s in supports]
     held = [h for s, span in pairs_of for h in held_by(s, span, bodies)]
-    nodes, frames = _held_vertices(bodies, held, moves)
+    equations = [e for s, span in pairs_of for e in _equations(s, span, bodies)]
+    numbers: dict[int, int] = {}
+    nodes, frames = _held_vertices(bodies, held, moves, numbers, _tied_along(equations))
+    tied, bound = eliminated(equations, Frames(nodes, frames), lambda move: _number(move, moves, numbers))
     pairs, directions, direction_moves, owners = _directed_edges(
         [(s, d) for s, span in pairs_of for d in _directed(s, span)], moves, sharing
     )
@@ -65,6 +76,9 @@ def gather(
         directions,
         np.array(nodes, dtype=np.int32).reshape(-1, 5),
         np.array(frames).reshape(-1, 3, 3),
+        tuple(equations),
+        tied,
+        bound,
         tuple(moves),
         (*owners, *[None] * len(free_directions)),
     )
@@ -76,7 +90,7 @@ def check_shared(bodies: Bodies, supports: Sequence[Support], vertices: np.ndarr
     for held in (h for s in supports for h in held_by(s, bodies.of(s), bodies)):
         some = np.isin(held.vertices, vertices)
         found.append(held._replace(vertices=held.vertices[some], directions=held.directions[some]))
-    _held_vertices(bodies, found, [])
+    _held_vertices(bodies, found, [], {}, {})
 
 
 def held_by(support: Support, span: Span, bodies: Bodies) -> list[Held]:
@@ -118,30 +132,96 @@ def free_rigid_motions(
 
     on_joints: vertices that a skeleton holds as far as its joints do; their components are left out.
     """
-    found, mesh, size, components = [], bodies.mesh, bodies.size, bodies.components
-    for part in range(components.max(initial=-1) + 1):
-        vertices = np.flatnonzero(components == part)
-        if np.isin(on_joints, vertices).any():
+    found, mesh, size = [], bodies.mesh, bodies.size
+    components = bodies.components
+    for parts in _tied_parts(components, constraints.equations):
+        members = [np.flatnonzero(components == part) for part in parts]
+        if np.isin(on_joints, np.concatenate(members)).any():
             continue
-        center = mesh.rest_positions[vertices].mean(axis=0)
-        rows = _prevented(bodies, constraints, components == part, center)
-        _, values, modes = np.linalg.svd(np.concatenate([rows, np.zeros((6, 6))]), full_matrices=False)
-        for mode in modes[values < 1e-8 * max(values[0], 1e-300)]:
-            where = f" of part {part} (with vertex {vertices[0]})" if components.max() > 0 else ""
-            found.append(_in_words(mode, center, size) + where)
+        centers = [mesh.rest_positions[vertices].mean(axis=0) for vertices in members]
+        rows = [np.zeros((6, 6 * len(parts)))]
+        for k, (part, center) in enumerate(zip(parts, centers, strict=True)):
+            own = _prevented(bodies, constraints, components == part, center)
+            rows.append(np.pad(own, ((0, 0), (6 * k, 6 * (len(parts) - k - 1)))))
+        rows += _prevented_by_ties(bodies, constraints.equations, parts, centers)
+        _, values, modes = np.linalg.svd(np.concatenate(rows), full_matrices=False)
+        for mode in modes[values < 1e-8 * max(values[0], 1e-300)].reshape(-1, len(parts), 6):
+            k = int(np.argmax(np.linalg.norm(mode, axis=1)))
+            where = f" of part {parts[k]} (with vertex {members[k][0]})" if components.max() > 0 else ""
+            found.append(_in_words(mode[k] / np.linalg.norm(mode[k]), centers[k], size) + where)
     return found
 
 
-def _held_vertices(bodies: Bodies, held: list[Held], moves: list[RigidMove]):
-    constraints: dict[int, list[VertexConstraint]] = {}
+def _tied_parts(components: np.ndarray, equations: Sequence[Equations]) -> list[list[int]]:
+    """Return the connected components in groups that equations tie to each other."""
+    pairs = [np.stack([e.vertices[:, :-1].ravel(), e.vertices[:, 1:].ravel()], axis=1) for e in equations]
+    group = joined_components(components, np.concatenate(pairs)) if pairs else components
+    _, first = np.unique(components, return_index=True)
+    of_part = group[first]
+    return [np.flatnonzero(of_part == k).tolist() for k in range(of_part.max(initial=-1) + 1)]
+
+
+def _prevented_by_ties(
+    bodies: Bodies, equations: Sequence[Equations], parts: list[int], centers: list[np.ndarray]
+) -> list[np.ndarray]:
+    """Return the combinations of rigid motions of these parts that equations prevent, rows (k, 6 len(parts))."""
+    found, mesh, size = [], bodies.mesh, bodies.size
+    place = np.full(bodies.components.max(initial=-1) + 1, -1)
+    place[parts] = np.arange(len(parts))
+    for each in equations:
+        of = place[bodies.components[each.vertices]]
+        arms = (mesh.rest_positions[each.vertices] - np.array(centers)[of]) / size
+        along = np.broadcast_to(each.direction, arms.shape)
+        motions = each.weights[:, None] * np.concatenate([along, np.cross(arms, along)], axis=2)
+        rows = np.zeros((len(of), len(parts), 6))
+        for k in range(of.shape[1]):
+            rows[np.arange(len(of)), of[:, k]] += motions[:, k]
+        here = of[:, 0] >= 0
+        found.append(rows[here].reshape(-1, 6 * len(parts)))
+    return found
+
+
+def _equations(support: Support, span: Span, bodies: Bodies) -> list[Equations]:
+    """Return the equations of a tie of displacements, with the scene's vertices."""
+    if not isinstance(support, DisplacementTie):
+        return []
+    return [
+        each._replace(vertices=bodies.original[each.vertices + span.first_vertex])
+        for each in support._equations(span.mesh)
+    ]
+
+
+def _tied_along(equations: list[Equations]) -> dict[int, list[np.ndarray]]:
+    """Return for each tied vertex the directions of its ties that are no world axes."""
+    found: dict[int, list[np.ndarray]] = {}
+    for each in equations:
+        slanted = [each.direction] * int(np.abs(each.direction).max() != 1.0)
+        for vertex in np.unique(each.vertices).tolist():
+            found.setdefault(vertex, []).extend(slanted)
+    return found
+
+
+def _held_vertices(
+    bodies: Bodies,
+    held: list[Held],
+    moves: list[RigidMove],
+    numbers: dict[int, int],
+    tied: dict[int, list[np.ndarray]],
+):
+    """Return the rows of held_nodes and held_frames of all vertices that supports hold or tie.
+
+    numbers: of moves, by their id. tied: directions by vertex along which it is tied, without world axes.
+    """
+    constraints: dict[int, list[VertexConstraint]] = {vertex: [] for vertex in tied}
     for support in held:
         for vertex, along in zip(support.vertices.tolist(), support.directions, strict=True):
             constraints.setdefault(vertex, []).append(VertexConstraint(along, support.move))
-    numbers: dict[int, int] = {}
     nodes, frames = [], []
     for vertex, some in sorted(constraints.items()):
         _check_agree(bodies, vertex, some)
-        frame, count, by = _frame(some)
+        frame, count, by = _frame(some) if some else (np.eye(3), 0, [None] * 3)
+        if count < 3 and tied.get(vertex):
+            frame = _turned_into(frame[:, :count], tied[vertex])
         nodes.append((vertex, count, *(_number(move, moves, numbers) for move in by)))
         frames.append(frame)
     return nodes, frames
@@ -218,6 +298,18 @@ def _frame(constraints: list[VertexConstraint]) -> tuple[np.ndarray, int, list[R
                 by.append(each.move)
     free = np.linalg.svd(columns.T)[2][len(by) :].T
     return np.column_stack([columns, free]), len(by), [*by, None, None, None][:3]
+
+
+def _turned_into(held: np.ndarray, directions: list[np.ndarray]) -> np.ndarray:
+    """Return an orthonormal frame (columns): held directions (3, m), then others as far as they are perpendicular."""
+    columns = held
+    for along in directions:
+        remaining = along - columns @ (columns.T @ along)
+        if np.linalg.norm(remaining) > 1e-9:
+            columns = np.column_stack([columns, remaining / np.linalg.norm(remaining)])
+    if columns.shape[1] == 3:
+        return columns
+    return np.column_stack([columns, np.linalg.svd(columns.T)[2][columns.shape[1] :].T])
 
 
 def _move_along(axis: np.ndarray, moving: list[VertexConstraint]) -> RigidMove | None:

@@ -112,9 +112,7 @@ class Pin(Support):
     ):
         self.body: Shell | None = checked_body(body)
         self.vertices: np.ndarray = selection("Pin vertices", vertices)
-        if not isinstance(components, str) or components not in _ORDERS:
-            raise ValueError(f'components must be some of "x", "y", "z", got {components!r}')
-        self.components = components
+        self.components = checked_components(components)
         self._move = _Move(displacement, rotation, center)
         moves = np.zeros(3) if displacement is None else self._move.displacement
         for axis, move in zip(_AXES, moves, strict=True):
@@ -123,10 +121,7 @@ class Pin(Support):
 
     def _held(self, mesh: TriangleMesh) -> list[Held]:
         vertices = indices("Pin vertices", self.vertices, mesh.n_vertices)
-        if isinstance(mesh, QuadraticTriangleMesh):
-            _refuse_ends_alone(mesh, vertices)
-        elif not isinstance(mesh, TriangleMesh):
-            _refuse_corners_alone(mesh, vertices)
+        refuse_corners_alone("Pin", mesh, vertices)
         directions = np.eye(3)[[_AXES.index(c) for c in self.components]]
         move = self._move.about(mesh.rest_positions[vertices], self)
         return [Held(vertices, np.broadcast_to(directions, (len(vertices), *directions.shape)), move)]
@@ -141,6 +136,13 @@ class Pin(Support):
     def __repr__(self) -> str:
         done = self._move.summary() + on_body(self.body)
         return f"Pin({len(self.vertices)} vertices, components {self.components}{done})"
+
+
+def checked_components(components: str) -> str:
+    """Return the components. Raises ValueError if they are not some of "x", "y", "z"."""
+    if not isinstance(components, str) or components not in _ORDERS:
+        raise ValueError(f'components must be some of "x", "y", "z", got {components!r}')
+    return components
 
 
 class Clamp(Support):
@@ -276,40 +278,41 @@ class SymmetryPlane(Support):
         )
 
 
-def _refuse_corners_alone(mesh, vertices: np.ndarray) -> None:
-    """Raise ValueError if a Pin holds all corners of a face of a quadratic solid, but none of its middle nodes.
+def refuse_corners_alone(name: str, mesh: Any, vertices: np.ndarray) -> None:
+    """Raise ValueError if a support holds corners of quadratic elements, but none of the nodes between them.
 
-    So it is with vertices that were selected on a mesh of four-node tetrahedra: the middle nodes would silently stay
-    free.
+    So it is with vertices that were selected on a mesh of the same elements without middle nodes, which would silently
+    stay free. name: of the support's class.
     """
-    if mesh.order == 1:
-        return
+    if isinstance(mesh, QuadraticTriangleMesh):
+        _refuse_ends_alone(name, mesh, vertices)
+    elif not isinstance(mesh, TriangleMesh) and mesh.order > 1:
+        _refuse_corners_of_faces_alone(name, mesh, vertices)
+
+
+def _refuse_corners_of_faces_alone(name: str, mesh: Any, vertices: np.ndarray) -> None:
+    """Raise ValueError if all corners of a face of a quadratic solid are held, but none of its middle nodes."""
     held = np.zeros(mesh.n_vertices, dtype=bool)
     held[vertices] = True
     middles = mesh.faces[3::4]  # of the four triangles of a face, the one between its middle nodes
     corners = held[mesh.faces_of_corners].all(axis=1) & ~held[middles].any(axis=1)
     if corners.any():
         raise ValueError(
-            f"Pin vertices hold the corners of {np.count_nonzero(corners)} faces of a quadratic Solid, and none of the "
+            f"{name} vertices hold the corners of {np.count_nonzero(corners)} faces of a quadratic Solid, and none of the "
             "nodes between them: select on the mesh of the solid, as in solid.mesh.vertices_at(x=0.0), which has "
             "ten nodes a tetrahedron"
         )
 
 
-def _refuse_ends_alone(mesh: QuadraticTriangleMesh, vertices: np.ndarray) -> None:
-    """Raise ValueError if a Pin holds a row of edges of six-node elements by their ends, but none of the nodes between
-    them.
-
-    So it is with vertices that were selected on a mesh of three-node triangles: the middle nodes would silently stay
-    free.
-    """
+def _refuse_ends_alone(name: str, mesh: QuadraticTriangleMesh, vertices: np.ndarray) -> None:
+    """Raise ValueError if a row of edges of six-node elements is held by its ends, but none of the nodes between them."""
     held = np.zeros(mesh.n_vertices, dtype=bool)
     held[vertices] = True
     edges = mesh.edges[held[mesh.edges].all(axis=1)]
     in_a_row = len(edges) and np.bincount(edges.ravel()).max() > 1
     if in_a_row and not held[mesh.edge_nodes].any():
         raise ValueError(
-            f"Pin vertices hold the ends of {len(edges)} edges of six-node elements, and none of the nodes between them: "
+            f"{name} vertices hold the ends of {len(edges)} edges of six-node elements, and none of the nodes between them: "
             "select on the mesh of the shell, as in shell.mesh.vertices_at(x=0.0)"
         )
 

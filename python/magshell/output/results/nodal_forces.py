@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...model.loads.loads import DeadLoad
+from ...model.supports.displacement_ties import DisplacementTie
 from ...solve.dynamics.trajectory import Trajectory
 from ...solve.statics.equilibrium import Equilibrium
 
@@ -14,12 +15,14 @@ from ...solve.statics.equilibrium import Equilibrium
 def nodal_forces(result: Any, index: int) -> dict[str, np.ndarray]:
     """Return the `reaction` of all supports and the dead `load` on the vertices in state `index`, (n_v, 3) N each.
 
-    Only those are there that the scene has. Paths store no reactions: their points would have to be solved again.
+    Only those are there that the scene has; those of EqualDisplacement and Periodic act between vertices and are left out.
+    Paths store no reactions: their points would have to be solved again.
     """
     scene, found = result.scene, {}
-    if scene.supports and isinstance(result, Equilibrium | Trajectory):
+    supports = [each for each in scene.supports if not isinstance(each, DisplacementTie)]
+    if supports and isinstance(result, Equilibrium | Trajectory):
         forces = np.zeros((scene.mesh.n_vertices, 3))
-        for support in scene.supports:
+        for support in supports:
             held = (
                 result.reaction(support, index)
                 if isinstance(result, Trajectory)

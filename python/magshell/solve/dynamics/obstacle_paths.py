@@ -200,12 +200,19 @@ def check_supports(asked: MotionInputs, prescribed: list[Any]) -> None:
     """
     scene, values = asked.inputs.scene, asked.inputs.values
     moving = {id(each.owner) for each, _ in prescribed}
+    if stuck := [each for each in scene._constraints.bound if id(each) in moving]:
+        raise ValueError(
+            f"{stuck[0]!r} cannot move in time: supports or other ties hold some of its vertices"
+        )
     if not moving or len(scene.supports) < 2:
         return
     held = {
         id(each): np.unique(
             np.concatenate(
-                [h.vertices for h in constraints.held_by(each, scene._bodies.of(each), scene._bodies)]
+                [
+                    np.zeros(0, dtype=np.int64),
+                    *(h.vertices for h in constraints.held_by(each, scene._bodies.of(each), scene._bodies)),
+                ]
             )
         )
         for each in scene.supports

@@ -40,6 +40,7 @@ from ..options import (
     ImplicitEuler,
     Integrator,
     Newton,
+    ProjectiveDynamics,
     as_adjoint_storage,
 )
 from .differentiable_state import DifferentiableState
@@ -111,6 +112,10 @@ def preparation(
         raise ValueError(
             f"{type(integrator).__name__} falls to first order where rigid parts with joints or vertices turn, as its first "
             "stage is of first order only: take TRBDF2(), which keeps the second, or ImplicitEuler()"
+        )
+    if scene._constraints.tied and isinstance(integrator, ProjectiveDynamics):
+        raise ValueError(
+            "ProjectiveDynamics does not support EqualDisplacement and Periodic: choose another integrator"
         )
     magnetization = arguments.pop("remanent_magnetization")
 

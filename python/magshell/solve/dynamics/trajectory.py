@@ -31,6 +31,7 @@ from ...model.scene.scene import Scene
 from ...model.scene.values import Values
 from ...model.shells.shell import Shell
 from ...model.shells.strains import StrainHistory, strains_of
+from ...model.supports.displacement_ties import Periodic
 from ...model.supports.supports import Clamp, Pin, SymmetryPlane
 from ..options import Clock, Integrator, clock_of
 from .obstacle_paths import ObstaclePath, ReadPath
@@ -310,7 +311,7 @@ class Trajectory(AnimateMixin, OfOneBody):
         state, time = self._state_at(index), float(self.times[index])
         return compute_contact_state(self.scene, self._values, contact, state, velocities, time)
 
-    def reaction(self, support: Pin | Clamp | SymmetryPlane, index: int = -1) -> Reaction:
+    def reaction(self, support: Pin | Clamp | SymmetryPlane | Periodic, index: int = -1) -> Reaction:
         """Return the forces of a support on the scene in a recorded state, by default the last.
 
         They include inertia and damping and are those at the end of the step that led there; NaN at the start.

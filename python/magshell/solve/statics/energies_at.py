@@ -266,7 +266,7 @@ def hessian(
 def free_motions(scene: Scene) -> Any:
     """Return the sparse matrix B (3 n_v + n_e, n) of the motions that supports leave free, for ms.hessian.
 
-    scene: without rigid bodies and skeletons; else a ValueError.
+    scene: without rigid bodies, skeletons, EqualDisplacement and Periodic; else a ValueError.
 
     Its rows have the order of positions.ravel(), then of the edge rotations; B z is a motion of them, B^T f a force on
     the free unknowns z. Its columns are orthonormal but where vertices are welded together.
@@ -279,6 +279,10 @@ def free_motions(scene: Scene) -> Any:
     """
     if not isinstance(scene, Scene):
         raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
+    if scene._constraints.tied:
+        raise ValueError(
+            "the free motions of a scene with EqualDisplacement or Periodic are not available yet"
+        )
     order, model = Unknowns("free_motions", scene), scene._model
     free = np.arange(model.free_size)
     rows, columns, entries = [], [], []

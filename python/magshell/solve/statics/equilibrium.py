@@ -20,6 +20,7 @@ from ...model.scene.reactions import Reaction, reaction_in
 from ...model.scene.scene import Scene
 from ...model.scene.values import Values
 from ...model.shells.strains import Largest, strains_of
+from ...model.supports.displacement_ties import Periodic
 from ...model.supports.supports import Clamp, Pin, SymmetryPlane
 from .magnetic_state import MagneticState
 from .solve_log import SolveLog, SolveStep
@@ -149,7 +150,7 @@ class Equilibrium(SaveMixin, OfOneBody):
         """Return the active pairs of a contact and their forces."""
         return compute_contact_state(self.scene, self._values, contact, self._state)
 
-    def reaction(self, support: Pin | Clamp | SymmetryPlane) -> Reaction:
+    def reaction(self, support: Pin | Clamp | SymmetryPlane | Periodic) -> Reaction:
         """Return the forces of a support on the scene.
 
         >>> import magshell as ms
