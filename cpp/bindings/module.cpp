@@ -7,7 +7,8 @@
 
 namespace magshell::bindings {
 void register_body_contact(py::module_& module);
-}
+void register_picture(py::module_& module);
+}  // namespace magshell::bindings
 
 PYBIND11_MODULE(_core, module) {
     namespace b = magshell::bindings;
@@ -30,6 +31,7 @@ PYBIND11_MODULE(_core, module) {
     b::register_adjoint(module);       // takes results of solves
     b::register_continuation(module);  // shares options with statics
     b::register_dynamics(module);
+    b::register_picture(module);
 #ifdef MAGSHELL_TESTING
     b::register_contact_pairs(module);
     b::register_elimination_fronts(module);

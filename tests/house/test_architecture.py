@@ -27,6 +27,7 @@ FLOORS = {
     "magshell/force": 2,
     "magshell/field": 2,
     "magshell/obstacle": 2,
+    "magshell/picture": 2,
     "magshell/body": 3,
     "magshell/dofs": 4,
     "magshell/assembly": 4,

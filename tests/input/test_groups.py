@@ -56,7 +56,10 @@ def test_a_keyword_that_is_elsewhere_is_told_where(call, words):
         (lambda: ms.Style(arrows=-1), "arrows must be"),
         (lambda: ms.Style(arrows=10**9), "a count of at most 20000"),
         (lambda: ms.Style(rest="yes"), "rest must be True or False, got 'yes'"),
-        (lambda: ms.Style(backend="opengl"), "backend must be 'pyvista' or 'matplotlib', got 'opengl'"),
+        (
+            lambda: ms.Style(backend="opengl"),
+            "backend must be one of 'magshell', 'pyvista', 'matplotlib', got 'opengl'",
+        ),
         (lambda: ms.Color("displacement", label=3), "the label of a color must be a string, got 3"),
         (
             lambda: ms.Color("displacement", scale="hot"),

@@ -9,7 +9,7 @@ import magshell as ms
 from magshell.output.plot import backend as backends
 from magshell.output.plot import colors, glyphs
 from magshell.output.plot.colors import rgb, scalar_of
-from magshell.output.plot.panels import outline
+from magshell.output.plot.outlines import outline
 from magshell.output.plot.view import view_of
 from magshell.output.results.state import State, states_of
 from magshell.output.results.units import length_unit, prefixed, round_below, with_unit
@@ -17,7 +17,7 @@ from magshell.output.results.units import length_unit, prefixed, round_below, wi
 MAGNETIZATION = (4e4, 0.0, 0.0)
 
 
-@pytest.fixture(params=["matplotlib", "pyvista"])
+@pytest.fixture(params=["magshell", "matplotlib", "pyvista"])
 def backend(request) -> str:
     if request.param == "pyvista" and (reason := backends.why_not_pyvista()):
         pytest.skip(f"pyvista cannot render here: {reason}")

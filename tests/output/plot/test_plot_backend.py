@@ -1,4 +1,4 @@
-"""Selection of the plotting library: the requested one, or else the best that works here."""
+"""Selection of what paints: magshell itself, or the library that is asked for."""
 
 import importlib.util
 import sys
@@ -30,14 +30,14 @@ def test_the_environment_chooses(mesh, monkeypatch) -> None:
         ("raise RuntimeError('no GL')", "RuntimeError: no GL"),
     ],
 )
-def test_a_driver_that_fails_leaves_matplotlib(monkeypatch, program, reason) -> None:
+def test_a_driver_that_fails_is_an_error_only_for_pyvista(monkeypatch, program, reason) -> None:
     if importlib.util.find_spec("pyvista") is None:
         pytest.skip("pyvista is not installed")
     monkeypatch.delenv(backends.VARIABLE, raising=False)
     monkeypatch.setattr(backends, "_PROBE", program)
     backends.why_not_pyvista.cache_clear()
     try:
-        assert backends.choose() == "matplotlib"
+        assert backends.choose() == "magshell"
         with pytest.raises(RuntimeError, match=reason):
             backends.choose("pyvista")
     finally:

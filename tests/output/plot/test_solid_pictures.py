@@ -8,7 +8,7 @@ import pytest
 
 import magshell as ms
 from magshell.output.plot.colors import scalar_of
-from magshell.output.plot.panels import _seen
+from magshell.output.plot.outlines import seen
 from magshell.output.plot.surfaces import on_surfaces, scalar_on_surfaces
 from magshell.output.results.state import states_of
 from magshell.output.results.units import length_unit
@@ -94,13 +94,13 @@ def test_lines_behind_a_closed_surface_are_not_drawn():
     inwards = ms.TriangleMesh(box.rest_positions, box.faces[:, ::-1])
     for mesh in (box, inwards):
         (state,) = states_of(mesh)
-        lines = mesh.edges[_seen(state, np.arange(mesh.n_edges), np.array([1.0, 1.0, 1.0]) / np.sqrt(3))]
+        lines = mesh.edges[seen(state, np.arange(mesh.n_edges), np.array([1.0, 1.0, 1.0]) / np.sqrt(3))]
         middles = mesh.rest_positions[lines].mean(axis=1) - mesh.rest_positions.min(axis=0)
         assert len(lines) == 9 + 3 and (np.abs(middles - 1.0) < 1e-9).any(axis=1).all()
     sheet = ms.meshes.rectangle(1.0, 1.0, cells=(2, 2))
     (state,) = states_of(sheet)
     for side in (1.0, -1.0):
-        assert len(_seen(state, np.arange(sheet.n_edges), np.array([0.0, 0.0, side]))) == sheet.n_edges
+        assert len(seen(state, np.arange(sheet.n_edges), np.array([0.0, 0.0, side]))) == sheet.n_edges
 
 
 def test_meshes_bodies_scenes_and_motions_are_drawn(scenes, tmp_path):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._input.quantity import quantity, real_numbers
+from ..._input.tensors import stacked
 from ..._runtime.frozen import variant
 from ..bodies.bodies import BODIES, Bodies
 from ..bodies.embedded_points import embed_points
@@ -172,16 +173,21 @@ class Spring(Springs):
         """Return for each spring the core's nodes and weights of the vector from its end b to its end a; a point of the
         ground has no nodes.
         """
-        found = []
-        for body, points in zip(self._of, self._ends, strict=True):
-            pairs = [] if body is None else [(body, point) for point in points]
-            found.append(embed_points(pairs, bodies, rigid_points, "Spring"))
+        found = [self._embedded_end(end, bodies, rigid_points) for end in range(2)]
         if not found[1]:
             return found[0]
         return [
             (np.concatenate([i, j]), np.concatenate([of_a, -of_b]))
             for (i, of_a), (j, of_b) in zip(*found, strict=True)
         ]
+
+    def _embedded_end(
+        self, end: int, bodies: Bodies, rigid_points: Sequence[RigidBodyPoints]
+    ) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Return the core's nodes and weights of the ends 0 or 1 of all springs; an empty list for the ground."""
+        body, points = self._of[end], self._ends[end]
+        pairs = [] if body is None else [(body, point) for point in points]
+        return embed_points(pairs, bodies, rigid_points, "Spring")
 
     def _core_input(
         self, label: str, bodies: Bodies, rigid_points: Sequence[RigidBodyPoints]
@@ -222,6 +228,11 @@ class SpringResult(SpringsResult):
     _springs: Spring
 
     @property
+    def ends(self) -> Computed:
+        """The positions of the ends a and b, (..., n, 2, 3) m; b of a spring with b=None is where a is at rest."""
+        return self._shaped(self._in_each_state(_both_ends, *map(self._points, range(2))), 2)
+
+    @property
     def length(self) -> Computed:
         """The lengths of the springs, (..., n) m. Raises ValueError for springs with b=None."""
         self._require_axial("length")
@@ -254,7 +265,16 @@ class SpringResult(SpringsResult):
     def _vectors(self, of_vertices: Any, own: str = "_own_points") -> Any:
         """Return the weighted sums of vectors of the vertices (..., n_v, 3) at the ends of each spring, (..., n, 3)."""
         scene = self._result.scene
-        embedded = self._springs._embedded(scene._bodies, scene._rigid)
+        return self._sums(self._springs._embedded(scene._bodies, scene._rigid), of_vertices, own)
+
+    def _points(self, end: int) -> Any:
+        """Return the positions of the ends 0 or 1, (..., n, 3) m; zero for the ground."""
+        scene, positions = self._result.scene, self._result.positions
+        embedded = self._springs._embedded_end(end, scene._bodies, scene._rigid)
+        return self._sums(embedded, positions, "_own_points") if embedded else 0.0 * self._vectors(positions)
+
+    def _sums(self, embedded: list[tuple[np.ndarray, np.ndarray]], of_vertices: Any, own: str) -> Any:
+        scene = self._result.scene
         width, n_v = max(len(vertices) for vertices, _ in embedded), len(scene._bodies.original)
         nodes, weights = np.zeros((len(embedded), width), dtype=np.int64), np.zeros((len(embedded), width, 1))
         for k, (at, of) in enumerate(embedded):
@@ -274,7 +294,13 @@ class SpringResult(SpringsResult):
         """Return numbers of all springs, or those of the only one without their axis."""
         if not self._springs._one:
             return found
-        return found[..., 0, :] if axes else found[..., 0]
+        return found[(..., 0, *[slice(None)] * axes)]
+
+
+def _both_ends(spring: Spring, a: Any, b: Any) -> Any:
+    if spring.ground is not None:
+        b = b + like(np.broadcast_to(np.atleast_2d(spring.ground), b.shape), b)
+    return stacked([a, b], -2)
 
 
 def _spans(spring: Spring, vectors: Any) -> Any:

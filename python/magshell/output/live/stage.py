@@ -10,7 +10,7 @@ import numpy as np
 from ..plot import colors, glyphs
 from ..plot.colors import Scalar
 from ..plot.limits import arrow_count
-from ..plot.panels import outline
+from ..plot.outlines import outline
 from ..plot.style import Style
 from ..plot.surroundings import obstacle_solids
 from ..plot.view import View
@@ -138,14 +138,15 @@ class Stage:
         return name
 
     def _around(self, state: State) -> list[str]:
-        """Draw obstacles, magnets that stay, links, tendons and rigid bodies."""
+        """Draw obstacles, magnets that stay, links, tendons, springs and rigid bodies."""
         names = []
         for number, each in enumerate(obstacle_solids([state], self.size, self.middle)):
             shade = bytes_of(each.colors[0])
             opacity = None if each.opacity == 1.0 else each.opacity
             name = f"/around/{number}_{'{:02x}{:02x}{:02x}'.format(*shade)}"
             names.append(self.put(name, self.to_view(each.positions), each.faces, shade, opacity))
-        parts = (("links", colors.LINK), ("shapes", colors.LINK), ("tendons", colors.TENDON))
+        parts = (("links", colors.LINK), ("shapes", colors.LINK))
+        parts += (("tendons", colors.TENDON), ("springs", colors.SPRING))
         for kind, color in parts:
             surfaces: Iterable[tuple[np.ndarray, np.ndarray]] = getattr(state, kind)
             for number, (points, faces) in enumerate(surfaces):

@@ -1,4 +1,4 @@
-"""Choice of the library that paints: pyvista if it can render off-screen, otherwise matplotlib."""
+"""Choice of what paints: magshell itself, unless pyvista or matplotlib is asked for."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import subprocess
 import sys
 
 VARIABLE = "MAGSHELL_PLOT"
-BACKENDS = ("pyvista", "matplotlib")
+BACKENDS = ("magshell", "pyvista", "matplotlib")
 _INSTALL = 'pip install "magshell[plot]"'
 _PROBE = """
 import pyvista
@@ -22,7 +22,7 @@ print("painted" if plotter.screenshot(return_img=True).min() < 128 else "blank")
 
 
 def choose(backend: str | None = None) -> str:
-    """Choose the backend requested by the argument or the environment variable, or the best one available.
+    """Choose the backend requested by the argument or the environment variable, by default "magshell".
 
     Raises:
         ValueError: if the name is not one of BACKENDS.
@@ -32,20 +32,18 @@ def choose(backend: str | None = None) -> str:
     asked = backend or os.environ.get(VARIABLE) or None
     if asked is not None and asked not in BACKENDS:
         source = "backend" if backend else f"the environment variable {VARIABLE}"
-        raise ValueError(f"{source} must be 'pyvista' or 'matplotlib', got {asked!r}")
+        raise ValueError(f"{source} must be one of {', '.join(map(repr, BACKENDS))}, got {asked!r}")
     try:
         importlib.import_module("matplotlib.backends.backend_agg")  # the canvas, with all of its dependencies
     except ImportError as error:
-        raise ImportError(
-            f"pictures need matplotlib, and better ones pyvista as well: {_INSTALL} ({error})"
-        ) from error
-    if asked == "pyvista" and not _installed("pyvista"):
+        raise ImportError(f"pictures need matplotlib: {_INSTALL} ({error})") from error
+    if asked != "pyvista":
+        return asked or "magshell"
+    if not _installed("pyvista"):
         raise ImportError(f"pyvista was asked for, and it is not installed: {_INSTALL}")
-    if asked == "matplotlib" or (reason := why_not_pyvista()) is None:
-        return asked or "pyvista"
-    if asked == "pyvista":
-        raise RuntimeError(f"pyvista cannot render off the screen here ({reason}); use backend='matplotlib'")
-    return "matplotlib"
+    if (reason := why_not_pyvista()) is not None:
+        raise RuntimeError(f"pyvista cannot render off the screen here ({reason}); use another backend")
+    return asked
 
 
 def _installed(name: str) -> bool:

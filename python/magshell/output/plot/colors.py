@@ -34,6 +34,8 @@ OBSTACLE = "#b59a76"
 MAGNET = "#8d949e"
 LINK = "#f0e6d2"
 TENDON = "#8c1c3c"
+SPRING = "#5b7f95"
+CREASE = "#c2571a"
 NO_VALUE = "#d9dbde"
 # Colours of bodies that lie over each other in one picture and are not coloured by a scalar.
 SERIES = ("#7fa8d1", "#e8b36a", "#8fbf9f", "#d58b8b", "#b3a2d0", "#9fa8b2")

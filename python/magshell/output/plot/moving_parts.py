@@ -100,9 +100,11 @@ def _surroundings(states: list[State], size: float) -> list[Part]:
 
 
 def _solids(state: State, size: float, middle: np.ndarray) -> list[tuple[str, Solid]]:
-    """Return the surfaces around the bodies of a state, with their kinds: obstacles, magnets, links, tendons, shapes."""
+    """Return the surfaces around the bodies of a state, with their kinds: obstacles, magnets, links, tendons,
+    springs, shapes.
+    """
     kinds = (("link", state.links, colors.LINK), ("tendon", state.tendons, colors.TENDON))
-    kinds += (("rigid_body", state.shapes, colors.LINK),)
+    kinds += (("spring", state.springs, colors.SPRING), ("rigid_body", state.shapes, colors.LINK))
     around = [
         ("magnet" if each.opacity == 1.0 else "obstacle", each)
         for each in obstacle_solids([state], size, middle)

@@ -23,8 +23,9 @@ from . import colors, glyphs
 from .colors import Scalar, scalar_of
 from .drawing import checked_titles
 from .limits import arrow_count
+from .outlines import outline
 from .page_surroundings import PageSurroundings
-from .panels import outline, size_of
+from .panels import size_of
 from .playback import SAMPLES, evenly_spaced, same_faces, speed_of
 from .solids import Solid
 from .style import Color, Style, colored, style_of

@@ -7,23 +7,19 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy
 
-from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ..results.state import State
 from ..results.units import LengthUnit, with_unit
 from . import colors, glyphs
 from .colors import Scalar, rgb
 from .cuts import Cut, Section, cut_edges, opened, section_solid
 from .limits import arrow_count
+from .outlines import outline_edges, seen, silhouette_edges
 from .solids import Solid, arrows, ribbons, sheet
 from .style import Style
 from .surroundings import box_of, obstacle_solids
 from .thick import thick_skins
 from .view import View
 
-# [-] Cosine of the angle between the normals of two faces in the reference configuration; an edge with a larger angle is
-# drawn as a crease. On closed surfaces the angle is larger, since coarse meshes of round bodies have large angles as well.
-CREASE = np.cos(np.radians(40.0))
-SOLID_CREASE = np.cos(np.radians(65.0))
 LINE = 0.0022  # [-] width of lines over the size of the drawing
 LONGEST_FIELD = 0.2  # [-] longest arrow of a uniform field over the size of the drawing
 LONGEST_CONTACT = 0.12  # [-] longest arrow of a contact force over the size of the drawing
@@ -157,43 +153,11 @@ def size_of(states: list[State]) -> float:
     return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
-def outline(mesh: TriangleMesh) -> np.ndarray:
-    """Return the edges to draw as lines, (k, 2): boundary edges, and creases of the rest shape."""
-    return mesh.edges[_outline(mesh)]
-
-
-def _outline(mesh: TriangleMesh) -> np.ndarray:
-    """Return the numbers of the edges of the outline, ascending."""
-    interior = mesh.interior_edges
-    normals = mesh.face_normals[mesh.edge_faces[interior]]
-    cosine = np.einsum("ei,ei->e", normals[:, 0], normals[:, 1])
-    creases = interior[cosine < np.where(_of_closed(mesh)[interior], SOLID_CREASE, CREASE)]
-    return np.sort(np.concatenate([mesh.boundary_edges, creases]))
-
-
-def _of_closed(mesh: TriangleMesh) -> np.ndarray:
-    """Return whether each edge belongs to a connected part without boundary, (n_e,) bool."""
-    of_edge = mesh.components[mesh.edges[:, 0]]
-    return ~np.isin(of_edge, of_edge[mesh.boundary_edges])
-
-
-def _seen(state: State, edges: np.ndarray, eye: np.ndarray) -> np.ndarray:
-    """Return those of the edges (k,) that are not on the far side of a closed surface.
-
-    Lines are lifted towards the eye, so those on the far side would be visible through the surface.
-    """
-    mesh = state.mesh
-    x0, x1, x2 = np.moveaxis(state.positions[mesh.faces], 1, 0)
-    piece = mesh.components[mesh.faces[:, 0]]
-    # volumes of the connected parts, negative if normals point inwards
-    volumes = np.bincount(piece, np.einsum("fi,fi->f", x0, np.cross(x1, x2)))
-    towards = np.cross(x1 - x0, x2 - x0) @ eye * np.sign(volumes)[piece] > 0
-    hidden = _of_closed(mesh)[edges] & ~towards[mesh.edge_faces[edges]].any(axis=1)
-    return edges[~hidden]
-
-
 def sheet_solids(state: State, shades: np.ndarray, view: View, size: float, options: Options) -> list[Solid]:
-    """Return the solids of a state's bodies, with links, tendons, rigid bodies and lines. shades: colours of the bodies."""
+    """Return the solids of a state's bodies, with links, tendons, springs, rigid bodies and lines.
+
+    shades: colours of the bodies.
+    """
     mesh, eye = state.mesh, view.axes[2]
     step = float(mesh.edge_lengths.mean())
     skins, border = [sheet(state.positions, mesh.faces, shades)], None
@@ -202,16 +166,22 @@ def sheet_solids(state: State, shades: np.ndarray, view: View, size: float, opti
     links = [sheet(*each, rgb(colors.LINK)) for each in state.links]
     inside = [*links, *(sheet(*each, rgb(colors.TENDON)) for each in state.tendons)]
     shapes = [sheet(*each, rgb(colors.LINK)) for each in state.shapes]
+    shapes += [sheet(*each, rgb(colors.SPRING)) for each in state.springs]
     skins = [replace(skin, opacity=FLESH) for skin in skins] if inside else skins
     solids = [*inside, *shapes, *skins]
     if options.mesh_lines:
-        edges = mesh.edges[_seen(state, np.arange(mesh.n_edges), eye)]
+        edges = mesh.edges[seen(state, np.arange(mesh.n_edges), eye)]
         solids.append(ribbons(state.positions[edges], eye, 0.5 * LINE * size, colors.OUTLINE, 0.6 * step))
-    lines = _outline(mesh)
+    lines = outline_edges(mesh)
     if border is not None:
         solids.append(ribbons(border, eye, LINE * size, colors.OUTLINE, 0.2 * step))
-    elif len(shown := mesh.edges[_seen(state, lines, eye)]):
-        solids.append(ribbons(state.positions[shown], eye, LINE * size, colors.OUTLINE, 0.8 * step))
+    shown = np.union1d(seen(state, lines, eye), silhouette_edges(state, eye)) if border is None else lines[:0]
+    if len(shown):
+        contours = state.positions[mesh.edges[shown]]
+        solids.append(ribbons(contours, eye, LINE * size, colors.OUTLINE, 0.8 * step))
+    if len(state.creases):
+        creases = state.positions[np.asarray(state.creases)]
+        solids.append(ribbons(creases, eye, 1.4 * LINE * size, colors.CREASE, 0.8 * step))
     if options.rest and state.displacements.any():
         lines = mesh.edges[lines] if len(lines) else mesh.edges
         solids.append(ribbons(mesh.rest_positions[lines], eye, 0.8 * LINE * size, colors.REST, 0.0))

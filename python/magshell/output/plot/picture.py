@@ -6,14 +6,14 @@ import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from ..._input.scalars import positive
 from ..._runtime.files import replace_file
 from ..._runtime.frozen import Frozen
-from . import colors, legend, polygons, vtk
+from . import colors, legend, polygons, raster, vtk
 from .label_layout import NEAR, Box, Room, candidate_centers, text_center
 from .legend import TEXT
 from .limits import check_pixels
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..._input.kinds import FilePath
+
+Screen: TypeAlias = "polygons.Screen | raster.Screen | vtk.Screen"
 
 DPI = 200
 MARGIN = 0.08  # [inch] margin of the picture
@@ -53,7 +55,7 @@ class Picture(Frozen):
     def save(self, path: FilePath, dpi: float | None = None) -> Path:
         """Write a PNG, PDF or SVG file. dpi: dots per inch, by default those of the figure.
 
-        Texts, curves and what matplotlib painted are vectors in a PDF or SVG; bodies that pyvista painted are images in it.
+        Texts, curves and what matplotlib painted are vectors in a PDF or SVG; all other bodies are images in it.
         An existing file is replaced once the new one is complete. Raises ValueError for another ending or too many pixels,
         FileNotFoundError if the folder does not exist, and OSError if the file cannot be written.
         """
@@ -140,13 +142,14 @@ def paint(drawing: Drawing, width: int, columns: int | None, backend: str, dpi: 
 
 
 @contextmanager
-def screen_of(axes: Axes, backend: str, samples: bool = True) -> Iterator[vtk.Screen | None]:
-    """Open the off-screen window on which pyvista paints a panel before it is copied to the axes; None for matplotlib."""
-    if backend != "pyvista":
-        yield None
-        return
+def screen_of(axes: Axes, backend: str, samples: bool = True) -> Iterator[Screen]:
+    """Open what a panel is painted on before it is copied to the axes."""
     box = axes.get_window_extent()
-    screen = vtk.Screen((round(box.width), round(box.height)), samples)
+    pixels = round(box.width), round(box.height)
+    if backend == "pyvista":
+        screen = vtk.Screen(pixels, samples)
+    else:
+        screen = raster.Screen(pixels) if backend == "magshell" else polygons.Screen()
     try:
         yield screen
     finally:
@@ -158,21 +161,18 @@ def paint_panel(
     panel: Panel,
     drawing: Drawing,
     window: Any,
-    screen: vtk.Screen | None,
+    screen: Screen,
     title: float,
     ruler: Ruler,
 ) -> None:
-    """Paint a panel into its axes, by pyvista if there is a screen, otherwise by matplotlib.
+    """Paint a panel into its axes.
 
     window: (left, right, bottom, top) m. title: inches for the title above the axes.
     """
     axes.set_axis_off()
     axes.set_xlim(window[0], window[1])
     axes.set_ylim(window[2], window[3])
-    if screen is not None:
-        vtk.paint(axes, panel, drawing.view, window, screen)
-    else:
-        polygons.paint(axes, panel, drawing.view)
+    screen.paint(axes, panel, drawing.view, window)
     if drawing.ticks:
         write_ticks(axes, drawing, window)
     box = axes.get_window_extent()

@@ -91,7 +91,7 @@ def state_at(states: list[State], moment: Moment) -> State:
     title = clock(max(abs(states[0].time), abs(states[-1].time)))(moment.time)
     moved = {
         name: tuple(_surfaces_between(getattr(start, name), getattr(end, name), moment.fraction))
-        for name in ("links", "tendons", "shapes")
+        for name in ("links", "tendons", "springs", "shapes")
     }
     moved |= {
         name: tuple(_moved(getattr(start, name), getattr(end, name), moment.fraction))

@@ -26,8 +26,18 @@ def shade(colors: np.ndarray, normals: np.ndarray, view: View) -> np.ndarray:
     return colors * (AMBIENT + DIFFUSE * np.maximum(seen @ light, 0.0))[:, None]
 
 
-def paint(axes: Axes, panel: Panel, view: View) -> None:
-    """Add the triangles of a panel to matplotlib axes whose coordinates are metres on the screen."""
+class Screen:
+    """The axes themselves, into which triangles are painted as polygons."""
+
+    def close(self) -> None:
+        """Close nothing: it holds no window."""
+
+    def paint(self, axes: Axes, panel: Panel, view: View, window: np.ndarray) -> None:
+        """Add the triangles of a panel to matplotlib axes whose coordinates are metres on the screen."""
+        _paint(axes, panel, view)
+
+
+def _paint(axes: Axes, panel: Panel, view: View) -> None:
     from matplotlib.collections import PolyCollection
 
     parts = [_triangles(solid, view) for solid in panel.solids if len(solid.faces)]

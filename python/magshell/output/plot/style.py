@@ -29,8 +29,10 @@ class Style:
     contacts: show the forces of all contacts, friction included, as arrows at the vertices, in front of everything else.
     ticks: show coordinates along the edges of a picture or movie that is seen along an axis: view="front", "side" or "top".
     thickness: draw shells with their thickness, so that a sheet seen edge-on is not a line.
-    backend: "pyvista" or "matplotlib"; by default that of the environment variable MAGSHELL_PLOT, else pyvista if it can
-        render off-screen, else matplotlib. A page is painted by the browser that shows it.
+    backend: "magshell", "matplotlib" or "pyvista"; by default that of the environment variable MAGSHELL_PLOT, else
+        "magshell", which paints pixels with a depth buffer, without a graphics driver. "matplotlib" paints polygons, which
+        stay vectors in a PDF or SVG but may be sorted wrongly; "pyvista" paints by VTK. A page is painted by the browser
+        that shows it.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -53,7 +55,9 @@ class Style:
         for name in ("show_field", "rest", "mesh_lines", "contacts", "ticks", "thickness"):
             flag(name, getattr(self, name))
         if self.backend is not None and self.backend not in BACKENDS:
-            raise ValueError(f"backend must be 'pyvista' or 'matplotlib', got {self.backend!r:.60}")
+            raise ValueError(
+                f"backend must be one of {', '.join(map(repr, BACKENDS))}, got {self.backend!r:.60}"
+            )
 
 
 def style_of(style: Style | None) -> Style:

@@ -33,26 +33,26 @@ class Screen:
             self.plotter.render_window.SetMultiSamples(0)
 
     def close(self) -> None:
+        """Close the window."""
         self.plotter.close()
 
+    def paint(self, axes: Axes, panel: Panel, view: View, window: np.ndarray) -> None:
+        """Add the image of a panel to matplotlib axes whose coordinates are metres on the screen.
 
-def paint(axes: Axes, panel: Panel, view: View, window: np.ndarray, screen: Screen) -> None:
-    """Add the image of a panel to matplotlib axes whose coordinates are metres on the screen.
-
-    window: (left, right, bottom, top), m.
-    """
-    fine = render(panel.solids, view, window, screen)
-    image = np.zeros((fine.shape[0] // OVERSAMPLING, fine.shape[1] // OVERSAMPLING, 3), dtype=np.uint16)
-    for i in range(OVERSAMPLING):
-        for j in range(OVERSAMPLING):
-            image += fine[i::OVERSAMPLING, j::OVERSAMPLING]
-    axes.imshow(
-        image / np.float32(255 * OVERSAMPLING**2),
-        extent=window,
-        interpolation="none",
-        aspect="auto",
-        zorder=0,
-    )
+        window: (left, right, bottom, top), m.
+        """
+        fine = render(panel.solids, view, window, self)
+        image = np.zeros((fine.shape[0] // OVERSAMPLING, fine.shape[1] // OVERSAMPLING, 3), dtype=np.uint16)
+        for i in range(OVERSAMPLING):
+            for j in range(OVERSAMPLING):
+                image += fine[i::OVERSAMPLING, j::OVERSAMPLING]
+        axes.imshow(
+            image / np.float32(255 * OVERSAMPLING**2),
+            extent=window,
+            interpolation="none",
+            aspect="auto",
+            zorder=0,
+        )
 
 
 def _quiet_without_a_screen() -> None:

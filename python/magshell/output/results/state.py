@@ -41,6 +41,7 @@ from .link_surfaces import (
 )
 from .magnets import surfaces_of
 from .nodal_forces import nodal_forces
+from .spring_surfaces import creases_of, springs_at_rest, springs_of
 from .surroundings import surroundings_of
 from .units import clock
 
@@ -57,6 +58,7 @@ class State:
     fields: the fields that vary in space, with their sources at their positions; strength: the factor on them.
     title: what the result calls it. time: s, of a motion, or None. obstacles: those around the bodies.
     links, tendons, shapes: surfaces of links, of tendons and of free rigid bodies, (vertices (n, 3) m, faces (m, 3)) each.
+    springs: surfaces of springs and foundations likewise. creases: (k, 2), the ends of their edges, vertices of the mesh.
     elements: () -> [(first face, mesh, SolidStates or ShellStresses)] of the bodies of a result, or None.
     loads: () -> ContactLoads of a result of a scene with contacts, or None.
     forces: () -> {name: (n_v, 3) N} of a result, the forces of its supports and loads on the vertices, or None.
@@ -81,6 +83,8 @@ class State:
     loads: Callable[[], ContactLoads] | None = None
     forces: Callable[[], dict[str, np.ndarray]] | None = None
     shapes: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+    springs: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+    creases: np.ndarray | tuple[()] = ()
     rotates: np.ndarray | bool = False
     thickness: Callable[[], np.ndarray] | None = None
 
@@ -171,7 +175,9 @@ def states_of(
         states = _states(what.mesh, _with_own(given, what), [what.fields])
         tendons = tuple(tendons_at_rest(what))
         states = _with_thickness(states, lambda k: what.bodies)
-        return [replace(state, links=tuple(links), shapes=tuple(shapes), tendons=tendons) for state in states]
+        inside = {"links": tuple(links), "shapes": tuple(shapes), "tendons": tendons}
+        inside |= {"springs": springs_at_rest(what), "creases": creases_of(what)}
+        return [replace(state, **inside) for state in states]
     is_result = isinstance(getattr(what, "scene", None), Scene) and hasattr(what, "positions")
     if is_result and not isinstance(what, EquilibriumSet):
         own = _held_by(what)
@@ -186,6 +192,7 @@ def states_of(
             pairs = zip(states, around.obstacles, strict=True)
             states = [replace(state, obstacles=each) for state, each in pairs]
         states = _with_tendons(what, _with_links(what, states, positions), positions)
+        states = _with_springs(what, states, positions)
         states = _with_elements(what, states, positions)
         if what.scene.bodies and hasattr(what, "_values_at"):
             states = _with_thickness(states, lambda k: what._values_at(k).sheets)
@@ -218,6 +225,17 @@ def _with_tendons(result, states: list[State], positions) -> list[State]:
     if not tendons:
         return states
     return [replace(state, tendons=tuple(each)) for state, each in zip(states, tendons, strict=True)]
+
+
+def _with_springs(result, states: list[State], positions) -> list[State]:
+    """Add creases to the states of a result, and springs unless other positions were given."""
+    if not result.scene.bodies:
+        return states
+    states = [replace(state, creases=creases_of(result.scene)) for state in states]
+    springs = [] if positions is not None else springs_of(result)
+    if not springs:
+        return states
+    return [replace(state, springs=each) for state, each in zip(states, springs, strict=True)]
 
 
 def _with_thickness(states: list[State], bodies_of: Callable[[int], Any]) -> list[State]:
