@@ -108,6 +108,7 @@ from .model.solids.materials import (
 )
 from .model.solids.skin import Skin
 from .model.solids.solid import Solid
+from .model.supports.displacement_ties import EqualDisplacement, Periodic
 from .model.supports.supports import Clamp, Pin, SymmetryPlane
 from .output.live import LiveView, show
 from .output.plot import (
@@ -125,6 +126,7 @@ from .output.plot import (
 )
 from .output.results.probes import Probe
 from .output.results.saved import load, save
+from .output.results.saved_scene import load_scene, save_scene
 from .output.results.series import write_series
 from .output.results.surface_files import write_surface
 from .output.results.tables import to_pandas, to_xarray
@@ -191,6 +193,7 @@ __all__ = [
     "EdgeLoad",
     "ElasticFoundation",
     "Elastomer",
+    "EqualDisplacement",
     "Equilibrium",
     "EquilibriumBatch",
     "EquilibriumJumped",
@@ -232,6 +235,7 @@ __all__ = [
     "ObjectiveFailed",
     "OwnField",
     "PathEvent",
+    "Periodic",
     "Picture",
     "Pin",
     "PlacedField",
@@ -315,6 +319,7 @@ __all__ = [
     "linear_buckling",
     "linear_response",
     "load",
+    "load_scene",
     "magnetization_from_remanence",
     "mass_matrix",
     "meshes",
@@ -335,6 +340,7 @@ __all__ = [
     "refined_for",
     "richardson_extrapolation",
     "save",
+    "save_scene",
     "set_num_threads",
     "shapes",
     "show",

@@ -78,6 +78,7 @@ __all__: list[str] = [
     "pull_back_motion",
     "push_forward",
     "push_forward_motion",
+    "rasterized",
     "sample_fields",
     "set_num_threads",
     "shell_stresses",
@@ -1366,6 +1367,25 @@ def push_forward_motion(
 ) -> tuple[typing.Any, ...]:
     """
     The derivatives of positions, edge rotations, velocities and motor forces of recorded states along a direction of the inputs, and the number of factorizations that they took.
+    """
+
+def rasterized(
+    surfaces: list[typing.Any],
+    window: typing.Annotated[
+        collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(4)"
+    ],
+    width: typing.SupportsInt | typing.SupportsIndex,
+    height: typing.SupportsInt | typing.SupportsIndex,
+    *,
+    samples: typing.SupportsInt | typing.SupportsIndex,
+    light: typing.Annotated[
+        collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"
+    ],
+    ambient: typing.SupportsFloat | typing.SupportsIndex,
+    diffuse: typing.SupportsFloat | typing.SupportsIndex,
+) -> numpy.typing.NDArray[numpy.uint8]:
+    """
+    Paints triangles into an image (height, width, 4). surfaces: dictionaries with positions (n, 3) m on the screen and in depth, faces, colors, per_face, lit, smooth and opacity. window: (left, right, bottom, top) m.
     """
 
 def sample_fields(

@@ -31,6 +31,14 @@ def env_calls(s: Sample) -> Iterator[Call]:
         ms.envs.ParametricAction,
         {"owner": s.clamp, "name": "displacement", "numbers": 3, "value": lambda share, time, before: before},
     )
+    described = {
+        "actuators": [ms.envs.Action(s.clamp, "displacement", **bounds)],
+        "observation": lambda now: now.positions[-1],
+        "reward": lambda now: now.time,
+        "time_step": 1e-3,
+        "actions_per_episode": 2,
+    }
+    yield Call("envs.make", ms.envs.make, {"source": s.scene, "describe": lambda scene: described})
     yield Call("envs.VectorEnv", ms.envs.VectorEnv, {"environment": pendulum, "num_envs": 2, "threads": 1})
     yield Call(
         "envs.episodes",

@@ -138,3 +138,46 @@ def test_curves_against_time_and_each_other(results):
         ms.plot_history(results["move"], "tip.w", probes=probes)
     with pytest.raises(ValueError, match="several states"):
         ms.plot_history(results["rest"], "tip.z", probes=probes)
+
+
+def test_points_between_vertices_are_interpolated_in_their_element() -> None:
+    mesh = ms.meshes.rectangle(0.05, 0.01, cells=(10, 2))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    rest = ms.equilibrium(ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81)))
+    corners = mesh.faces[7]
+    point = np.array([0.5, 0.3, 0.2]) @ mesh.rest_positions[corners]
+    table = ms.to_pandas(
+        rest, probes=[ms.Probe("p", points=point), ms.Probe("c", points=point, what="position")]
+    )
+    moved = np.array([0.5, 0.3, 0.2]) @ rest.displacements[corners]
+    np.testing.assert_allclose([table[f"p.{a} [m]"][0] for a in "xyz"], moved, atol=1e-15)
+    np.testing.assert_allclose([table[f"c.{a} [m]"][0] for a in "xyz"], point + moved, atol=1e-15)
+    with pytest.raises(ValueError, match="lies outside every element"):
+        ms.to_pandas(rest, probes=ms.Probe("off", points=(0.06, 0.0, 0.0)))
+    with pytest.raises(ValueError, match="needs `of` or `points`, one of them"):
+        ms.Probe("both", [0], points=point)
+
+
+def test_stresses_of_a_pulled_strip_and_block_are_the_applied_ones() -> None:
+    """Pull a shell and a solid without contraction: the stress is E times a small strain, along x alone."""
+    pull = 1e-7
+    mesh = ms.meshes.rectangle(0.02, 0.01, cells=(4, 2))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.0)
+    block = ms.Solid(
+        ms.meshes.box((0.02, 0.01, 0.01), cells=(2, 1, 1)),
+        material=ms.StVenantKirchhoff(young_modulus=1e6, poisson_ratio=0.0),
+    )
+    for body in (sheet, block):
+        ends = [body.mesh.vertices_at(x=x) for x in (0.0, 0.02)]
+        held = [ms.Pin(ends[0]), ms.Pin(ends[1], displacement=(pull, 0, 0))]
+        rest = ms.equilibrium(ms.Scene(body, supports=held), solver=ms.MixedNewton(tolerance=1e-12))
+        inside = (0.012, 0.004, 0.0)
+        probes = [
+            ms.Probe("s", ends[1], "stress"),
+            ms.Probe("v", points=inside, what="von_mises_stress", body=body),
+        ]
+        table = ms.to_pandas(rest, probes=probes)
+        stress = 1e6 * pull / 0.02
+        np.testing.assert_allclose(table["s.xx [Pa]"][0], stress, rtol=1e-4)
+        np.testing.assert_allclose(table["v [Pa]"][0], stress, rtol=1e-4)
+        assert abs(table["s.xy [Pa]"][0]) < 1e-6 * stress

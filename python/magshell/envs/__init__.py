@@ -30,6 +30,7 @@ from .action import Action
 from .differentiable import EnvState
 from .parametric_action import ParametricAction
 from .rollouts import Episode, episodes
+from .saved import make
 from .snapshot import Snapshot
 
 __all__ = [
@@ -41,6 +42,7 @@ __all__ = [
     "Snapshot",
     "VectorEnv",
     "episodes",
+    "make",
     "robots",
 ]
 
