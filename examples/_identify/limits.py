@@ -8,7 +8,7 @@ import torch
 import magshell as ms
 
 from .inverse import UNIT, Problem
-from .model import FIELDS, NOISE, sheet, true_magnetization
+from .model import FIELDS, NOISE, measured, sheet, true_magnetization
 
 
 def scaled_together(cells, factor: float = 2.0) -> dict:
@@ -45,6 +45,31 @@ def deviations(problem: Problem, p: torch.Tensor) -> dict:
         "magnetization": UNIT * np.sqrt(variances[problem.n_nodes :]).reshape(-1, 3),
         "common factor": float(np.log(10) / np.linalg.norm(sensitivity @ common)),
     }
+
+
+def intervals(cells, level: float = 0.95) -> dict:
+    """Fit the magnetization of each strip with its intervals [A/m], Y being known, to noisy positions of the same
+    mesh.
+    """
+    whole = sheet(cells)
+    solve = ms.WarmStart(whole.scene)
+
+    def positions(magnetization):
+        rows = ms.parametrize.from_regions(magnetization, whole.regions)
+        return solve(remanent_magnetization=rows, applied_flux_density=FIELDS).positions
+
+    fitted = ms.fit(
+        positions,
+        measured(cells, NOISE, same_mesh=True),
+        {"magnetization": ms.FitParameter(np.zeros_like(true_magnetization()), size=UNIT, unit="A/m")},
+        noise=NOISE,
+        level=level,
+        progress=False,
+    )
+    inside = (fitted.lower["magnetization"] < true_magnetization()) & (
+        true_magnetization() < fitted.upper["magnetization"]
+    )
+    return {"fit": fitted, "inside": int(inside.sum()), "of": inside.size}
 
 
 def of_finer_magnetizations(cells, divisions=((5, 1), (10, 1), (5, 3))) -> list[dict]:

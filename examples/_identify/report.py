@@ -106,4 +106,9 @@ def summary(result: dict) -> str:
         *(f"    on {row['strips'][0]} x {row['strips'][1]} regions {1e-3 * row['deviation']:.1f} kA/m at worst, "
           "Y being known" for row in result["finer magnetizations"]),
     ]  # fmt: skip
+    found = result["intervals"]
+    lines.append(
+        f"  with Y known, {found['inside']} of {found['of']} intervals of ms.fit (95 %) hold the true component of M; "
+        f"{found['fit'].minimum.history[-1].evaluations} evaluations"
+    )
     return "\n".join(lines)
