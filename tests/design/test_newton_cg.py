@@ -279,3 +279,18 @@ def test_first_steps_beyond_all_numbers_are_refused(method):
     x = torch.zeros(2, dtype=torch.float64, requires_grad=True)
     with pytest.raises(ValueError, match=r"first_step must be at most 1e\+100 sizes, got 1e\+200"):
         getattr(ms.optim, method)([x], first_step=1e200)
+
+
+def test_bounds_that_change_between_steps_are_refused():
+    x = parameter(0.0, 0.0)
+
+    def objective():
+        return ((x - 2) ** 2).sum()
+
+    optimizer = ms.optim.NewtonCG([x], upper=1.0)
+    for _ in range(6):
+        optimizer.step(objective)
+    assert x.tolist() == pytest.approx([1.0, 1.0])
+    optimizer.param_groups[0]["upper"] = [3.0 * torch.ones(2, dtype=torch.float64)]
+    with pytest.raises(ValueError, match="bounds or scale of the optimizer changed"):
+        optimizer.step(objective)

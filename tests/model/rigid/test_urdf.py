@@ -112,6 +112,9 @@ def test_a_free_base_falls(tmp_path):
         ('ixx="0.01"', 'ixx="1.0"', r"'upper'.*inertia"),
         ('<axis xyz="0 1 0"/>', '<axis xyz="0 0 0"/>', r"'shoulder'.*axis must not be zero"),
         ("</robot>", "", "not a URDF file"),
+        ('<joint name="wrist"', '<joint name="elbow"', "several joints of one name: elbow"),
+        ('<link name="base"/>', '<link name="base"/><link name="tool"/>', "several links of one name: tool"),
+        ('lower="-0.1" upper="0.7"', "", r"'elbow'.*limits are 0 and 0"),
     ],
 )
 def test_unsupported_elements_are_refused(tmp_path, old, new, message):
@@ -125,5 +128,7 @@ def test_limits_are_not_dropped_in_silence(tmp_path):
     with pytest.raises(ValueError, match=r"'elbow'.*limit_stiffness"):
         ms.Skeleton.from_urdf(path)
     assert ms.Skeleton.from_urdf(path, limits=False).named["elbow"].upper_limit is None
+    one_sided = written(tmp_path, ARM.replace('lower="-0.1"', ""))
+    assert ms.Skeleton.from_urdf(one_sided, **LIMIT).named["elbow"].lower_limit == 0.0  # as URDF defines it
     with pytest.raises(FileNotFoundError, match="no file"):
         ms.Skeleton.from_urdf(tmp_path / "nothing.urdf")

@@ -58,9 +58,8 @@ def cells_of(mesh: Any) -> Cells:
         return Cells(mesh.rest_positions, mesh.faces, mesh.face_areas, mesh.face_barycenters)
     if isinstance(mesh, TetMesh) and mesh.order == 1:
         return Cells(mesh.rest_positions, mesh.tetrahedra, mesh.volumes, mesh.tetrahedron_barycenters)
-    raise ValueError(
-        f"mesh must be a TriangleMesh or a TetMesh of four-node tetrahedra, got {type(mesh).__name__}"
-    )
+    got = "one of ten-node tetrahedra" if isinstance(mesh, TetMesh) else type(mesh).__name__
+    raise ValueError(f"mesh must be a TriangleMesh or a TetMesh of four-node tetrahedra, got {got}")
 
 
 def checked_density(name: str, values: Any, count: int | str) -> torch.Tensor:

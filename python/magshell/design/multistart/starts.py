@@ -94,10 +94,13 @@ class MultistartResult(Sequence[Any]):
         head += f", {len(self.failed)} failed" if self.failed else ""
         lines = [f"  start {found.number}: {_in_words(found)}" for found in self.finished[:_MOST_SHOWN]]
         if len(self.finished) > _MOST_SHOWN:
+            rest = self.objectives[_MOST_SHOWN:]
             lines.append(
-                f"  ... and {len(self.finished) - _MOST_SHOWN} more, up to {self.objectives[-1]:.6g}"
+                f"  ... and {len(rest)} more, with objectives from {rest.min():.6g} to {rest.max():.6g}"
             )
         lines += [f"  start {lost.number} failed: {lost.error:.200}" for lost in self.failed[:_MOST_SHOWN]]
+        if len(self.failed) > _MOST_SHOWN:
+            lines.append(f"  ... and {len(self.failed) - _MOST_SHOWN} more that failed")
         return "\n".join([head, *lines])
 
 

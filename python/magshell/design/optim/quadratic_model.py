@@ -60,9 +60,15 @@ class QuadraticModel(ABC):
         """Return a step within the bounds and the radius that lowers the model.
 
         Products are taken in the first call only. Later ones, with smaller radii, return points on the path to its step.
+        Raises ValueError if the bounds are not those of the first call.
         """
         if not self._corners:
             self._corners = self._path(lower, upper, radius)
+            self._bounds = (lower.copy(), upper.copy())
+        elif not all(map(np.array_equal, self._bounds, (lower, upper))):
+            raise ValueError(
+                "bounds or scale of the optimizer changed after the objective was evaluated: make a new optimizer with them"
+            )
         (before, image_before), *others = self._corners
         for after, image_after in others:
             fraction = min(1.0, _reach(before, after - before, radius))

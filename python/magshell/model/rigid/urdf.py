@@ -22,6 +22,10 @@ def read_urdf(
     A root without mass is the world if the base is fixed: it is no link then, and its joints have no parent.
     """
     robot = _parsed(Path(path))
+    for kind, every in (("links", robot.links), ("joints", robot.joints)):
+        names = [each.name for each in every]
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            raise ValueError(f"{path} has several {kind} of one name: {', '.join(twice)}")
     frames = _link_frames(robot)
     links = {each.name: _link(each, frames[each.name]) for each in robot.links}
     (root,) = {each.name for each in robot.links} - {each.child for each in robot.joints}
@@ -122,7 +126,7 @@ def _joint(given, links: dict[str, Link], frame: np.ndarray, limits: dict[Any, A
     """Return a joint of the file, or None if it is a floating one. Raises ValueError for what joints here do not have.
 
     frame: (4, 4), that of its child, which is also that of the joint. limits: stiffness and smoothing of limits; None leaves
-    limits out. A bound that the file does not give is no limit.
+    limits out. A bound that a file leaves out is 0, as URDF defines it.
     """
     if given.mimic is not None:
         raise ValueError("it mimics another joint, which no joint here does: take the mimic element out")
@@ -144,13 +148,17 @@ def _joint(given, links: dict[str, Link], frame: np.ndarray, limits: dict[Any, A
         if damping := float(given.dynamics.damping or 0.0):
             law["damping"] = damping
     if limits is not None and kind != "continuous" and given.limit is not None:
-        bounds = {"lower_limit": given.limit.lower, "upper_limit": given.limit.upper}
-        if any(value is not None for value in bounds.values()):
-            if None in limits.values():
-                raise ValueError(
-                    "it has limits: say by limit_stiffness and limit_smoothing how stiff it is beyond, or limits=False"
-                )
-            law |= {**bounds, **limits}
+        lower, upper = (float(bound or 0.0) for bound in (given.limit.lower, given.limit.upper))
+        if not lower < upper:
+            raise ValueError(
+                f"its limits are {lower:g} and {upper:g}, where a bound that is left out is 0: give it a range, make it "
+                "continuous or fixed, or say limits=False"
+            )
+        if None in limits.values():
+            raise ValueError(
+                "it has limits: say by limit_stiffness and limit_smoothing how stiff it is beyond, or limits=False"
+            )
+        law |= {"lower_limit": lower, "upper_limit": upper, **limits}
     axis = np.array([1.0, 0.0, 0.0]) if given.axis is None else given.axis
     make = Prismatic if kind == "prismatic" else Revolute
     return make(**ends, origin=frame[:3, 3], axis=frame[:3, :3] @ axis, **law)

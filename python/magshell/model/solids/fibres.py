@@ -63,7 +63,7 @@ class Fibres:
 
     def __repr__(self) -> str:
         length = "" if self.length is None else f", {self.length:.4g} m long"
-        return f"Fibres(in {len(self.elements)} tetrahedra{length})"
+        return f"Fibres(in {len(self.directions)} tetrahedra{length})"
 
 
 def checked_directions(name: str, values: Any, shape: tuple[Any, ...]) -> np.ndarray:
