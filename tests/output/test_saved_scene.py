@@ -62,7 +62,7 @@ class Evil:
 @pytest.mark.parametrize(
     "content", [b"", b"magshell scene 1\n", b"magshell scene 1\n" + pickle.dumps(Evil())]
 )
-def test_other_files_are_refused_without_running_code(tmp_path, content) -> None:
+def test_files_of_other_classes_are_refused_without_running_code(tmp_path, content) -> None:
     limit = sys.getrecursionlimit()
     (tmp_path / "x.scene").write_bytes(content)
     with pytest.raises(ValueError, match=r"is no file of a scene|cannot be read by magshell"):
