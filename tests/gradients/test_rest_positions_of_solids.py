@@ -171,13 +171,6 @@ def test_couples_on_six_node_elements_have_no_derivative_by_rest_positions():
         ms.equilibrium(scene, values={body: {"rest_positions": given}}, applied_flux_density=FLUX)
 
 
-def test_a_magnetization_that_rotates_has_no_derivative_by_rest_positions():
-    body = block(magnetization_law="rotates")
-    given = torch.tensor(body.rest_positions, requires_grad=True)
-    with pytest.raises(ms.NoGradient, match="a magnetization that rotates yet"):
-        ms.equilibrium(scene_of(body), values={body: {"rest_positions": given}}, applied_flux_density=FLUX)
-
-
 def test_tetrahedra_that_rest_positions_turn_inside_out_are_named_before_the_solve():
     body = block("linear")
     x = np.array(body.rest_positions)
@@ -187,7 +180,9 @@ def test_tetrahedra_that_rest_positions_turn_inside_out_are_named_before_the_sol
         ms.equilibrium(scene_of(body), values={body: {"rest_positions": x}}, applied_flux_density=FLUX)
 
 
-@pytest.mark.parametrize("name", ["a solid with muscles at rest", "tied sheets at rest"])
+@pytest.mark.parametrize(
+    "name", ["actuated at rest", "on springs at rest", "two sheets with their own field at rest"]
+)
 def test_scenes_that_cannot_follow_rest_positions_yet_say_so(name):
     scene = kind(name).scene
     with pytest.raises(ValueError, match="rest_positions cannot be replaced in a scene with"):

@@ -1,7 +1,5 @@
 #include "magshell/energy/grown_face.h"
 
-#include <cmath>
-
 namespace magshell {
 namespace {
 
@@ -86,17 +84,10 @@ Vec3 GrownFace::natural_angle_changes(const Vec3& rest_angles) const {
     for (int i = 0; i < 3; ++i) {
         const Eigen::Vector2d &tj = triangle_.grown[(i + 1) % 3], &tk = triangle_.grown[(i + 2) % 3];
         const double length = face().edge_length[i];
-        const double share = length / (triangle_.edge[i].norm() * std::sqrt(triangle_.determinant));
         natural_angle_changes[i] =
-            rest_angles[i] * (share - 1.0) - length / (4.0 * face().area) * tj.dot(curvature_ * tk);
+            rest_angles[i] * (lengthened(i) - 1.0) - length / (4.0 * face().area) * tj.dot(curvature_ * tk);
     }
     return natural_angle_changes;
-}
-
-Mat2 GrownFace::lengths_by_growth(const Vec3& by) const {
-    Mat2 sum = Mat2::Zero();
-    for (int i = 0; i < 3; ++i) sum += by[i] * triangle_.squared_length_by_growth(i);
-    return sum;
 }
 
 GrownFace::ByNatural GrownFace::natural_angle_changes_vjp(const Vec3& rest_angles, const Vec3& by) const {
@@ -105,7 +96,7 @@ GrownFace::ByNatural GrownFace::natural_angle_changes_vjp(const Vec3& rest_angle
         const int j = (i + 1) % 3, k = (i + 2) % 3;
         const Eigen::Vector2d &tj = triangle_.grown[j], &tk = triangle_.grown[k];
         const double length = face().edge_length[i], over = length / (4.0 * face().area);
-        const double share = length / (triangle_.edge[i].norm() * std::sqrt(triangle_.determinant));
+        const double share = lengthened(i);
         const double bent = over * tj.dot(curvature_ * tk);
         const Mat2 stretched = triangle_.relative_length_by_growth(i);
         sum.growth += by[i] * (rest_angles[i] * share * (stretched - 0.5 * triangle_.inverse) -
@@ -113,6 +104,27 @@ GrownFace::ByNatural GrownFace::natural_angle_changes_vjp(const Vec3& rest_angle
                                over * (symmetric_product(curvature_ * tk, triangle_.edge[j]) +
                                        symmetric_product(curvature_ * tj, triangle_.edge[k])));
         sum.curvature -= by[i] * over * symmetric_product(tj, tk);
+    }
+    return sum;
+}
+
+// With dt~ = H t~ and dt' = G H t~, the area A' changes by tr H, and det G stays.
+GrownFace::ByRest GrownFace::natural_angle_changes_by_rest(const Vec3& rest_angles, const Vec3& by) const {
+    ByRest sum{Mat2::Zero(), Vec3::Zero()};
+    const Mat2& growth = triangle_.growth;
+    for (int i = 0; i < 3; ++i) {
+        const int j = (i + 1) % 3, k = (i + 2) % 3;
+        const std::array<Eigen::Vector2d, 3>&edge = triangle_.edge, &grown = triangle_.grown;
+        const double over = face().edge_length[i] / (4.0 * face().area), share = lengthened(i);
+        const double bent = over * grown[j].dot(curvature_ * grown[k]);
+        const Mat2 stretched = growth * grown[i] * edge[i].transpose() / grown[i].squaredNorm(),
+                   at_rest = edge[i] * edge[i].transpose() / edge[i].squaredNorm();
+        sum.deformation +=
+            by[i] *
+            (rest_angles[i] * share * (stretched - at_rest) - bent * (stretched - Mat2::Identity()) -
+             over * growth *
+                 (curvature_ * grown[k] * edge[j].transpose() + curvature_ * grown[j] * edge[k].transpose()));
+        sum.angles[i] = by[i] * (share - 1.0);
     }
     return sum;
 }

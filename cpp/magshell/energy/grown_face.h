@@ -12,6 +12,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 
 #include "magshell/energy/material.h"
 
@@ -28,6 +29,7 @@ class GrownTriangle {
   public:
     GrownTriangle(const std::array<Eigen::Vector2d, 3>& edges, const Mat2& growth)
         : edge(edges),
+          growth(growth),
           grown{growth * edges[0], growth * edges[1], growth * edges[2]},
           inverse(growth.inverse()),
           determinant(growth.determinant()),
@@ -35,13 +37,26 @@ class GrownTriangle {
 
     Mat2 membrane_by_growth(const ShellMaterial& m, const Vec3& r, const Vec3& d) const;
     Mat2 bending_by_growth(const ShellMaterial& m, const Vec3& r, const Vec3& d) const;
-    /// Return the derivatives by G of |t'_i|^2, and of l'_i divided by l'_i.
+    /// Returns the derivative by G of |t'_i|^2; relative_length_by_growth() that of l'_i, divided by l'_i.
     Mat2 squared_length_by_growth(int i) const { return 2.0 * symmetric_product(grown[i], edge[i]); }
+    /// Returns the gradient of by . |t'|^2 by growth.
+    Mat2 lengths_by_growth(const Vec3& by) const {
+        Mat2 sum = Mat2::Zero();
+        for (int i = 0; i < 3; ++i) sum += by[i] * squared_length_by_growth(i);
+        return sum;
+    }
     Mat2 relative_length_by_growth(int i) const {
         return symmetric_product(grown[i], edge[i]) / grown[i].squaredNorm();
     }
 
-    std::array<Eigen::Vector2d, 3> edge, grown;
+    /// Returns the same natural triangle with itself as reference shape: derivatives by its growth are those by a homogeneous deformation
+    /// of the natural shape. from_natural() converts one of these to that by a deformation of the reference shape, G S G^-1.
+    GrownTriangle natural() const { return {grown, Mat2::Identity()}; }
+    Mat2 from_natural(const Mat2& by) const { return growth * by * inverse; }
+
+    std::array<Eigen::Vector2d, 3> edge;
+    Mat2 growth;
+    std::array<Eigen::Vector2d, 3> grown;
     Mat2 inverse;
     double determinant;
     RestFace face;
@@ -66,18 +81,27 @@ class GrownFace {
     /// Returns o_i [rad], the natural angles relative to those of the reference shape.
     Vec3 natural_angle_changes(const Vec3& rest_angles) const;
 
-    /// Returns the gradient of by . |t'|^2 by growth.
-    Mat2 lengths_by_growth(const Vec3& by) const;
     struct ByNatural {
         Mat2 growth, curvature;
     };
     /// Returns the gradient of by . o by growth and curvature.
     ByNatural natural_angle_changes_vjp(const Vec3& rest_angles, const Vec3& by) const;
+    struct ByRest {
+        Mat2 deformation;
+        Vec3 angles;
+    };
+    /// Returns the gradient of by . o by a homogeneous deformation of the reference shape in its plane, and by its angles.
+    ByRest natural_angle_changes_by_rest(const Vec3& rest_angles, const Vec3& by) const;
 
     /// Converts a derivative in axes of the face to one by a tensor in world axes.
     Mat3 in_world(const Mat2& tensor) const { return axes_ * tensor * axes_.transpose(); }
 
   private:
+    /// Returns l'_i / (l~_i sqrt(det G)).
+    double lengthened(int i) const {
+        return face().edge_length[i] / (triangle_.edge[i].norm() * std::sqrt(triangle_.determinant));
+    }
+
     Eigen::Matrix<double, 3, 2> axes_;
     GrownTriangle triangle_;
     Mat2 curvature_;

@@ -27,11 +27,16 @@ class MagneticSix {
         return at;
     }
 
+    /// Returns the vectors a_1 and a_2 of nodes at x, or their rates for nodal velocities.
+    static std::array<SimdVec3, 2> edges(const SimdVec3 x[6], int point) {
+        return {combination(firsts_[point], x), combination(seconds_[point], x)};
+    }
+
     const Law& frame() const { return frame_; }
     /// Computes the rates of the law's frame for given nodal velocities.
     void rates(const SimdVec3 along[6], SimdVec3 rate[3]) const {
-        const SimdVec3 zero = {SimdDouble(0.0), SimdDouble(0.0), SimdDouble(0.0)};
-        const SimdVec3 ends[3] = {zero, combination(first(), along), combination(second(), along)};
+        const std::array<SimdVec3, 2> by = edges(along, point_);
+        const SimdVec3 ends[3] = {{SimdDouble(0.0), SimdDouble(0.0), SimdDouble(0.0)}, by[0], by[1]};
         frame_.frame_rate(ends, rate);
     }
 
@@ -95,9 +100,9 @@ class MagneticSix {
         return sum;
     }
     static Law of(const SimdVec3 x[6], int point, const Element& e) {
-        const SimdVec3 corners[3] = {{SimdDouble(0.0), SimdDouble(0.0), SimdDouble(0.0)},
-                                     combination(firsts_[point], x),
-                                     combination(seconds_[point], x)};
+        const std::array<SimdVec3, 2> from_first = edges(x, point);
+        const SimdVec3 corners[3] = {
+            {SimdDouble(0.0), SimdDouble(0.0), SimdDouble(0.0)}, from_first[0], from_first[1]};
         return Law(corners, e);
     }
     static void set_column(SimdMat3& matrix, int j, const SimdVec3& column) {

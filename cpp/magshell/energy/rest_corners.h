@@ -46,6 +46,16 @@ void add_by_rest_corners(const RestShape& face, const Mat3& by_deformation, cons
     for (int k = 0; k < 3; ++k) out.segment<3>(3 * corners[k]) += by_deformation * face.gradients[k];
 }
 
+/// Adds the gradient by the corners through the plane of the face, from the derivative by the components in that plane of a symmetric tensor
+/// T that is fixed in space, such as growth: by_tensor, a symmetric tensor in world axes with by_tensor n~ = 0. A motion of a corner tilts
+/// the plane: a vector a in it changes by - (dn~ . a) n~, dn~ = - sum_k g_k (n~ . dX_k).
+template <class Corners>
+void add_by_rest_plane(const RestShape& face, const Mat3& by_tensor, const Mat3& tensor,
+                       const Corners& corners, VectorXd& out) {
+    const Vec3 tilted = 2.0 * by_tensor * (tensor * face.normal);
+    for (int k = 0; k < 3; ++k) out.segment<3>(3 * corners[k]) += face.gradients[k].dot(tilted) * face.normal;
+}
+
 /// Returns the gradient by the edge vectors a~_1, a~_2 at rest of a power that is proportional to the area and linear in the coordinates
 /// c = R^-1 M~ of a magnetization M~, R = (a~_1, a~_2, n~), from its gradient by M~. As M~ = R c stays, by_c . dc = - by_M~ . dR c, and the
 /// motion of a corner tilts n~: dn~ = - sum_k g_k (n~ . dX_k).

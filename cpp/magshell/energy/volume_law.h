@@ -52,19 +52,21 @@ inline double target_at_rest(VolumeLaw law, double rest) {
 struct VolumeEnergy {
     double energy, slope, curvature = 0.0, magnitude = 0.0;
     std::array<double, 2> slope_by{};
-    double slope_by_factor = 0.0;
+    double slope_by_factor = 0.0, slope_by_rest = 0.0;  // slope_by_rest: by V_0
 
     /// Evaluates a law under a load factor.
     VolumeEnergy(VolumeLaw law, std::array<double, 2> numbers, double rest, double volume, double factor)
         : VolumeEnergy(law, loaded(law, numbers, rest, factor), rest, volume) {
         if (has_target_volume(law)) {
             slope_by_factor = slope_by[0] * (numbers[0] - target_at_rest(law, rest));
+            if (law == VolumeLaw::liquid) slope_by_rest += (1.0 - factor) * slope_by[0];
             slope_by[0] *= factor;
             return;
         }
         slope_by_factor = slope;
         energy = factor == 0.0 ? 0.0 : factor * energy;  // avoids 0 times infinity
-        for (double* each : {&slope, &curvature, &magnitude, &slope_by[0], &slope_by[1]}) *each *= factor;
+        for (double* each : {&slope, &curvature, &magnitude, &slope_by[0], &slope_by[1], &slope_by_rest})
+            *each *= factor;
     }
 
     VolumeEnergy(VolumeLaw law, const std::array<double, 2>& numbers, double rest, double volume) {
@@ -86,6 +88,7 @@ struct VolumeEnergy {
                 curvature = a / (ratio * volume);
                 magnitude = b + a / ratio;
                 slope_by = {-1.0 / ratio, 1.0};
+                slope_by_rest = -a / volume;
                 return;
             case VolumeLaw::liquid:
                 energy = 0.5 * b * (volume - a) * (volume - a) / rest;
@@ -93,6 +96,7 @@ struct VolumeEnergy {
                 curvature = b / rest;
                 magnitude = b * (std::abs(volume) + std::abs(a)) / rest;
                 slope_by = {-b / rest, (volume - a) / rest};
+                slope_by_rest = -slope / rest;
                 return;
             case VolumeLaw::cell:
                 energy = 0.5 * rest * b * (ratio - a) * (ratio - a);
@@ -100,6 +104,7 @@ struct VolumeEnergy {
                 curvature = b / rest;
                 magnitude = b * (std::abs(ratio) + std::abs(a));
                 slope_by = {-b, ratio - a};
+                slope_by_rest = -b * ratio / rest;
                 return;
         }
     }

@@ -5,6 +5,7 @@
 #include "magshell/terms/contact/friction_term.h"
 #include "magshell/terms/load/edge_moment_term.h"
 #include "magshell/terms/load/face_energy.h"
+#include "magshell/terms/load/group_energy_term.h"
 #include "magshell/terms/load/load_term.h"
 #include "magshell/terms/load/pressure_term.h"
 #include "magshell/terms/load/water_term.h"
@@ -26,7 +27,8 @@ bool rest_gradient_is_complete(const Term& term) {
         return shaped->has_rest_gradient();
     if (const auto* const moments = dynamic_cast<const EdgeMomentTerm*>(&term))
         return !moments->reads_rest_lengths();
-    return is_one_of<LoadTerm, PressureTerm, ContactTerm, FaceEnergyTerm<SurfaceTension>>(term);
+    return is_one_of<LoadTerm, PressureTerm, ContactTerm, FaceEnergyTerm<SurfaceTension>, GroupEnergyTerm>(
+        term);
 }
 
 }  // namespace

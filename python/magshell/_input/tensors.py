@@ -103,6 +103,21 @@ def dtype_like(*inputs):
     return next(real, sys.modules["torch"].float64)
 
 
+def joined(parts: list[Any], axis: int = 0):
+    """Join arrays along an axis that they have, or tensors in their graphs."""
+    if is_tensor(parts[0]):
+        import torch
+
+        return torch.cat(parts, axis)
+    return np.concatenate(parts, axis)
+
+
+def broadcast_rows(rows: Any, count: int):
+    """Return an array or a tensor of one row or of `count` with `count` rows."""
+    shape = (count, *rows.shape[1:])
+    return rows.expand(shape) if is_tensor(rows) else np.broadcast_to(rows, shape)
+
+
 def stacked(parts: list[Any], axis: int = 0):
     """Join arrays along a new axis, or tensors in their graphs. An empty list gives an empty array."""
     if parts and is_tensor(parts[0]):

@@ -122,20 +122,45 @@ class MuscleEnergy final : public MuscleTerm {
             loop_.gather(group, lambda, adjoint);
             typename Shared::Found found;
             for (int p = 0; p < points; ++p) {
-                const DeformedFibre at(each.m[p].at(x));
-                const FibreLaw::Response law = fibres_->law.at(at.length, each.activation);
-                const SimdVec3 rate = each.m[p].at(adjoint);
-                const SimdDouble along = dot(at.n, rate), scale = each.volume[p] * each.strength;
-                found.strength += each.volume[p] * law.tension * along;
-                found.activation += scale * law.by_activation * along;
-                found.add(
-                    p, x,
-                    (scale * law.slope * along) * at.n + (scale * at.over_length(law)) * at.across(rate));
-                found.add(p, adjoint, (scale * law.tension) * at.n);
+                const Pull pull(*this, each, p, x, adjoint);
+                found.strength += each.volume[p] * pull.law.tension * pull.along;
+                found.activation += pull.scale * pull.law.by_activation * pull.along;
+                found.add(p, x, pull.by_stretched);
+                found.add(p, adjoint, pull.by_rate);
             }
             gathered.take(group, found);
         });
         gathered.hand_over(out);
+    }
+
+    // A deformation I + H of the rest shape turns F m into F (I - H) m, and the rate of F m likewise.
+    void add_rest_vjp(const double* q, const LoadParameters&, const double* lambda, VectorXd& out) override {
+        for (Index group = 0; group < loop_.groups(); ++group) {
+            const Pieces& each = fibres_->at(group);
+            SimdVec3 x[N], adjoint[N];
+            loop_.gather(group, q, x);
+            loop_.gather(group, lambda, adjoint);
+            for (int p = 0; p < points; ++p) {
+                const Pull pull(*this, each, p, x, adjoint);
+                SimdDouble pulled[N];
+                for (int k = 0; k < N; ++k)
+                    pulled[k] = dot(x[k], pull.by_stretched) + dot(adjoint[k], pull.by_rate);
+                for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+                    const Index t = loop_.element(group, lane);
+                    const Eigen::Matrix<double, N, 3> g = Shared::gradients(fibres_->rest_of(t), p);
+                    Vec3 direction = Vec3::Zero(), by_direction = direction;
+                    for (int k = 0; k < N; ++k) {
+                        direction += each.m[p].alpha[k][lane] *
+                                     (fibres_->fibres.rest(t, k) - fibres_->fibres.rest(t, 0));
+                        by_direction += pulled[k][lane] * g.row(k).transpose();
+                    }
+                    const Mat3 by =
+                        pull.power[lane] * Mat3::Identity() - by_direction * direction.transpose();
+                    for (int k = 0; k < N; ++k)
+                        out.segment<3>(3 * fibres_->fibres.nodes_of(t)[k]) += by * g.row(k).transpose();
+                }
+            }
+        }
     }
 
     // The stretch l loses digits to the cancellation of coordinates as F does.
@@ -198,6 +223,26 @@ class MuscleEnergy final : public MuscleTerm {
     // At the last evaluated state: T' and T/l.
     struct Stiffness {
         SimdDouble along[points], across[points];
+    };
+
+    // The power of a point along a motion, with its derivatives by F m and by the rate of F m.
+    struct Pull {
+        FibreLaw::Response law;
+        SimdDouble along, scale, power;
+        SimdVec3 by_stretched, by_rate;
+
+        Pull(const MuscleEnergy& muscle, const Pieces& each, int p, const SimdVec3 x[N],
+             const SimdVec3 motion[N]) {
+            const DeformedFibre at(each.m[p].at(x));
+            law = muscle.fibres_->law.at(at.length, each.activation);
+            const SimdVec3 rate = each.m[p].at(motion);
+            along = dot(at.n, rate);
+            scale = each.volume[p] * each.strength;
+            power = scale * law.tension * along;
+            by_stretched =
+                (scale * law.slope * along) * at.n + (scale * at.over_length(law)) * at.across(rate);
+            by_rate = (scale * law.tension) * at.n;
+        }
     };
 
     // Computes sum_p alpha_pk alpha_pl M_p for all pairs of nodes. The blocks are symmetric, so six numbers of

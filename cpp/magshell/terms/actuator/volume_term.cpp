@@ -30,7 +30,7 @@ void add_curvature(const std::array<Vec3, N>& x, double factor, SimdMat3 blocks[
 
 VolumeTerm::VolumeTerm(const std::vector<VolumeInput>& inputs, const Nodes& nodes, const SystemMatrix& matrix,
                        Registry& registry)
-    : factor_(registry.load_parameters.add("scene", "load_factor", "1", 1, 1)) {
+    : nodes_(nodes), factor_(registry.load_parameters.add("scene", "load_factor", "1", 1, 1)) {
     for (const VolumeInput& input : inputs) {
         const VolumeNames names = names_of(input.law);
         const Index rows = static_cast<Index>(input.surfaces.size());
@@ -74,9 +74,13 @@ void VolumeTerm::add(const VolumeInput& input, const ClosedSurface& surface, Ind
         for (std::size_t i = 1; i < added.nodes.size(); ++i)
             for (std::size_t j = 0; j < i; ++j)
                 added.pairs.push_back(matrix.node_slot(added.nodes[i], added.nodes[j]));
-    std::vector<Vec3> rest;
-    for (const Index node : added.nodes) rest.push_back(nodes.rest[node] - nodes.rest[added.nodes[0]]);
-    added.rest = added.volume_at(rest);
+    added.rest = added.volume_at(added.at_rest(nodes));
+}
+
+std::vector<Vec3> VolumeTerm::Volume::at_rest(const Nodes& all) const {
+    std::vector<Vec3> x;
+    for (const Index node : nodes) x.push_back(all.rest[node] - all.rest[nodes[0]]);
+    return x;
 }
 
 std::vector<Vec3> VolumeTerm::Volume::at(const double* q) const {
@@ -254,6 +258,19 @@ void VolumeTerm::vjp(const double*, const LoadParameters& load_parameters, const
         for (int k = 0; k < 2; ++k)
             if (each.slots[k].entry >= 0) out.values[each.slots[k].at(each.row)] += law.slope_by[k] * along;
         out.load_parameters[factor_.first] += law.slope_by_factor * along;
+    }
+}
+
+void VolumeTerm::add_rest_vjp(const double*, const LoadParameters& load_parameters, const double* lambda,
+                              VectorXd& out) {
+    for (const Volume& each : volumes_) {
+        const VolumeEnergy law(each.law, each.numbers, each.rest, each.volume,
+                               load_parameters[factor_.first]);
+        const double by_rest = law.slope_by_rest * each.along(lambda);
+        std::vector<Vec3> slopes(each.nodes.size(), Vec3::Zero());
+        each.add_slopes(each.at_rest(nodes_), slopes);
+        for (std::size_t k = 0; k < slopes.size(); ++k)
+            out.segment<3>(3 * each.nodes[k]) += by_rest * slopes[k];
     }
 }
 

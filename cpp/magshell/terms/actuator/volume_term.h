@@ -17,6 +17,7 @@
 #include "magshell/energy/volume_form.h"
 #include "magshell/energy/volume_law.h"
 #include "magshell/terms/low_rank_term.h"
+#include "magshell/terms/rest_shape_term.h"
 
 namespace magshell {
 
@@ -36,7 +37,7 @@ struct VolumeInput {
     std::vector<ClosedSurface> surfaces;
 };
 
-class VolumeTerm final : public LowRankTerm {
+class VolumeTerm final : public LowRankTerm, public RestShapeTerm {
   public:
     VolumeTerm(const std::vector<VolumeInput>& inputs, const Nodes& nodes, const SystemMatrix& matrix,
                Registry& registry);
@@ -55,6 +56,8 @@ class VolumeTerm final : public LowRankTerm {
     void add_cancelling_here(VectorXd& out) const override;
     void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
              Gradient& out) override;
+    void add_rest_vjp(const double*, const LoadParameters& load_parameters, const double* lambda,
+                      VectorXd& out) override;
     std::size_t bytes() const override;
 
   private:
@@ -83,6 +86,7 @@ class VolumeTerm final : public LowRankTerm {
         /// Returns the positions relative to the first node: the volume does not depend on the origin, and no
         /// digits are lost far from it.
         std::vector<Vec3> at(const double* q) const;
+        std::vector<Vec3> at_rest(const Nodes& all) const;
         double volume_at(const std::vector<Vec3>& x) const;
         void add_slopes(const std::vector<Vec3>& x, std::vector<Vec3>& out) const;
         double along(const double* p) const;
@@ -92,6 +96,7 @@ class VolumeTerm final : public LowRankTerm {
              std::array<ParameterSlice, 2> slots, const Nodes& nodes, const SystemMatrix& matrix);
     void add_outer_product(const Volume& volume, double stiffness, SystemMatrix& out) const;
 
+    const Nodes& nodes_;
     ParameterSlice factor_;
     std::vector<Volume> volumes_;
 };

@@ -4,18 +4,20 @@
 #include <optional>
 
 #include "magshell/energy/induced_face.h"
+#include "magshell/energy/rest_corners.h"
 #include "magshell/field/dipoles.h"
 #include "magshell/terms/magnetic/applied_field_term.h"
 #include "magshell/terms/magnetic/face_sampling.h"
 #include "magshell/terms/magnetic/field_groups.h"
 #include "magshell/terms/magnetic/total_applied_field.h"
+#include "magshell/terms/rest_shape_term.h"
 
 namespace magshell {
 namespace {
 
 // The energy of faces that the applied field magnetizes, -1/2 M . B for each volume, with the magnetization of a thin
 // plate, M = along B - across (n . B) n. The faces do not magnetize each other.
-class InducedTerm final : public AppliedFieldTerm {
+class InducedTerm final : public AppliedFieldTerm, public RestShapeTerm {
   public:
     InducedTerm(const Surface& surface, Index body, const FaceLoop& loop, const FieldSources& sources,
                 Registry& registry);
@@ -31,6 +33,7 @@ class InducedTerm final : public AppliedFieldTerm {
                   bool, SystemMatrix& out) const override;
     void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
              Gradient& out) override;
+    void add_rest_vjp(const double*, const LoadParameters&, const double*, VectorXd& out) override;
     // Returns NaN where the field varies, as the error of the samples is not estimated; a uniform field has none.
     double field_sampling_error(const double*, const LoadParameters& load_parameters, double) override {
         return field_.varies(load_parameters) ? std::numeric_limits<double>::quiet_NaN() : 0.0;
@@ -68,6 +71,7 @@ class InducedTerm final : public AppliedFieldTerm {
     std::vector<double> susceptibilities_, thicknesses_;
     FaceSampling sampling_;
     LargeVector<InducedFace::Element> elements_;
+    std::vector<double> powers_;  // lambda . g of each face, from the last vjp()
     Field field_at_assembly_;
 };
 
@@ -254,6 +258,7 @@ void InducedTerm::vjp(const double* q, const LoadParameters& load_parameters, co
     // Points off the middle surface move with the thickness, whose derivative needs the second gradient.
     const FieldSamples samples = field_.at_factor_one(places, m, sampling_.any_fine() ? 2 : 1);
 
+    powers_.assign(surface_.n_faces(), 0.0);
     FieldProbe probe;
     probe.flux.resize(places.size()), probe.moment.resize(places.size()),
         probe.direction.resize(places.size());
@@ -279,8 +284,9 @@ void InducedTerm::vjp(const double* q, const LoadParameters& load_parameters, co
                 const double flux_through = normal.dot(b), its_rate = tilt.dot(b);
                 const Vec3 by_flux = across * (its_rate * normal + flux_through * tilt) -
                                      (along * gv - (across * normal.dot(gv)) * normal);
-                out.values[thickness_.at(f)] +=
-                    volume / h * (across * flux_through * its_rate - m[n].dot(gv));
+                const double slope = across * flux_through * its_rate - m[n].dot(gv);
+                powers_[f] += volume * slope;
+                out.values[thickness_.at(f)] += volume / h * slope;
                 out.values[susceptibility_.at(f)] += volume / vacuum_permeability *
                                                      ((1.0 - 1.0 / (permeability * permeability)) *
                                                           flux_through * (its_rate + normal.dot(gv)) -
@@ -300,6 +306,15 @@ void InducedTerm::vjp(const double* q, const LoadParameters& load_parameters, co
         }
     });
     field_.add_vjp(places, probe, samples, load_parameters, out);
+}
+
+// The power is proportional to the area at rest, and depends on the rest shape in no other way.
+void InducedTerm::add_rest_vjp(const double*, const LoadParameters&, const double*, VectorXd& out) {
+    for (Index f = 0; f < surface_.n_faces(); ++f) {
+        const RestShape rest(surface_.rest_corners(f));
+        for (int k = 0; k < 3; ++k)
+            out.segment<3>(3 * surface_.corners[f][k]) += powers_[f] * rest.gradients[k];
+    }
 }
 
 void InducedTerm::add_moments(const double* q, const LoadParameters& load_parameters,

@@ -4,6 +4,7 @@
 #include "magshell/energy/magnetic.h"
 #include "magshell/energy/magnetic_solid.h"
 #include "magshell/energy/magnetic_solid_rotating.h"
+#include "magshell/energy/rotating_rest.h"
 #include "magshell/strain/tetrahedron.h"
 #include "magshell/terms/element_energies.h"
 #include "magshell/terms/magnetic/applied_field_term.h"
@@ -40,7 +41,6 @@ class MagneticSolidTerm final : public AppliedFieldTerm, public ElementEnergies,
 
     std::string_view name() const override { return Magnetic::name; }
     Index body() const override { return body_; }
-    bool has_rest_gradient() const override { return Point::is_linear; }
 
     bool set_values(const Values& values) override {
         if (!values.changed(magnetization_)) return false;
@@ -120,6 +120,7 @@ class MagneticSolidTerm final : public AppliedFieldTerm, public ElementEnergies,
         FieldProbe probe;  // - V_p (M', M, v)
         probe.direction = rates.velocities;
         by_magnetization_.resize(places.size());
+        if (!Point::is_linear) applied_.resize(places.size()), rotations_ = rates.rotations;
         for (Index t = 0; t < solid_.n_elements(); ++t) {
             const RestElement<Element> rest = rest_of(t);
             const Eigen::Matrix<double, 3, N> x = nodes_of(t, q), along = nodes_of(t, lambda);
@@ -134,6 +135,7 @@ class MagneticSolidTerm final : public AppliedFieldTerm, public ElementEnergies,
                         rest.volume[p] *
                         (g.transpose() * (along.transpose() * flux + x.transpose() * flux_rate));
                 } else {
+                    applied_[n] = {flux, flux_rate};
                     by_magnetization -= rest.volume[p] * (rates.rotations[n].transpose() *
                                                           (flux.cross(rates.spins[n]) + flux_rate));
                 }
@@ -159,17 +161,26 @@ class MagneticSolidTerm final : public AppliedFieldTerm, public ElementEnergies,
         }
     }
 
-    void add_rest_vjp(const double*, const LoadParameters&, const double*, VectorXd& out) override {
-        if constexpr (Point::is_linear)
-            for (Index t = 0; t < solid_.n_elements(); ++t) {
-                const RestElement<Element> rest = rest_of(t);
-                const std::span<const Index> nodes = solid_.nodes_of(t);
-                for (int p = 0; p < points; ++p) {
-                    const Eigen::Matrix<double, N, 3> g = gradients(rest, p);
-                    const Mat3 by = by_deformation(t, p);
-                    for (int k = 0; k < N; ++k) out.segment<3>(3 * nodes[k]) += by * g.row(k).transpose();
+    void add_rest_vjp(const double* q, const LoadParameters&, const double* lambda, VectorXd& out) override {
+        for (Index t = 0; t < solid_.n_elements(); ++t) {
+            const RestElement<Element> rest = rest_of(t);
+            const std::span<const Index> nodes = solid_.nodes_of(t);
+            const Eigen::Matrix<double, 3, N> x = nodes_of(t, q), along = nodes_of(t, lambda);
+            for (int p = 0; p < points; ++p) {
+                const Eigen::Matrix<double, N, 3> g = gradients(rest, p);
+                Mat3 by;
+                if constexpr (Point::is_linear) {
+                    by = by_deformation(t, p);
+                } else {
+                    const SimdVec3& m = elements_[t / SimdDouble::width].at[p].remanence;
+                    const Index n = t * points + p;
+                    by = rotating_by_rest_deformation(x * g, along * g, rotations_[n],
+                                                      lane_of(m, t % SimdDouble::width), rest.volume[p],
+                                                      applied_[n]);
                 }
+                for (int k = 0; k < N; ++k) out.segment<3>(3 * nodes[k]) += by * g.row(k).transpose();
             }
+        }
     }
 
     std::size_t bytes() const override { return loop_.bytes() + bytes_of(elements_) + bytes_of(fields_); }
@@ -290,8 +301,11 @@ class MagneticSolidTerm final : public AppliedFieldTerm, public ElementEnergies,
     ParameterSlice magnetization_;
     std::array<double, N> shapes_[points];
     std::vector<Points> elements_;
-    std::vector<Vec3> by_magnetization_;  // gradient by that of each point, from the last vjp()
-    std::vector<Fields> fields_;          // sampled for the current assembly; empty in a uniform field
+    // The gradient by the magnetization of each point, from the last vjp(); of one that turns also the applied field and R.
+    std::vector<Vec3> by_magnetization_;
+    std::vector<FluxAndRate> applied_;
+    std::vector<Mat3> rotations_;
+    std::vector<Fields> fields_;  // sampled for the current assembly; empty in a uniform field
 };
 
 template <template <int> class Law>

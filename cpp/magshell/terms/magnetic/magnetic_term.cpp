@@ -7,7 +7,7 @@
 #include "magshell/energy/magnetic.h"
 #include "magshell/energy/magnetic_face_fine.h"
 #include "magshell/energy/magnetic_rotating.h"
-#include "magshell/energy/rest_corners.h"
+#include "magshell/energy/rotating_rest.h"
 #include "magshell/mesh/half_edges.h"
 #include "magshell/terms/element_energies.h"
 #include "magshell/terms/magnetic/applied_field_term.h"
@@ -28,8 +28,7 @@ class MagneticTerm final : public AppliedFieldTerm, public ElementEnergies, publ
                  Registry& registry);
 
     std::string_view name() const override { return Magnetic::name; }
-    bool has_rest_gradient() const override { return std::is_same_v<Law, Magnetic>; }
-    void add_rest_vjp(const double*, const LoadParameters&, const double*, VectorXd& out) override;
+    void add_rest_vjp(const double* q, const LoadParameters&, const double* lambda, VectorXd& out) override;
     Index body() const override { return body_; }
     bool set_values(const Values& values) override;
     double energy(const double* q, const LoadParameters& load_parameters) const override {
@@ -93,8 +92,10 @@ class MagneticTerm final : public AppliedFieldTerm, public ElementEnergies, publ
     std::vector<double> thicknesses_;
     FaceSampling sampling_;
     LargeVector<typename Law::Element> elements_;
-    std::vector<Vec3> by_magnetization_;  // gradient by that of each face, from the last vjp()
-    Fields fields_;                       // sampled for the current assembly
+    // The gradient by the magnetization of each face, and the applied field there, from the last vjp().
+    std::vector<Vec3> by_magnetization_;
+    std::vector<FluxAndRate> applied_;
+    Fields fields_;  // sampled for the current assembly
     std::vector<std::array<Index, 3>>
         neighbours_;      // across the edge opposite each corner, -1 for none; see find_neighbours
     bool linear_ = true;  // every magnetization is linear in the positions
@@ -263,6 +264,7 @@ void MagneticTerm<Law>::vjp(const double* q, const LoadParameters& load_paramete
     probe.flux.resize(points.size()), probe.moment.resize(points.size()),
         probe.direction.resize(points.size());
     by_magnetization_.resize(surface_.n_faces());
+    applied_.resize(surface_.n_faces());
     loop_.each_group([&](Index group) {
         SimdVec3 x[3], rate[3];
         loop_.gather(group, q, x);
@@ -303,6 +305,7 @@ void MagneticTerm<Law>::vjp(const double* q, const LoadParameters& load_paramete
             }
             const Vec3 by_coordinates =
                 -volume * (frame_rate.transpose() * flux + frame.transpose() * flux_rate);
+            applied_[f] = {flux, flux_rate};
             by_magnetization_[f] = rest_frame(f).transpose().inverse() * by_coordinates;
             out.values.segment<3>(magnetization_.at(f)) += by_magnetization_[f];
             out.values[thickness_.at(f)] += by_coordinates.dot(coordinates) / h;
@@ -312,17 +315,38 @@ void MagneticTerm<Law>::vjp(const double* q, const LoadParameters& load_paramete
 }
 
 template <class Law>
-void MagneticTerm<Law>::add_rest_vjp(const double*, const LoadParameters&, const double*, VectorXd& out) {
+void MagneticTerm<Law>::add_rest_vjp(const double* q, const LoadParameters&, const double* lambda,
+                                     VectorXd& out) {
+    std::vector<std::array<Vec3, 2>> by_edges(surface_.n_faces());
+    loop_.each_group([&](Index group) {
+        SimdVec3 x[3], rate[3], columns[3];
+        loop_.gather(group, q, x);
+        loop_.gather(group, lambda, rate);
+        const typename Law::Element& e = elements_[group];
+        Law(x, e).frame(columns);
+        for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+            const Index f = loop_.face(group, lane);
+            const RestShape rest(surface_.rest_corners(f));
+            const Vec3 coordinates(e.alpha[lane], e.beta[lane], e.gamma[lane]);
+            if constexpr (std::is_same_v<Law, Magnetic>) {
+                by_edges[f] = magnetic_by_rest_edges(rest, coordinates, by_magnetization_[f]);
+            } else {
+                Mat3 frame;
+                frame << lane_of(columns[0], lane), lane_of(columns[1], lane), lane_of(columns[2], lane);
+                const Mat3 at_rest = rest_frame(f);
+                const MovingFace face = {{lane_of(x[1] - x[0], lane), lane_of(x[2] - x[0], lane)},
+                                         {lane_of(rate[1] - rate[0], lane), lane_of(rate[2] - rate[0], lane)},
+                                         frame * at_rest.transpose()};
+                by_edges[f] =
+                    rotating_by_rest_edges(rest, face, at_rest * coordinates, e.volume[lane], applied_[f]);
+            }
+        }
+    });
     for (Index f = 0; f < surface_.n_faces(); ++f) {
-        const typename Law::Element& e = elements_[f / SimdDouble::width];
-        const int lane = f % SimdDouble::width;
-        const std::array<Vec3, 2> by =
-            magnetic_by_rest_edges(RestShape(surface_.rest_corners(f)),
-                                   {e.alpha[lane], e.beta[lane], e.gamma[lane]}, by_magnetization_[f]);
         const std::array<Index, 3>& nodes = surface_.corners[f];
         for (int k = 0; k < 2; ++k) {
-            out.segment<3>(3 * nodes[k + 1]) += by[k];
-            out.segment<3>(3 * nodes[0]) -= by[k];
+            out.segment<3>(3 * nodes[k + 1]) += by_edges[f][k];
+            out.segment<3>(3 * nodes[0]) -= by_edges[f][k];
         }
     }
 }

@@ -1,5 +1,7 @@
 // The gradient of the bending energy by rest positions. These functions have a file of their own for the reason that
 // bending_projective.cpp gives.
+#include <utility>
+
 #include "magshell/assembly/dihedral_angles.h"
 #include "magshell/energy/rest_corners.h"
 #include "magshell/terms/shell/bending_term.h"
@@ -10,22 +12,41 @@ void BendingTerm::add_rest_vjp(const double* q, const LoadParameters&, const dou
     const std::vector<ByRestFace> by_faces = by_rest_faces(q, lambda);
     std::vector<Vec3> by_angles(by_faces.size());
     for (Index f = 0; f < sheet_.n_faces(); ++f) {
-        add_by_rest_corners(RestShape(sheet_.rest_corners(f)), by_faces[f].deformation, sheet_.corners[f],
-                            out);
+        const RestShape shape(sheet_.rest_corners(f));
+        add_by_rest_corners(shape, by_faces[f].deformation, sheet_.corners[f], out);
+        if (growth_.any())
+            add_by_rest_plane(shape, by_faces[f].growth, growth_.growth(f), sheet_.corners[f], out);
         by_angles[f] = by_faces[f].angles;
     }
-    add_rest_angles_vjp(by_angles, out);
+    add_rest_angles_vjp(std::move(by_angles), out);
 }
 
 void BendingTerm::add_rest_strains_vjp(const Strains& stresses, VectorXd& out) const {
     std::vector<Vec3> by_angles(sheet_.n_faces());
     for (Index f = 0; f < sheet_.n_faces(); ++f)
         by_angles[f] = {-stresses.number(f, 0), -stresses.number(f, 1), -stresses.number(f, 2)};
-    add_rest_angles_vjp(by_angles, out);
+    add_rest_angles_vjp(std::move(by_angles), out);
 }
 
-// A side has the natural angle weight theta~ of its dihedral angle.
-void BendingTerm::add_rest_angles_vjp(const std::vector<Vec3>& by_angles, VectorXd& out) const {
+// A side has the angle weight theta~ of its dihedral angle at rest, changed by growth and natural curvature.
+void BendingTerm::add_rest_angles_vjp(std::vector<Vec3> by_angles, VectorXd& out) const {
+    if (growth_.any()) {
+        std::vector<Vec3> by_grown(by_angles.size());
+        for (Index f = 0; f < sheet_.n_faces(); ++f) by_grown[f] = shared(by_angles, f);
+        for (Index f = 0; f < sheet_.n_faces(); ++f) {
+            const RestShape shape(sheet_.rest_corners(f));
+            const GrownFace face = grown(f);
+            const Vec3 angles = rest_angles(f);
+            const GrownFace::ByRest by = face.natural_angle_changes_by_rest(angles, by_grown[f]);
+            const GrownFace::ByNatural by_natural = face.natural_angle_changes_vjp(angles, by_grown[f]);
+            add_by_rest_corners(shape, face.in_world(by.deformation), sheet_.corners[f], out);
+            add_by_rest_plane(shape, face.in_world(by_natural.growth), growth_.growth(f), sheet_.corners[f],
+                              out);
+            add_by_rest_plane(shape, face.in_world(by_natural.curvature), growth_.curvature(f),
+                              sheet_.corners[f], out);
+            by_angles[f] += by.angles;
+        }
+    }
     VectorXd q(3 * nodes_.n_nodes());
     for (Index node = 0; node < nodes_.n_nodes(); ++node) q.segment<3>(3 * node) = nodes_.rest[node];
     const Index n = sheet_.n_dihedrals();

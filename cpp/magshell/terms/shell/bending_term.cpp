@@ -362,7 +362,7 @@ void BendingTerm::vjp(const double* q, const LoadParameters&, const double* lamb
         const std::vector<ByRestFace> by_faces = by_rest_faces(q, lambda);
         std::vector<Vec3> by_angles(by_faces.size());
         for (Index f = 0; f < sheet_.n_faces(); ++f) {
-            growth_.add_vjp(f, by_faces[f].deformation, Mat3::Zero(), out);
+            growth_.add_vjp(f, by_faces[f].growth, Mat3::Zero(), out);
             by_angles[f] = by_faces[f].angles;
         }
         add_natural_angles_vjp(by_angles, out);
@@ -377,8 +377,13 @@ std::vector<BendingTerm::ByRestFace> BendingTerm::by_rest_faces(const double* q,
     each_face(q, lambda, [&](Index f, const Vec3& d, const Vec3& rates, const Vec3& stress_rates) {
         const Vec3 scale = scales_of(f);
         const GrownFace face = grown(f);
-        found[f].deformation = face.in_world(face.triangle().bending_by_growth(
-            materials_[f], scale.cwiseProduct(rates), scale.cwiseProduct(d)));
+        const GrownTriangle& triangle = face.triangle();
+        const auto by_growth_of = [&](const GrownTriangle& of) {
+            return of.bending_by_growth(materials_[f], scale.cwiseProduct(rates), scale.cwiseProduct(d));
+        };
+        found[f].growth = found[f].deformation = face.in_world(by_growth_of(triangle));
+        if (growth_.any())
+            found[f].deformation = face.in_world(triangle.from_natural(by_growth_of(triangle.natural())));
         found[f].angles = -history_.factor() * stress_rates;
     });
     return found;

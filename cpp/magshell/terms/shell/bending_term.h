@@ -37,7 +37,6 @@ class BendingTerm final : public StrainScaffold<BendingTerm>, public RestShapeTe
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
     void strains_vjp(const Strains& stresses, Gradient& out) const override;
-    bool has_rest_gradient() const override { return !growth_.any(); }
     void add_rest_vjp(const double* q, const LoadParameters&, const double* lambda, VectorXd& out) override;
     void add_rest_strains_vjp(const Strains& stresses, VectorXd& out) const override;
     std::size_t bytes() const override;
@@ -95,10 +94,10 @@ class BendingTerm final : public StrainScaffold<BendingTerm>, public RestShapeTe
     Vec3 shared(const std::vector<Vec3>& of_faces, Index face) const;
     void find_natural_angles();
     void add_natural_angles_vjp(const std::vector<Vec3>& by_angles, Gradient& out) const;
-    // Gradients of lambda . g at the last evaluated state by the rest shape of a face: by a homogeneous deformation, through its stiffness,
-    // and by the angles from which its strains are measured.
+    // Gradients of lambda . g at the last evaluated state by the rest shape of a face: by a homogeneous deformation and by the growth
+    // tensor in its plane, both through its stiffness, and by the angles from which its strains are measured.
     struct ByRestFace {
-        Mat3 deformation;
+        Mat3 deformation, growth;
         Vec3 angles;
     };
     std::vector<ByRestFace> by_rest_faces(const double* q, const double* lambda);
@@ -106,8 +105,8 @@ class BendingTerm final : public StrainScaffold<BendingTerm>, public RestShapeTe
     // lambda, whose rates of the dihedral angles store_rates() has stored.
     template <class Body>
     void each_face(const double* q, const double* lambda, const Body& body);
-    // Adds the gradient by rest positions through the rest angles, from that by the angles of each face.
-    void add_rest_angles_vjp(const std::vector<Vec3>& by_angles, VectorXd& out) const;
+    // Adds the gradient by rest positions through the angles from which strains are measured, from that by these angles of each face.
+    void add_rest_angles_vjp(std::vector<Vec3> by_angles, VectorXd& out) const;
     void assemble_faces(Index group, SystemMatrix& out) const;
     void assemble_dihedrals(Index first, Index last, const double* q, const Strains& stress,
                             SystemMatrix& out) const;

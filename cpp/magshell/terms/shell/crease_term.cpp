@@ -18,12 +18,18 @@ DihedralAngle fold_at(const std::array<Index, 4>& nodes, const double* q) {
     return DihedralAngle(x[0], x[1], x[2], x[3], SimdDouble(1.0));
 }
 
+VectorXd rest_state(const Nodes& nodes) {
+    VectorXd rest(3 * nodes.n_nodes());
+    for (Index node = 0; node < nodes.n_nodes(); ++node) rest.segment<3>(3 * node) = nodes.rest[node];
+    return rest;
+}
+
 }  // namespace
 
 CreaseTerm::CreaseTerm(const std::vector<CreaseInput>& inputs, const Nodes& nodes, const SystemMatrix& matrix,
-                       Registry& registry) {
-    VectorXd rest = VectorXd::Zero(nodes.n_dofs());
-    for (Index node = 0; node < nodes.n_nodes(); ++node) rest.segment<3>(3 * node) = nodes.rest[node];
+                       Registry& registry)
+    : nodes_(nodes) {
+    const VectorXd rest = rest_state(nodes);
     for (const CreaseInput& input : inputs) {
         const ParameterSlice stiffness =
             registry.values.add(input.owner, "stiffness", "N", input.stiffness_rows, 1);
@@ -118,18 +124,42 @@ void CreaseTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
                 edge.stiffness * (edge.reach + beyond) / (edge.height * edge.height);
 }
 
+double CreaseTerm::rate(const Edge& edge, const double* q, const double* lambda) {
+    SimdVec3 g[4];
+    fold_at(edge.nodes, q).gradient(g);
+    double rate = 0.0;
+    for (int node = 0; node < 4; ++node)
+        rate += lane_of(g[node], 0).dot(Eigen::Map<const Vec3>(lambda + 3 * edge.nodes[node]));
+    return rate;
+}
+
 void CreaseTerm::vjp(const double* q, const LoadParameters&, const double* lambda, Gradient& out) {
     for (std::size_t k = 0; k < edges_.size(); ++k) {
         const Edge& edge = edges_[k];
-        SimdVec3 g[4];
-        fold_at(edge.nodes, q).gradient(g);
-        double rate = 0.0;
-        for (int node = 0; node < 4; ++node)
-            rate += lane_of(g[node], 0).dot(Eigen::Map<const Vec3>(lambda + 3 * edge.nodes[node]));
+        const double rate = this->rate(edge, q, lambda);
         out.values[edge.stiffness_of.at(edge.row_of(edge.stiffness_of))] +=
             edge.length * (unwrapped_angles_[k] - edge.rest_angle) * rate;
         if (edge.angle_of.rows > 0)
             out.values[edge.angle_of.at(edge.row_of(edge.angle_of))] -= edge.stiffness * rate;
+    }
+}
+
+// The power k L (theta - theta_r) theta' follows the rest shape through L, and through theta_r if that is the angle at rest.
+void CreaseTerm::add_rest_vjp(const double* q, const LoadParameters&, const double* lambda, VectorXd& out) {
+    const VectorXd rest = rest_state(nodes_);
+    for (std::size_t k = 0; k < edges_.size(); ++k) {
+        const Edge& edge = edges_[k];
+        const double rate = this->rate(edge, q, lambda);
+        const Vec3 along = (nodes_.rest[edge.nodes[1]] - nodes_.rest[edge.nodes[0]]) / edge.length;
+        const double by_length =
+            edge.stiffness / edge.length * (unwrapped_angles_[k] - edge.rest_angle) * rate;
+        out.segment<3>(3 * edge.nodes[1]) += by_length * along;
+        out.segment<3>(3 * edge.nodes[0]) -= by_length * along;
+        if (edge.angle_of.rows > 0) continue;
+        SimdVec3 g[4];
+        fold_at(edge.nodes, rest.data()).gradient(g);
+        for (int node = 0; node < 4; ++node)
+            out.segment<3>(3 * edge.nodes[node]) -= edge.stiffness * rate * lane_of(g[node], 0);
     }
 }
 

@@ -10,12 +10,13 @@
 
 #include "magshell/assembly/lanes.h"
 #include "magshell/body/nodes.h"
+#include "magshell/terms/rest_shape_term.h"
 #include "magshell/terms/shell/crease_input.h"
 #include "magshell/terms/term.h"
 
 namespace magshell {
 
-class CreaseTerm final : public Term {
+class CreaseTerm final : public Term, public RestShapeTerm {
   public:
     CreaseTerm(const std::vector<CreaseInput>& inputs, const Nodes& nodes, const SystemMatrix& matrix,
                Registry& registry);
@@ -32,6 +33,7 @@ class CreaseTerm final : public Term {
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
              Gradient& out) override;
+    void add_rest_vjp(const double* q, const LoadParameters&, const double* lambda, VectorXd& out) override;
     std::vector<double> angle_branches() const override { return unwrapped_angles_; }
     void set_angle_branches(const std::vector<double>& angle_branches) override {
         unwrapped_angles_ = angle_branches;
@@ -51,9 +53,12 @@ class CreaseTerm final : public Term {
         double stiffness = 0.0, rest_angle = 0.0;  // k L [N m], theta_r
         Index row_of(const ParameterSlice& slice) const { return slice.rows > 1 ? row : 0; }
     };
+    /// Returns the rate of the angle of an edge at q along lambda.
+    static double rate(const Edge& edge, const double* q, const double* lambda);
     /// Returns theta at q with as many full turns as make it nearest to its value at the last evaluated state.
     double unwrapped_angle(const double* q, std::size_t k) const;
 
+    const Nodes& nodes_;
     std::vector<Edge> edges_;
     std::vector<double> unwrapped_angles_;  // of each edge at the last evaluated state
     bool psd_projection_ = false;

@@ -25,12 +25,16 @@ MembraneTerm::MembraneTerm(const Surface& surface, Index body, const MembraneFac
         }
 }
 
-// Returns the natural configuration of a triangle, with the mean growth of the faces that it consists of.
-GrownFace MembraneTerm::grown(Index face) const {
+// Returns the mean growth of the faces that a triangle consists of.
+Mat3 MembraneTerm::mean_growth(Index face) const {
     Mat3 growth = Mat3::Zero();
     for (const MembraneFaces::FacePart& share : faces_.parts(face))
         growth += share.part * growth_.growth(share.face);
-    return {faces_.rest_corners(face), growth, Mat3::Zero()};
+    return growth;
+}
+
+GrownFace MembraneTerm::grown(Index face) const {
+    return {faces_.rest_corners(face), mean_growth(face), Mat3::Zero()};
 }
 
 // Returns the triangle in its natural configuration, which is the reference configuration if nothing grows.
@@ -161,12 +165,12 @@ void MembraneTerm::vjp(const double* q, const LoadParameters&, const double* lam
         for (int k = 0; k < 2; ++k)
             materials_.add_vjp(faces_.parts(f)[k].face, 1, by_shares[f][k][0], by_shares[f][k][1], out);
     if (!growth_.any()) return;
-    add_growth_vjp(by_deformation(q, lambda), out);
+    add_growth_vjp(by_shape(q, lambda), out);
 }
 
 // The reference lengths change in the strains, and the stiffness.
-std::vector<Mat3> MembraneTerm::by_deformation(const double* q, const double* lambda) const {
-    std::vector<Mat3> by_faces(surface_.n_faces());
+std::vector<MembraneTerm::ByFace> MembraneTerm::by_shape(const double* q, const double* lambda) const {
+    std::vector<ByFace> by_faces(surface_.n_faces());
     each_group([&](Index group) {
         SimdDouble strains[3], rates[3], stresses[3];
         strain(group, q, strains);
@@ -176,48 +180,73 @@ std::vector<Mat3> MembraneTerm::by_deformation(const double* q, const double* la
         for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
             const Index f = loop_.face(group, lane);
             const GrownFace own = grown(f);
-            const Vec3 d = lane_of(strains, lane), along = lane_of(rates, lane);
-            Mat2 by_growth = own.lengths_by_growth(-history_.factor() * lane_of(stresses, lane));
-            for (const MembraneFaces::FacePart& share : faces_.parts(f))
-                if (share.part > 0.0)
-                    by_growth +=
-                        share.part * own.triangle().membrane_by_growth(materials_[share.face], along, d);
-            by_faces[f] = own.in_world(by_growth);
+            const Vec3 d = lane_of(strains, lane), along = lane_of(rates, lane),
+                       by_lengths = -history_.factor() * lane_of(stresses, lane);
+            const auto by_growth_of = [&](const GrownTriangle& triangle) -> Mat2 {
+                Mat2 by = triangle.lengths_by_growth(by_lengths);
+                for (const MembraneFaces::FacePart& share : faces_.parts(f))
+                    if (share.part > 0.0)
+                        by += share.part * triangle.membrane_by_growth(materials_[share.face], along, d);
+                return by;
+            };
+            by_faces[f] = by_face(own, by_growth_of);
         }
     });
     return by_faces;
 }
 
-std::vector<Mat3> MembraneTerm::strains_by_deformation(const Strains& stresses) const {
-    std::vector<Mat3> by_faces(surface_.n_faces());
+std::vector<MembraneTerm::ByFace> MembraneTerm::strains_by_shape(const Strains& stresses) const {
+    std::vector<ByFace> by_faces(surface_.n_faces());
     for (Index f = 0; f < surface_.n_faces(); ++f) {
-        const GrownFace own = grown(f);
-        by_faces[f] = own.in_world(
-            own.lengths_by_growth({-stresses.number(f, 0), -stresses.number(f, 1), -stresses.number(f, 2)}));
+        const Vec3 by(-stresses.number(f, 0), -stresses.number(f, 1), -stresses.number(f, 2));
+        by_faces[f] =
+            by_face(grown(f), [&](const GrownTriangle& triangle) { return triangle.lengths_by_growth(by); });
     }
     return by_faces;
 }
 
+// Without growth both derivatives are the same.
+template <class ByGrowth>
+MembraneTerm::ByFace MembraneTerm::by_face(const GrownFace& own, const ByGrowth& by_growth_of) const {
+    const GrownTriangle& triangle = own.triangle();
+    const Mat3 by_growth = own.in_world(by_growth_of(triangle));
+    if (!growth_.any()) return {by_growth, by_growth};
+    return {own.in_world(triangle.from_natural(by_growth_of(triangle.natural()))), by_growth};
+}
+
 void MembraneTerm::strains_vjp(const Strains& stresses, Gradient& out) const {
-    if (growth_.any()) add_growth_vjp(strains_by_deformation(stresses), out);
+    if (growth_.any()) add_growth_vjp(strains_by_shape(stresses), out);
 }
 
 void MembraneTerm::add_rest_vjp(const double* q, const LoadParameters&, const double* lambda, VectorXd& out) {
-    add_by_deformation(by_deformation(q, lambda), out);
-    if (!faces_.is_unchanged()) add_parts_vjp(q, lambda, out);
+    std::vector<double> by_first(surface_.n_faces(), 0.0);
+    if (!faces_.is_unchanged()) by_first = by_first_part(q, lambda);
+    add_by_shape(by_shape(q, lambda), std::move(by_first), out);
 }
 
 void MembraneTerm::add_rest_strains_vjp(const Strains& stresses, VectorXd& out) const {
-    add_by_deformation(strains_by_deformation(stresses), out);
+    add_by_shape(strains_by_shape(stresses), std::vector<double>(surface_.n_faces(), 0.0), out);
 }
 
-void MembraneTerm::add_by_deformation(const std::vector<Mat3>& by_faces, VectorXd& out) const {
-    for (Index f = 0; f < surface_.n_faces(); ++f)
-        add_by_rest_corners(RestShape(faces_.rest_corners(f)), by_faces[f], faces_.corners()[f], out);
+// by_first: the derivative by the first part of each triangle, but for that through the mean growth.
+void MembraneTerm::add_by_shape(const std::vector<ByFace>& by_faces, std::vector<double> by_first,
+                                VectorXd& out) const {
+    for (Index f = 0; f < surface_.n_faces(); ++f) {
+        const RestShape shape(faces_.rest_corners(f));
+        add_by_rest_corners(shape, by_faces[f].deformation, faces_.corners()[f], out);
+        if (!growth_.any()) continue;
+        add_by_rest_plane(shape, by_faces[f].growth, mean_growth(f), faces_.corners()[f], out);
+        const std::array<MembraneFaces::FacePart, 2> parts = faces_.parts(f);
+        if (parts[1].part > 0.0)
+            by_first[f] +=
+                by_faces[f]
+                    .growth.cwiseProduct(growth_.growth(parts[0].face) - growth_.growth(parts[1].face))
+                    .sum();
+    }
+    if (!faces_.is_unchanged()) add_parts_vjp(by_first, out);
 }
 
-// The first part of a triangle is A_1 / (A_1 + A_2), with the areas at rest of the two faces of the shell.
-void MembraneTerm::add_parts_vjp(const double* q, const double* lambda, VectorXd& out) const {
+std::vector<double> MembraneTerm::by_first_part(const double* q, const double* lambda) const {
     std::vector<double> by_first(surface_.n_faces(), 0.0);
     each_group([&](Index group) {
         SimdDouble strains[3], rates[3];
@@ -233,6 +262,11 @@ void MembraneTerm::add_parts_vjp(const double* q, const double* lambda, VectorXd
             by_first[f] = lane_of(rates, lane).dot(difference * lane_of(strains, lane));
         }
     });
+    return by_first;
+}
+
+// The first part of a triangle is A_1 / (A_1 + A_2), with the areas at rest of the two faces of the shell.
+void MembraneTerm::add_parts_vjp(const std::vector<double>& by_first, VectorXd& out) const {
     for (Index f = 0; f < surface_.n_faces(); ++f) {
         const std::array<MembraneFaces::FacePart, 2> parts = faces_.parts(f);
         if (parts[1].part == 0.0) continue;
@@ -248,10 +282,11 @@ void MembraneTerm::add_parts_vjp(const double* q, const double* lambda, VectorXd
     }
 }
 
-void MembraneTerm::add_growth_vjp(const std::vector<Mat3>& by_faces, Gradient& out) const {
+void MembraneTerm::add_growth_vjp(const std::vector<ByFace>& by_faces, Gradient& out) const {
     for (Index f = 0; f < surface_.n_faces(); ++f)
         for (const MembraneFaces::FacePart& share : faces_.parts(f))
-            if (share.part > 0.0) growth_.add_vjp(share.face, share.part * by_faces[f], Mat3::Zero(), out);
+            if (share.part > 0.0)
+                growth_.add_vjp(share.face, share.part * by_faces[f].growth, Mat3::Zero(), out);
 }
 
 void MembraneTerm::add_forces(const Strains& stresses, Residual& out) {

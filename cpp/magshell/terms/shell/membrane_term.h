@@ -36,7 +36,6 @@ class MembraneTerm final : public StrainScaffold<MembraneTerm>, public RestShape
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
     void strains_vjp(const Strains& stresses, Gradient& out) const override;
-    bool has_rest_gradient() const override { return !growth_.any(); }
     void add_rest_vjp(const double* q, const LoadParameters&, const double* lambda, VectorXd& out) override;
     void add_rest_strains_vjp(const Strains& stresses, VectorXd& out) const override;
     std::size_t bytes() const override;
@@ -56,14 +55,22 @@ class MembraneTerm final : public StrainScaffold<MembraneTerm>, public RestShape
     void strain(Index group, const double* q, SimdDouble d[3]) const;
     void rate(Index group, const double* p, SimdDouble d[3]) const;
     RestFace rest_face(Index face) const;
-    // Return the derivatives by a homogeneous deformation of each triangle at rest: of lambda . g at the last evaluated state, and of the
-    // strains times stresses.
-    std::vector<Mat3> by_deformation(const double* q, const double* lambda) const;
-    std::vector<Mat3> strains_by_deformation(const Strains& stresses) const;
-    void add_by_deformation(const std::vector<Mat3>& by_faces, VectorXd& out) const;
-    // Adds the gradient by rest positions through the parts of two faces in a triangle.
-    void add_parts_vjp(const double* q, const double* lambda, VectorXd& out) const;
-    void add_growth_vjp(const std::vector<Mat3>& by_faces, Gradient& out) const;
+    Mat3 mean_growth(Index face) const;
+    // Derivatives by the shape of a triangle, in world axes: by a homogeneous deformation at rest, and by the growth tensor in its plane.
+    struct ByFace {
+        Mat3 deformation, growth;
+    };
+    // Return the derivatives by the shape of each triangle: of lambda . g at the last evaluated state, and of the strains times stresses.
+    std::vector<ByFace> by_shape(const double* q, const double* lambda) const;
+    std::vector<ByFace> strains_by_shape(const Strains& stresses) const;
+    template <class ByGrowth>
+    ByFace by_face(const GrownFace& own, const ByGrowth& by_growth_of) const;
+    void add_by_shape(const std::vector<ByFace>& by_faces, std::vector<double> by_first, VectorXd& out) const;
+    // Returns, for the triangles with parts of two faces, the derivative of lambda . g by the first part through the stiffness.
+    std::vector<double> by_first_part(const double* q, const double* lambda) const;
+    // Adds the gradient by rest positions through the parts of two faces in a triangle, from the derivative by the first part.
+    void add_parts_vjp(const std::vector<double>& by_first, VectorXd& out) const;
+    void add_growth_vjp(const std::vector<ByFace>& by_faces, Gradient& out) const;
     const Symmetric3& stiffness(Index group) const { return elements_[group].stiffness; }
 
     const Surface& surface_;

@@ -7,6 +7,7 @@
 #include "magshell/energy/magnetic_rotating.h"
 #include "magshell/energy/magnetic_six.h"
 #include "magshell/energy/rest_point_six.h"
+#include "magshell/energy/rotating_rest.h"
 #include "magshell/terms/element_energies.h"
 #include "magshell/terms/magnetic/applied_field_term.h"
 #include "magshell/terms/magnetic/field_groups.h"
@@ -23,8 +24,7 @@ class MagneticSixTerm final : public AppliedFieldTerm, public ElementEnergies, p
                     const SystemMatrix& matrix, const FieldSources& sources, Registry& registry);
 
     std::string_view name() const override { return Magnetic::name; }
-    bool has_rest_gradient() const override { return std::is_same_v<Law, Magnetic>; }
-    void add_rest_vjp(const double*, const LoadParameters&, const double*, VectorXd& out) override;
+    void add_rest_vjp(const double* q, const LoadParameters&, const double* lambda, VectorXd& out) override;
     Index body() const override { return body_; }
     bool set_values(const Values& values) override;
     double energy(const double* q, const LoadParameters& load_parameters) const override {
@@ -82,9 +82,11 @@ class MagneticSixTerm final : public AppliedFieldTerm, public ElementEnergies, p
     ParameterSlice magnetization_, thickness_;  // values
     std::vector<double> thicknesses_;
     std::vector<Points> elements_;
-    std::vector<Vec3> by_magnetization_;  // gradient by that of each point, from the last vjp()
-    std::vector<Fields> fields_;          // sampled for the current assembly; empty in a uniform field
-    bool linear_ = true;                  // every magnetization is linear in the positions
+    // The gradient by the magnetization of each point, and the applied field there, from the last vjp().
+    std::vector<Vec3> by_magnetization_;
+    std::vector<FluxAndRate> applied_;
+    std::vector<Fields> fields_;  // sampled for the current assembly; empty in a uniform field
+    bool linear_ = true;          // every magnetization is linear in the positions
 };
 
 template <class Law>
@@ -231,6 +233,7 @@ void MagneticSixTerm<Law>::vjp(const double* q, const LoadParameters& load_param
     probe.flux.resize(places.size()), probe.moment.resize(places.size()),
         probe.direction.resize(places.size());
     by_magnetization_.resize(places.size());
+    applied_.resize(places.size());
     loop_.each_group([&](Index group) {
         SimdVec3 x[6], along[6];
         loop_.gather(group, q, x);
@@ -250,6 +253,7 @@ void MagneticSixTerm<Law>::vjp(const double* q, const LoadParameters& load_param
                 frame_rate << lane_of(rate[0], lane), lane_of(rate[1], lane), lane_of(rate[2], lane);
                 const Vec3 flux = everywhere + factor * samples.flux[n];
                 const Vec3 flux_rate = factor * (samples.gradient[n] * v);
+                applied_[n] = {flux, flux_rate};
                 const double volume = e.volume[lane];
                 const Vec3 by_coordinates =
                     -volume * (frame_rate.transpose() * flux + frame.transpose() * flux_rate);
@@ -283,17 +287,39 @@ void MagneticSixTerm<Law>::add_moments(const double* q, const LoadParameters&, s
 }
 
 template <class Law>
-void MagneticSixTerm<Law>::add_rest_vjp(const double*, const LoadParameters&, const double*, VectorXd& out) {
-    for (Index f = 0; f < sheet_.n_faces(); ++f)
+void MagneticSixTerm<Law>::add_rest_vjp(const double* q, const LoadParameters&, const double* lambda,
+                                        VectorXd& out) {
+    for (Index group = 0; group < loop_.groups(); ++group) {
+        SimdVec3 x[6], along[6], columns[3];
+        loop_.gather(group, q, x);
+        loop_.gather(group, lambda, along);
         for (int p = 0; p < points; ++p) {
-            const typename Law::Element& e = elements_[f / SimdDouble::width].at[p];
-            const int lane = f % SimdDouble::width;
-            const RestPointSix rest(sheet_.rest[f], six_nodes::inside[p].at);
-            rest.add_by_edges(magnetic_by_rest_edges(RestShape(rest.corners()),
-                                                     {e.alpha[lane], e.beta[lane], e.gamma[lane]},
-                                                     by_magnetization_[f * points + p]),
-                              sheet_.own_nodes[f], out);
+            const typename Law::Element& e = elements_[group].at[p];
+            const Point at(x, p, e);
+            const std::array<SimdVec3, 2> rates = Point::edges(along, p);
+            at.frame().frame(columns);
+            for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+                const Index f = loop_.element(group, lane), n = f * points + p;
+                const RestPointSix rest(sheet_.rest[f], six_nodes::inside[p].at);
+                const RestShape shape(rest.corners());
+                const Vec3 coordinates(e.alpha[lane], e.beta[lane], e.gamma[lane]);
+                std::array<Vec3, 2> by_edges;
+                if constexpr (std::is_same_v<Law, Magnetic>) {
+                    by_edges = magnetic_by_rest_edges(shape, coordinates, by_magnetization_[n]);
+                } else {
+                    Mat3 frame;
+                    frame << lane_of(columns[0], lane), lane_of(columns[1], lane), lane_of(columns[2], lane);
+                    const Mat3 at_rest = Law::rest_frame(shape.edges[0], shape.edges[1]);
+                    const MovingFace face = {{lane_of(at.frame().a1, lane), lane_of(at.frame().a2, lane)},
+                                             {lane_of(rates[0], lane), lane_of(rates[1], lane)},
+                                             frame * at_rest.transpose()};
+                    by_edges = rotating_by_rest_edges(shape, face, at_rest * coordinates, e.volume[lane],
+                                                      applied_[n]);
+                }
+                rest.add_by_edges(by_edges, sheet_.own_nodes[f], out);
+            }
         }
+    }
 }
 
 template <class Law>

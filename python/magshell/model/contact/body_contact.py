@@ -261,9 +261,9 @@ class SelfContact(BodyContact):
     ):
         if not isinstance(a, BODIES):
             raise ValueError(f"a must be a Shell or Solid of the scene, got {a!r:.60}")
-        _check_does_not_cross(a)
         self.a: Shell | Solid | RigidBody = a
         self.b: Shell | Solid | RigidBody = a
+        self._check_rest_shape()
         self._take(
             min_distance=min_distance,
             activation_distance=activation_distance,
@@ -275,6 +275,15 @@ class SelfContact(BodyContact):
             sticking_speed=sticking_speed,
             lagged_friction=lagged_friction,
         )
+
+    def _check_rest_shape(self) -> None:
+        """Raise ValueError if the mesh passes through itself at rest."""
+        pairs = self.a.mesh.self_intersections(self.a.mesh.rest_positions)
+        if len(pairs):
+            raise ValueError(
+                f"the mesh of a passes through itself at rest, and cannot be kept from it: {len(pairs)} pairs of faces do, "
+                f"{pairs[0, 0]} and {pairs[0, 1]} the first"
+            )
 
     def _distance(self, bodies) -> float:
         return _thickness(self.a)
@@ -314,15 +323,6 @@ def checked_side(name: str, side: Shell | Solid | RigidBody) -> Shell | Solid | 
             f"{name} is a RigidBody that does not say of which body it is: RigidBody(..., body=...)"
         )
     return side
-
-
-def _check_does_not_cross(body) -> None:
-    pairs = body.mesh.self_intersections(body.mesh.rest_positions)
-    if len(pairs):
-        raise ValueError(
-            f"the mesh of a passes through itself at rest, and cannot be kept from it: {len(pairs)} pairs of faces do, "
-            f"{pairs[0, 0]} and {pairs[0, 1]} the first"
-        )
 
 
 def side_of(side: Shell | Solid | RigidBody) -> Shell | Solid | RigidShape:

@@ -19,6 +19,7 @@ class BatchResult:
     positions: Any
     failed: dict[int, Any]
     _members: tuple[Any, ...]
+    _rest: Any  # (k or 1, ..., n_v, 3) m, the rest positions, if some were given
 
     _as_given = ("failed",)
 
@@ -30,7 +31,7 @@ class BatchResult:
     @property
     def displacements(self) -> Computed:
         """The displacements from the rest shape, in the shape of `positions`, m."""
-        return displacements_of(self)
+        return displacements_of(self) if self._rest is None else self.positions - self._rest
 
     def __len__(self) -> int:
         return len(self._members)

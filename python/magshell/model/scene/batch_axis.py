@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..._input.keyword_value import keyword_value
-from ..._input.tensors import detached, is_tensor, requires_gradient
+from ..._input.tensors import broadcast_rows, detached, is_tensor, joined, like, requires_gradient
 from ..._runtime.solve_keywords import SOLVE_KEYWORDS, names_of
+from .reshaped import REST
 from .scene import Scene
 from .values import Values
 
@@ -88,10 +89,6 @@ class BatchAxis:
                 raise ValueError(
                     f"values of {owner!r} must be a dict {{name: value}}, got {type(named).__name__}"
                 )
-            if "rest_positions" in named:
-                raise ValueError(
-                    "rest_positions cannot be replaced in a batch yet: solve its members one by one"
-                )
             found += [(owner, name, value) for name, value in named.items()]
         self.values: list[BatchValue] = [self._value(*each) for each in found]
 
@@ -99,6 +96,20 @@ class BatchAxis:
     def followed(self) -> list[BatchValue]:
         """The values that gradients are computed for."""
         return [each for each in self.values if each.followed]
+
+    @property
+    def rest_positions(self) -> Any:
+        """The rest positions of all members, (members or 1, n_v, 3) m, a tensor if some are; None if none are given."""
+        given = {each.owner: each for each in self.values if each.name == REST and each.owner is not None}
+        if not given:
+            return None
+        tensors = [each.value for each in given.values() if is_tensor(each.value)]
+        parts = []
+        for body in self._scene.bodies:
+            value = given[body].value if body in given else body.mesh.rest_positions
+            part = value if is_tensor(value) else like(np.array(value, dtype=np.float64), *tensors)
+            parts.append(part if part.ndim == 3 else part[None])
+        return joined([broadcast_rows(part, max(map(len, parts))) for part in parts], axis=1)
 
     def arguments(self, member: int) -> tuple[dict[str, Any], list[Any]]:
         """Return the keywords of one member's solve, and the tensors among them that stand for `followed`.
@@ -177,13 +188,20 @@ class BatchAxis:
                 elif name in SOLVE_KEYWORDS:
                     sizes = {"n_v": scene.mesh.n_vertices, "n_f": scene._bodies.n_magnetized}
                     keyword_value(SOLVE_KEYWORDS[name], numbers, sizes)
-            elif thorough:
+            elif thorough and name != REST:
                 Values(scene, {owner: {name: numbers}})
             else:
                 owner.replaced(**{name: numbers})
         except ValueError as error:
             return error
         return None
+
+
+def row_of(rest_positions: Any, member: int) -> Any:
+    """Return the rest positions of a member from BatchAxis.rest_positions, if they are tensors; else None."""
+    if not is_tensor(rest_positions):
+        return None
+    return rest_positions[member if len(rest_positions) > 1 else 0]
 
 
 def _check_gravity(numbers: np.ndarray) -> None:

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._input.tensor_kinds import why_not
-from ..._input.tensors import detached, is_tensor, requires_gradient
+from ..._input.tensors import detached, is_tensor, joined, requires_gradient
 from ..._runtime.frozen import remember, variant
 from ...errors import NoGradient
-from ..loads.custom_energy import CustomEnergy
+from ..actuators.tendon import Tendon
+from ..contact.body_contact import SelfContact
 from ..loads.springs import Springs
 from ..supports.displacement_ties import DisplacementTie
+from ..supports.supports import Clamp, Pin
 from .rest_gradient import without_rest_gradient
 from .scene import Scene
 
@@ -33,11 +35,10 @@ class ReshapedScene(Scene):
     _shares_directions = False
 
 
-def reshaped(scene: Scene, values: Any, no_gradient_with: Sequence[str] | None = ()) -> tuple[Scene, Any]:
+def reshaped(scene: Scene, values: Any, no_gradient_with: Sequence[str] = ()) -> tuple[Scene, Any]:
     """Return the scene in which a solve computes with these values, and the values by the objects of that scene.
 
-    no_gradient_with: what the solve has, besides the scene, that has no derivative by rest positions; None if the solve
-    has no gradients.
+    no_gradient_with: what the solve has, besides the scene, that has no derivative by rest positions.
 
     Without rest_positions among the values they are returned as they are. Raises ValueError for rest positions that do
     not fit, or in a scene with something that cannot follow them; NoGradient if a gradient by them is asked for and
@@ -50,13 +51,14 @@ def reshaped(scene: Scene, values: Any, no_gradient_with: Sequence[str] | None =
     numbers = {body: _numbers(body, value) for body, value in given.items()}
     there = _made(scene, numbers)
     if any(requires_gradient(value) for value in given.values()):
-        if no_gradient_with is None:
-            raise NoGradient(
-                f"no gradient by {REST} here: only ms.equilibrium, ms.WarmStart, ms.simulate and ms.linear_response have "
-                "one. Detach them"
-            )
         _refuse_without_gradient(there, no_gradient_with)
     return there, {there._own(owner): named for owner, named in values.items()}
+
+
+def turning_supports(scene: Scene) -> list[str]:
+    """Return words for supports that rotate, whose turn a solve changes: those have no derivative by rest positions yet."""
+    moved = [support for support in scene.supports if isinstance(support, Pin | Clamp)]
+    return ["supports that rotate"] * any(each._move.rotation is not None for each in moved)
 
 
 def without_rest_positions(scene: Scene, values: dict[Any, dict[str, Any]]) -> dict[Any, dict[str, Any]]:
@@ -81,14 +83,13 @@ def given_rest(scene: Scene, values: dict[Any, dict[str, Any]]) -> Any:
     tensors = {owner: named[REST] for owner, named in values.items() if is_tensor(named.get(REST))}
     if not tensors:
         return None
-    import torch
-
     like = next(iter(tensors.values()))
-    parts = [
-        tensors[body].to(like) if body in tensors else like.new_tensor(np.array(body.mesh.rest_positions))
-        for body in scene.bodies
-    ]
-    return torch.cat(parts)
+    return joined(
+        [
+            tensors[body].to(like) if body in tensors else like.new_tensor(np.array(body.mesh.rest_positions))
+            for body in scene.bodies
+        ]
+    )
 
 
 def _rest_positions(scene: Any, values: Any) -> dict[Any, Any]:
@@ -146,10 +147,7 @@ def _with_rest(
     own: dict[int, Any] = {}
 
     def stand_in(item: Any) -> Any:
-        body = getattr(item, "body", None)
-        found = now.get(id(item), item)
-        if id(body) in now:
-            found = variant(item, body=now[id(body)])
+        found = now.get(id(item)) or _about(item, now)
         if found is not item:
             own[id(item)] = found
         return found
@@ -164,7 +162,40 @@ def _with_rest(
     own[id(scene)] = there
     own |= {id(body.skin): now[id(body)].skin for body in numbers if getattr(body, "skin", None) is not None}
     remember(there, _stand_ins=own)
+    _check_same_ties(scene, there)
+    for contact in there.contacts:
+        if isinstance(contact, SelfContact):
+            contact._check_rest_shape()
     return there
+
+
+def _about(item: Any, now: dict[int, Any]) -> Any:
+    """Return an object of the scene that names the bodies of `now`, by their ids, in place of those they stand for."""
+
+    def named(value: Any) -> Any:
+        if id(value) in now:
+            return now[id(value)]
+        if type(value) not in (tuple, list):
+            return value
+        parts = [named(each) for each in value]
+        same = all(part is each for part, each in zip(parts, value, strict=True))
+        return value if same else type(value)(parts)
+
+    attributes = (
+        {name: named(value) for name, value in vars(item).items()} if hasattr(item, "__dict__") else {}
+    )
+    changed = {name: value for name, value in attributes.items() if value is not vars(item)[name]}
+    return variant(item, **changed) if changed else item
+
+
+def _check_same_ties(scene: Scene, there: Scene) -> None:
+    """Raise ValueError if ties weld other vertices than before, as where welded vertices have moved apart."""
+    apart = np.flatnonzero(scene._bodies.original != there._bodies.original)
+    if apart.size:
+        raise ValueError(
+            f"{REST} [m] change what is tied: vertex {apart[0]} of the scene must be where vertex "
+            f"{scene._bodies.original[apart[0]]} is, to which it was welded, and apart from all others"
+        )
 
 
 def _check_same_supports(scene: Scene, there: Scene) -> None:
@@ -183,13 +214,10 @@ def _check_same_supports(scene: Scene, there: Scene) -> None:
 
 def _refuse_what_cannot_follow(scene: Scene) -> None:
     has = (
-        ("ties", scene.ties),
         ("rigid bodies", scene.rigid_parts),
         ("EqualDisplacement or Periodic", [s for s in scene.supports if isinstance(s, DisplacementTie)]),
-        ("actuators", scene.actuators),
-        ("contact between bodies", scene._body_contacts),
+        ("a Tendon", [each for each in scene.actuators if isinstance(each, Tendon)]),
         ("an OwnField", scene.own_field),
-        ("a CustomEnergy", [load for load in scene.loads if isinstance(load, CustomEnergy)]),
         ("springs", [load for load in scene.loads if isinstance(load, Springs)]),
     )
     found = [name for name, some in has if some]

@@ -30,6 +30,9 @@ if TYPE_CHECKING:
     from .values import Gradient, Values
 
 
+_GROWN = ("growth", "rest_curvature")
+
+
 class AtNodes(NamedTuple):
     """Gradients by vertices (n_v, 3) and by the directions across edges (n_d, 3)."""
 
@@ -41,12 +44,10 @@ def without_rest_gradient(scene: Scene) -> list[str]:
     """Return words for everything in a scene that has no derivative by rest positions."""
     found = []
     for body in scene.bodies:
-        found += [name for name in ("growth", "rest_curvature") if getattr(body, name, None) is not None]
-        for magnetic in (body, getattr(body, "skin", None)):
-            if scene.is_magnetic and getattr(magnetic, "magnetization_law", "stretches") != "stretches":
-                found.append("a magnetization that rotates")
-        if getattr(body, "susceptibility", None) is not None:
-            found.append("a susceptibility")
+        if isinstance(body.mesh, QuadraticTriangleMesh):
+            found += [
+                f"the {name} of six-node shells" for name in _GROWN if getattr(body, name, None) is not None
+            ]
     # The core knows its terms; words above say why where a term has a derivative in other scenes.
     return list(dict.fromkeys(found)) or list(dict.fromkeys(_core.without_rest_gradient(scene._model)))
 

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...errors import NoGradient
+from ...model.scene.reshaped import REST
 from ...model.scene.values import Gradient
 from .critical_system import CriticalSystem, Located, forces_and_prescribed
 from .differences import directional_derivative
@@ -162,6 +163,10 @@ class CriticalAdjoint:
         """Return the rate of g of the free unknowns along a change of a leaf, and the motion of what supports prescribe."""
         inputs, model = self._inputs, self._inputs.scene._model
         now = system.residual.controls
+        if leaf.owner is not None and leaf.name == REST:
+            raise NoGradient(
+                f"no gradient by {REST} of a bifurcation, and no tangent of a path: only limit points have gradients by them"
+            )
 
         def at(step: float) -> np.ndarray:
             numbers, after = changed(inputs, leaf, step * change)
@@ -186,7 +191,8 @@ _DISSOLVES = (
 
 def _scaled(inputs: Inputs, gradient: Gradient, fraction: float) -> Gradient:
     """Return a gradient with the fraction of the load parameters there that an input at one end of the path has."""
-    return Gradient(inputs.scene, gradient.of_values, fraction * gradient.of_controls(slice(None)))
+    by_controls = fraction * gradient.of_controls(slice(None))
+    return Gradient(inputs.scene, gradient.of_values, by_controls, rest=gradient.rest)
 
 
 def _of_limit(system: CriticalSystem, by_parameter: float, by_state: np.ndarray) -> Slopes:

@@ -14,7 +14,7 @@ from ..._input.tensors import is_tensor
 from ..._runtime.solve_keywords import SOLVE_KEYWORDS
 from ..._runtime.worker_threads import checked_threads
 from ...errors import Interrupted
-from ...model.scene.batch_axis import BatchAxis
+from ...model.scene.batch_axis import BatchAxis, row_of
 from ...model.scene.time_varying import may_jump, row_in_time
 from ..adjoint.batch import Member, OnThreads, solve_members
 from ..adjoint.dynamic import MotionAdjoint
@@ -82,10 +82,14 @@ def simulate_batch(
     solved = solve_members(on, axis, solve, lambda fraction, residual: progress(fraction), missing)
     points, edge_rotations, velocities, driving = solved.arrays
     n_v, rigid = scene.mesh.n_vertices, bool(scene.rigid_parts)
+    rest = axis.rest_positions
     found = [
         None
         if one is None
-        else _member(axis, k, one.result, n_v, (points[k], edge_rotations[k], velocities[k], driving[k]))
+        else replace(
+            _member(axis, k, one.result, n_v, (points[k], edge_rotations[k], velocities[k], driving[k])),
+            _rest=row_of(rest, k),
+        )
         for k, one in enumerate(solved.members)
     ]
     times = first.time_steps.grid_times[first.record_every * np.arange(points.shape[1])]
@@ -97,6 +101,7 @@ def simulate_batch(
         edge_rotations,
         solved.failed,
         tuple(found),
+        None if rest is None else rest[:, None],
     )
     if solved.interrupt is not None:
         done = int(batch.converged.sum())

@@ -20,14 +20,13 @@ from ...model.fields.magnet_overlap import describe_magnet_overlap
 from ...model.scene.field_sampling import warn_of_sampling
 from ...model.scene.fine_faces import fine_faces
 from ...model.scene.replacements import requested
-from ...model.scene.reshaped import reshaped
+from ...model.scene.reshaped import reshaped, turning_supports
 from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs
 from ...model.scene.values import Values
 from ...model.shells.obtuse_faces import warn_of_obtuse_faces
 from ...model.shells.shell import Shell
 from ...model.shells.strains import StrainHistory, warn_if_large
-from ...model.supports.supports import Clamp, Pin
 from ..adjoint.dynamic import MotionAdjoint
 from ..adjoint.motion_tangent import motion_with_tangents
 from ..options import (
@@ -208,19 +207,13 @@ def _reshaped(scene: Scene, values: Any, start: Any) -> tuple[Scene, Any]:
     Raises ValueError too for a state from which the motion cannot go on with these.
     """
     last = vars(scene).get("_reshaped", (None, scene))[1]
-    there, values = reshaped(scene, values, no_gradient_with=_without_rest_gradient(scene))
+    there, values = reshaped(scene, values, no_gradient_with=turning_supports(scene))
     if there not in (scene, last) and isinstance(start, MotionState | DifferentiableState):
         raise ValueError(
             "start is the state of a motion at other rest_positions: hand over its "
             "positions and velocities instead"
         )
     return there, values
-
-
-def _without_rest_gradient(scene: Scene) -> list[str]:
-    """Return words for what the gradient of a motion by rest positions does not include yet."""
-    moved = [support for support in scene.supports if isinstance(support, Pin | Clamp)]
-    return ["supports that rotate"] * any(each._move.rotation is not None for each in moved)
 
 
 def _advice(result: Trajectory, chosen: bool) -> str:

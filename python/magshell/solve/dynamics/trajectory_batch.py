@@ -42,6 +42,7 @@ class TrajectoryBatch(BatchResult):
     edge_rotations: Any
     failed: dict[int, Any]
     _members: tuple[Trajectory | None, ...] = field(repr=False)
+    _rest: Any = field(repr=False, default=None)
 
     @property
     def energy(self) -> np.ndarray:

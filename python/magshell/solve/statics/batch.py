@@ -12,7 +12,8 @@ from ..._input.arrays import count
 from ..._input.tensors import is_tensor
 from ..._runtime.worker_threads import checked_threads
 from ...errors import Interrupted
-from ...model.scene.batch_axis import BatchAxis
+from ...model.scene.batch_axis import BatchAxis, row_of
+from ...model.scene.reshaped import reshaped
 from ..adjoint.batch import BatchAdjoint, Member, OnThreads, solve_members
 from ..adjoint.static import Adjoint
 from .equilibria import EquilibriumSet
@@ -40,14 +41,16 @@ def find_along(
     """Find the equilibria of all members of a batch whose values are split, and what computes their gradients."""
     on = OnThreads(scene, checked_threads(threads, axis.members))
     starts = _starts(start, axis.members)
-    inputs_of(scene, axis.arguments(0)[0], search.ignore_velocity_forces)  # raises what every member would
+    first = axis.arguments(0)[0]  # checked here, as every member would raise the same
+    there, first["values"] = reshaped(scene, first["values"])
+    inputs_of(there, first, search.ignore_velocity_forces)
 
     def solve(member: int, check: Callable[[], None]) -> Member:
         keywords, leaves = axis.arguments(member)
         one = find(
             scene, keywords, starts[member], replace(search, progress=lambda fraction, residual: check())
         )
-        arrays = arrays_of(scene, one.found)
+        arrays = arrays_of(one.inputs.scene, one.found)
         return Member(one.equilibrium, arrays, Adjoint(one.inputs, one.found), one.inputs.tensors, leaves)
 
     def missing() -> tuple[np.ndarray, ...]:
@@ -57,12 +60,18 @@ def find_along(
     solved = solve_members(on, axis, solve, search.progress, missing)
     points, edge_rotations, driving = solved.arrays
     n_v = scene.mesh.n_vertices
+    rest = axis.rest_positions
     members = [
-        None if one is None else _member(axis, k, one.result, n_v, points[k], edge_rotations[k], driving[k])
+        None
+        if one is None
+        else replace(
+            _member(axis, k, one.result, n_v, points[k], edge_rotations[k], driving[k]),
+            _rest=row_of(rest, k),
+        )
         for k, one in enumerate(solved.members)
     ]
     positions = points[:, :n_v] if scene.rigid_parts else points
-    batch = EquilibriumBatch(scene, positions, edge_rotations, solved.failed, tuple(members))
+    batch = EquilibriumBatch(scene, positions, edge_rotations, solved.failed, tuple(members), rest)
     if solved.interrupt is not None:
         done = int(batch.converged.sum())
         told = f"interrupted: {done} of {axis.members} members of the batch were found"

@@ -42,6 +42,7 @@ class EquilibriumBatch(BatchResult):
     edge_rotations: Any
     failed: dict[int, Any]
     _members: tuple[Equilibrium | None, ...] = field(repr=False)
+    _rest: Any = field(repr=False, default=None)
 
     @property
     def energy(self) -> np.ndarray:

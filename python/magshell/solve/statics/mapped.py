@@ -12,6 +12,7 @@ from ..._runtime.frozen import immutable
 from ...errors import NoGradient
 from ...model.results.result_lookup import displacements_of
 from ...model.scene.batch_axis import BatchAxis
+from ...model.scene.reshaped import given_rest
 from ..adjoint.batch import BatchAdjoint
 from .batch import find_along
 from .single_solve import Search
@@ -32,6 +33,7 @@ class MappedEquilibrium:
     scene: Scene = field(repr=False)
     positions: Any = field(repr=False)
     edge_rotations: Any = field(repr=False)
+    _rest: Any = field(repr=False, default=None)
 
     @property
     def displacements(self) -> Computed:
@@ -57,7 +59,8 @@ def find_mapped(scene: Scene, arguments: dict[str, Any], start: Any, search: Sea
     followed = {key: is_followed_in_map(each) for key, each in tensors.items()}
     solves = _Solves(scene, arguments, followed, start, search)
     points, edge_rotations = mapped(solves, list(tensors.values()))
-    return MappedEquilibrium(scene, points, edge_rotations)
+    rest = given_rest(scene, arguments.get("values") or {})
+    return MappedEquilibrium(scene, points, edge_rotations, rest)
 
 
 class _Solves:
