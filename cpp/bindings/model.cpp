@@ -9,6 +9,7 @@
 #include "bindings/given_away.h"
 #include "bindings/scene_input.h"
 #include "bindings/strains.h"
+#include "magshell/assembly/rough_hessian_operator.h"
 #include "magshell/core/errors.h"
 #include "magshell/mesh/space_filling_order.h"
 #include "magshell/solve/linear_response.h"
@@ -333,6 +334,22 @@ void register_model(py::module_& module) {
             py::arg("q"), py::arg("controls"), py::arg("direction"), py::call_guard<py::gil_scoped_release>(),
             "The product of the Hessian with a direction, of all unknowns (n,), with the own field.")
         .def(
+            "rough_operator_product",
+            [](Model& model, const VectorXd& q, const LoadParameters& load_parameters, const VectorXd& p) {
+                const std::lock_guard lock(model.in_use());
+                model.evaluate(q, load_parameters);
+                model.assemble(q, load_parameters, false);
+                VectorXd product = VectorXd::Zero(p.size());
+                for (const std::shared_ptr<const HessianOperator>& each : model.operators())
+                    if (const auto* quick = dynamic_cast<const RoughHessianOperator*>(each.get()))
+                        quick->add_rough_product(p, product);
+                return product;
+            },
+            py::arg("q"), py::arg("controls"), py::arg("direction"), py::call_guard<py::gil_scoped_release>(),
+            "Nearly the product of the own field's Hessian with a direction, of all unknowns (n,), as solves "
+            "with "
+            "a large tolerance take it.")
+        .def(
             "term_gradient",
             [](Model& model, const std::string& name, const VectorXd& q,
                const LoadParameters& load_parameters) {
@@ -363,7 +380,7 @@ void register_model(py::module_& module) {
                 return own_flux_density(model, q, at);
             },
             py::arg("q"), py::arg("points"),
-            "The flux density of the magnetized shells at points outside of them, (n, 3) [T].")
+            "The flux density of the magnetized bodies at points outside of them, (n, 3) [T].")
         .def(
             "own_field_on_moments",
             [](const Model& model, const VectorXd& q) {

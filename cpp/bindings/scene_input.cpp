@@ -222,6 +222,7 @@ SceneInput scene_input(const py::kwargs& given) {
         input.obstacles.push_back(obstacle.cast<std::shared_ptr<Obstacle>>());
     input.water = given["water"].cast<std::shared_ptr<Water>>();
     input.own_field = {given["own_field_shells"].cast<std::vector<Index>>(),
+                       given["own_field_six_node_shells"].cast<std::vector<Index>>(),
                        given["own_field_solids"].cast<std::vector<Index>>(),
                        given["own_field_skins"].cast<std::vector<Index>>(),
                        given["own_field_rigid"].cast<std::vector<Index>>(),

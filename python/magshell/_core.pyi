@@ -534,7 +534,7 @@ class Model:
         points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
         """
-        The flux density of the magnetized shells at points outside of them, (n, 3) [T].
+        The flux density of the magnetized bodies at points outside of them, (n, 3) [T].
         """
     def points(
         self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
@@ -564,6 +564,15 @@ class Model:
         What is wrong with a state, in words; empty where nothing is.
         """
     def rest_state(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    def rough_operator_product(
+        self,
+        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        direction: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Nearly the product of the own field's Hessian with a direction, of all unknowns (n,), as solves with a large tolerance take it.
+        """
     def set_values(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
         """
         All of them, rows in the caller's order.
@@ -1446,6 +1455,8 @@ def solve_with_operator(
     values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     added: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
     rhs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    rough: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.0,
 ) -> tuple[typing.Any, ...]: ...
 def state_on_joints(
     model: Model,

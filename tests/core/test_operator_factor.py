@@ -30,7 +30,9 @@ def test_operator_factor_solves_and_counts_as_the_dense_matrix(shift, rank, size
     whole, lower = sparse_part(shift)
     added = added_part(size, rank, rng)
     rhs = rng.normal(size=N)
-    report, solution = _core.solve_with_operator(N, lower.indptr, lower.indices, lower.data, added, rhs)
+    report, solution = _core.solve_with_operator(
+        N, lower.indptr, lower.indices, lower.data, added, rhs, added
+    )
     eigenvalues = np.linalg.eigvalsh(whole + added)
     assert report.succeeded
     negative = np.count_nonzero(eigenvalues < 0.0)
@@ -46,7 +48,33 @@ def test_operator_factor_without_operator_part_keeps_the_solution():
     whole, lower = sparse_part(0.1)
     rhs = np.ones(N)
     report, solution = _core.solve_with_operator(
-        N, lower.indptr, lower.indices, lower.data, np.zeros((N, N)), rhs
+        N, lower.indptr, lower.indices, lower.data, np.zeros((N, N)), rhs, np.zeros((N, N))
     )
     assert report.negative_pivots == 0
     np.testing.assert_allclose(whole @ solution, rhs, rtol=0, atol=1e-12)
+
+
+def test_solves_with_a_large_tolerance_take_rough_products():
+    """Check which products a solve takes, and that counts with rough ones are those of the exact matrix."""
+    rng = np.random.default_rng(5)
+    whole, lower = sparse_part(0.1)
+    added = added_part(1.0, 20, rng)
+    change = 1e-3 * added_part(1.0, 20, rng)
+    rough = added + change
+    rhs = rng.normal(size=N)
+    count = np.count_nonzero(np.linalg.eigvalsh(whole + added) < 0.0)
+    for tolerance, product in ((1e-4, rough), (1e-7, added), (0.0, added)):
+        report, solution = _core.solve_with_operator(
+            N, lower.indptr, lower.indices, lower.data, added, rhs, rough, tolerance
+        )
+        left = np.linalg.norm((whole + product) @ solution - rhs)
+        assert left <= max(2 * tolerance, 1e-10) * np.linalg.norm(rhs)
+        assert min(count, 2) <= report.negative_pivots <= count
+    # an eigenvalue of the rough matrix on the other side of zero: the exact products decide
+    first = np.linalg.eigh(whole)[1][:, 0]
+    smallest = np.linalg.eigvalsh(whole)[0]
+    exact, near = -0.999 * smallest * np.outer(first, first), -1.001 * smallest * np.outer(first, first)
+    report, _ = _core.solve_with_operator(N, lower.indptr, lower.indices, lower.data, exact, rhs, near)
+    assert report.negative_pivots == 0
+    report, _ = _core.solve_with_operator(N, lower.indptr, lower.indices, lower.data, near, rhs, exact)
+    assert report.negative_pivots == 1

@@ -47,18 +47,23 @@ py::tuple loaded(Index size, const IndexArray& column_starts, const IndexArray& 
                           given_away(std::move(part.pattern.rows)), given_away(std::move(part.values)));
 }
 
-// Factorizes a sparse matrix plus a dense symmetric one that is known by its products only, and solves with it. Returns (report,
-// solution).
+// Factorizes a sparse matrix plus a dense symmetric one that is known by its products only, and solves with it: exactly, or to a positive
+// tolerance. `rough` has the products that need not be exact. Returns (report, solution).
 py::tuple solve_with_operator(Index size, const IndexArray& column_starts, const IndexArray& rows,
-                              const Array& values, const Eigen::MatrixXd& added, VectorXd rhs) {
+                              const Array& values, const Eigen::MatrixXd& added, VectorXd rhs,
+                              const Eigen::MatrixXd& rough, double tolerance) {
     std::shared_ptr<SparsePattern> pattern = std::make_shared<SparsePattern>(
         SparsePattern{size, to_indices(column_starts, "column_starts"), to_indices(rows, "rows")});
     check_pattern(*pattern);
     OperatorFactor factor(analyze(pattern));
     std::copy_n(values.data(), values.size(), factor.values().begin());
-    factor.set_operator([added](const VectorXd& x) { return VectorXd(added * x); });
+    factor.set_operator([added](const VectorXd& x) { return VectorXd(added * x); },
+                        [rough](const VectorXd& x) { return VectorXd(rough * x); });
     const FactorReport report = factor.factorize();
-    factor.solve(rhs);
+    if (tolerance > 0.0)
+        factor.solve_approximately(rhs, tolerance);
+    else
+        factor.solve(rhs);
     return py::make_tuple(report, rhs);
 }
 
@@ -68,7 +73,8 @@ void register_kernels(py::module_& module) {
     module.def("lane_logarithms", &lane_logarithms, py::arg("numbers"),
                "ln of an array's numbers as the element kernels take it, to be tested.");
     module.def("solve_with_operator", &solve_with_operator, py::arg("size"), py::arg("column_starts"),
-               py::arg("rows"), py::arg("values"), py::arg("added"), py::arg("rhs"));
+               py::arg("rows"), py::arg("values"), py::arg("added"), py::arg("rhs"), py::arg("rough"),
+               py::arg("tolerance") = 0.0);
     module.def("loaded_part", &loaded, py::arg("size"), py::arg("column_starts"), py::arg("rows"),
                py::arg("values"), py::arg("forces"),
                "Of a symmetric matrix, given as to analyze(), the part that forces (n,) act on: its "

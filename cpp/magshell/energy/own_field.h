@@ -72,11 +72,10 @@ class OwnField {
     };
     /// Trees of the source points, and the pairs of boxes whose sums they replace.
     struct Trees;
-    /// Pairs that are near: for each target element its source elements, and the pairs (element, face) with charged sides. Trees if the
-    /// sums are not direct.
+    /// Pairs that are near: a target element and a source element before it, each pair once, and an element and a face with charged sides.
+    /// Trees if the sums are not direct.
     struct Neighbours {
-        std::vector<std::vector<Index>> elements;
-        std::vector<std::array<Index, 2>> sides;
+        std::vector<std::array<Index, 2>> elements, sides;
         std::shared_ptr<const Trees> trees;
     };
 
@@ -91,8 +90,8 @@ class OwnField {
     /// Sets the accuracy of sums over more than most_direct points; 0: they are direct.
     void set_accuracy(double accuracy) { accuracy_ = accuracy; }
     double accuracy() const { return accuracy_; }
-    static constexpr Index most_direct =
-        16000;  // trees take less time beyond; see benchmarks/own_field_costs.py
+    // Trees take less time beyond so many points; see benchmarks/own_field_costs.py.
+    static constexpr Index most_direct = 16000, most_direct_rough = 4000;
     /// Returns the number of source points: four per element with a source, six per face with a normal magnetization if there are
     /// charges.
     Index n_points() const { return 4 * active_elements_ + (has_charges_ ? 6 * active_faces_ : 0); }
@@ -102,6 +101,8 @@ class OwnField {
 
     /// Finds the near pairs of sources at positions q of all nodes.
     Neighbours neighbours(const double* q) const { return neighbours(q, Targets::sources); }
+    /// Returns the same pairs with trees of a low accuracy, for products with the Hessian that need not be exact.
+    Neighbours rough(const double* q, const Neighbours& near) const;  // plain-words: ok, of products
     /// Returns the energy [J] and sets its gradient [N] by the position of each of nodes().
     double gradient(const double* q, const Neighbours& near, std::vector<Vec3>& by_position) const;
     /// Adds the product of the Hessian at q with the direction p to out; both have three numbers per node of the scene.
@@ -205,7 +206,8 @@ class OwnField {
     }
     bool has_sides(Targets at) const { return at == Targets::all || (has_charges_ && active_faces_ > 0); }
     Neighbours neighbours(const double* q, Targets targets) const;
-    std::shared_ptr<const Trees> trees(const std::vector<Triple<double>>& x, Targets targets) const;
+    std::shared_ptr<const Trees> trees(const std::vector<Triple<double>>& x, Targets targets,
+                                       double accuracy) const;
     template <class T>
     std::vector<Triple<T>> positions(const double* q, const double* rate) const;
     template <class T>
@@ -213,6 +215,9 @@ class OwnField {
     template <class T>
     void add_element_pairs(const Geometry<T>& at, const Neighbours& near, Targets targets,
                            Evaluation<T>& out) const;
+    template <class T>
+    void add_near_pairs(const Geometry<T>& at, const Neighbours& near, Targets targets,
+                        Evaluation<T>& out) const;
     template <class T>
     void add_sides(const Geometry<T>& at, const Neighbours& near, Targets targets, Evaluation<T>& out) const;
     template <class T>

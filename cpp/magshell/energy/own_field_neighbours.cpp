@@ -85,9 +85,12 @@ OwnField::Neighbours OwnField::neighbours(const double* q, Targets targets) cons
         if (k < active_elements_) sources.add(center, of_elements.far * element.length);
         side_elements.add(center, of_sides.far * element.length);
     }
-    near.elements = near_balls(all, sources, [](Index) { return true; });
-    for (Index k = 0; k < active_elements_; ++k) std::erase(near.elements[k], k);
-    if (n_points() > most_direct && accuracy_ > 0.0) near.trees = trees(x, targets);
+    const std::vector<std::vector<Index>> near_elements =
+        near_balls(all, sources, [](Index) { return true; });
+    for (Index k = 0; k < target_elements(targets); ++k)
+        for (const Index j : near_elements[k])
+            if (j < k) near.elements.push_back({k, j});  // elements with a source come first in the order
+    if (n_points() > most_direct && accuracy_ > 0.0) near.trees = trees(x, targets, accuracy_);
     if (!has_sides(targets)) return near;
     for (Index k = 0; k < target_faces(targets); ++k) {
         const Face& face = faces_[face_order_[k]];
@@ -100,8 +103,16 @@ OwnField::Neighbours OwnField::neighbours(const double* q, Targets targets) cons
     return near;
 }
 
-std::shared_ptr<const OwnField::Trees> OwnField::trees(const std::vector<Triple<double>>& x,
-                                                       Targets targets) const {
+OwnField::Neighbours OwnField::rough(const double* q, const Neighbours& near) const {
+    constexpr double accuracy = 1e-3;  // [-] see test_rough_products_are_close_to_exact_ones
+    Neighbours rough = near;
+    if (n_points() > most_direct_rough && accuracy_ > 0.0)
+        rough.trees = trees(positions<double>(q, nullptr), Targets::sources, std::max(accuracy, accuracy_));
+    return rough;
+}
+
+std::shared_ptr<const OwnField::Trees> OwnField::trees(const std::vector<Triple<double>>& x, Targets targets,
+                                                       double accuracy) const {
     const Geometry<double> at(*this, x);
     std::vector<Vec3> element_points, side_points;
     for (Index k = 0; k < target_elements(targets); ++k)
@@ -112,8 +123,8 @@ std::shared_ptr<const OwnField::Trees> OwnField::trees(const std::vector<Triple<
         for (Index k = 0; k < target_faces(targets); ++k)
             at.each_side_point(face_order_[k], [&](const SourcePoint<double>& point, const double*, double,
                                                    double) { side_points.push_back(values_of(point.at)); });
-    Trees trees{.elements = SourceTree(element_points, 4, accuracy_),
-                .faces = SourceTree(side_points, 6, accuracy_)};
+    Trees trees{.elements = SourceTree(element_points, 4, accuracy),
+                .faces = SourceTree(side_points, 6, accuracy)};
     BoxPairs mirrored;
     pair_boxes(trees.elements, trees.elements, trees.element_pairs, mirrored);
     pair_boxes(trees.elements, trees.faces, trees.side_pairs_of_elements, trees.side_pairs_of_faces);

@@ -26,25 +26,21 @@ template std::vector<Triple<double>> OwnField::positions(const double*, const do
 template <class T>
 void OwnField::add_element_pairs(const Geometry<T>& at, const Neighbours& near, Targets targets,
                                  Evaluation<T>& out) const {
-    constexpr bool has_rates = std::is_same_v<T, Dual>;
-    const std::size_t few = 4, many = 16;
-    SourceArrays coarse_points, fine_points;
-    const bool has_currents = active_faces_ > 0;
+    constexpr std::size_t few = 4;
+    SourceArrays points;
     std::vector<SourceSums<T>> by_tree;
-    if (near.trees) by_tree = near.trees->template element_sums<T>(at);
-    coarse_points.resize(few * active_elements_, has_currents, has_rates);
-    fine_points.resize(many * active_elements_, has_currents, has_rates);
-    in_blocks(active_elements_, [&](Index first, Index last) {
-        for (Index k = first; k < last; ++k) {
-            std::size_t coarse_k = few * k, fine_k = many * k;
-            at.each_point(element_order_[k], coarse, [&](const SourcePoint<T>& point, const SamplePoint&) {
-                coarse_points.set(coarse_k++, point);
-            });
-            at.each_point(element_order_[k], fine, [&](const SourcePoint<T>& point, const SamplePoint&) {
-                fine_points.set(fine_k++, point);
-            });
-        }
-    });
+    if (near.trees) {
+        by_tree = near.trees->template element_sums<T>(at);
+    } else {
+        points.resize(few * active_elements_, active_faces_ > 0, std::is_same_v<T, Dual>);
+        in_blocks(active_elements_, [&](Index first, Index last) {
+            std::size_t number = few * static_cast<std::size_t>(first);
+            for (Index k = first; k < last; ++k)
+                at.each_point(
+                    element_order_[k], coarse,
+                    [&](const SourcePoint<T>& point, const SamplePoint&) { points.set(number++, point); });
+        });
+    }
     in_blocks(target_elements(targets), [&](Index first, Index last) {
         for (Index k = first; k < last; ++k) {
             const Index e = element_order_[k];
@@ -57,38 +53,13 @@ void OwnField::add_element_pairs(const Geometry<T>& at, const Neighbours& near, 
                 if (near.trees)
                     sums = by_tree[number++];
                 else
-                    coarse_points.add_sums(point, 0, few * active_elements_, own, own_end, sums);
+                    points.add_sums(point, 0, few * active_elements_, own, own_end, sums);
                 at.add(e, sums, sample, adjoint);
             });
-            for (const Index j : near.elements[k]) {
-                const Element &element = elements_[e], &other = elements_[element_order_[j]];
-                ElementAdjoint<T> change;
-                at.each_point(e, fine, [&](const SourcePoint<T>& point, const SamplePoint& sample) {
-                    SourceSums<T> sums;
-                    fine_points.add_sums(point, many * j, many * (j + 1), 0, 0, sums);
-                    at.add(e, sums, sample, change);
-                });
-                ElementAdjoint<T> before;
-                at.each_point(e, coarse, [&](const SourcePoint<T>& point, const SamplePoint& sample) {
-                    SourceSums<T> sums;
-                    coarse_points.add_sums(point, few * j, few * (j + 1), 0, 0, sums);
-                    at.add(e, sums, sample, before);
-                });
-                change -= before;
-                const Triple<T> apart = at.middle(element) - at.middle(other);
-                const T distance = norm(apart), longer = std::max(element.length, other.length);
-                T weight, slope;
-                lift(blend(of_elements, value_of(distance) / value_of(longer)), distance / longer, weight,
-                     slope);
-                const T pair_energy = at.charges[e] * change.charge + at.element_currents[e] * change.current;
-                const Triple<T> by_middle = (pair_energy * slope / (distance * longer)) * apart;
-                change.scale(weight);
-                at.add_by_middle(element, by_middle, change);
-                adjoint += change;
-            }
             if (!elements_[e].is_edge()) add_self(at, e, adjoint);
         }
     });
+    add_near_pairs(at, near, targets, out);
     for (Index k = 0; k < active_elements_; ++k) {
         const Index e = element_order_[k];
         out.energy += T(0.5) * (at.charges[e] * out.elements[e].charge +

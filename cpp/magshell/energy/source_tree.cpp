@@ -14,8 +14,9 @@ constexpr double opening = 0.6;
 // [-] Digits of an interpolation that the decay of its Chebyshev coefficients promises, over those that the sums need: the largest
 // terms come from near boxes; see test_tree_sums_agree_with_direct_ones.
 constexpr double promised_digits = 0.75;
-constexpr Index leaf_points =
-    400;  // most points of a leaf, near those of a grid; see test_tree_sums_agree_with_direct_ones
+// Most points of a leaf, near those of a grid, at accuracies of up to `loose` and beyond; see benchmarks/own_field_costs.py.
+constexpr Index leaf_points = 400, loose_leaf_points = 120;
+constexpr double loose = 1e-4;  // [-] see benchmarks/own_field_costs.py
 constexpr double thinnest =
     0.02;  // [-] least side of a box over its diameter, so that differences along it keep digits; see
            // test_tree_sums_agree_with_direct_ones
@@ -29,7 +30,9 @@ double chebyshev_point(int n, int i) {
 }
 
 SourceTree::SourceTree(const std::vector<Vec3>& points, Index group_size, double accuracy)
-    : group_size_(group_size), digits_(-std::log10(accuracy)) {
+    : group_size_(group_size),
+      leaf_points_(accuracy > loose ? loose_leaf_points : leaf_points),
+      digits_(-std::log10(accuracy)) {
     const Index n_groups = static_cast<Index>(points.size()) / group_size;
     order_.resize(n_groups);
     std::iota(order_.begin(), order_.end(), Index(0));
@@ -80,7 +83,7 @@ Index SourceTree::split(Index first, Index last, Index parent, const Mat3& axes,
     box.half = (0.5 * (high - low)).cwiseMax(thinnest * box.radius);
     set_grid(box);
     boxes_.push_back(box);
-    if ((last - first) * group_size_ <= leaf_points || last - first < 2) return number;
+    if ((last - first) * group_size_ <= leaf_points_ || last - first < 2) return number;
     int longest = 0;
     box.half.maxCoeff(&longest);
     const Vec3 along = box.axes.col(longest);

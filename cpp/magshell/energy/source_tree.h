@@ -53,7 +53,7 @@ class SourceTree {
     Index split(Index first, Index last, Index parent, const Mat3& axes, const std::vector<Vec3>& points);
     void set_grid(Box& box);
 
-    const Index group_size_;
+    const Index group_size_, leaf_points_;
     const double digits_;
     std::vector<Box> boxes_;
     std::vector<std::vector<Index>> levels_;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "magshell/assembly/rough_hessian_operator.h"
 #include "magshell/core/errors.h"
 #include "magshell/dofs/skeleton_coordinates.h"
 #include "magshell/linalg/krylov/operator_factor.h"
@@ -290,16 +291,23 @@ void Model::reduce_matrix(Factor& factor) {
         static_cast<LowRankFactor&>(factor).set_low_rank(low_rank_.reduced(dof_map_, size()),
                                                          low_rank_.stiffness());
     if (terms_.operators.empty()) return;
-    OperatorFactor::Operator product;
-    if (!operators_.empty())
-        product = [this, operators = operators_](const VectorXd& x) {
-            const VectorXd full = dof_map_.expand(x);
-            VectorXd image = VectorXd::Zero(full.size());
-            for (const std::shared_ptr<const HessianOperator>& each : operators)
-                each->add_product(full, image);
-            return dof_map_.vector(image);
-        };
-    static_cast<OperatorFactor&>(factor).set_operator(std::move(product));
+    const auto product_of = [&](bool rough) {
+        OperatorFactor::Operator product;
+        if (!operators_.empty())
+            product = [this, rough, operators = operators_](const VectorXd& x) {
+                const VectorXd full = dof_map_.expand(x);
+                VectorXd image = VectorXd::Zero(full.size());
+                for (const std::shared_ptr<const HessianOperator>& each : operators)
+                    if (const auto* quick = dynamic_cast<const RoughHessianOperator*>(each.get());
+                        quick && rough)
+                        quick->add_rough_product(full, image);
+                    else
+                        each->add_product(full, image);
+                return dof_map_.vector(image);
+            };
+        return product;
+    };
+    static_cast<OperatorFactor&>(factor).set_operator(product_of(false), product_of(true));
 }
 
 void Model::assign_columns() {

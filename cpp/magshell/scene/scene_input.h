@@ -116,11 +116,14 @@ struct ClosureInput {
 
 /// The shells, solids, skins and rigid bodies with a moment whose own magnetic field acts, by their numbers in SceneInput; none: it does not act.
 struct OwnFieldInput {
-    std::vector<Index> shells, solids, skins, rigid;
+    std::vector<Index> shells, six_node_shells, solids, skins, rigid;
     Index max_points = 0;
     double accuracy = 0.0;  // [-] of sums over many points; 0: they are direct
 
-    bool acts() const { return !shells.empty() || !solids.empty() || !skins.empty() || !rigid.empty(); }
+    bool acts() const {
+        return !(shells.empty() && six_node_shells.empty() && solids.empty() && skins.empty() &&
+                 rigid.empty());
+    }
 };
 
 /// The whole scene. Nodes of supports count the vertices first, then directions.

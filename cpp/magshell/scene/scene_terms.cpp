@@ -253,10 +253,14 @@ void Builder::add_own_field(const SceneInput& input) {
     const OwnFieldInput& given = input.own_field;
     OwnFieldTerm::Sources sources;
     for (const Index shell : given.shells)
-        sources.sheets.push_back({bodies_.faces()[shell].surface, input.shells[shell].magnetization_law});
+        sources.sheets.emplace_back(*bodies_.faces()[shell].surface, input.shells[shell].magnetization_law);
+    for (const Index shell : given.six_node_shells)
+        sources.sheets.emplace_back(*bodies_.six_node_shells()[shell],
+                                    input.six_node_shells[shell].magnetization_law);
     for (const Index skin : given.skins)
-        sources.sheets.push_back({bodies_.faces()[input.shells.size() + input.solids.size() + skin].surface,
-                                  input.skins[skin].magnetization_law});
+        sources.sheets.emplace_back(
+            *bodies_.faces()[input.shells.size() + input.solids.size() + skin].surface,
+            input.skins[skin].magnetization_law);
     for (const Index solid : given.solids) sources.solids.push_back(bodies_.solids()[solid]);
     for (const Index part : given.rigid)
         sources.magnets.push_back({input.rigid[part].owner, bodies_.rigid_nodes()[part]});

@@ -94,3 +94,13 @@ def test_derivatives_by_magnetization_with_trees_equal_those_with_direct_sums():
 def test_accuracy_that_a_tree_cannot_hold_is_refused(accuracy):
     with pytest.raises(ValueError, match="accuracy"):
         ms.OwnField(accuracy=accuracy)
+
+
+@pytest.mark.parametrize("components", KINDS.values(), ids=KINDS)
+def test_rough_products_are_close_to_exact_ones(components):
+    model, inputs, state, direction = curled_sheet(components, 1e-6)
+    exact = product_of(model, inputs, state, direction)
+    with inputs.in_core():
+        rough = model.rough_operator_product(state, inputs.controls, direction)
+    error = np.linalg.norm(rough - exact)
+    assert 0.0 < error < 2e-3 * np.linalg.norm(exact)

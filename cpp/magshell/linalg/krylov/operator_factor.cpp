@@ -22,10 +22,17 @@ constexpr int most_iterations = 300;  // see test_operator_factor_solves_and_cou
 // test_operator_factor_solves_and_counts_as_the_dense_matrix.
 constexpr double rounding_matters = 1e-10;
 
+// [-] Tolerance of a solve from which on rough products do; see test_solves_with_a_large_tolerance_take_rough_products.
+constexpr double rough_suffices = 1e-5;
+// [-] Distance of the nearest eigenvalue from the bound, over the largest one, from which on a count with rough products is sure: ten times
+// the error of these; see test_solves_with_a_large_tolerance_take_rough_products.
+constexpr double clear_margin = 1e-2;
+
 // The outcome of Lanczos' method.
 struct Count {
     Index below = 0;       // eigenvalues below the bound
     bool settled = false;  // whether the next one is known to lie above it
+    double margin = 0.0;   // [-] distance of the nearest one from the bound, over the size of the largest one
 };
 
 // Counts the eigenvalues of A^-1 H below `bound` by Lanczos' method in the inner product of A, with full orthogonalization. Vectors v and
@@ -78,6 +85,9 @@ Count count_below(const Factor& positive, const OperatorFactor::Operator& produc
                 certain_of_all = length * std::abs(ritz.vectors(size - 1, k)) <=
                                  certain * std::abs(ritz.values[k] - bound);
             count.settled = invariant || certain_of_all;
+            const double size_of_all =
+                std::max({1.0, std::abs(ritz.values[0]), std::abs(ritz.values[size - 1])});
+            count.margin = (ritz.values.array() - bound).abs().minCoeff() / size_of_all;
         }
         beside.push_back(length);
     }
@@ -122,7 +132,8 @@ FactorReport OperatorFactor::complete_report() {
     counted_ = true;
     Count count;
     if (report_.negative_pivots == 0 && report_.perturbed_pivots == 0) {
-        count = count_below(*sparse_, operator_, -1.0);
+        count = count_below(*sparse_, rough_, -1.0);
+        if (!count.settled || count.margin < clear_margin) count = count_below(*sparse_, operator_, -1.0);
     } else {
         VectorXd shift;
         // K x = 0 means (A + D)^-1 (H - D) x = - x, with the shift D.
@@ -146,9 +157,10 @@ VectorXd OperatorFactor::image(const VectorXd& x) const {
 void OperatorFactor::solve_approximately(VectorXd& rhs, double tolerance) const {
     if (!operator_) return sparse_->solve(rhs);
     const bool identity = tolerance > rounding_matters;
+    const Operator& added = tolerance >= rough_suffices ? rough_ : operator_;
     VectorXd before;
     const auto product = [&](const VectorXd& x) {
-        return VectorXd((identity ? before : sparse_->image(x)) + operator_(x));
+        return VectorXd((identity ? before : sparse_->image(x)) + added(x));
     };
     const auto precondition = [&](VectorXd& x) {
         if (identity) before = x;

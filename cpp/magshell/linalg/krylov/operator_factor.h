@@ -20,8 +20,12 @@ class OperatorFactor final : public Factor {
 
     explicit OperatorFactor(std::unique_ptr<Factor> sparse);
 
-    /// Sets H until it is set again; an empty function is zero.
-    void set_operator(Operator product) { operator_ = std::move(product); }
+    /// Sets H until it is set again; an empty function is zero. rough: nearly the same product in less time, for solves with a large
+    /// tolerance and for counts that are far from a change.
+    void set_operator(Operator product, Operator rough) {
+        operator_ = std::move(product);
+        rough_ = std::move(rough);
+    }
     FactorReport factorize() override;
     /// A deferred report has the negative eigenvalues of A.
     void set_count_deferred(bool deferred) override { deferred_ = deferred; }
@@ -44,7 +48,7 @@ class OperatorFactor final : public Factor {
     std::unique_ptr<Factor> shifted(const LargeVector<double>& values, VectorXd& shift) const;
 
     std::unique_ptr<Factor> sparse_;
-    Operator operator_;
+    Operator operator_, rough_;
     LargeVector<double> entries_;  // of A, which a factorization overwrites
     bool deferred_ = false, counted_ = true;
 };

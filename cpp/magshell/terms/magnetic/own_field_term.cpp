@@ -1,44 +1,41 @@
 #include "magshell/terms/magnetic/own_field_term.h"
 
+#include <mutex>
 #include <string>
 
+#include "magshell/assembly/rough_hessian_operator.h"
 #include "magshell/core/errors.h"
 #include "magshell/terms/magnetic/solid_triangles.h"
 
 namespace magshell {
 namespace {
 
-class OwnFieldHessian final : public HessianOperator {
+class OwnFieldHessian final : public RoughHessianOperator {
   public:
-    OwnFieldHessian(std::shared_ptr<const OwnField> field, const double* q, Index n_dofs, double factor)
-        : field_(std::move(field)),
-          q_(Eigen::Map<const VectorXd>(q, n_dofs)),
-          near_(field_->neighbours(q)),
-          factor_(factor) {}
+    OwnFieldHessian(std::shared_ptr<const OwnField> field, const VectorXd& q,
+                    const OwnField::Neighbours& near, double factor)
+        : field_(std::move(field)), q_(q), near_(near), factor_(factor) {}
 
-    void add_product(const VectorXd& x, VectorXd& y) const override {
-        VectorXd product = VectorXd::Zero(y.size());
-        field_->add_hessian_product(q_.data(), near_, x.data(), product.data());
-        y += factor_ * product;
+    void add_product(const VectorXd& x, VectorXd& y) const override { add(near_, x, y); }
+    void add_rough_product(const VectorXd& x, VectorXd& y) const override {
+        std::call_once(has_rough_, [this] { rough_ = field_->rough(q_.data(), near_); });
+        add(rough_, x, y);
     }
 
   private:
+    void add(const OwnField::Neighbours& near, const VectorXd& x, VectorXd& y) const {
+        VectorXd product = VectorXd::Zero(y.size());
+        field_->add_hessian_product(q_.data(), near, x.data(), product.data());
+        y += factor_ * product;
+    }
+
     std::shared_ptr<const OwnField> field_;
     VectorXd q_;
     OwnField::Neighbours near_;
     double factor_;
+    mutable std::once_flag has_rough_;
+    mutable OwnField::Neighbours rough_;
 };
-
-OwnField::Faces faces_of(const std::vector<OwnFieldTerm::Sheet>& sheets) {
-    OwnField::Faces faces;
-    for (const OwnFieldTerm::Sheet& sheet : sheets)
-        for (Index f = 0; f < sheet.surface->n_faces(); ++f) {
-            faces.nodes.push_back(sheet.surface->corners[f]);
-            faces.rest.push_back(sheet.surface->rest_corners(f));
-            faces.rotates.push_back(sheet.law == MagnetizationLaw::rotates);
-        }
-    return faces;
-}
 
 std::vector<OwnField::RigidNodes> rigid_nodes_of(const std::vector<OwnFieldTerm::Magnet>& magnets) {
     std::vector<OwnField::RigidNodes> rigid;
@@ -56,15 +53,14 @@ OwnFieldTerm::OwnFieldTerm(Sources sources, Index max_points, double accuracy, c
       max_points_(max_points),
       n_dofs_(nodes.n_dofs()),
       factor_(registry.load_parameters.add("scene", "own_field_factor", "1", 1, 1)),
-      field_(faces_of(sheets_), triangles_of(solids_), rigid_nodes_of(magnets_)),
+      field_(triangles_of(sheets_), triangles_of(solids_), rigid_nodes_of(magnets_)),
       sources_(std::make_shared<const OwnField>(field_)) {
     field_.set_accuracy(accuracy);
-    for (const Sheet& sheet : sheets_) {
-        const Surface* const surface = sheet.surface;
-        magnetization_.push_back(registry.values.add(surface->owner, "remanent_magnetization", "A/m",
-                                                     surface->n_faces(), 3, &surface->faces));
+    for (const SheetTriangles& sheet : sheets_) {
+        magnetization_.push_back(registry.values.add(sheet.owner(), "remanent_magnetization", "A/m",
+                                                     sheet.n_faces(), 3, &sheet.faces()));
         thickness_.push_back(
-            registry.values.add(surface->owner, "thickness", "m", surface->n_faces(), 1, &surface->faces));
+            registry.values.add(sheet.owner(), "thickness", "m", sheet.n_faces(), 1, &sheet.faces()));
     }
     for (const Solid* solid : solids_)
         of_solids_.push_back(registry.values.add(solid->owner, "remanent_magnetization", "A/m",
@@ -87,9 +83,10 @@ bool OwnFieldTerm::set_values(const Values& values) {
     magnetizations_.clear();
     thicknesses_.clear();
     for (std::size_t k = 0; k < sheets_.size(); ++k)
-        for (Index f = 0; f < sheets_[k].surface->n_faces(); ++f) {
-            magnetizations_.push_back(values.vector(magnetization_[k], f));
-            thicknesses_.push_back(values.number(thickness_[k], f));
+        for (Index f = 0; f < sheets_[k].n_faces(); ++f) {
+            const std::size_t count = magnetizations_.size() + sheets_[k].per_face();
+            magnetizations_.resize(count, values.vector(magnetization_[k], f));
+            thicknesses_.resize(count, values.number(thickness_[k], f));
         }
     of_tetrahedra_.clear();
     for (std::size_t k = 0; k < solids_.size(); ++k)
@@ -115,24 +112,35 @@ bool OwnFieldTerm::set_values(const Values& values) {
 double OwnFieldTerm::energy(const double* q, const LoadParameters& load_parameters) const {
     const double factor = load_parameters[factor_.first];
     if (!sources_->acts() || factor == 0.0) return 0.0;
-    std::vector<Vec3> by_position;
-    return factor * sources_->gradient(q, sources_->neighbours(q), by_position);
+    return factor * state_at(q)->energy;
 }
 
 void OwnFieldTerm::evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) {
     const double factor = load_parameters[factor_.first];
     if (!sources_->acts() || factor == 0.0) return;
-    std::vector<Vec3> by_position;
-    sources_->gradient(q, sources_->neighbours(q), by_position);
-    for (std::size_t k = 0; k < by_position.size(); ++k)
-        for (int i = 0; i < 3; ++i) out.add(3 * sources_->nodes()[k] + i, factor * by_position[k][i]);
+    const std::shared_ptr<const State> state = state_at(q);
+    for (std::size_t k = 0; k < state->by_position.size(); ++k)
+        for (int i = 0; i < 3; ++i) out.add(3 * sources_->nodes()[k] + i, factor * state->by_position[k][i]);
 }
 
 std::shared_ptr<const HessianOperator> OwnFieldTerm::hessian_operator(
     const double* q, const LoadParameters& load_parameters) const {
     const double factor = load_parameters[factor_.first];
     if (!sources_->acts() || factor == 0.0) return nullptr;
-    return std::make_shared<const OwnFieldHessian>(sources_, q, n_dofs_, factor);
+    const std::shared_ptr<const State> state = state_at(q);
+    return std::make_shared<const OwnFieldHessian>(sources_, state->q, state->near, factor);
+}
+
+std::shared_ptr<const OwnFieldTerm::State> OwnFieldTerm::state_at(const double* q) const {
+    const std::shared_ptr<const State> last = state_;
+    if (last && last->sources == sources_ && std::equal(q, q + n_dofs_, last->q.data())) return last;
+    const std::shared_ptr<State> state = std::make_shared<State>();
+    state->sources = sources_;
+    state->q = Eigen::Map<const VectorXd>(q, n_dofs_);
+    state->near = sources_->neighbours(q);
+    state->energy = sources_->gradient(q, state->near, state->by_position);
+    state_ = state;
+    return state;
 }
 
 std::vector<double> OwnFieldTerm::own_energies(const double* q) const {
@@ -145,9 +153,9 @@ std::vector<double> OwnFieldTerm::own_energies(const double* q) const {
         energies.push_back(alone.gradient(q, alone.neighbours(q), by_position));
     };
     std::ptrdiff_t first = 0;
-    for (const Sheet& sheet : sheets_) {
-        const std::ptrdiff_t last = first + sheet.surface->n_faces();
-        add(OwnField(faces_of({sheet}), {}, {}),
+    for (const SheetTriangles& sheet : sheets_) {
+        const std::ptrdiff_t last = first + sheet.n_triangles();
+        add(OwnField(triangles_of(std::vector{sheet}), {}, {}),
             {magnetizations_.begin() + first, magnetizations_.begin() + last},
             {thicknesses_.begin() + first, thicknesses_.begin() + last}, {});
         first = last;
@@ -166,11 +174,12 @@ void OwnFieldTerm::vjp(const double* q, const LoadParameters& load_parameters, c
                        Gradient& out) {
     const double factor = load_parameters[factor_.first];
     const OwnField::FaceGradient by = field_.vjp(q, lambda);
-    std::size_t face = 0;
+    std::size_t triangle = 0;
     for (std::size_t k = 0; k < sheets_.size(); ++k)
-        for (Index f = 0; f < sheets_[k].surface->n_faces(); ++f, ++face) {
-            out.values.segment<3>(magnetization_[k].at(f)) += factor * by.magnetization[face];
-            out.values[thickness_[k].at(f)] += factor * by.thickness[face];
+        for (Index t = 0; t < sheets_[k].n_triangles(); ++t, ++triangle) {
+            const Index face = t / sheets_[k].per_face();
+            out.values.segment<3>(magnetization_[k].at(face)) += factor * by.magnetization[triangle];
+            out.values[thickness_[k].at(face)] += factor * by.thickness[triangle];
         }
     std::size_t tetrahedron = 0;
     for (std::size_t k = 0; k < solids_.size(); ++k)
@@ -181,11 +190,10 @@ void OwnFieldTerm::vjp(const double* q, const LoadParameters& load_parameters, c
         out.values.segment<3>(center_[k].first) += factor * corners_[k].gradient(by.of_dipoles[k].position);
     }
     if (!sources_->acts()) return;
-    std::vector<Vec3> by_position;
-    sources_->gradient(q, sources_->neighbours(q), by_position);
-    for (std::size_t k = 0; k < by_position.size(); ++k)
+    const std::shared_ptr<const State> state = state_at(q);
+    for (std::size_t k = 0; k < state->by_position.size(); ++k)
         out.load_parameters[factor_.first] +=
-            by_position[k].dot(Eigen::Map<const Vec3>(lambda + 3 * sources_->nodes()[k]));
+            state->by_position[k].dot(Eigen::Map<const Vec3>(lambda + 3 * sources_->nodes()[k]));
 }
 
 }  // namespace magshell

@@ -1,31 +1,25 @@
-// OwnFieldTerm: the energy of magnetized shells of linear triangles, solids and rigid bodies with a moment in the field that they make themselves
+// OwnFieldTerm: the energy of magnetized shells, solids and rigid bodies with a moment in the field that they make themselves
 // (energy/own_field.h).
 #pragma once
 
 #include "magshell/body/nodes.h"
 #include "magshell/body/solid.h"
-#include "magshell/body/surface.h"
-#include "magshell/energy/magnetization_law.h"
 #include "magshell/energy/own_field.h"
 #include "magshell/terms/magnetic/corner_weights.h"
+#include "magshell/terms/magnetic/sheet_triangles.h"
 #include "magshell/terms/operator_term.h"
 
 namespace magshell {
 
 class OwnFieldTerm final : public OperatorTerm {
   public:
-    struct Sheet {
-        const Surface* surface;
-        MagnetizationLaw law;
-    };
-
     /// A rigid body with a moment, and all of its nodes, first the corners of its tetrahedron.
     struct Magnet {
         std::string owner;
         std::vector<Index> nodes;
     };
     struct Sources {
-        std::vector<Sheet> sheets;
+        std::vector<SheetTriangles> sheets;
         std::vector<const Solid*> solids;
         std::vector<Magnet> magnets;
     };
@@ -51,7 +45,18 @@ class OwnFieldTerm final : public OperatorTerm {
     std::vector<double> own_energies(const double* q) const;
 
   private:
-    const std::vector<Sheet> sheets_;
+    /// The own field at one state, which energy, forces and Hessian share.
+    struct State {
+        std::shared_ptr<const OwnField> sources;
+        VectorXd q;
+        OwnField::Neighbours near;
+        double energy;                  // [J]
+        std::vector<Vec3> by_position;  // [N]
+    };
+    /// Returns the own field at q, which is kept until it is asked for at another state.
+    std::shared_ptr<const State> state_at(const double* q) const;
+
+    const std::vector<SheetTriangles> sheets_;
     const std::vector<const Solid*> solids_;
     const std::vector<Magnet> magnets_;
     std::vector<CornerWeights> corners_;  // of the magnets
@@ -60,12 +65,13 @@ class OwnFieldTerm final : public OperatorTerm {
     std::vector<ParameterSlice> of_solids_;                  // magnetization of each solid
     std::vector<ParameterSlice> moment_, center_;            // of each magnet
     ParameterSlice factor_;
-    std::vector<Vec3> magnetizations_;  // of all faces [A/m]
+    std::vector<Vec3> magnetizations_;  // of all triangles of sheets [A/m]
     std::vector<double> thicknesses_;   // [m]
     std::vector<Vec3> of_tetrahedra_;   // magnetizations [A/m]
     OwnField field_;                    // of all faces and tetrahedra
     std::shared_ptr<const OwnField>
         sources_;  // of the elements with a source; shared with the Hessians of earlier solves, so it is replaced, never changed
+    mutable std::shared_ptr<const State> state_;
 };
 
 }  // namespace magshell

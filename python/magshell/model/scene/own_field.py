@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from ..._input.arrays import count, number
 from ..._input.checked_list import checked_list
 from ..._runtime.frozen import Frozen
-from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ..rigid.rigid import RigidBody
 from ..shells.shell import Shell
 from ..solids.solid import Solid
@@ -25,7 +24,8 @@ class OwnField(Frozen):
 
     Without it a scene has the model of the papers: magnetized bodies feel the applied field only. With it they attract
     and repel each other and themselves. The sources of a shell lie on the edges of its mesh, two by two points on each
-    edge with a source and four by four where edges are near (docs/theory.md). A uniform tangential magnetization has
+    edge with a source and four by four where edges are near (docs/theory.md); a six-node face is four flat triangles between
+    its nodes. A uniform tangential magnetization has
     sources on the border of a shell only; a normal one, or a tangential one that rotates without stretching
     (magnetization_law="rotates"), has sources on all edges. The sources of a solid are charges on the faces of its
     tetrahedra, four points a face; a uniform magnetization has them on the surface only. Up to 16,000 points all pairs are
@@ -36,7 +36,7 @@ class OwnField(Frozen):
 
     The rest shape is that of the body without its magnetization, so that a solve loads it with the own field too.
 
-    bodies: the bodies whose field acts, on all of them: Shells of three-node faces, Solids that are magnetized throughout
+    bodies: the bodies whose field acts, on all of them: Shells, Solids that are magnetized throughout
         with magnetization_law="stretches", Solids with a skin, and RigidBodies or Links with a magnetic_moment; None: all
         magnetized bodies of the scene, which must be such. Shells that are tied to each other may have it if no edge has
         more than two faces.
@@ -85,6 +85,7 @@ def own_field_inputs(scene: Scene) -> dict[str, object]:
     if given is None:
         return {
             "own_field_shells": none,
+            "own_field_six_node_shells": none,
             "own_field_solids": none,
             "own_field_skins": none,
             "own_field_rigid": none,
@@ -106,6 +107,7 @@ def own_field_inputs(scene: Scene) -> dict[str, object]:
     bodies = scene._bodies
     return {
         "own_field_shells": _numbers(bodies.flat_sheets, chosen),
+        "own_field_six_node_shells": _numbers(bodies.six_node_sheets, chosen),
         "own_field_solids": _numbers(
             bodies.solids, [each for each in chosen if _is_magnetized_throughout(each)]
         ),
@@ -141,11 +143,6 @@ def _check(number: int, body: Shell | Solid) -> None:
     """Raise ValueError if the own field of a body is not supported, or if it has no magnetization."""
     name = f"own_field does not support body {number}"
     if isinstance(body, Shell):
-        if not isinstance(body.mesh, TriangleMesh):
-            raise ValueError(
-                f"{name}, a Shell of six-node faces: Shells of three-node faces have it; name other bodies in "
-                "ms.OwnField(bodies=...)"
-            )
         if body.susceptibility is not None:
             raise ValueError(
                 f"{name}, which has a susceptibility: the magnetization that a field "

@@ -1,0 +1,202 @@
+// Sums over the points of two near elements of an OwnField (energy/own_field.h), for numbers and for dual numbers:
+//
+//   G = sum_ij w_i w_j / |p_i - p_j|,     p_i = sum_k u_ik x_k + zeta_i h n                                       [1/m]
+//
+// The points of an element share its charge and current, so that one G with its derivatives serves the pair in both directions.
+#pragma once
+
+#include <array>
+#include <cstring>
+#include <vector>
+
+#include "magshell/core/vector3.h"
+#include "magshell/energy/own_field_pairs.h"
+
+namespace magshell {
+namespace own_field {
+
+/// A dual number in each lane.
+struct SimdDual {
+    SimdDouble value{0.0}, rate{0.0};
+
+    SimdDual() = default;
+    SimdDual(const SimdDouble& v, const SimdDouble& r) : value(v), rate(r) {}
+    SimdDual& operator+=(const SimdDual& b) {
+        value += b.value;
+        rate += b.rate;
+        return *this;
+    }
+    friend SimdDual operator+(const SimdDual& a, const SimdDual& b) {
+        return {a.value + b.value, a.rate + b.rate};
+    }
+    friend SimdDual operator-(const SimdDual& a, const SimdDual& b) {
+        return {a.value - b.value, a.rate - b.rate};
+    }
+    friend SimdDual operator*(const SimdDual& a, const SimdDual& b) {
+        return {a.value * b.value, a.rate * b.value + a.value * b.rate};
+    }
+    friend SimdDual operator*(const SimdDouble& a, const SimdDual& b) { return {a * b.value, a * b.rate}; }
+};
+
+inline SimdDual inverse_root(const SimdDual& a) {
+    const SimdDouble root = magshell::inverse_root(a.value);
+    return {root, SimdDouble(-0.5) * (root * root * root) * a.rate};
+}
+
+template <class T>
+struct LanesOf {
+    using Type = SimdDouble;
+    static Type load(const double* values, const double*) {
+        SimdDouble out;
+        std::memcpy(&out.lanes, values, sizeof out.lanes);
+        return out;
+    }
+    static Type broadcast(const double* values, const double*) { return SimdDouble(*values); }
+    static T sum(const Type& a) {
+        double sum = 0.0;
+        for (int lane = 0; lane < SimdDouble::width; ++lane) sum += a[lane];
+        return sum;
+    }
+};
+
+template <>
+struct LanesOf<Dual> {
+    using Type = SimdDual;
+    static Type load(const double* values, const double* rates) {
+        return {LanesOf<double>::load(values, nullptr), LanesOf<double>::load(rates, nullptr)};
+    }
+    static Type broadcast(const double* values, const double* rates) {
+        return {SimdDouble(*values), SimdDouble(*rates)};
+    }
+    static Dual sum(const Type& a) { return {LanesOf<double>::sum(a.value), LanesOf<double>::sum(a.rate)}; }
+};
+
+inline constexpr int most_points = 16;  // of an element
+
+/// The weights of the points of an element by component; lanes behind the last point have none.
+struct PointWeights {
+    int count = 0, n_nodes = 0;
+    alignas(64) std::array<std::array<double, most_points>, 3> nodes{};  // u
+    alignas(64) std::array<double, most_points> levels{}, weights{};     // zeta, w
+};
+
+/// The points of all elements by component; each element begins at a SIMD vector, and missing points are far away.
+class PointArrays {
+  public:
+    PointArrays(std::size_t elements, int points, bool has_rates)
+        // plain-words: ok, a stride between elements
+        : stride_((points + SimdDouble::width - 1) / SimdDouble::width * SimdDouble::width) {
+        for (int c = 0; c < 3; ++c) {
+            values_[c].assign(elements * stride_, far_away);
+            if (has_rates) rates_[c].assign(elements * stride_, 0.0);
+        }
+    }
+    std::size_t stride() const { return stride_; }  // plain-words: ok, between elements
+
+    template <class T>
+    void set(std::size_t element, std::size_t point, const Triple<T>& at) {
+        const T* const given[3] = {&at.x, &at.y, &at.z};
+        for (int c = 0; c < 3; ++c) {
+            values_[c][element * stride_ + point] = value_of(*given[c]);
+            if (!rates_[c].empty()) rates_[c][element * stride_ + point] = rate_of(*given[c]);
+        }
+    }
+    const double* values(int component, std::size_t element) const {
+        return values_[component].data() + element * stride_;
+    }
+    const double* rates(int component, std::size_t element) const {
+        return rates_[component].empty() ? nullptr : rates_[component].data() + element * stride_;
+    }
+
+  private:
+    std::size_t stride_;
+    std::array<std::vector<double>, 3> values_, rates_;
+};
+
+/// G and its derivatives by the nodes of both elements and by h n.
+template <class T>
+class PairMean {
+  public:
+    using Lanes = typename LanesOf<T>::Type;
+
+    PairMean() {
+        value_ = Lanes(zero());
+        for (int side = 0; side < 2; ++side) {
+            levels_[side] = none();
+            for (Triple<Lanes>& node : nodes_[side]) node = none();
+        }
+    }
+
+    /// Adds `sign` times G over the points of a rule.
+    void add(const PointArrays& points, std::size_t first, const PointWeights& of_first, std::size_t second,
+             const PointWeights& of_second, double sign) {
+        using Load = LanesOf<T>;
+        constexpr int width = SimdDouble::width, most_vectors = most_points / width;
+        const int vectors = static_cast<int>(points.stride()) / width;
+        const auto from = [&](int component, std::size_t element, std::size_t k, const auto& read) {
+            const double* const rates = points.rates(component, element);
+            return read(points.values(component, element) + k, rates ? rates + k : nullptr);
+        };
+        Triple<Lanes> at_second[most_vectors], forces[most_vectors];
+        for (int v = 0; v < vectors; ++v) {
+            const std::size_t k = static_cast<std::size_t>(v) * width;
+            at_second[v] = {from(0, second, k, Load::load), from(1, second, k, Load::load),
+                            from(2, second, k, Load::load)};
+            forces[v] = none();
+        }
+        for (int i = 0; i < of_first.count; ++i) {
+            const std::size_t k = static_cast<std::size_t>(i);
+            const Triple<Lanes> at = {from(0, first, k, Load::broadcast), from(1, first, k, Load::broadcast),
+                                      from(2, first, k, Load::broadcast)};
+            const SimdDouble weight(sign * of_first.weights[i]);
+            Triple<Lanes> total = none();
+            for (int v = 0; v < vectors; ++v) {
+                const Triple<Lanes> d = at - at_second[v];
+                const Lanes inverse = inverse_root(dot(d, d));
+                const SimdDouble both =
+                    weight * LanesOf<double>::load(&of_second.weights[v * width], nullptr);
+                const Lanes scaled = both * inverse;
+                const Triple<Lanes> force = (scaled * (inverse * inverse)) * d;
+                value_ += scaled;
+                total += force;
+                forces[v] += force;
+            }
+            for (int n = 0; n < of_first.n_nodes; ++n)
+                add_scaled(SimdDouble(-of_first.nodes[n][i]), total, nodes_[0][n]);
+            add_scaled(SimdDouble(-of_first.levels[i]), total, levels_[0]);
+        }
+        for (int v = 0; v < vectors; ++v) {
+            for (int n = 0; n < of_second.n_nodes; ++n)
+                add_scaled(LanesOf<double>::load(&of_second.nodes[n][v * width], nullptr), forces[v],
+                           nodes_[1][n]);
+            add_scaled(LanesOf<double>::load(&of_second.levels[v * width], nullptr), forces[v], levels_[1]);
+        }
+    }
+
+    T value() const { return LanesOf<T>::sum(value_); }
+    Triple<T> by_node(int side, int node) const { return sum(nodes_[side][node]); }
+    Triple<T> by_level(int side) const { return sum(levels_[side]); }
+
+  private:
+    static Lanes zero() {
+        if constexpr (std::is_same_v<T, Dual>)
+            return SimdDual();
+        else
+            return SimdDouble(0.0);
+    }
+    static Triple<Lanes> none() { return {zero(), zero(), zero()}; }
+    static void add_scaled(const SimdDouble& factor, const Triple<Lanes>& more, Triple<Lanes>& out) {
+        out.x += factor * more.x;
+        out.y += factor * more.y;
+        out.z += factor * more.z;
+    }
+    static Triple<T> sum(const Triple<Lanes>& a) {
+        return {LanesOf<T>::sum(a.x), LanesOf<T>::sum(a.y), LanesOf<T>::sum(a.z)};
+    }
+
+    Lanes value_;
+    Triple<Lanes> nodes_[2][3], levels_[2];
+};
+
+}  // namespace own_field
+}  // namespace magshell
