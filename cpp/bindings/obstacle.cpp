@@ -11,6 +11,7 @@
 #include "magshell/obstacle/box.h"
 #include "magshell/obstacle/capsule.h"
 #include "magshell/obstacle/complement.h"
+#include "magshell/obstacle/ellipsoid.h"
 #include "magshell/obstacle/height_field.h"
 #include "magshell/obstacle/mesh_obstacle.h"
 #include "magshell/obstacle/plane.h"
@@ -91,6 +92,10 @@ void register_obstacle(py::module_& module) {
                 return std::make_shared<Capsule>(vec(start), vec(end), radius);
             },
             py::arg("start"), py::arg("end"), py::arg("radius"))
+        .def_static(
+            "ellipsoid",
+            [](const Triple& semi_axes) -> Shared { return std::make_shared<Ellipsoid>(vec(semi_axes)); },
+            py::arg("semi_axes"))
         .def_static("tube", &make_tube, py::arg("points"), py::arg("radii"), py::arg("closed"))
         .def_static("height_field", &make_height_field, py::arg("origin"), py::arg("spacing"),
                     py::arg("heights"))

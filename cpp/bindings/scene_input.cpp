@@ -220,6 +220,7 @@ SceneInput scene_input(const py::kwargs& given) {
     input.body_contacts = body_contacts_of(given["body_contacts"]);
     for (const py::handle obstacle : given["obstacles"])
         input.obstacles.push_back(obstacle.cast<std::shared_ptr<Obstacle>>());
+    input.attached_to = given["attached_to"].cast<std::vector<Index>>();
     input.water = given["water"].cast<std::shared_ptr<Water>>();
     input.own_field = {given["own_field_shells"].cast<std::vector<Index>>(),
                        given["own_field_six_node_shells"].cast<std::vector<Index>>(),

@@ -277,6 +277,12 @@ class Obstacle:
         radius: typing.SupportsFloat | typing.SupportsIndex,
     ) -> Obstacle: ...
     @staticmethod
+    def ellipsoid(
+        semi_axes: typing.Annotated[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"
+        ],
+    ) -> Obstacle: ...
+    @staticmethod
     def height_field(
         origin: typing.Annotated[
             collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(2)"

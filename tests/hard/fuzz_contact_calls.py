@@ -32,6 +32,7 @@ def _shapes(s: Sample) -> Iterator[Call]:
         "Plane": (obstacles.Plane, {"normal": (0, 0, 1)}),
         "slope": (obstacles.slope, {"angle": 0.1, "uphill": (1, 0)}),
         "Sphere": (obstacles.Sphere, {"radius": 0.1, "inside": False}),
+        "Ellipsoid": (obstacles.Ellipsoid, {"semi_axes": (0.1, 0.2, 0.1), "inside": False}),
         "Box": (obstacles.Box, {"size": (0.1, 0.1, 0.1), "rounding": 0.01, "inside": False}),
         "Capsule": (
             obstacles.Capsule,
@@ -52,6 +53,13 @@ def _shapes(s: Sample) -> Iterator[Call]:
     ball = ms.meshes.spherical_cap(0.1, 0.0, np.pi, cells=(8, 6))
     body = {"mesh": ball.rest_positions, "faces": ball.faces, "resolution": 8, **PLACED}
     yield Call("obstacles.MeshObstacle", probed(obstacles.MeshObstacle), body, cost=2)
+    part = ms.RigidBody(mass=1e-3, inertia=1e-8, center=(0, 0, -0.1))
+    placed = {name: PLACED[name] for name in ("center", "rotation")}
+    yield Call(
+        "obstacles.Attached",
+        probed(obstacles.Attached),
+        {"obstacle": obstacles.Sphere(0.1), "to": part, **placed},
+    )
     plane = obstacles.Plane(**PLACED)
     yield Call("Obstacle.signed_distance", plane.signed_distance, {"points": points, "time": 0.1})
     yield Call("Obstacle.normals", plane.normals, {"points": points, "time": 0.1})

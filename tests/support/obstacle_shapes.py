@@ -39,6 +39,8 @@ MAKERS = {
     "sphere around": lambda **place: ob.Sphere(0.6, inside=True, **place),
     "rounded box": lambda **place: ob.Box((1.2, 0.8, 1.0), rounding=0.15, **place),
     "box around": lambda **place: ob.Box((1.2, 0.8, 1.0), rounding=0.3, inside=True, **place),
+    "ellipsoid": lambda **place: ob.Ellipsoid((0.8, 0.5, 0.6), **place),
+    "ellipsoid around": lambda **place: ob.Ellipsoid((0.8, 0.7, 0.6), inside=True, **place),
     "capsule": lambda **place: ob.Capsule([[-0.4, 0, 0.1], [0.3, 0.2, 0]], 0.3, **place),
     "capsule around": lambda **place: ob.Capsule(0.8, 0.3, inside=True, **place),
     "tube": lambda **place: ob.Tube(WAVY, RADII, **place),

@@ -197,6 +197,10 @@ def _around(given: Arrays, bodies: dict[str, object]) -> dict[str, object]:
         "parameter of a fit": ms.FitParameter(given([1.0, 2.0]), prior=(given([1.0, 2.0]), 0.1)),
         "plane": plane,
         "sphere": ms.obstacles.Sphere(0.1, **place),
+        "ellipsoid": ms.obstacles.Ellipsoid(given([0.1, 0.2, 0.1]), **place),
+        "attached": ms.obstacles.Attached(
+            ms.obstacles.Sphere(0.1), ms.RigidBody(mass=1.0, inertia=1.0), center=given([0, 0, 1.0])
+        ),
         "box": ms.obstacles.Box(given([0.1, 0.1, 0.1]), **place),
         "capsule": ms.obstacles.Capsule(given([[0, 0, 0], [0.1, 0, 0]]), 0.01, **place),
         "tube": ms.obstacles.Tube(given([[0, 0, 0], [0.1, 0, 0], [0.2, 0.1, 0]]), 0.05, **place),

@@ -37,6 +37,7 @@ Bodies::Bodies(const SceneInput& input) {
     add_link_couplings(input);
     nodes_ = numbering.finish(input.directions, input.original);
     add_volume_and_tendon_couplings(input);
+    add_attached_couplings(input);
     for (const GroupEnergyInput& energy : input.group_energies)
         for (std::size_t first = 0; first < energy.vertices.size(); first += energy.group_size) {
             std::vector<Index>& nodes = coupled_.emplace_back();
@@ -165,6 +166,30 @@ void Bodies::add_volume_and_tendon_couplings(const SceneInput& input) {
                 add(nodes, point.vertices.begin(), point.vertices.end());
             close(nodes);
         }
+}
+
+std::vector<std::array<Index, 4>> Bodies::corners_of(const std::vector<Index>& rigid) const {
+    std::vector<std::array<Index, 4>> all;
+    for (const Index part : rigid) {
+        std::array<Index, 4>& corners = all.emplace_back();
+        corners.fill(-1);
+        if (part >= 0) std::copy_n(rigid_nodes_[part].begin(), 4, corners.begin());
+    }
+    return all;
+}
+
+// Couples every point in contact with the corners of the rigid body that carries the obstacle.
+void Bodies::add_attached_couplings(const SceneInput& input) {
+    const std::vector<std::array<Index, 4>> corners = corners_of(input.attached_to);
+    for (const ContactInput& contact : input.contacts)
+        for (const Index obstacle : contact.obstacles)
+            for (const ContactPoint& point : contact.points) {
+                if (corners[obstacle][0] < 0) break;
+                std::vector<Index>& nodes =
+                    coupled_.emplace_back(corners[obstacle].begin(), corners[obstacle].end());
+                for (const Index vertex : point.nodes)
+                    if (vertex >= 0) nodes.push_back(nodes_.vertices.core[vertex]);
+            }
 }
 
 std::vector<Stencil> Bodies::stencils(const SceneInput& input) const {

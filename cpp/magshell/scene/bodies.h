@@ -52,6 +52,8 @@ class Bodies {
     Index n_edges() const { return n_edges_; }
     /// Returns the dofs that each element of a shell couples, and those of each edge moment.
     std::vector<Stencil> stencils(const SceneInput& input) const;
+    /// Returns the four corners of rigid bodies; of a negative number negative nodes.
+    std::vector<std::array<Index, 4>> corners_of(const std::vector<Index>& rigid) const;
 
     /// Returns the dofs that each element of a solid or six-node shell couples, the corners of rigid bodies coupled by a joint, and the
     /// other nodes that volumes and tendons couple.
@@ -92,6 +94,7 @@ class Bodies {
     void add_rigid(const std::vector<RigidInput>& rigid, NodeNumbering& numbering);
     void add_link_couplings(const SceneInput& input);
     void add_volume_and_tendon_couplings(const SceneInput& input);
+    void add_attached_couplings(const SceneInput& input);
 
     std::vector<std::unique_ptr<Shell>> owned_;
     std::vector<std::unique_ptr<Solid>> owned_solids_;

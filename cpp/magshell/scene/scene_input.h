@@ -157,6 +157,8 @@ struct SceneInput {
     std::vector<ContactSurfaceInput> contact_surfaces;
     std::vector<BodyContactInput> body_contacts;
     std::vector<std::shared_ptr<const Obstacle>> obstacles;
+    std::vector<Index>
+        attached_to;  // per obstacle: the index in `rigid` of the body that carries it; negative: none
     std::shared_ptr<const Water> water;
     OwnFieldInput own_field;
 };

@@ -415,7 +415,8 @@ void Builder::add_friction(const Inputs& inputs, Contact& contact) {
 
 void Builder::add_contacts(const SceneInput& input) {
     std::unique_ptr<ContactTerm> contact =
-        std::make_unique<ContactTerm>(bodies_.nodes(), matrix_, input.contacts, input.obstacles, registry_);
+        std::make_unique<ContactTerm>(bodies_.nodes(), matrix_, input.contacts, input.obstacles,
+                                      bodies_.corners_of(input.attached_to), registry_);
     const ContactTerm& touched = *contact;
     out_.contacts.add(contact.get());
     out_.energies.push_back(std::move(contact));

@@ -80,6 +80,36 @@ def test_free_rotation_conserves_momentum_and_energy():
     assert motion.kinetic_energy == pytest.approx(motion.kinetic_energy[0], rel=1e-9)
 
 
+@pytest.mark.parametrize("kind", ["hinge", "ball"])
+def test_free_skeleton_keeps_its_momentum_and_errs_at_second_order(kind):
+    """Let two links turn about each other: joints transmit forces, so that free flight of each link is not known."""
+    spin = {"velocity": (0.1, 0.2, -0.3), "angular_velocity": (1.0, 2.0, 0.5)}
+    base = ms.Link(mass=2.0, inertia=(0.1, 0.2, 0.25), center=(0, 0, 0), **spin)
+    hand = ms.Link(mass=0.7, inertia=(0.02, 0.03, 0.04), center=(0.5, 0.1, 0.0))
+    ends = {"child": hand, "parent": base, "origin": (0.3, 0, 0)}
+    joint = (
+        ms.Revolute(**ends, axis=(0, 0.3, 1), rate=3.0)
+        if kind == "hinge"
+        else ms.Ball(**ends, rate=(1.0, 2.0, -1.0))
+    )
+    scene = ms.Scene(ms.Skeleton([base, hand], [joint]), allow_rigid_motions=True)
+    errors = []
+    for time_step in (0.01, 0.005):
+        move = ms.simulate(scene, steps=round(2.0 / time_step), time_step=time_step, progress=False)
+        momenta, turning = np.zeros(3), np.zeros(3)
+        for link in (base, hand):
+            found = move[link]
+            inertia = found.rotation @ link.inertia_tensor @ found.rotation.transpose(0, 2, 1)
+            momenta = momenta + link.mass * found.velocity
+            turning = turning + np.einsum("nij,nj->ni", inertia, found.angular_velocity)
+            turning = turning + link.mass * np.cross(found.center, found.velocity)
+        assert np.abs(momenta - momenta[0]).max() < 2e-9 * np.linalg.norm(momenta[0])
+        energy = np.abs(move.kinetic_energy / move.kinetic_energy[0] - 1.0).max()
+        errors.append((np.abs(turning - turning[0]).max() / np.linalg.norm(turning[0]), energy))
+    assert errors[0][0] < 1e-4 and errors[0][1] < 2e-4
+    assert np.log2(np.divide(*errors)) == pytest.approx([2.0, 2.0], abs=0.5)
+
+
 @pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_body_that_turns_many_times_a_step_has_no_flight():
     """Compare a body that turns a few times a step with one that turns more often and has no flight."""

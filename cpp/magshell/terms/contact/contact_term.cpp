@@ -20,6 +20,12 @@ Vec3 weighted(const ContactPoint& point, const double* all) {
     return sum;
 }
 
+ContactTerm::AttachedNodes all_nodes(const ContactPoint& point, const CornerFrame& frame) {
+    ContactTerm::AttachedNodes nodes;
+    std::ranges::copy(frame.corners(), std::ranges::copy(point.nodes, nodes.begin()).out);
+    return nodes;
+}
+
 }  // namespace
 
 SimdMat3 to_simd(const Mat3& block) {
@@ -31,8 +37,11 @@ SimdMat3 to_simd(const Mat3& block) {
 
 ContactTerm::ContactTerm(const Nodes& nodes, const SystemMatrix& matrix,
                          const std::vector<ContactInput>& contacts,
-                         const std::vector<std::shared_ptr<const Obstacle>>& obstacles, Registry& registry)
+                         const std::vector<std::shared_ptr<const Obstacle>>& obstacles,
+                         const std::vector<CornerFrame::Corners>& frames, Registry& registry)
     : laws_(contacts.size()), stiffness_(contacts.size(), 0.0) {
+    for (const CornerFrame::Corners& corners : frames)
+        frames_.push_back(corners[0] < 0 ? nullptr : std::make_unique<CornerFrame>(corners, nodes.rest));
     for (const ContactInput& given : contacts) {
         const std::string owner = "contact " + std::to_string(contacts_.size());
         const auto number = [&](const char* name, const char* unit) {
@@ -53,6 +62,12 @@ ContactTerm::ContactTerm(const Nodes& nodes, const SystemMatrix& matrix,
                 ++contact.first_on_face;
             else
                 contact.slots.push_back(pair_slots<3>(matrix, point.nodes));
+        }
+        for (const Index o : contact.obstacles) {
+            std::vector<PairSlots<attached_nodes>>& slots = contact.attached.emplace_back();
+            if (!frames_[o]) continue;
+            for (const ContactPoint& point : contact.points)
+                slots.push_back(pair_slots<attached_nodes>(matrix, all_nodes(point, *frames_[o])));
         }
     }
     for (const std::shared_ptr<const Obstacle>& shape : obstacles) {
@@ -88,6 +103,17 @@ ObstacleState ContactTerm::obstacle_state(Index obstacle, const LoadParameters& 
     return {obstacles_[obstacle], ObstaclePose{row(0), row(1), row(2), row(3)}};
 }
 
+void ContactTerm::obstacle_vjp(const ActiveContact& active, const ObstacleState& obstacle, double by_distance,
+                               const Vec3& by_normal, const Vec3& by_relative_velocity,
+                               ObstacleGradient& out) {
+    if (!active.relative)
+        return obstacle.vjp(active.position, active.at, by_distance, by_normal, by_relative_velocity, out);
+    // The pose of an attached obstacle relative to its rigid body does not change, so that no velocity depends on it.
+    const RelativeMotion& relative = *active.relative;
+    obstacle.vjp(relative.at_rest(), relative.in_body(active.at), by_distance,
+                 relative.axes.transpose() * by_normal, Vec3::Zero(), out);
+}
+
 void ContactTerm::add_vjp(const ActiveContact& active, double by_force, const ContactLaw& by_friction,
                           const ObstacleGradient& by_obstacle, VectorXd& by_values,
                           LoadParameters& by_load_parameters) const {
@@ -116,18 +142,24 @@ std::vector<ContactTerm::ActiveContact> ContactTerm::active_contacts(
         const Index count = static_cast<Index>(contact.points.size());
         for (const Index o : contact.obstacles) {
             const ObstacleState obstacle = obstacle_state(o, load_parameters);
+            const CornerFrame* const frame = frames_[o].get();
+            const CornerFrame::Pose pose = frame ? frame->pose(q) : CornerFrame::Pose();
             std::vector<std::vector<ActiveContact>> found((count + points_per_task - 1) / points_per_task);
             parallel_for(static_cast<int>(found.size()), [&](int block) {
                 const Index first = block * points_per_task, last = std::min(count, first + points_per_task);
                 for (Index p = first; p < last; ++p) {
                     const Vec3 x = weighted(contact.points[p], q);
-                    const Distance at = obstacle.distance(x);
+                    const Distance at = obstacle.distance(frame ? frame->at_rest(pose, x) : x);
                     const double depth = law.offset - at.value;
                     if (!(depth > 0.0)) continue;
                     const Penalty penalty(depth, law.smoothing);
                     found[block].push_back({static_cast<Index>(c), o, p, x, at, law.stiffness * penalty.force,
                                             law.stiffness * penalty.stiffness,
                                             law.stiffness * penalty.force_by_smoothing});
+                    if (!frame) continue;
+                    ActiveContact& active = found[block].back();
+                    active.relative = std::make_shared<RelativeMotion>(*frame, pose, x);
+                    active.at = active.relative->in_world(at);
                 }
             });
             for (const std::vector<ActiveContact>& part : found)
@@ -158,18 +190,25 @@ Passage ContactTerm::passes_through(const VectorXd& q, const LoadParameters& loa
     return passes_between(own_positions(q, load_parameters), own_positions(end, load_parameters_at_end));
 }
 
+Vec3 ContactTerm::own_position(Index obstacle, const ObstacleState& at, const VectorXd& q,
+                               const Vec3& x) const {
+    const CornerFrame* const frame = frames_[obstacle].get();
+    return at.own(frame ? frame->at_rest(frame->pose(q.data()), x) : x);
+}
+
 std::vector<Vec3> ContactTerm::own_positions(const VectorXd& q, const LoadParameters& load_parameters) const {
     std::vector<Vec3> places;
     for (const Contact& contact : contacts_)
         for (const Index o : contact.obstacles) {
             const ObstacleState obstacle = obstacle_state(o, load_parameters);
             for (const ContactPoint& point : contact.points)
-                places.push_back(obstacle.own(weighted(point, q.data())));
+                places.push_back(own_position(o, obstacle, q, weighted(point, q.data())));
         }
     for (const WatchedObstacle& each : watched_) {
         const ObstacleState obstacle = obstacle_state(each.obstacle, load_parameters);
         for (const std::array<Index, 3>& face : each.faces)
-            for (const Index node : face) places.push_back(obstacle.own(q.segment<3>(3 * node)));
+            for (const Index node : face)
+                places.push_back(own_position(each.obstacle, obstacle, q, q.segment<3>(3 * node)));
     }
     return places;
 }
@@ -204,27 +243,45 @@ std::vector<Vec3> ContactTerm::rotation_vectors(const LoadParameters& load_param
 }
 
 Vec3 ContactTerm::at_point(const ActiveContact& active, const double* all) const {
-    return weighted(point(active), all);
+    const Vec3 at = weighted(point(active), all);
+    return active.relative ? at + active.relative->motion(all) : at;
+}
+
+ContactTerm::AttachedNodes ContactTerm::attached_nodes_of(const ActiveContact& active) const {
+    return all_nodes(point(active), *active.relative->frame);
+}
+
+Mat3 ContactTerm::jacobian(const ActiveContact& active, int place) const {
+    if (place < point_nodes) return point(active).weights[place] * Mat3::Identity();
+    return active.relative->jacobian(place - point_nodes);
 }
 
 void ContactTerm::distribute(const ActiveContact& active, const Vec3& vector, VectorXd& out) const {
     const ContactPoint& p = point(active);
-    for (int k = 0; k < 3; ++k)
+    for (int k = 0; k < point_nodes; ++k)
         if (p.nodes[k] >= 0) out.segment<3>(3 * p.nodes[k]) += p.weights[k] * vector;
+    for (int k = 0; k < 4 && active.relative; ++k)
+        out.segment<3>(3 * active.relative->corner(k)) += active.relative->reaction(k, vector);
 }
 
 void ContactTerm::distribute(const ActiveContact& active, const Vec3& force, Residual& out) const {
     const ContactPoint& p = point(active);
-    for (int k = 0; k < 3; ++k)
-        if (p.nodes[k] >= 0)
-            for (int axis = 0; axis < 3; ++axis) out.add(3 * p.nodes[k] + axis, p.weights[k] * force[axis]);
+    const auto add = [&out](Index node, const Vec3& own) {
+        for (int axis = 0; axis < 3; ++axis) out.add(3 * node + axis, own[axis]);
+    };
+    for (int k = 0; k < point_nodes; ++k)
+        if (p.nodes[k] >= 0) add(p.nodes[k], p.weights[k] * force);
+    for (int k = 0; k < 4 && active.relative; ++k)
+        add(active.relative->corner(k), active.relative->reaction(k, force));
 }
 
 void ContactTerm::add_cancelling_force(const ActiveContact& active, double stiffness, VectorXd& out) const {
     const ContactPoint& p = point(active);
-    for (int k = 0; k < 3; ++k)
-        if (p.nodes[k] >= 0)
-            out.segment<3>(3 * p.nodes[k]).array() += p.weights[k] * stiffness * active.position.norm();
+    const double force = stiffness * active.position.norm();
+    for (int k = 0; k < point_nodes; ++k)
+        if (p.nodes[k] >= 0) out.segment<3>(3 * p.nodes[k]).array() += p.weights[k] * force;
+    for (int k = 0; k < 4 && active.relative; ++k)
+        out.segment<3>(3 * active.relative->corner(k)).array() += active.relative->jacobian(k).norm() * force;
 }
 
 void ContactTerm::add_cancelling_normal_forces(VectorXd& out) const {
@@ -235,6 +292,14 @@ void ContactTerm::add_cancelling_normal_forces(VectorXd& out) const {
 void ContactTerm::add_block(const ActiveContact& active, const Mat3& block, SystemMatrix& out) const {
     const Contact& contact = contacts_[active.contact];
     const ContactPoint& p = point(active);
+    if (active.relative) {
+        std::array<Mat3, attached_nodes> jacobians;
+        for (int i = 0; i < attached_nodes; ++i) jacobians[i] = jacobian(active, i);
+        add_attached_blocks(
+            active, [&](int i, int j) -> Mat3 { return jacobians[i].transpose() * block * jacobians[j]; },
+            out);
+        return;
+    }
     if (active.point < contact.first_on_face) {
         out.add_diagonal_block(p.nodes[0], to_simd(block), 0);
         return;
@@ -243,6 +308,36 @@ void ContactTerm::add_block(const ActiveContact& active, const Mat3& block, Syst
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j <= i; ++j) blocks[lower_index(i, j)] = to_simd(p.weights[i] * p.weights[j] * block);
     scatter_blocks<3>(out, p.nodes, contact.slots[active.point - contact.first_on_face], blocks, 0);
+}
+
+template <class Block>
+void ContactTerm::add_attached_blocks(const ActiveContact& active, const Block& block,
+                                      SystemMatrix& out) const {
+    SimdMat3 blocks[attached_nodes * (attached_nodes + 1) / 2];
+    for (int i = 0; i < attached_nodes; ++i)
+        for (int j = 0; j <= i; ++j) blocks[lower_index(i, j)] = to_simd(block(i, j));
+    const Contact& contact = contacts_[active.contact];
+    const auto obstacle = std::ranges::find(contact.obstacles, active.obstacle) - contact.obstacles.begin();
+    scatter_blocks<attached_nodes>(out, attached_nodes_of(active), contact.attached[obstacle][active.point],
+                                   blocks, 0);
+}
+
+// The second derivative of y along u and v, times R n: sum_k s_k (u_k . (v - v_c) + v_k . (u - u_c)), s_k = w_k . R^T n, with u at the
+// point and u_c at the middle of the corners.
+void ContactTerm::add_rotation_curvature(const ActiveContact& active, SystemMatrix& out) const {
+    std::array<double, attached_nodes> slopes{}, shares{};
+    for (int k = 0; k < point_nodes; ++k) shares[k] = point(active).weights[k];
+    for (int k = 0; k < 4; ++k) {
+        slopes[point_nodes + k] = active.relative->levers[k].dot(active.at.normal);
+        shares[point_nodes + k] = -0.25;
+    }
+    add_attached_blocks(
+        active,
+        [&](int i, int j) -> Mat3 {
+            const double sum = slopes[i] * shares[j] + slopes[j] * shares[i];
+            return -active.force * sum * Mat3::Identity();
+        },
+        out);
 }
 
 double ContactTerm::energy(const double* q, const LoadParameters& load_parameters) const {
@@ -259,6 +354,8 @@ std::vector<ContactTerm::HardContact> ContactTerm::hard_contacts() const {
     for (std::size_t c = 0; c < contacts_.size(); ++c)
         for (const Index obstacle : contacts_[c].obstacles)
             for (const ContactPoint& p : contacts_[c].points) {
+                if (frames_[obstacle])
+                    throw InvalidInput("Coulomb's law node by node is for obstacles that no body carries");
                 if (p.nodes[1] >= 0)
                     throw InvalidInput("Coulomb's law node by node is for vertices: take face_samples=0");
                 all.push_back({p.nodes[0], obstacle, laws_[c].offset, laws_[c].friction});
@@ -271,6 +368,8 @@ void ContactTerm::add_contact_stiffness(VectorXd& of_nodes) const {
         const ContactPoint& p = point(active);
         for (int k = 0; k < 3; ++k)  // row sums of stiffness w w^T
             if (p.nodes[k] >= 0) of_nodes[p.nodes[k]] += p.weights[k] * active.stiffness;
+        for (int k = 0; k < 4 && active.relative; ++k)
+            of_nodes[active.relative->corner(k)] += 0.25 * active.stiffness;
     }
 }
 
@@ -285,6 +384,7 @@ void ContactTerm::finish_assembly(const double*, const LoadParameters&, SystemMa
         const Distance& at = active.at;
         add_block(active, active.stiffness * at.normal * at.normal.transpose() - active.force * at.curvature,
                   out);
+        if (active.relative) add_rotation_curvature(active, out);
     }
 }
 
@@ -295,9 +395,8 @@ void ContactTerm::vjp(const double*, const LoadParameters& load_parameters, cons
         const Vec3 along = at_point(active, lambda);
         const double by_force = -along.dot(active.at.normal);
         ObstacleGradient by_obstacle;
-        obstacle_state(active.obstacle, load_parameters)
-            .vjp(active.position, active.at, -active.stiffness * by_force, -active.force * along,
-                 Vec3::Zero(), by_obstacle);
+        obstacle_vjp(active, obstacle_state(active.obstacle, load_parameters), -active.stiffness * by_force,
+                     -active.force * along, Vec3::Zero(), by_obstacle);
         add_vjp(active, by_force, {}, by_obstacle, out.values, out.load_parameters);
     }
 }

@@ -9,6 +9,7 @@
 #include "magshell/body/nodes.h"
 #include "magshell/energy/contact.h"
 #include "magshell/obstacle/obstacle_state.h"
+#include "magshell/terms/contact/relative_motion.h"
 #include "magshell/terms/term.h"
 
 namespace magshell {
@@ -53,12 +54,18 @@ class ContactTerm final : public Term {
         Index contact, obstacle, point;
         Vec3 position;
         Distance at;
-        double force, stiffness;  // N [N] and dN/d(depth) [N/m]
-        double by_smoothing;      // dN/d(smoothing) [N/m]
+        double force, stiffness;                                   // N [N] and dN/d(depth) [N/m]
+        double by_smoothing;                                       // dN/d(smoothing) [N/m]
+        std::shared_ptr<const RelativeMotion> relative = nullptr;  // of an obstacle that a rigid body carries
     };
+    /// The places of a point in contact with an attached obstacle: the nodes of the point, then the corners of the rigid body.
+    static constexpr int point_nodes = 3, attached_nodes = 7;
+    using AttachedNodes = std::array<Index, attached_nodes>;
 
+    /// frames: for each obstacle the corners of the rigid body that carries it; the first is negative if none does.
     ContactTerm(const Nodes& nodes, const SystemMatrix& matrix, const std::vector<ContactInput>& contacts,
-                const std::vector<std::shared_ptr<const Obstacle>>& obstacles, Registry& registry);
+                const std::vector<std::shared_ptr<const Obstacle>>& obstacles,
+                const std::vector<CornerFrame::Corners>& frames, Registry& registry);
 
     bool set_values(const Values& values) override;
     void add_contact_stiffness(VectorXd& of_nodes) const override;
@@ -68,7 +75,8 @@ class ContactTerm final : public Term {
         Index node, obstacle;
         double offset, friction;
     };
-    /// Returns all vertices under hard contact. Throws InvalidInput if points on faces are in contact as well.
+    /// Returns all vertices under hard contact. Throws InvalidInput if points on faces are in contact as well, or rigid bodies carry
+    /// obstacles.
     std::vector<HardContact> hard_contacts() const;
     /// Multiplies the energy, and with it all forces, by a factor from now on; see Tableau::contact_factor().
     void set_factor(double factor);
@@ -107,6 +115,10 @@ class ContactTerm final : public Term {
     }
     const ContactLaw& law(const ActiveContact& active) const { return laws_[active.contact]; }
     ObstacleState obstacle_state(Index obstacle, const LoadParameters& load_parameters) const;
+    /// Adds the gradient by an obstacle's placement and pose of a function of the distance, the normal and the relative velocity at a
+    /// point, as ObstacleState::vjp does.
+    static void obstacle_vjp(const ActiveContact& active, const ObstacleState& obstacle, double by_distance,
+                             const Vec3& by_normal, const Vec3& by_relative_velocity, ObstacleGradient& out);
     /// Adds the gradient of a function of a point's normal force and friction, given its derivatives by the
     /// normal force, by the friction law and by the obstacle. Gradients by the obstacle's pose go to
     /// `by_load_parameters`, which belong to the time at which the obstacle had that pose.
@@ -114,11 +126,15 @@ class ContactTerm final : public Term {
                  const ObstacleGradient& by_obstacle, VectorXd& by_values,
                  LoadParameters& by_load_parameters) const;
 
-    /// Adds a symmetric block between the nodes of a point, weighted by their shape functions.
+    /// Adds a symmetric block between the nodes of a point, weighted by their shape functions, and those of a rigid body that carries
+    /// the obstacle.
     void add_block(const ActiveContact& active, const Mat3& block, SystemMatrix& out) const;
-    /// Returns the value at a point of a vector of all degrees of freedom.
+    /// Returns the nodes of a point and of the rigid body that carries its obstacle, and their Jacobians of the relative motion.
+    AttachedNodes attached_nodes_of(const ActiveContact& active) const;
+    Mat3 jacobian(const ActiveContact& active, int place) const;
+    /// Returns the value at a point of a vector of all degrees of freedom, relative to a rigid body that carries the obstacle.
     Vec3 at_point(const ActiveContact& active, const double* all) const;
-    /// Distributes a vector at a point to the point's nodes, by their weights.
+    /// Distributes a vector at a point to the point's nodes, by their weights, and its reaction to such a rigid body.
     void distribute(const ActiveContact& active, const Vec3& vector, VectorXd& out) const;
     void distribute(const ActiveContact& active, const Vec3& force, Residual& out) const;
     /// Adds the magnitude [N] of the forces that cancel within a force that depends on the point's position by
@@ -139,12 +155,22 @@ class ContactTerm final : public Term {
     std::size_t bytes() const override;
 
   private:
+    /// Returns a point of the world in an obstacle's own frame.
+    Vec3 own_position(Index obstacle, const ObstacleState& at, const VectorXd& q, const Vec3& x) const;
+    /// Adds the part of the Hessian due to the rotation of a rigid body that carries the obstacle, for this normal force.
+    void add_rotation_curvature(const ActiveContact& active, SystemMatrix& out) const;
+    /// Adds the lower triangle of the blocks block(i, j) between the nodes of a point and the rigid body that carries its obstacle.
+    template <class Block>
+    void add_attached_blocks(const ActiveContact& active, const Block& block, SystemMatrix& out) const;
+
     struct Contact {
         std::vector<Index> obstacles;
         std::vector<ContactPoint> points;  // in the core's numbering of nodes
         std::vector<PairSlots<3>> slots;   // for points on faces, which come last
         Index first_on_face = 0;
         ParameterSlice stiffness, smoothing, offset, friction, sticking_speed;
+        std::vector<std::vector<PairSlots<attached_nodes>>>
+            attached;  // per obstacle: of its points, if it is carried
     };
     struct ObstacleSlices {
         ParameterSlice center, rotation;
@@ -156,6 +182,7 @@ class ContactTerm final : public Term {
     double factor_ = 1.0;
     std::vector<double> stiffness_;  // [N/m] of each contact, without the factor
     std::vector<PositionedObstacle> obstacles_;
+    std::vector<std::unique_ptr<const CornerFrame>> frames_;  // per obstacle; nullptr: none
     std::vector<ObstacleSlices> obstacle_slices_;
     std::vector<ActiveContact> evaluated_contacts_;
     std::vector<WatchedObstacle> watched_;  // with faces in the core's numbering of nodes

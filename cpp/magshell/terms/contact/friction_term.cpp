@@ -50,6 +50,10 @@ void FrictionTerm::assemble(const Kinematics& at, const LoadParameters&, bool po
         if (each.lagged || contacts_.frozen()) continue;
         const Mat3 block = -coefficient * by_position(each.friction, active, each.obstacle.spin());
         const ContactPoint& point = contact_.point(active);
+        if (active.relative) {
+            add_attached(each, -coefficient, at.v, rest);
+            continue;
+        }
         if (point.nodes[1] < 0) {
             rest.add(point.nodes[0], block);
             continue;
@@ -57,6 +61,69 @@ void FrictionTerm::assemble(const Kinematics& at, const LoadParameters&, bool po
         NonsymmetricTangent::FaceBlock shared{point.nodes, point.weights, {}};
         for (int k = 0; k < 3; ++k) shared.block.middleCols<3>(3 * k) = point.weights[k] * block;
         rest.add(shared);
+    }
+}
+
+// The force on the nodes is G^T f(N, n, G v), of which N, n and G change with the positions:
+//
+//   dN = - k n . G dx,   dn = C G dx + dR R^T n,   dR w_k = sum_j (w_j . w_k) dx_j,   dG_k = (dR w_k) d^T + (R w_k) dd^T
+//
+// with d = x - c, C the curvature and k the stiffness; relative_motion.h has G.
+void FrictionTerm::add_attached(const FrictionContact& each, double factor, const VectorXd& v,
+                                NonsymmetricTangent& rest) const {
+    constexpr int points = ContactTerm::point_nodes, all = ContactTerm::attached_nodes;
+    const ContactTerm::ActiveContact& active = *each.active;
+    const RelativeMotion& relative = *active.relative;
+    const Friction& friction = each.friction;
+    const auto overlap = [&](int j, int k) {
+        return relative.frame->weight(j).dot(relative.frame->weight(k));
+    };
+    Mat3 by_arm = Mat3::Zero();  // of the relative velocity
+    for (int k = 0; k < 4; ++k)
+        by_arm += relative.levers[k] * v.segment<3>(3 * relative.corner(k)).transpose();
+    const Mat3 by_place = by_position(friction, active, Vec3::Zero());
+    std::array<Mat3, all> jacobians, changes;  // G, df/dx
+    std::array<double, all> shares;            // dd/dx
+    for (int j = 0; j < all; ++j) {
+        const int corner = j - points;
+        jacobians[j] = contact_.jacobian(active, j);
+        shares[j] = corner < 0 ? contact_.point(active).weights[j] : -0.25;
+        changes[j] = by_place * jacobians[j] + shares[j] * friction.by_velocity * by_arm;
+        if (corner < 0) continue;
+        double turned = 0.0;
+        for (int k = 0; k < 4; ++k)
+            turned += overlap(corner, k) * relative.arm.dot(v.segment<3>(3 * relative.corner(k)));
+        changes[j] += relative.levers[corner].dot(active.at.normal) * friction.by_normal +
+                      turned * friction.by_velocity;
+    }
+    const auto block = [&](int i, int j) -> Mat3 {
+        Mat3 sum = jacobians[i].transpose() * changes[j];
+        if (i >= points) {
+            sum += shares[j] * relative.levers[i - points].dot(friction.force) * Mat3::Identity();
+            if (j >= points)
+                sum += overlap(i - points, j - points) * relative.arm * friction.force.transpose();
+        }
+        return factor * sum;
+    };
+    const ContactTerm::AttachedNodes nodes = contact_.attached_nodes_of(active);
+    // Adds the blocks between up to four places, all or only those of the first with the others.
+    const auto add = [&](const std::array<int, 4>& places, bool only_of_first) {
+        NonsymmetricTangent::PairBlock& pair = rest.append_pair();
+        for (int a = 0; a < 4; ++a) {
+            pair.nodes[a] = places[a] < 0 ? -1 : nodes[places[a]];
+            for (int b = 0; b < 4; ++b) {
+                const bool wanted =
+                    places[a] >= 0 && places[b] >= 0 && (!only_of_first || (a == 0) != (b == 0));
+                pair.blocks[4 * a + b] = wanted ? block(places[a], places[b]) : Mat3(Mat3::Zero());
+            }
+        }
+    };
+    add({0, 1, 2, -1}, false);
+    add({points, points + 1, points + 2, points + 3}, false);
+    for (int k = 0; k < points; ++k) {
+        if (nodes[k] < 0) continue;
+        add({k, points, points + 1, -1}, true);
+        add({k, points + 2, points + 3, -1}, true);
     }
 }
 
@@ -75,8 +142,9 @@ void FrictionTerm::vjp(const Kinematics&, const LoadParameters&, const VectorXd&
         }
         const double by_force = -coefficient * along.dot(friction.by_normal_force);
         ObstacleGradient by_obstacle;
-        each.obstacle.vjp(active.position, active.at, -active.stiffness * by_force,
-                          -coefficient * (friction.by_normal.transpose() * along), -by_velocity, by_obstacle);
+        ContactTerm::obstacle_vjp(active, each.obstacle, -active.stiffness * by_force,
+                                  -coefficient * (friction.by_normal.transpose() * along), -by_velocity,
+                                  by_obstacle);
         contact_.add_vjp(active, by_force,
                          {.friction = -each.factor * along.dot(friction.force),
                           .sticking_speed = -coefficient * along.dot(friction.by_sticking_speed)},

@@ -38,6 +38,11 @@ class FrictionTerm final : public ForceTerm {
         Friction friction;
     };
 
+    /// Adds the blocks of factor times the friction of a point and of the rigid body that carries the obstacle, by their positions.
+    /// v: velocities of all degrees of freedom.
+    void add_attached(const FrictionContact& each, double factor, const VectorXd& v,
+                      NonsymmetricTangent& rest) const;
+
     const ContactTerm& contact_;
     FrictionContacts<ContactTerm::ActiveContact> contacts_;
     LoadParameters load_parameters_before_;

@@ -15,7 +15,9 @@ from ...errors import MeshQualityWarning
 from ..bodies.words import called
 from ..rigid.rigid import RigidBody
 from ..solids.solid import Solid
+from .attached_obstacles import positioned
 from .body_contact import BodyContact, has_contact_shape, side_of
+from .obstacles.attached import Attached
 
 if TYPE_CHECKING:
     from ..bodies.bodies import Bodies
@@ -189,6 +191,7 @@ def contact_inputs(contacts: Sequence[Contact | BodyContact], bodies: Bodies) ->
             raise ValueError(
                 f"{contact!r} is about nothing: the scene has no vertices that obstacles could keep out"
             )
+        _check_attached(contact, vertices, bodies)
         inputs.append(
             {
                 "obstacles": [numbers[id(each)] for each in contact.obstacles],
@@ -199,6 +202,25 @@ def contact_inputs(contacts: Sequence[Contact | BodyContact], bodies: Bodies) ->
             }
         )
     return inputs
+
+
+def _check_attached(contact: Contact, vertices: np.ndarray, bodies: Bodies) -> None:
+    """Raise ValueError if an attached obstacle acts on vertices of its own rigid body, or with lagged friction."""
+    for obstacle in contact.obstacles:
+        if not isinstance(obstacle, Attached):
+            continue
+        if contact.lagged_friction:
+            raise ValueError(
+                f"lagged_friction is not available with {obstacle!r:.80}: use lagged_friction=False"
+            )
+        if obstacle.to.vertices is None:
+            continue
+        own = bodies.of(obstacle.to).first_vertex + np.asarray(obstacle.to.vertices)
+        if np.isin(vertices, own).any():
+            raise ValueError(
+                f"the Contact with {obstacle!r:.80} acts on vertices of the rigid body that carries it: give the Contact "
+                "vertices= of other bodies, or body="
+            )
 
 
 def poses(obstacle: Obstacle, times: np.ndarray) -> np.ndarray:
@@ -239,13 +261,16 @@ def near_kinks(
     return every[every >= 0]
 
 
-def check_outside(scene: Scene, values: Any, positions: np.ndarray, time: float) -> None:
+def check_outside(scene: Scene, values: Any, points: np.ndarray, time: float) -> None:
     """Raise ValueError if a body starts too deep in an obstacle, whose force would then shoot it out.
 
     The limit is half the thickness for a sheet, and a hundredth of its size for a solid.
+
+    points: positions of the vertices, (n_v, 3) m, or also of the points of rigid bodies, which are else at rest.
     """
     if not scene._obstacle_contacts:
         return
+    positions, own = points[: scene.mesh.n_vertices], points[scene.mesh.n_vertices :]
     allowed = np.empty(scene.mesh.n_vertices)
     for span, sheet in zip(scene._bodies.spans, values.sheets, strict=True):
         solid = isinstance(sheet, Solid)
@@ -255,7 +280,8 @@ def check_outside(scene: Scene, values: Any, positions: np.ndarray, time: float)
         where = np.einsum("pk,pkc->pc", weights, positions[vertices])
         offset = values.current(contact).offset
         for obstacle in contact.obstacles:
-            depth = offset - values.current(obstacle).signed_distance(where, time)
+            now = positioned(scene, values.current(obstacle), own if len(own) else None)
+            depth = offset - now.signed_distance(where, time)
             inside = np.flatnonzero(depth > allowed[vertices[:, 0]])
             if inside.size:
                 worst = inside[np.argmax(depth[inside])]

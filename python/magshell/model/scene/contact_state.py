@@ -9,10 +9,11 @@ import numpy as np
 
 from ... import _core
 from ..._runtime.frozen import immutable, variant
+from ..contact.attached_obstacles import positioned_in_motion
 from ..contact.body_contact import BodyContact
 from ..contact.contact import Contact
 from ..contact.contacts_to_core import contact_points
-from ..contact.obstacles import Obstacle
+from ..contact.obstacles import Attached, Obstacle
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -32,8 +33,17 @@ class ObstacleState(NamedTuple):
         return self.velocity + np.cross(self.spin, points - center)
 
 
-def obstacle_state(obstacle: Obstacle, time: float | None) -> ObstacleState:
-    """Return the state of an obstacle at a time of a motion; with None its state in an equilibrium, where it rests."""
+def obstacle_state(
+    scene: Scene, obstacle: Obstacle, time: float | None, points: np.ndarray, velocities: np.ndarray
+) -> ObstacleState:
+    """Return the state of an obstacle at a time of a motion; with None its state in an equilibrium, where it rests.
+
+    points, velocities: of the vertices and of the points of rigid bodies, (n, 3).
+    """
+    if isinstance(obstacle, Attached):
+        own = slice(scene.mesh.n_vertices, None)
+        now = positioned_in_motion(scene, obstacle, points[own], velocities[own])
+        return ObstacleState(now.obstacle, 0.0, now.velocity, now.spin)
     if time is not None:
         return ObstacleState(obstacle, time, *obstacle.rates(time))
     return ObstacleState(variant(obstacle, motion=None), 0.0, np.zeros(3), np.zeros(3))
@@ -43,23 +53,24 @@ def pairs_with_obstacles(
     scene: Scene,
     values: Any,
     contact: Contact,
-    positions: np.ndarray,
+    all_points: np.ndarray,
     velocities: np.ndarray,
     time: float | None,
 ) -> dict[str, np.ndarray]:
     """Return the contact pairs with obstacles, in the arrays that the core's `touching_pairs` returns for pairs of
     bodies.
 
-    positions, velocities: (n_v, 3). time: s; None in an equilibrium.
+    all_points, velocities: of the vertices and of the points of rigid bodies, (n, 3). time: s; None in an equilibrium.
     """
     vertices, weights = contact_points(scene._bodies, contact)
     numbers = values.current(contact)._law(*values.contact_bodies(contact))
     stiffness, smoothing, offset, coefficient, sticking_speed = numbers
     corners = np.where(weights != 0.0, vertices, 0)
-    points = np.einsum("pk,pkc->pc", weights, positions[corners])
+    points = np.einsum("pk,pkc->pc", weights, all_points[corners])
     moves = np.einsum("pk,pkc->pc", weights, velocities[corners])
     found: dict[str, list[np.ndarray]] = {}
-    for body in (obstacle_state(values.current(each), time) for each in contact.obstacles):
+    for each in contact.obstacles:
+        body = obstacle_state(scene, values.current(each), time, all_points, velocities)
         distances = body.obstacle.signed_distance(points, body.time)
         active = np.flatnonzero(distances < offset)
         at = points[active]
@@ -198,7 +209,9 @@ def compute_contact_state(
     """
     velocities = np.zeros((scene.mesh.n_vertices, 3)) if velocities is None else velocities
     if isinstance(contact, Contact) and any(each is contact for each in scene._obstacle_contacts):
-        found = pairs_with_obstacles(scene, values, contact, scene._model.positions(state), velocities, time)
+        points = scene._model.points(state)
+        moving = np.concatenate([velocities, np.zeros((len(points) - len(velocities), 3))])
+        found = pairs_with_obstacles(scene, values, contact, points, moving, time)
         *_, coefficient, sticking_speed = values.current(contact)._law(*values.contact_bodies(contact))
         return _gathered(scene, found, coefficient, sticking_speed)
     numbers = [k for k, each in enumerate(scene._body_contacts) if each is contact]

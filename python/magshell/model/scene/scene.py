@@ -18,6 +18,7 @@ from ..actuators.actuator import Actuator
 from ..bodies.bodies import Bodies
 from ..bodies.ties import Tie
 from ..bodies.words import called
+from ..contact.attached_obstacles import bodies_of_attached
 from ..contact.body_contact import BodyContact
 from ..contact.contact import Contact
 from ..contact.contacts_to_core import (
@@ -268,6 +269,7 @@ class Scene(PlotMixin):
             contact_surfaces=surfaces,
             body_contacts=body_contacts,
             obstacles=[each._core for each in self.obstacles],
+            attached_to=bodies_of_attached(self),
             water=None if self.water is None else self.water._core,
             **own_field_inputs(self),
             **({} if self._numbered_like is None else {"numbered_like": self._numbered_like._model}),

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
+from ..._input.tensors import detached
+from ...model.contact.attached_obstacles import positioned
 from ...model.contact.obstacles import Obstacle
 from ...model.fields.field import AppliedField
 from ...solve.dynamics.trajectory import Trajectory
@@ -30,7 +34,11 @@ def surroundings_of(result: SolveResult) -> Surroundings:
         return Surroundings([scene.fields], [scene.obstacles])
     count = len(result) if isinstance(result, Trajectory | EquilibriumPath) else 1
     values = [result._values_at(k) for k in range(count)]
-    fields, obstacles = (
-        [tuple(map(each.current, objects)) for each in values] for objects in (scene.fields, scene.obstacles)
-    )
+    fields = [tuple(map(each.current, scene.fields)) for each in values]
+    own = getattr(result, "_own_points", None)
+    rows = [None] * count if own is None else np.reshape(detached(own), (count, -1, 3))
+    obstacles = [
+        tuple(positioned(scene, each.current(obstacle), row) for obstacle in scene.obstacles)
+        for each, row in zip(values, rows, strict=True)
+    ]
     return Surroundings(fields, obstacles)

@@ -14,6 +14,7 @@ from ..._input.quantity import quantity
 from ..._input.tensors import detached, is_tensor, requires_gradient
 from ..._runtime.solve_keywords import SOLVE_KEYWORDS
 from ...model.contact.contacts_to_core import check_outside, poses
+from ...model.contact.obstacles import Attached
 from ...model.contact.watched_obstacles import watched_obstacles
 from ...model.fields.field import AppliedField
 from ...model.rigid.equimomental_points import check_joints, check_rigid, own_velocities
@@ -377,9 +378,9 @@ class MotionInputs:
         positions = quantity("start", "m", given, (mesh.n_vertices, 3))
         inputs.scene._bodies.check_welded("start", "m", positions)
         check_faces(inputs.scene, positions)
-        self._outside = positions
         with inputs.in_core():
             state = model.state(positions, np.zeros(inputs.scene._bodies.n_rotations))
+        self._outside = model.points(state)
         check_rigid(inputs.scene, positions, model.positions(state), "start [m]", mesh.size)
         return MotionState(0.0, state, still, rotations_known=False)
 
@@ -435,8 +436,13 @@ def _checked_state(start: MotionState, size: int, n_strains: int) -> MotionState
 
 
 def _check_contact_method(inputs: Inputs, integrator: Integrator) -> None:
-    """Raise ValueError if contact cannot be implicit in a motion for which the integrator asks so."""
+    """Raise ValueError if an integrator cannot treat the contact of a motion as it is asked to."""
     scene = inputs.scene
+    attached = [each for each in scene.obstacles if isinstance(each, Attached)]
+    if attached and getattr(integrator, "_projective", None) is not None:
+        raise ValueError(
+            f"ms.ProjectiveDynamics does not take an obstacle that a body carries: {attached[0]!r:.80}"
+        )
     if not getattr(integrator, "implicit_contact", False) or not scene.contacts or scene.water is None:
         return
     added_mass = float(detached(inputs.values.current(scene.water).added_mass))

@@ -18,6 +18,7 @@ from ..._runtime.mixins import AnimateMixin
 from ..._runtime.npz import open_npz
 from ...mesh.triangles.self_intersections import describe_self_intersections
 from ...model.actuators.actuator import Actuator
+from ...model.contact.attached_obstacles import positioned
 from ...model.contact.body_contact import BodyContact
 from ...model.contact.contact import Contact
 from ...model.contact.contacts_to_core import near_kinks
@@ -254,18 +255,20 @@ class Trajectory(AnimateMixin, OfOneBody):
         {0: array([3, 4, 5], dtype=int32), 1: array([3, 4, 5], dtype=int32)}
         """
         positions, now, bodies = detached(self.positions), self._values.current, self.scene._bodies
-        placed = [
-            (
-                now(each),
-                [now(obstacle) for obstacle in each.obstacles],
-                self._values.contact_bodies(each),
-                bodies,
-            )
-            for each in self.scene._obstacle_contacts
-        ]
+        own_points = [None] * len(self.times) if self._own_points is None else detached(self._own_points)
         found = {}
         for k, time in enumerate(self.times):
-            near = [near_kinks(*each, positions[k], time) for each in placed]
+            near = [
+                near_kinks(
+                    now(each),
+                    [positioned(self.scene, now(obstacle), own_points[k]) for obstacle in each.obstacles],
+                    self._values.contact_bodies(each),
+                    bodies,
+                    positions[k],
+                    time,
+                )
+                for each in self.scene._obstacle_contacts
+            ]
             near += [self._near_body_kinks(contact, k) for contact in self.scene._body_contacts]
             if near and (every := np.unique(np.concatenate(near))).size:
                 found[k] = every

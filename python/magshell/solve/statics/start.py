@@ -50,9 +50,9 @@ def starting_point(
         raise ValueError(f"start [m] must have shape (n_v, 3) = ({n_v}, 3), got {positions.shape}")
     scene._bodies.check_welded("start", "m", positions)
     check_faces(scene, positions)
-    check_outside(scene, inputs.values, positions, 0.0)
     with inputs.in_core():
         state = model.state(positions, np.zeros(scene._bodies.n_rotations))
+    check_outside(scene, inputs.values, model.points(state), 0.0)
     check_rigid(scene, positions, model.positions(state), "start [m]", scene.mesh.size)
     return state, [], inputs.controls, False
 

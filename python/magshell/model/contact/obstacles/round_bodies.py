@@ -1,4 +1,4 @@
-"""Spheres, boxes and capsules: solid bodies, or hollow ones with the sheet inside."""
+"""Spheres, ellipsoids, boxes and capsules: solid bodies, or hollow ones with the sheet inside."""
 
 from __future__ import annotations
 
@@ -52,6 +52,49 @@ class Sphere(Obstacle):
 
     def _summary(self) -> str:
         return f"radius {self.radius:g} m{_side(self.inside)}"
+
+
+class Ellipsoid(Obstacle):
+    """An ellipsoid around the center.
+
+    Args:
+        semi_axes: (3,) m, along the axes of its own frame.
+        inside: True if the bodies of the scene are inside of it, a hollow.
+        center, rotation, motion: see Obstacle.
+
+    >>> Ellipsoid((0.3, 0.2, 0.1)).signed_distance([0, 0, 0.15]).round(12).item()
+    0.05
+    """
+
+    def __init__(
+        self,
+        semi_axes: Numbers,
+        inside: bool = False,
+        *,
+        center: Numbers = (0.0, 0.0, 0.0),
+        rotation: Numbers = (0.0, 0.0, 0.0),
+        motion: Callable[..., Any] | None = None,
+    ) -> None:
+        super().__init__(center, rotation, motion)
+        self.semi_axes: np.ndarray = all_positive("semi_axes", "m", semi_axes, (3,))
+        self.inside: bool = flag("inside", inside)
+        shape = core.Obstacle.ellipsoid(self.semi_axes)
+        self._of(_sided(shape, inside), semi_axes=self.semi_axes, inside=inside)
+
+    def _surface(self, extent: float, around: np.ndarray) -> Surface:
+        vertices, faces = sphere_surface(1.0)
+        return vertices * self.semi_axes, faces
+
+    @property
+    def _middle(self) -> tuple[np.ndarray, float]:
+        if self.inside:
+            return NO_MIDDLE
+        radius, along = float(self.semi_axes.min()), int(np.argmax(self.semi_axes))
+        end = (float(self.semi_axes[along]) - radius) * np.eye(3)[along]
+        return points_between(-end, end, radius), radius
+
+    def _summary(self) -> str:
+        return f"semi-axes {' x '.join(f'{x:g}' for x in self.semi_axes)} m{_side(self.inside)}"
 
 
 class Box(Obstacle):
