@@ -53,7 +53,7 @@ def test_poles_are_felt_and_not_what_lies_between(identified) -> None:
 
 
 def test_intervals_hold_the_true_magnetization(identified) -> None:
-    """Expect 14.25 of 15; fewer than 11 have a probability of 1 in 1600."""
+    """Count intervals of 95 %: 14.25 of 15 are expected, and fewer than 11 have a probability of 1 in 1600."""
     found = identified["intervals"]
     assert found["of"] == 15 and found["inside"] >= 11
     assert found["fit"].tests.size > 1e-3 and found["fit"].undetermined == []

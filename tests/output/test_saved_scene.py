@@ -47,7 +47,7 @@ def test_solids_skeletons_and_fields_come_back(tmp_path) -> None:
 
 def test_scenes_with_functions_are_refused(tmp_path) -> None:
     field = ms.CustomField(lambda x: 0.0 * x, length_scale=1.0)
-    with pytest.raises(ValueError, match="cannot be saved, as it holds something else than numbers"):
+    with pytest.raises(ValueError, match="neither numbers nor of magshell, and cannot be saved"):
         ms.save_scene(tmp_path / "f.scene", scene(field=field))
     assert not (tmp_path / "f.scene").exists()
     with pytest.raises(ValueError, match="scene must be a Scene, got Equilibrium"):
@@ -68,6 +68,14 @@ def test_files_of_other_classes_are_refused_without_running_code(tmp_path, conte
     with pytest.raises(ValueError, match=r"is no file of a scene|cannot be read by magshell"):
         ms.load_scene(tmp_path / "x.scene")
     assert sys.getrecursionlimit() == limit
+
+
+def test_a_class_that_a_module_of_magshell_imports_is_refused() -> None:
+    """Write pickle's STACK_GLOBAL by hand, as no object has such a name: it would lead to subprocess.Popen alike."""
+    module, name = b"magshell.output.results.saved_scene", b"pickle.Unpickler"
+    text = b"".join(b"\x8c" + bytes([len(each)]) + each for each in (module, name))
+    with pytest.raises(ValueError, match=r"it names magshell.output.results.saved_scene.pickle.Unpickler"):
+        saved_scene._read(b"\x80\x04" + text + b"\x93.")
 
 
 def test_a_file_that_names_a_function_of_magshell_is_refused() -> None:

@@ -55,7 +55,7 @@ def save_scene(path: str | Path, scene: Scene) -> None:
         _read(content)
     except (pickle.PicklingError, AttributeError, TypeError, ValueError) as error:
         raise ValueError(
-            f"this scene cannot be saved, as it holds something else than numbers: {error}"
+            f"this scene holds objects that are neither numbers nor of magshell, and cannot be saved: {error}"
         ) from error
     replace_file(Path(path), lambda file: file.write(_HEADER + content))
 
@@ -95,9 +95,12 @@ class _Reader(pickle.Unpickler):
 
     def find_class(self, module: str, name: str) -> Any:
         """Return a class that the file names. Raises ValueError for one that does not belong into a scene."""
-        found = super().find_class(module, name) if module.split(".")[0] == "magshell" else None
-        if isinstance(found, type):
-            return found
+        if module.split(".")[0] == "magshell":
+            found = super().find_class(module, name)
+            if (
+                isinstance(found, type) and found.__module__ == module
+            ):  # not one that the module imports, as pickle.Unpickler
+                return found
         if name in _ALLOWED.get(module, ()):
             return super().find_class(module, name)
         raise ValueError(f"it names {module}.{name}")
