@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -365,42 +364,6 @@ def folding() -> dict[str, Any]:
     return shown(states, [(strip.scene.mesh.faces, SHEET)], (14, -70), held=10)
 
 
-def snapping_flaps() -> dict[str, Any]:
-    from _own_field.flaps import flaps
-
-    pair = flaps((12, 4), own_field=True)
-    fields = [0.0, -0.25e-3, -0.5e-3, -1e-3, 0.0, *np.linspace(1e-3, 6e-3, 6)]
-    states = [state.positions for state in pair.states(np.array(fields))]
-    lower, upper = pair.flaps
-    first = lower.mesh.n_vertices
-    parts = [(lower.mesh.faces, SHEET), (upper.mesh.faces + first, ACCENT)]
-    return shown(_eased(states), parts, (12, -70), held=8)
-
-
-def self_folding() -> dict[str, Any]:
-    from _own_field.leaves import folding_strip, program
-
-    strip = folding_strip(26, own_field=True)
-    states = [state.positions for state in strip.states(program(8))]
-    leaf = strip.shell.mesh.face_barycenters[:, 0] > 19.5e-3
-    parts = [
-        (strip.shell.mesh.faces[~leaf], SHEET),
-        (strip.shell.mesh.faces[leaf], ACCENT),
-    ]
-    return shown(_eased(states), parts, (14, -70), held=8)
-
-
-def _eased(states: list[np.ndarray]) -> list[np.ndarray]:
-    """Return states with one half-way between each two, except across a snap."""
-    found = []
-    size = np.ptp(states[0], axis=0).max()
-    for before, after in pairwise(states):
-        found.append(before)
-        if np.abs(after - before).max() < 0.3 * size:
-            found.append(0.5 * (before + after))
-    return [*found, states[-1]]
-
-
 def identify() -> dict[str, Any]:
     from _identify.model import measured, sheet
 
@@ -585,8 +548,6 @@ _COMPUTED: dict[str, tuple[str, Callable[[], dict[str, Any]]]] = {
     "cell_gripper": ("Arms of pneumatic cells carry a ball", cell_gripper),
     "pendulum_in_jelly": ("Two bones in jelly swing", pendulum_in_jelly),
     "folding": ("A strip coils up", folding),
-    "snapping_flaps": ("Two flaps hold each other and let go", snapping_flaps),
-    "self_folding": ("A strip stays folded by its own field", self_folding),
     "identify": ("A sheet of uneven stiffness in three fields", identify),
     "relaxation_fit": ("A bar of silicone is pulled and held", relaxation_fit),
     "shell_against_volume": ("A plate of tetrahedra is twisted", shell_against_volume),

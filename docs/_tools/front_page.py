@@ -22,9 +22,14 @@ sys.path[:0] = [str(HERE), str(ROOT / "examples")]
 
 import example_scenes  # noqa: E402
 import front_page_scenes  # noqa: E402
+import own_field_scenes  # noqa: E402
 from painter import write  # noqa: E402
 
-SCENES = {**front_page_scenes.SCENES, **example_scenes.SCENES}
+SCENES = {
+    **front_page_scenes.SCENES,
+    **example_scenes.SCENES,
+    **own_field_scenes.SCENES,
+}
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -27,6 +27,7 @@ SMALL = {
     "folding": "cells=(21, 20), angles=(4, 5)",
     "snapping_flaps": "step=0.5e-3",
     "self_folding": "",
+    "bead_chain": "",
     "tendon_arm": "",
     "pendulum_in_jelly": "cells=6",
     "bistable_beam": "cells=(24, 4), meshes=((12, 2), (24, 4), (48, 8))",

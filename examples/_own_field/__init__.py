@@ -1,1 +1,1 @@
-"""Parts of the examples snapping_flaps and self_folding."""
+"""Parts of the examples snapping_flaps, self_folding and bead_chain."""
