@@ -5,7 +5,7 @@ import pytest
 from gradient_kinds import MAKERS, kind
 from gradient_kinds_linear import LINEAR_MAKERS
 from gradient_scenes import admissible, label
-from test_tangents import is_geometry, results_of
+from test_tangents import results_of
 
 import magshell as ms
 
@@ -38,9 +38,7 @@ STEP = {
 
 def inputs_of(name):
     together = kind(name).together
-    return {
-        key: value for key, value in together.items() if not is_geometry(key) and key[1] != "rest_positions"
-    }
+    return {key: value for key, value in together.items() if key[1] != "rest_positions"}
 
 
 def directions(name, given, rng):

@@ -57,6 +57,7 @@ UNDER = {  # every obstacle, its highest point at the middle of its own frame
     ob.Capsule: lambda **place: ob.Capsule(
         [[0.0, -0.03, 0.0], [0.01, 0.03, 0.0]], 0.04, **_lowered(place, 0.04)
     ),
+    ob.Ellipsoid: lambda **place: ob.Ellipsoid((0.08, 0.07, 0.05), **_lowered(place, 0.05)),
     ob.Tube: lambda **place: ob.Tube(CURVE, 0.03, inside=False, **_lowered(place, 0.03)),
     ob.HeightField: lambda **place: ob.HeightField(
         GRID, GRID, 1e-3 * np.sin(40 * GRID)[:, None] * np.cos(30 * GRID), **place

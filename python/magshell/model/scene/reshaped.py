@@ -57,7 +57,8 @@ def reshaped(scene: Scene, values: Any, no_gradient_with: Sequence[str] = ()) ->
 
 def turning_supports(scene: Scene) -> list[str]:
     """Return words for supports that rotate, whose turn a solve changes: those have no derivative by rest positions yet."""
-    moved = [support for support in scene.supports if isinstance(support, Pin | Clamp)]
+    supports = getattr(scene, "supports", ())  # a solve refuses what is no scene after this
+    moved = [support for support in supports if isinstance(support, Pin | Clamp)]
     return ["supports that rotate"] * any(each._move.rotation is not None for each in moved)
 
 

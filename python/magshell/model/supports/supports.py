@@ -112,7 +112,7 @@ class Pin(Support):
     ):
         self.body: Shell | None = checked_body(body)
         self.vertices: np.ndarray = selection("Pin vertices", vertices)
-        self.components = checked_components(components)
+        self.components: str = checked_components(components)
         self._move = _Move(displacement, rotation, center)
         moves = np.zeros(3) if displacement is None else self._move.displacement
         for axis, move in zip(_AXES, moves, strict=True):

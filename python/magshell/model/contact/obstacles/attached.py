@@ -62,7 +62,8 @@ class Attached(Obstacle):
         super().__init__(
             obstacle.center if center is None else center, obstacle.rotation if rotation is None else rotation
         )
-        self.obstacle, self.to = obstacle, to
+        self.obstacle: Obstacle = obstacle
+        self.to: RigidBody = to
         self._of(obstacle._core, obstacle=obstacle, to=to)
 
     def __getstate__(self) -> dict[Any, Any]:
