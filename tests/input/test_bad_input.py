@@ -98,7 +98,7 @@ test_scene_is_refused = refused(
         (
             "a load as support",
             held_by(ms.PointLoad([0], (0, 0, 1))),
-            "supports must hold Pin, Clamp, SymmetryPlane objects, got PointLoad",
+            "supports must hold Pin, Clamp, SymmetryPlane, EqualDisplacement, Periodic objects, got PointLoad",
         ),
         ("a support as load", lambda: scene(loads=[CLAMP]), "loads must hold PointLoad, .* got Clamp"),
         (

@@ -66,6 +66,7 @@ class SolidModel:
             volumes=[],
             tendons=[],
             springs=[],
+            attached_to=[],
             creases=[],
             group_energies=[],
             solids=[
@@ -98,6 +99,7 @@ class SolidModel:
             obstacles=[],
             water=None,
             own_field_shells=[],
+            own_field_six_node_shells=[],
             own_field_solids=[],
             own_field_skins=[],
             own_field_rigid=[],

@@ -298,9 +298,6 @@ def test_gradients_that_do_not_exist_are_refused():
     factors = ms.linear_buckling(scene, applied_flux_density=flux_density).factors
     with pytest.raises(ms.NoGradient, match="susceptibility"):
         factors.sum().backward()
-    rest = torch.tensor(np.array(shell.mesh.rest_positions), requires_grad=True)
-    with pytest.raises(ms.NoGradient, match="susceptibility"):
-        ms.equilibrium(scene, applied_flux_density=(0, 0, 0), values={shell: {"rest_positions": rest}})
 
 
 def test_second_derivatives_of_an_equilibrium_agree_with_differences_of_gradients():

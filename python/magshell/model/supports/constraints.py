@@ -356,6 +356,9 @@ def _prevented(bodies, constraints: Constraints, in_part: np.ndarray, center: np
 
 
 def _in_words(mode: np.ndarray, center: np.ndarray, size: float) -> str:
+    shown = mode[3:] if np.linalg.norm(mode[3:]) >= 1e-6 else mode[:3]
+    first = int(np.argmax(np.abs(shown) > 0.5 * np.abs(shown).max()))
+    mode = mode * np.sign(shown[first])  # either sign is right, and which one comes depends on rounding
     translation, rotation = mode[:3], mode[3:]
     if np.linalg.norm(rotation) < 1e-6:
         return f"translation along {_vector(translation)}"
