@@ -32,6 +32,13 @@ def same(one, other):
     return np.array_equal(np.asarray(one), np.asarray(other), equal_nan=np.asarray(one).dtype.kind == "f")
 
 
+def prescribes(support) -> bool:
+    """Return whether a support has a reaction: ties of displacements that are unknown have none."""
+    return not isinstance(support, ms.EqualDisplacement | ms.Periodic) or (
+        getattr(support, "displacement", None) is not None
+    )
+
+
 def facts(result):
     """Return the properties of a result, apart from its arrays."""
     found = [repr(result), result.positions, result.edge_rotations]
@@ -40,7 +47,7 @@ def facts(result):
     found += [
         result.energies,
         result.energy,
-        *(result.reaction(each).force for each in result.scene.supports),
+        *(result.reaction(each).force for each in result.scene.supports if prescribes(each)),
     ]
     if all(isinstance(body, ms.Shell) for body in result.scene.bodies) and result.scene.bodies:
         found += [result.strains().membrane]

@@ -29,7 +29,12 @@ def is_linear(scene) -> bool:
 
 WEIGHING = [name for name in MAKERS if kind(name).scene.bodies and not lacks_density(kind(name).scene)]
 WITH_RIGID_PARTS = [name for name in MAKERS if kind(name).scene.rigid_parts]
-WITHOUT = [name for name in WEIGHING if name not in WITH_RIGID_PARTS]
+WITH_TIES = [
+    name
+    for name in WEIGHING
+    if any(isinstance(each, ms.EqualDisplacement | ms.Periodic) for each in kind(name).scene.supports)
+]
+WITHOUT = [name for name in WEIGHING if name not in (*WITH_RIGID_PARTS, *WITH_TIES)]
 
 
 @pytest.mark.parametrize("name", WEIGHING)
@@ -67,8 +72,8 @@ def test_consistent_and_lumped_masses_give_frequencies_that_differ_by_the_mesh_e
     assert 1.0 <= ratio <= 1.0 + MESH_ERROR * coarse**2
 
 
-@pytest.mark.parametrize("name", WITH_RIGID_PARTS)
-def test_consistent_masses_with_rigid_parts_are_refused(name):
+@pytest.mark.parametrize("name", [*WITH_RIGID_PARTS, *WITH_TIES])
+def test_consistent_masses_with_rigid_parts_or_ties_are_refused(name):
     scene = kind(name).scene
     with pytest.raises(ValueError, match='mass="lumped"'):
         consistent_masses(scene._values)

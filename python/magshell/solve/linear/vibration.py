@@ -20,6 +20,7 @@ from ...model.scene.solve_inputs import Inputs
 from ...model.scene.values import Values
 from ...model.shells.shell import Shell
 from ...model.solids.solid import Solid
+from ...model.supports.displacement_ties import DisplacementTie
 from ..adjoint.eigenvalue import FrequencyAdjoint
 from ..adjoint.residual import Residual
 from ..statics.equilibrium import Equilibrium
@@ -35,12 +36,16 @@ if TYPE_CHECKING:
 def consistent_masses(values: Values) -> scipy.sparse.csc_array:
     """Return the consistent mass matrix of the free degrees of freedom, (n, n) kg, zero for edge rotations.
 
-    Raises ValueError if there are rigid bodies, or if a body has no density.
+    Raises ValueError if there are rigid bodies or ties of displacements, or if a body has no density.
     """
     scene = values.scene
     if scene.rigid_parts:
         raise ValueError(
             'mass="consistent" is for scenes without rigid parts, whose masses are lumped: mass="lumped"'
+        )
+    if any(isinstance(support, DisplacementTie) for support in scene.supports):
+        raise ValueError(
+            'mass="consistent" is for scenes without EqualDisplacement and Periodic, which couple masses: mass="lumped"'
         )
     values.vertex_masses  # noqa: B018 - says which body has no density
     of_vertices = masses_of_vertices(values)
