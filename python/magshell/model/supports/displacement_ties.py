@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -37,7 +38,7 @@ class Equations(NamedTuple):
     support: Support
 
 
-class DisplacementTie(Support):
+class DisplacementTie(Support, ABC):
     """The base class of supports that hold no vertex, but make displacements of vertices depend on each other."""
 
     def _held(self, mesh: TriangleMesh) -> list[Held]:
@@ -46,9 +47,9 @@ class DisplacementTie(Support):
     def _directed(self, mesh: TriangleMesh) -> list[DirectedEdges]:
         return []
 
+    @abstractmethod
     def _equations(self, mesh: TriangleMesh) -> list[Equations]:
         """Return the equations of this tie, with the vertices of its body's mesh."""
-        raise NotImplementedError
 
 
 class EqualDisplacement(DisplacementTie):
