@@ -45,7 +45,8 @@ def grown_at_rest(bending: str) -> Kind:
 def grown_evenly() -> Kind:
     """Build a sheet with one growth number for all faces, and one curvature tensor.
 
-    It is thick: of one of 1 mm, with some random numbers, gradients and differences agree to 2e-4 only. The cause is not known.
+    It is thick: of one of 1 mm, with some random numbers, gradients and differences agree to 2e-4 only; the cause is not
+    known.
     """
     sheet = _sheet(MESH, "midedge", 0.99, np.diag([8.0, 1.0, 1.0]), thickness=4e-3)
     return Kind(_clamped(sheet), {}, fixed=EXACT, reach=_REACH)
