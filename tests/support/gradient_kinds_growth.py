@@ -53,6 +53,7 @@ def grown_evenly() -> Kind:
 
 
 def grown_six_nodes() -> Kind:
+    """Build a grown sheet of six-node triangles under its weight, without which no modulus of all faces would matter."""
     sheet = curved(own_magnetization=False)
     n = sheet.mesh.n_elements
     grown = ms.Shell(
@@ -60,10 +61,12 @@ def grown_six_nodes() -> Kind:
         thickness=1e-3,
         young_modulus=sheet.young_modulus,
         poisson_ratio=sheet.poisson_ratio,
+        mass_density=1e3,
         growth=_tensors(n, 1.02, 0.01),
         rest_curvature=_tensors(n, 3.0, 2.0),
     )
-    return Kind(_clamped(grown), {}, fixed=EXACT, reach=_REACH, step=1e-5)
+    scene = _clamped(grown, gravity=(0.2, 0.1, -9.81))
+    return Kind(scene, {"gravity_factor": 1.0}, fixed=EXACT, reach=_REACH, step=1e-5)
 
 
 def growing(integrator, in_time: int = 0, six_nodes: bool = False, **keywords) -> Kind:
